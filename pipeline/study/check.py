@@ -1,6 +1,6 @@
-"""Physical sense of a study: what cannot work is an error, what is doubtful a warning.
+"""Physical sense of a study: what cannot work is an error, what is doubtful is a warning.
 
-What makes no sense in a shape by itself, the shape reports; here is what must fit together.
+Each shape checks its own keys. This module checks combinations of sections.
 """
 
 import itertools
@@ -35,11 +35,11 @@ from pipeline.study.sweep import Axis
 _LINEAR = 0.10
 # No tissue is softer (Pa): brain and fat have some hundred.
 _SOFTEST = 1.0
-_OR_LOST = '; or write `off = "lost"` in [probe.path]'
+_OR_LOST = '. To go on without contact at such places, write `off = "lost"` in [probe.path]'
 
 
 def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
-    """Check single sections, then those that must fit each other."""
+    """Check each section, then combinations of sections."""
     bodies, probes = cast(Sequence[Body], sections["body"]), cast(Sequence[Probe], sections["probe"])
     materials, meshes = cast(Sequence[Material], sections["material"]), cast(Sequence[Mesh], sections["mesh"])
     problems.each(_tell_notices, body=bodies)
@@ -62,7 +62,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     check_reference(meshes, axes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
         if "repeats" in solve.model_fields_set and not solve.timing:
-            problems.error("solve.repeats", solve.repeats, "only a timing study repeats its cases: add `timing = true`")
+            problems.error("solve.repeats", solve.repeats, "is of timing studies: add `timing = true`, or omit it")
 
 
 def _placed(
@@ -84,60 +84,62 @@ def _placed(
 
 
 def _check_depth(probe: Probe, problems: Problems) -> None:
-    """Warn of depths at which strains are large below an edge; a tool that is not flat tells of its own."""
+    """Warn of depths at which strains at the edge of a flat tool are large. Other tools check their own depths."""
     if isinstance(probe, Indenter) or probe.half_width <= 0:  # a slit that leaves nothing of a blade says so itself
         return
-    proportional = "F stays proportional to depth" if probe.proportional_to else "strains are taken to be small"
+    proportional = "F stays proportional to depth" if probe.proportional_to else "strains are assumed small"
     if probe.depth > _LINEAR * probe.half_width:
         problems.warn(
             "probe.depth",
             in_mm(probe.depth),
-            f"is {probe.depth / probe.half_width:.0%} of the probe's half width {in_mm(probe.half_width)}: above "
-            f"{_LINEAR:.0%}, where F of a neo-Hookean body is about 1 % less, linear elasticity is an extrapolation "
-            f"({proportional})",
+            f"is {probe.depth / probe.half_width:.0%} of the tool's half width {in_mm(probe.half_width)}. Above "
+            f"{_LINEAR:.0%}, linear elasticity is an extrapolation ({proportional}); at {_LINEAR:.0%}, F of a "
+            "neo-Hookean "
+            "body is about 1 % smaller",
         )
 
 
 def _tell_notices(body: Body, problems: Problems) -> None:
-    """Tell what was found in the file of a body."""
+    """Warn of what was found in the file of a body."""
     if isinstance(body, FromFile):
         for notice in body.notices:
             problems.warn("body.file", body.file, notice)
 
 
 def _check_softness(body: Body, material: Material, problems: Problems) -> None:
-    """Warn of moduli that no tissue has: an m may stand for an M."""
+    """Warn of moduli that no tissue has: an m may be meant as an M."""
     for key, tissue in tissues_of(body, material):
         if tissue.young < _SOFTEST:
             problems.warn(
                 f"{key}.young",
                 f"{tissue.young:g} Pa",
-                "is softer than any tissue; mPa are thousandths of a pascal, MPa are millions",
+                "is softer than any tissue. mPa are thousandths of a pascal, MPa are millions",
             )
 
 
 def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:
-    """Report a depth that the body does not have, and warn of one that squeezes all of its thickness."""
+    """Report a depth larger than the thickness of the body, and warn of one that compresses all of the thickness."""
     thickness = body.thickness(probe.frame_on(body))
     if probe.depth >= thickness:
         problems.error(
             "probe.depth",
             in_mm(probe.depth),
-            f"must be below the {in_mm(thickness)} that the body reaches below the probe, along its axis",
+            f"must be below {in_mm(thickness)}, the thickness of the tissue under the tool, along its axis",
         )
         return False
     if _LINEAR * thickness < probe.depth <= _LINEAR * probe.half_width:
         problems.warn(
             "probe.depth",
             in_mm(probe.depth),
-            f"is {probe.depth / thickness:.0%} of the {in_mm(thickness)} of tissue below the probe: above "
-            f"{_LINEAR:.0%} linear elasticity is an extrapolation",
+            f"is {probe.depth / thickness:.0%} of the thickness of the tissue under the tool, "
+            f"{in_mm(thickness)}. Above "
+            f"{_LINEAR:.0%}, linear elasticity is an extrapolation",
         )
     return True
 
 
 def _has_place(probe: Probe, problems: Problems) -> bool:
-    """Report directions that are none; what has one has no place."""
+    """Report vectors without a direction, and return whether there is none."""
     sane = True
     with problems.about(probe=probe):
         for key in ("axis", "direction"):
@@ -149,7 +151,7 @@ def _has_place(probe: Probe, problems: Problems) -> bool:
 
 
 def _check_place(body: Body, probe: Probe, way: Axis | None, problems: Problems) -> bool:
-    """Report a place at which the probe cannot touch the body, and tell whether it has one."""
+    """Report a place at which the probe cannot touch the body, and return whether it can."""
     error = place_error(body, probe)
     if error is not None and not (way and way.off == "lost" and error.key == "at"):
         found, key = getattr(probe, error.key), way.path if way and error.key == "at" else f"probe.{error.key}"
@@ -161,10 +163,10 @@ def _check_place(body: Body, probe: Probe, way: Axis | None, problems: Problems)
 def _check_way(
     way: Axis | None, probes: Sequence[Probe], placed: Sequence[tuple[Body, Probe]], problems: Problems
 ) -> None:
-    """Refuse a path that never meets a body, and the loss of a contact that cannot be lost."""
+    """Report a path that misses the body, and a slit on a path that may leave the body."""
     if way is None or way.off != "lost" or problems.errors:
         return
     if any(probe.slit for probe in probes):
-        problems.error("probe.path.off", way.off, "a blade that stands in a slit does not leave the body: refuse it")
+        problems.error("probe.path.off", way.off, "a blade in a slit does not leave the body: omit `off`")
     elif not placed:
-        problems.error("probe.path", None, "meets the body nowhere: of all its places there is none to stand on")
+        problems.error("probe.path", None, "misses the body: the tool fits at none of its places")

@@ -1,4 +1,4 @@
-"""Physical sense of a mesh: its sizes among themselves, and with the body, probe and material that it is for."""
+"""Physical sense of a mesh: its sizes, and whether they fit the body, the probe and the material."""
 
 from collections.abc import Sequence
 from math import isfinite, isinf
@@ -24,7 +24,7 @@ _LEAST_MIXED = 0.25
 
 
 def check_sizes(mesh: Mesh, problems: Problems) -> None:
-    """Refuse sizes of elements that contradict each other."""
+    """Report sizes of elements that contradict each other."""
     if mesh.fine > mesh.coarse:
         problems.error("mesh.fine", in_mm(mesh.fine), f"must be at most coarse = {in_mm(mesh.coarse)}")
     if mesh.rim is not None and mesh.rim > mesh.fine:
@@ -32,7 +32,7 @@ def check_sizes(mesh: Mesh, problems: Problems) -> None:
 
 
 def check_chosen(meshes: Sequence[Mesh], problems: Problems) -> None:
-    """Refuse an ε that does nothing in all of a study: with an accuracy, sizes are chosen where no part is kept."""
+    """Report an ε without effect: with `accuracy`, and without a cut at ε, all sizes are chosen."""
     if not all(mesh.accuracy is not None and mesh.outside == "coarse" for mesh in meshes):
         return
     for mesh in meshes:
@@ -40,13 +40,14 @@ def check_chosen(meshes: Sequence[Mesh], problems: Problems) -> None:
             problems.error(
                 "mesh.epsilon",
                 "full" if isinf(mesh.epsilon) else in_mm(mesh.epsilon),
-                "does nothing beside an accuracy, for which sizes are chosen: leave one of the two out, or keep a part "
-                'of the body, outside = "free"',
+                "has no effect with `accuracy`, for which all sizes are chosen. Omit one of the two, or cut the "
+                "body at "
+                'epsilon: outside = "free"',
             )
 
 
 def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
-    """Return the distances (m) between the probe's edge and the faces held beside it, by the key that sets them."""
+    """Return the distances (m) between the probe's edge and fixed faces beside it, by the key that sets them."""
     frame, gaps = probe.frame_on(body), {}
     if isinstance(body, FromFile) or not is_level(body, frame):
         if isfinite(gap := held_gap(body, probe, frame)):
@@ -59,26 +60,26 @@ def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
 
 
 def check_column(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
-    """Refuse a column that contact runs out of."""
+    """Report a column that the contact is not inside."""
     frame = probe.frame_on(body)
     column = mesh.column(body.reach(frame))
     if mesh.outside == "free" and isinstance(probe, Indenter) and column <= (1 + ON_EDGE) * probe.half_length:
         problems.error(
             "mesh.epsilon",
             in_mm(mesh.epsilon),
-            f"keeps a column that contact along the {probe.shape} runs out of: must be above half its length, "
-            f'{in_mm(probe.half_length)}, or use outside = "coarse"',
+            f"is too small: the {probe.shape} touches tissue outside the column of that radius; must be above half its "
+            f'length, {in_mm(probe.half_length)}; or use outside = "coarse"',
         )
 
 
 def check_gap(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
-    """Between the probe and a held face there must be room for an element, or F is that of the element."""
+    """Report a gap between the probe and a fixed face that has no room for an element."""
     if _meets_held_column(body, probe, mesh):
         problems.error(
             "mesh.epsilon",
             in_mm(mesh.epsilon),
-            f"keeps a column that is held at its side, and that the {probe.shape} reaches, {in_mm(probe.pressed)} from "
-            f'its axis: must be above that, or use outside = "coarse" or "free"',
+            f"is too small: the side of the column is fixed, and the {probe.shape} reaches it; must be above "
+            f'{in_mm(probe.pressed)}, the radius of the tool; or use outside = "coarse" or "free"',
         )
         return
     if mesh.accuracy is not None and "rim" not in mesh.model_fields_set:
@@ -88,13 +89,14 @@ def check_gap(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
             problems.error(
                 key,
                 in_mm(mesh.epsilon) if key == "mesh.epsilon" else None,
-                f"leaves {in_mm(gap)} between the probe's edge and a held face, less than an element there: "
-                f"use a rim below {in_mm(gap)}",
+                f"leaves {in_mm(gap)} between the tool's edge and a fixed face, less than one element. Use a "
+                "`rim` below "
+                f"{in_mm(gap)}",
             )
 
 
 def _meets_held_column(body: Body, probe: Probe, mesh: Mesh) -> bool:
-    """Tell whether the tissue would have to be pushed in where it is held, which no displacement does."""
+    """Return whether the probe presses tissue that is fixed: there is no such displacement."""
     frame = probe.frame_on(body)
     if mesh.outside != "fixed" or probe.slit is not None:
         return False
@@ -108,21 +110,21 @@ def check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:
         reach, is_cut = in_mm(probe.circumradius), mesh.outside in ("free", "fixed")
         if isinstance(probe, Indenter):
             what = f"is less than {reach}, up to which the {probe.shape} may touch: contact may leave the fine mesh"
-            what += ", but not beyond the column" if is_cut else ""
+            what += ", but not the column" if is_cut else ""
         else:
-            what = f"is less than the probe's radius {reach}: part of the contact lies outside the fine mesh"
-            what += ", and the column cuts the footprint off" if is_cut else ""
+            what = f"is less than the tool's radius {reach}: part of the contact is outside the fine mesh"
+            what += ", and the column cuts part of it off" if is_cut else ""
         problems.warn("mesh.epsilon", in_mm(mesh.epsilon), what)
     if mesh.rim_size(probe.half_width) > probe.half_width:
         problems.warn(
             "mesh.rim",
             in_mm(mesh.rim_size(probe.half_width)),
-            f"does not resolve the probe, whose half width is {in_mm(probe.half_width)}: F may be far off",
+            f"is larger than the tool's half width {in_mm(probe.half_width)}: F may be far off",
         )
 
 
 def check_support(body: Body, mesh: Mesh, problems: Problems) -> None:
-    """Refuse a support that elements cannot follow."""
+    """Report a support that elements cannot follow."""
     body.support.check(body.heights, mesh.fine, problems)
 
 
@@ -134,7 +136,7 @@ def check_locking(body: Body, material: Material, mesh: Mesh, problems: Problems
             problems.error(
                 "mesh.element",
                 mesh.element,
-                f'mixed elements are for Poisson\'s ratios above {_LEAST_MIXED}; use "auto" or "displacement"',
+                f'mixed elements need Poisson\'s ratios above {_LEAST_MIXED}; use "auto" or "displacement"',
             )
         return
     visible, most = _LOCKING[mesh.degree]
@@ -143,17 +145,18 @@ def check_locking(body: Body, material: Material, mesh: Mesh, problems: Problems
             problems.error(
                 key,
                 poisson,
-                f"displacement elements of degree {mesh.degree} lock: must be at most {most}; "
-                'with degree 2 or 3 and element = "auto", mixed elements take values up to 0.5',
+                f"displacement elements of degree {mesh.degree} lock: must be at most {most}. Mixed elements "
+                "allow values "
+                'up to 0.5: use degree 2 or 3, and element = "auto"',
             )
         elif poisson > visible or poisson == most:
             problems.warn(
-                key, poisson, f"displacement elements of degree {mesh.degree} lock at this value: F comes out too high"
+                key, poisson, f"displacement elements of degree {mesh.degree} lock at this value: F is too large"
             )
 
 
 def check_reference(meshes: Sequence[Mesh], axes: tuple[Axis, ...], problems: Problems) -> None:
-    """Warn where nothing of the study is a full order to compare with."""
+    """Warn of a study without a full-order case to compare with."""
     if all(isfinite(mesh.epsilon) for mesh in meshes if mesh.accuracy is None):
         if any(mesh.accuracy is not None for mesh in meshes):
             return
@@ -161,5 +164,5 @@ def check_reference(meshes: Sequence[Mesh], axes: tuple[Axis, ...], problems: Pr
         problems.warn(
             "mesh.epsilon",
             None,
-            f'{"the list has" if swept else "there is"} no "full" case: F_max, F/F_max and speed-up stay empty',
+            f'{"the list has" if swept else "there is"} no "full" case: the dataset has no F_max, F/F_max and speed-up',
         )

@@ -1,9 +1,11 @@
-"""Layers and inclusions of a study: do they fit into the body, and is what they are made of all that it needs?"""
+"""Layers and inclusions of a study: whether they fit into the body, and whether [material] is needed."""
 
 import itertools
 import re
 from collections.abc import Iterator, Sequence
 from typing import cast
+
+import numpy as np
 
 from pipeline.quantities import RESERVED
 from pipeline.shapes.body import Body, Layered
@@ -15,10 +17,12 @@ from pipeline.study.problems import Problems
 from pipeline.study.schema import Material, material_of
 from pipeline.study.sweep import Axis
 
-# What must be left round an inclusion, in units of its smallest semi-axis: elements there are no larger.
+# Room around an inclusion, in units of its smallest semi-axis: elements there are no larger.
 GAP = 0.1
 # Points on an inclusion, besides the ends of its axes, that are looked at.
 _POINTS = 2000
+# Heights at which a message looks for tissue.
+_LEVELS = 401
 # Names of tissues that lie on one another: two of them in a sweep were probably meant as layers.
 _LIE_ON_ONE_ANOTHER = {
     "skin",
@@ -45,7 +49,7 @@ _THINNEST = 1e-6
 
 
 def check_regions(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
-    """Check layers and inclusions of every body, and whether there is a material for what they leave."""
+    """Check layers and inclusions of every body, and whether there is a material for the rest."""
     bodies, before = cast(Sequence[Body], sections["body"]), len(problems.errors)
     problems.each(_check_pieces, body=bodies)
     if len(problems.errors) == before:
@@ -56,7 +60,7 @@ def check_regions(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ..
 
 
 def material_without_section(bodies: Sequence[Section]) -> Material:
-    """Return what stands for [material] where layers fill every body: it is that of the first layer."""
+    """Return the material of a study without [material], whose layers fill the body: that of the first layer."""
     return material_of(cast(Sequence[Body], bodies)[0].regions[0])
 
 
@@ -88,16 +92,16 @@ def _check_layers(body: Layered, problems: Problems) -> None:
         key = f"body.layer[{number}].thickness"
         if layer.thickness is None:
             if number < len(body.layer):
-                problems.error(key, None, "is required: only the last layer reaches the bottom by itself")
+                problems.error(key, None, "is required: only the last layer may omit it, and then reaches the bottom")
                 return
             if height - total <= _SAME * height:
-                problems.error(key, None, f"nothing is left for it: the layers above take all of {in_mm(height)}")
+                problems.error(key, None, f"has no room: the layers above fill the whole height, {in_mm(height)}")
             return
         if layer.thickness < _THINNEST * height:
             problems.error(
                 key,
                 in_mm(layer.thickness),
-                f"must be at least {in_mm(_THINNEST * height)}, a millionth of the body's height {in_mm(height)}",
+                f"must be at least {in_mm(_THINNEST * height)}, a millionth of the height of the body, {in_mm(height)}",
             )
             return
         total += layer.thickness
@@ -105,13 +109,14 @@ def _check_layers(body: Layered, problems: Problems) -> None:
             problems.error(
                 key,
                 in_mm(layer.thickness),
-                f"layers down to this one take {in_mm(total)}: must be at most the body's height {in_mm(height)}",
+                f"layers down to this one are {in_mm(total)} thick: must be at most the height of the body, "
+                f"{in_mm(height)}",
             )
             return
 
 
 def _check_inclusions(body: Body, problems: Problems) -> None:
-    """Between an inclusion and all else there must be room for an element."""
+    """Report inclusions without room for an element around them."""
     for number, inclusion in enumerate(body.inclusion, start=1):
         surface, key = inclusion.surface, f"body.inclusion[{number}].at"
         gap, found = GAP * min(surface.axes), [in_mm(x) for x in inclusion.at]
@@ -119,9 +124,10 @@ def _check_inclusions(body: Body, problems: Problems) -> None:
             problems.error(
                 key,
                 found,
-                f"{inclusion.name} must lie inside the {body.shape}, {in_mm(gap)} (a tenth of its smallest "
-                f"semi-axis) or more from its surface; "
-                + (f"it is {in_mm(room)} from it" if room > 0 else f"it reaches {in_mm(-room)} out of it"),
+                f"{inclusion.name} must be inside the {body.shape}, at least {in_mm(gap)} (a tenth of its smallest "
+                f"semi-axis) below the surface; "
+                + (f"it is {in_mm(room)} below it" if room > 0 else f"it reaches {in_mm(-room)} out of the body")
+                + f". {_tissue_at(body, inclusion.at)}",
             )
         low, high = surface.centre[2] - surface.axes[2], surface.centre[2] + surface.axes[2]
         for height in body.interfaces:
@@ -129,8 +135,9 @@ def _check_inclusions(body: Body, problems: Problems) -> None:
                 problems.error(
                     key,
                     found,
-                    f"{inclusion.name} must keep {in_mm(gap)} (a tenth of its smallest semi-axis) from "
-                    f"where a layer ends, at z = {in_mm(height)}; it is {_distance(room)}",
+                    f"{inclusion.name} must be at least {in_mm(gap)} (a tenth of its smallest semi-axis) from "
+                    "the end of "
+                    f"a layer, at z = {in_mm(height)}; {_distance(room)}",
                 )
     for (i, one), (j, other) in itertools.combinations(enumerate(body.inclusion, start=1), 2):
         gap = GAP * min(*one.surface.axes, *other.surface.axes)
@@ -138,8 +145,8 @@ def _check_inclusions(body: Body, problems: Problems) -> None:
             problems.error(
                 f"body.inclusion[{j}].at",
                 [in_mm(x) for x in other.at],
-                f"{other.name} must keep {in_mm(gap)} (a "
-                f"tenth of the smallest semi-axis) from {one.name}, inclusion[{i}]; it is {_distance(room)}",
+                f"{other.name} must be at least {in_mm(gap)} (a tenth of the smallest semi-axis) from {one.name}, "
+                f"inclusion[{i}]; {_distance(room)}",
             )
 
 
@@ -152,7 +159,18 @@ def _apart(one: Inclusion, other: Inclusion) -> float:
 
 
 def _distance(room: float) -> str:
-    return f"{in_mm(room)} from it" if room > 0 else "not"
+    return f"the distance is {in_mm(room)}" if room > 0 else "they overlap"
+
+
+def _tissue_at(body: Body, at: tuple[float, float, float]) -> str:
+    """Say between which heights there is tissue on the vertical line through a place."""
+    x, y, _ = at
+    heights = np.linspace(*body.heights, _LEVELS)
+    inside = heights[body.inside(np.column_stack([np.full(_LEVELS, x), np.full(_LEVELS, y), heights])) > 0]
+    where = f"At x = {in_mm(x)} and y = {in_mm(y)}"
+    if not len(inside):
+        return f"{where}, there is no tissue"
+    return f"{where}, the tissue reaches from about z = {in_mm(inside[0])} to {in_mm(inside[-1])}"
 
 
 def _check_axes(axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -180,29 +198,33 @@ def _check_sweep(bodies: Sequence[Body], axes: tuple[Axis, ...], problems: Probl
             problems.warn(
                 "[[material]]",
                 None,
-                f"is a sweep: the whole body is made of {', then of '.join(names)}; layers of one body are "
-                f"[[body.layer]]: {page_of('body.layer')}",
+                f"is a sweep: each case has one material for the whole body ({', '.join(names)}). For layers of "
+                "one body, "
+                f"write [[body.layer]]: {page_of('body.layer')}",
             )
         elif any(isinstance(body, Layered) and body.layer for body in bodies):
             problems.warn(
                 "[[material]]",
                 None,
-                f"is a sweep, and no layer: below the layers the body is made of {', then of '.join(names)}, in a case "
-                "each; another layer is one more [[body.layer]]",
+                f"is a sweep: each case has one material below the layers ({', '.join(names)}). For another "
+                "layer, write "
+                "one more [[body.layer]]",
             )
 
 
 def _check_material(
     bodies: Sequence[Body], materials: Sequence[Material], axes: tuple[Axis, ...], problems: Problems
 ) -> None:
-    """[material] is what no layer or inclusion is: it is needed for that, and says nothing where nothing is left."""
+    """Report a missing [material], and one that is not used because layers fill the body."""
     if not bodies:
         return
     if not all(body.is_filled for body in bodies):
         if not materials and not any(p.key.lstrip("[").startswith("material") for p in problems.errors):
-            problems.error("[material]", None, "this section is required: it is what no layer or inclusion is made of")
+            problems.error(
+                "[material]", None, "this section is required: it is the material outside layers and inclusions"
+            )
         return
     for axis in (axis for axis in axes if axis.section == "material"):
-        problems.error(axis.path, None, "sweeps nothing: layers fill the body, and nothing is made of [material]")
+        problems.error(axis.path, None, "sweeps nothing: layers fill the body, so [material] is not used")
     if materials:
-        problems.warn("[material]", None, "layers fill the body: nothing is made of this section; leave it out")
+        problems.warn("[material]", None, "is not used, since layers fill the body: omit this section")

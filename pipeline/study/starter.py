@@ -11,8 +11,8 @@ _WIDTH = 110
 def starter(name: str) -> str:
     """Return the text of a study of a disc on a box that runs in seconds. Optional keys are comments."""
     lines = [
-        "# A list in place of one value is a sweep, and a dimension of the dataset; so is {from, to, steps}. Quantities",
-        "# have units. A comment after each key lists its values. Keys in comments are optional.",
+        "# A list in place of one value is a sweep, and a dimension of the dataset; so is a range {from, to, steps}.",
+        "# Quantities have units. A comment after each key lists its values. Keys in comments are optional.",
         f"title = {json.dumps(name, ensure_ascii=False)}",
     ]
     for section in all_sections():

@@ -13,7 +13,7 @@ from tests.studies import changed
 SPHERE = {"shape": "sphere", "radius": "6 mm", "depth": "0.2 mm", "contact": "unilateral"}
 # A tilted tool touches beside its axis, an ellipsoid has no layers, and mixed elements are for larger ν: these are
 # refused before the table is asked.
-_BEFORE = ("would touch the body", "an ellipsoid has no layer", "mixed elements are for")
+_BEFORE = ("would touch the body", "an ellipsoid has no layer", "mixed elements need")
 TISSUE = {"young": "20 kPa", "poisson": 0.3, "density": "1 g/cm^3"}
 HAVING = {
     "found contact": {"probe": SPHERE},

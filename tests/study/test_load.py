@@ -30,7 +30,7 @@ MISTAKES = {
     "poisson above": ({"material": {"poisson": 0.7}}, ["material.poisson = 0.7", "at most 0.5"]),
     "poisson below": ({"material": {"poisson": -0.1}}, ["material.poisson = -0.1", "at least 0"]),
     "incompressible": (
-        {"material": {"poisson": 0.5}, "mesh": {"element": "displacement"}}, ["material.poisson = 0.5", "mixed"],
+        {"material": {"poisson": 0.5}, "mesh": {"element": "displacement"}}, ["material.poisson = 0.5", "Mixed elements"],
     ),
     "locking": (
         {"material": {"poisson": 0.499}, "mesh": {"element": "displacement"}},
@@ -68,7 +68,7 @@ MISTAKES = {
             "mesh": {"accuracy": "1 %", "epsilon": ["9 mm", "full"]}
             | dict.fromkeys(("fine", "coarse", "rim", "growth", "degree"))
         },
-        ["mesh.epsilon", "does nothing beside an accuracy", 'outside = "free"'],
+        ["mesh.epsilon", "has no effect with `accuracy`", 'outside = "free"'],
     ),
     "text for a truth": ({"solve": {"exact": "yes"}}, ['solve.exact = "yes"', "true or false"]),
     "text for a list": ({"plan": {"without": "symmetry"}}, ["plan.without", 'must be a list, such as ["symmetry"]']),
@@ -139,14 +139,14 @@ MISTAKES = {
     "footprint round an ellipsoid": ({"body": ELLIPSOID, "probe": {"radius": "29 mm"}}, ["probe.at", "turns by"]),
     "no room beside the probe": (
         {"body": {"shape": "cylinder", "radius": "3.5 mm", "height": "9 mm", "fixed": "sides"}},
-        ["body.fixed", "leaves 0.5 mm", "rim below 0.5 mm"],
+        ["body.fixed", "leaves 0.5 mm", "`rim` below 0.5 mm"],
     ),
     "no room in the column": (
         {"mesh": {"outside": "fixed", "epsilon": "3.2 mm"}}, ["mesh.epsilon", "leaves 0.2 mm"],
     ),
     "held column as wide as the disc": (
         {"mesh": {"outside": "fixed", "epsilon": "3 mm"}},
-        ['mesh.epsilon = "3 mm"', "the disc reaches, 3 mm from its axis", "must be above that", '"coarse" or "free"'],
+        ['mesh.epsilon = "3 mm"', "above 3 mm, the radius of the tool", "must be above 3 mm", '"coarse" or "free"'],
     ),
     "held column within the disc": (
         {"mesh": {"outside": "fixed", "epsilon": ["2 mm", "9 mm"]}}, ['mesh.epsilon = "2 mm"', "must be above"],
@@ -155,10 +155,10 @@ MISTAKES = {
         {"mesh": {"outside": "fixed", "epsilon": "3 mm", "accuracy": "1 %"}}, ['mesh.epsilon = "3 mm"'],
     ),
     "held column within an ellipse": (
-        {"probe": ELLIPSE, "mesh": {"outside": "fixed", "epsilon": "2 mm"}}, ["the ellipse reaches, 3 mm"],
+        {"probe": ELLIPSE, "mesh": {"outside": "fixed", "epsilon": "2 mm"}}, ["the ellipse reaches it"],
     ),
     "held column that the flanks of a wedge reach": (
-        {"probe": WEDGE, "mesh": {"outside": "fixed", "epsilon": "2.03 mm"}}, ["the wedge reaches, 2.035 mm"],
+        {"probe": WEDGE, "mesh": {"outside": "fixed", "epsilon": "2.03 mm"}}, ["above 2.035 mm"],
     ),
     "column that a wedge sticks out of": (
         {"probe": WEDGE, "mesh": {"outside": "free", "epsilon": "2 mm"}}, ["mesh.epsilon", "above half its length, 2"],
@@ -248,12 +248,12 @@ def test_every_study_validates(file):
 def test_doubtful_input_is_a_warning():
     words = " ".join(study(probe={"depth": "1 mm"}, mesh={"epsilon": "2 mm"}).warnings)
     assert "linear elasticity" in words
-    assert "less than the probe's radius" in words
+    assert "less than the tool's radius" in words
     assert "F_max" in words
     assert "lock" in " ".join(study(material={"poisson": 0.495}, mesh={"element": "displacement"}).warnings)
     assert not study().warnings
     thin = study(body={"size": ["40 mm", "40 mm", "1 mm"]}, probe={"depth": "0.15 mm"})
-    assert "15% of the 1 mm of tissue below the probe" in " ".join(thin.warnings)
+    assert "15% of the thickness of the tissue under the tool, 1 mm" in " ".join(thin.warnings)
 
 
 def test_sweeps_become_dimensions_in_the_file_s_order():
@@ -328,4 +328,4 @@ def test_several_materials_beside_layers_are_told_to_be_a_sweep():
     materials = [{"name": name, "young": "10 kPa", "poisson": 0.3} for name in ("a", "b")]
     content = raw(body={"layer": layers}) | {"material": materials}
     (warning,) = (text for text in parse(content).warnings if "[[material]]" in text)
-    assert "is a sweep, and no layer" in warning
+    assert "one material below the layers (a, b)" in warning

@@ -82,7 +82,7 @@ def test_elements_fit_between_a_footprint_and_what_is_held():
     near = {"below": f"{1e3 * lowest - 0.3:.6f} mm"}
     body = {"shape": "surface", "file": str(MESHES / "liver.stl"), "unit": "mm", "fixed": near}
     probe = {"at": ["-25 mm", "0 mm"]}
-    with pytest.raises(StudyError, match=r"leaves 0\.3 mm between the probe's edge and a held face"):
+    with pytest.raises(StudyError, match=r"leaves 0\.3 mm between the tool's edge and a fixed face"):
         study(body=body, probe=probe, mesh={"rim": "0.5 mm"})
     (fits,) = study(body=body, probe=probe, mesh={"rim": "0.2 mm"}).cases()
     assert held_gaps(fits.body, fits.probe, fits.mesh)["body.fixed"] == pytest.approx(0.3e-3, rel=1e-3)

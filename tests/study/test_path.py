@@ -87,7 +87,7 @@ WRONG = {
     "off the body": (OFF | {"off": "refuse"}, ["probe.path", '"30 mm"', "inside the body's top", 'off = "lost"']),
     "wrong word": ({"line": LINE, "off": "void"}, ['probe.path.off = "void"', "'refuse' or 'lost'"]),
     "never on the body": ({"line": {"from": ["50 mm", "0 mm"], "to": ["60 mm", "0 mm"], "steps": 2}, "off": "lost"},
-                          ["probe.path", "meets the body nowhere"]),
+                          ["probe.path", "misses the body"]),
 }  # fmt: skip
 
 

@@ -25,7 +25,7 @@ MISTAKES = {
     "too thick": ({"layer": [SKIN, FAT | {"thickness": "19 mm"}]}, ["body.layer[2].thickness", "at most", "20 mm"]),
     "too thin": ({"layer": [SKIN, FAT | {"thickness": "3e-16 mm"}]}, ["body.layer[2].thickness", "a millionth"]),
     "thickness missing": ({"layer": [FAT, SKIN]}, ["body.layer[1].thickness", "only the last"]),
-    "nothing left": ({"layer": [SKIN | {"thickness": "20 mm"}, FAT]}, ["body.layer[2].thickness", "nothing is"]),
+    "nothing left": ({"layer": [SKIN | {"thickness": "20 mm"}, FAT]}, ["body.layer[2].thickness", "has no room"]),
     "ball or ellipsoid": ({"inclusion": [BALL | {"axes": ["1 mm"] * 3}]}, ["body.inclusion[1]", "radius", "axes"]),
     "near the surface": (
         {"inclusion": [BALL | {"at": ["0 mm", "0 mm", "-4.3 mm"]}]}, ["body.inclusion[1].at", "0.4 mm", "0.3 mm"],
@@ -36,7 +36,7 @@ MISTAKES = {
     ),
     "touching": (
         {"inclusion": [BALL, BALL | {"name": "other", "at": ["8.1 mm", "0 mm", "-10 mm"]}]},
-        ["body.inclusion[2].at", "from tumour", "0.1 mm from it"],
+        ["body.inclusion[2].at", "from tumour", "the distance is 0.1 mm"],
     ),
     "locking of a layer": ({"layer": [SKIN | {"poisson": 0.499}]}, ["body.layer[1].poisson = 0.499", "lock"]),
 }  # fmt: skip
@@ -88,7 +88,7 @@ def test_material_is_needed_for_what_is_left_and_for_nothing_else():
     content = raw(body={"layer": [SKIN]})
     del content["material"]
     assert "[material]" in messages(content)
-    assert "nothing is made of" in str(study(body={"layer": [SKIN, FAT]}).warnings)
+    assert "is not used" in str(study(body={"layer": [SKIN, FAT]}).warnings)
     assert "sweeps nothing" in messages(raw(body={"layer": [SKIN, FAT]}, material={"poisson": [0.3, 0.4]}))
     assert layered().case(()).scale.stress == 60e3
 

@@ -68,13 +68,13 @@ def test_errors_and_warnings_name_the_table():
     (warning,) = parse(raw() | {"probe": needles(depth="1 mm")}).warnings
     assert re.search(r'probe\[2\]\.depth = "1 mm": is 33% .*\(probe "long"\)$', warning)
     (warning,) = parse(raw(mesh={"epsilon": ["4 mm", "full"]}) | {"probe": needles(radius="5 mm")}).warnings
-    assert re.search(r'mesh\.epsilon = "4 mm": is less than the probe\'s radius 5 mm.*\(probe "long"\)$', warning)
+    assert re.search(r'mesh\.epsilon = "4 mm": is less than the tool\'s radius 5 mm.*\(probe "long"\)$', warning)
 
 
 def test_a_warning_of_all_tables_names_none_and_stands_once():
     content = raw(mesh={"epsilon": ["2.9 mm", "full"]}) | {"probe": needles()}
     (warning,) = parse(content).warnings
-    assert "probe's radius 3 mm" in warning
+    assert "tool's radius 3 mm" in warning
     assert "(probe" not in warning
 
 
@@ -92,7 +92,7 @@ def test_materials_named_like_layers_are_said_to_be_a_sweep():
         return raw() | {"material": [{"name": name, "young": "10 kPa", "poisson": 0.3} for name in names]}
 
     (warning,) = parse(materials("skin", "fat")).warnings
-    assert "[[material]]: is a sweep: the whole body is made of skin, then of fat" in warning
+    assert "[[material]]: is a sweep: each case has one material for the whole body (skin, fat" in warning
     assert "[[body.layer]]: docs/howto/layers.md" in warning
     assert not parse(materials("liver", "muscle")).warnings
     assert "write [[body.layer]]" in str(told(raw() | {"layer": [{"name": "skin"}]}))
