@@ -123,5 +123,5 @@ def _polygon(points: list[tuple[float, float]]) -> FloatArray:
 
 
 def to_rectangle(p: str, q: str) -> str:
-    """Return the distance to the sides of a rectangle as text, negative inside; p and q are distances past the sides."""
+    """Return the distance to a rectangle's sides as text, negative inside; p and q are distances past the sides."""
     return f"(Sqrt(Max({p},0)^2+Max({q},0)^2)+Min(Max({p},{q}),0))"

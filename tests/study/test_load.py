@@ -30,7 +30,8 @@ MISTAKES = {
     "poisson above": ({"material": {"poisson": 0.7}}, ["material.poisson = 0.7", "at most 0.5"]),
     "poisson below": ({"material": {"poisson": -0.1}}, ["material.poisson = -0.1", "at least 0"]),
     "incompressible": (
-        {"material": {"poisson": 0.5}, "mesh": {"element": "displacement"}}, ["material.poisson = 0.5", "Mixed elements"],
+        {"material": {"poisson": 0.5}, "mesh": {"element": "displacement"}},
+        ["material.poisson = 0.5", "Mixed elements"],
     ),
     "locking": (
         {"material": {"poisson": 0.499}, "mesh": {"element": "displacement"}},
