@@ -1,1 +1,1 @@
-"""Size field, generation, curving and distribution of the mesh. Knows nothing of elasticity."""
+"""Size field, mesh generation, curved elements and distribution. Knows nothing of elasticity."""

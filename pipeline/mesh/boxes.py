@@ -1,7 +1,7 @@
-"""Boxes of a plane, halved until each is small enough for where it lies, and cut into triangles.
+"""Boxes of a plane, halved until each is small enough for its place, and cut into triangles.
 
-A box is a row of r0, r1, z0, z1. Where a side is cut depends on that side alone. Corners of neighbours then either
-agree to the last bit or are a good part of a side apart.
+A box is a row of r0, r1, z0, z1. The place where a side is cut depends on that side alone. Corners of neighbours are
+then either bitwise equal or far apart.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,14 +10,14 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 
-# Of boxes (n, 4): whether each is too large, and whether it is the second of its sides that is the longer one.
+# For boxes (n, 4): whether each is too large, and whether its second side is the longer one.
 Judge = Callable[[FloatArray], tuple[BoolArray, BoolArray]]
 
 
 def halve_boxes(boxes: FloatArray, marks: Sequence[FloatArray], judge: Judge) -> FloatArray:
-    """Halve ``boxes`` across the longer side until ``judge`` finds none too large; return those that are left, (n, 4).
+    """Halve ``boxes`` across the longer side until ``judge`` finds none too large; return the resulting boxes, (n, 4).
 
-    ``marks`` are places along each of the two axes that become sides of boxes where boxes get small enough.
+    ``marks`` are places along each of the two axes; where boxes become small enough, their sides pass through them.
     """
     todo, done = boxes, []
     while len(todo):
@@ -28,9 +28,9 @@ def halve_boxes(boxes: FloatArray, marks: Sequence[FloatArray], judge: Judge) ->
 
 
 def triangulate(boxes: FloatArray) -> tuple[FloatArray, IntArray, IntArray]:
-    """Join the centre of each box to all the corners, its own and its neighbours', on its boundary.
+    """Connect the centre of each box to all corners, its own and its neighbours', on its boundary.
 
-    Return the points (n, 2), the triangles (m, 3), and which box (m,) each triangle is a part of.
+    Return the points (n, 2), the triangles (m, 3), and the box (m,) of each triangle.
     """
     r0, r1, z0, z1 = boxes.T
     corners = np.array([(r0, z0), (r1, z0), (r1, z1), (r0, z1)])  # (4, 2, n), counter-clockwise
@@ -39,7 +39,7 @@ def triangulate(boxes: FloatArray) -> tuple[FloatArray, IntArray, IntArray]:
     centre = len(points) + np.arange(len(boxes))
     cells, owners = [], []
     for side, fixed in enumerate((1, 0, 1, 0)):
-        # In this order, the points between the two ends of a side are those that lie on it.
+        # In this order, the points between the two ends of a side are those on it.
         order = np.lexsort((points[:, 1 - fixed], points[:, fixed]))
         place = np.argsort(order)
         start, end = place[number[side]], place[number[(side + 1) % 4]]
@@ -54,7 +54,7 @@ def triangulate(boxes: FloatArray) -> tuple[FloatArray, IntArray, IntArray]:
 
 
 def _halve(boxes: FloatArray, axis: int, marks: FloatArray) -> FloatArray:
-    """Cut boxes across ``axis`` at the mark in the middle half of their side, if there is one, else in the middle."""
+    """Cut boxes across ``axis`` at a mark in the middle half of their side, if there is one, else in the middle."""
     low, high = boxes[:, 2 * axis], boxes[:, 2 * axis + 1]
     middle = cut = (low + high) / 2
     for mark in marks:

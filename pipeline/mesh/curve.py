@@ -1,7 +1,7 @@
-"""Order-2 geometry: curved rim and sides, and quarter-point elements at the probe's edge.
+"""Quadratic geometry: curved rim and sides, and quarter-point elements at the probe's edge.
 
-The displacement behaves like r^½ at the edge of a probe. Where the mid node of an edge that ends on the rim sits
-at a quarter of its length, a quadratic element contains r^½ (R. S. Barsoum, Int. J. Numer. Methods Eng. 10, 1976).
+The displacement goes like r^½ at the edge of a probe. A quadratic element represents r^½ if the mid node of an edge
+that ends on the rim is at a quarter of its length (R. S. Barsoum, Int. J. Numer. Methods Eng. 10, 1976).
 """
 
 from dataclasses import replace
@@ -20,19 +20,19 @@ from pipeline.stages import stage
 
 # Edges of the reference tetrahedron in the order of basix's quadratic nodes 4 to 9.
 EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
-# A point this near to a surface, in units of its size, is on it.
+# A point is on a surface within this distance, in units of the surface's size.
 _CLOSE = 1e-6
-# Straight edges are never this far from a rim that they follow, in units of the footprint's half width.
+# Largest distance of straight edges from the rim that they approximate, in units of the footprint's half width.
 _OFF_RIM = 0.2
-# A cell is straightened where its Jacobian falls below this share of the straight cell's.
+# A cell is straightened if its Jacobian falls below this share of the straight cell's.
 _LEAST_JACOBIAN = 1e-3
-# Projections onto two surfaces in turn, until a point is on both.
+# Alternating projections onto two surfaces, until a point is on both.
 _ALTERNATIONS = 30
 
 
 @stage("curved rim and sides")
 def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
-    """Return ``mesh`` with ten nodes a cell, on the true rim and sides, and with quarter points at a singular rim."""
+    """Return ``mesh`` with ten nodes per cell, on the true rim and sides, with quarter points at a singular rim."""
     mesh = _on_rim_nodes(mesh, scene)
     corners = mesh.cells
     pairs = np.sort(corners[:, EDGES].reshape(-1, 2), axis=1)
@@ -48,7 +48,7 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     middle = curved.copy()
     if scene.probe.has_singular_edge:
         middle = _quarter_points(mesh, edges, middle)
-    # A folded cell gives up its quarter points first: without its arcs the footprint would be a smaller one.
+    # A folded cell loses its quarter points first: without its arcs the footprint would be smaller.
     for milder in (curved, straight):
         _unfold(mesh.points[corners], middle, of_cell, milder)
     nodes = np.hstack([corners, len(mesh.points) + of_cell])
@@ -56,7 +56,7 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
 
 
 def _on_faces(bent: tuple[IntArray, FloatArray], edges: IntArray, middle: FloatArray) -> FloatArray:
-    """Move the mid nodes of edges to where the geometry kernel has them: rims that are not plane are such, too."""
+    """Move the mid nodes of edges to the geometry kernel's positions, which include rims that are not plane."""
     among, points = np.sort(bent[0], axis=1), bent[1]
     count = int(edges.max()) + 1
     keys, wanted = edges @ np.array([count, 1]), among @ np.array([count, 1])
@@ -68,7 +68,7 @@ def _on_faces(bent: tuple[IntArray, FloatArray], edges: IntArray, middle: FloatA
 
 
 def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
-    """Move the mid nodes of edges along a curved rim onto it, or onto the column where that cuts the footprint."""
+    """Move the mid nodes of edges along a curved rim onto it, or onto a column that cuts the footprint."""
     if _is_lifted(scene):
         if mesh.bent is not None:
             return middle
@@ -93,12 +93,12 @@ def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray)
 
 
 def _is_lifted(scene: Scene) -> bool:
-    """Tell whether a CAD kernel cut the footprint out of a surface; on triangles its edge was lifted to begin with."""
+    """Return whether a CAD kernel cut the footprint out of a surface; on triangles its edge was lifted before."""
     return not (isinstance(scene.body, Scanned) or scene.is_flat)
 
 
 def _on_lifted_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
-    """Move the mid nodes of edges along a rim onto it where the footprint's edge meets the surface along the axis."""
+    """Move the mid nodes of edges along a rim onto the curve where the footprint's edge, lifted, meets the surface."""
     keys, beside = _key(mesh, edges), [name for name in mesh.facets if name != PROBE and name not in MIRROR.values()]
     chosen = np.isin(edges, mesh.rim).all(axis=1) & np.isin(keys, _facet_edges(mesh, [PROBE]))
     chosen &= np.isin(keys, _facet_edges(mesh, beside))
@@ -108,7 +108,7 @@ def _on_lifted_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: Floa
 
 
 def _lifted(scene: Scene, points: FloatArray) -> FloatArray:
-    """Return the points of the footprint's edge on the surface, nearest in the probe's plane to points near the rim."""
+    """Return the points of the lifted rim that are nearest, in the probe's plane, to points near the rim."""
     flat = scene.probe.to_edge(scene.frame.local(points)[:, :2])
     found, _ = scene.body.lift(scene.frame, flat)
     if not np.all(np.linalg.norm(found - points, axis=1) < _OFF_RIM * scene.probe.half_width):
@@ -117,7 +117,7 @@ def _lifted(scene: Scene, points: FloatArray) -> FloatArray:
 
 
 def _on_rim_nodes(mesh: MeshArrays, scene: Scene) -> MeshArrays:
-    """Move the corners of elements on a rim that is not plane, which the kernel knows to its tolerance, onto it."""
+    """Move the corners of elements on a rim that is not plane exactly onto it: the kernel has a tolerance."""
     if mesh.bent is not None or not (_is_lifted(scene) and scene.probe.is_curved):
         return mesh
     points = mesh.points.copy()
@@ -139,17 +139,17 @@ def _on_sides(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArra
         on_side = np.abs(surface.distance(mesh.points)) < _CLOSE * scene.body.extent
         chosen = outer & on_side[edges].all(axis=1)
         if scene.is_ball and surface is scene.cut_face:
-            # Two of its points may be joined across the top, or a plane of symmetry, too.
+            # An edge between two of its points may also cross the top, or a plane of symmetry.
             chosen &= np.isin(keys, _facet_edges(mesh, [FIXED]))
         elif isinstance(surface, Ovoid):
-            # It is all of the boundary: two of its points may be joined across a plane of symmetry, too.
+            # The ellipsoid is the whole boundary: an edge between two of its points may cross a plane of symmetry.
             chosen &= np.isin(keys, _facet_edges(mesh, [name for name in mesh.facets if name not in MIRROR.values()]))
         middle[chosen] = surface.project(middle[chosen])
     return middle
 
 
 def _on_inclusions(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
-    """Move the mid nodes of edges in the surface of an inclusion onto it, and onto the column that cuts it, too."""
+    """Move the mid nodes of edges in the surface of an inclusion onto it, and onto a column that cuts it."""
     if mesh.regions is None or not scene.body.inclusion:
         return middle
     between = np.isin(_key(mesh, edges), _interface_edges(mesh, mesh.regions))
@@ -169,7 +169,7 @@ def _on_inclusions(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: Floa
 
 
 def _interface_edges(mesh: MeshArrays, regions: IntArray) -> IntArray:
-    """Keys of the edges of the triangles between two regions."""
+    """Return keys of the edges of the triangles between two regions."""
     corners = np.sort(mesh.cells[:, [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)]].reshape(-1, 3), axis=1)
     order = np.lexsort(corners.T)
     sorted_corners, owner = corners[order], np.repeat(regions, 4)[order]
@@ -183,7 +183,7 @@ def _key(mesh: MeshArrays, edges: IntArray) -> IntArray:
 
 
 def _facet_edges(mesh: MeshArrays, names: object) -> IntArray:
-    """Keys of the edges of the boundary triangles in the named groups."""
+    """Return keys of the edges of the boundary triangles in the named groups."""
     facets = np.concatenate([mesh.facets[name] for name in names])  # type: ignore[attr-defined]
     return np.unique(edge_keys(facets, len(mesh.points)))
 
@@ -194,14 +194,14 @@ def _quarter_points(mesh: MeshArrays, edges: IntArray, middle: FloatArray) -> Fl
     for here in (0, 1):
         chosen = ends[:, here] & ~ends[:, 1 - here]
         start, end = mesh.points[edges[chosen, here]], mesh.points[edges[chosen, 1 - here]]
-        # An edge in a round side bulges: keep the bulge, which a quarter of the way is 3/4 of that in the middle.
+        # A curved edge keeps its bulge, which at a quarter of the length is 3/4 of that in the middle.
         bulge = middle[chosen] - (start + end) / 2
         middle[chosen] = start + (end - start) / 4 + 0.75 * bulge
     return middle
 
 
 def _unfold(corners: FloatArray, middle: FloatArray, of_cell: IntArray, milder: FloatArray) -> None:
-    """Replace the mid nodes of folded cells by those of ``milder``, and so on with the neighbours that this folds."""
+    """Replace the mid nodes of folded cells by ``milder`` ones, then those of neighbours that this folds, and so on."""
     bad = np.zeros(len(corners), dtype=bool)
     while (folded := _folded(corners, middle[of_cell]) & ~bad).any():
         bad |= folded
@@ -209,7 +209,7 @@ def _unfold(corners: FloatArray, middle: FloatArray, of_cell: IntArray, milder: 
 
 
 def _folded(corners: FloatArray, middle: FloatArray) -> np.ndarray:
-    """Tell, for each cell, whether its quadratic map folds at a point where the stiffness is integrated."""
+    """Return a mask of cells whose quadratic map folds at a quadrature point of the stiffness."""
     curved = np.abs(middle - corners[:, EDGES].mean(axis=2)).max(axis=(1, 2)) > 0
     result = np.zeros(len(corners), dtype=bool)
     if curved.any():
@@ -222,7 +222,7 @@ def _folded(corners: FloatArray, middle: FloatArray) -> np.ndarray:
 
 @cache
 def _gradients() -> FloatArray:
-    """Return gradients of the quadratic shape functions at interior points near every corner, and between.
+    """Return gradients of the quadratic shape functions at interior points near every corner, and between corners.
 
     Their shape is (points, 10, 3).
     """

@@ -19,8 +19,8 @@ from pipeline.stages import stage
 class BodyMesh:
     """A distributed mesh and the facets, local to this rank, of each boundary group.
 
-    ``regions`` numbers the region of each local cell, ghosts too; None for a body of one material.
-    ``deviation`` (m) is how far its points are from the surface of a file of triangles; not a number of other bodies.
+    ``regions`` are the region numbers of local cells, ghosts included; None for a body of one material. ``deviation``
+    (m) is the largest distance of its points from the surface in a file of triangles; NaN for other bodies.
     """
 
     mesh: Any
@@ -47,7 +47,7 @@ class BodyMesh:
 
 @stage("dolfinx mesh")
 def distribute(comm: MPI.Comm, arrays: MeshArrays | None) -> BodyMesh:
-    """Create the dolfinx mesh of ``arrays``, which only rank 0 holds; collective."""
+    """Create the dolfinx mesh of ``arrays``, which are on rank 0 only; collective."""
     if arrays is not None:
         cells, points = arrays.cells, arrays.points
         known = cells.shape[1], arrays.facets, len(cells), arrays.deviation
@@ -60,14 +60,14 @@ def distribute(comm: MPI.Comm, arrays: MeshArrays | None) -> BodyMesh:
 
 def _find_regions(comm: MPI.Comm, mesh: Any, arrays: MeshArrays | None) -> Int32Array | None:
     """Return the region of each local cell, from the arrays on rank 0; collective."""
-    # A byte for each cell of the whole mesh goes to every rank: less than its coordinates did.
+    # Each rank receives one byte per cell of the whole mesh: less than the coordinates.
     small = None if arrays is None or arrays.regions is None else arrays.regions.astype(np.uint8)
     regions = comm.bcast(small)
     return None if regions is None else regions[compat.original_cells(mesh)].astype(np.int32)
 
 
 def exterior_facets(mesh: Any) -> tuple[Int32Array, IntArray]:
-    """Return the local facets of the boundary of a mesh, and the input numbers of their corners, lowest first."""
+    """Return the local facets of the boundary of a mesh, and the input numbers of their corners, sorted."""
     topology = mesh.topology
     tdim = topology.dim
     for dims in ((tdim - 1, tdim), (tdim - 1, 0), (tdim, 0)):
@@ -84,7 +84,7 @@ def exterior_facets(mesh: Any) -> tuple[Int32Array, IntArray]:
 def _find_facets(mesh: Any, surface: dict[str, IntArray]) -> dict[str, Int32Array]:
     """Find the local facets of each group of triangles, given by the input numbers of their corners."""
     exterior, local = exterior_facets(mesh)
-    # Boundary points numbered among themselves: three of their numbers fit one integer.
+    # Boundary points are renumbered: three of their numbers then fit into one integer.
     boundary = np.unique(np.concatenate([triangles.reshape(-1) for triangles in surface.values()]))
     base = len(boundary)
     local_keys = _keys(np.searchsorted(boundary, local), base)

@@ -1,10 +1,9 @@
-"""The half plane of a body round about an axis of an ellipsoid: half an ellipse, meshed in its own coordinates.
+"""The half plane of an ellipsoid of revolution: half an ellipse, meshed in its own coordinates.
 
-A point is r = a ρ sin φ, z = c (ρ cos φ - 1): the pole that is touched is the origin, φ is the angle from it, and
-ρ = 1 is the surface. The rectangle of 0 <= φ <= π and -1 <= ρ - 1 <= 0 is halved into boxes, as that of a cylinder is,
-by distances in space; of its lower side, ρ = 0, one point is left. Boxes are then cut into triangles with straight
-sides, and those that have a side on the surface are bent to it: to polynomials of degree 4 that meet it in five points
-a side.
+A point is r = a ρ sin φ, z = c (ρ cos φ - 1): the touched pole is the origin, φ is the angle from it, and ρ = 1 is the
+surface. The rectangle 0 <= φ <= π, -1 <= ρ - 1 <= 0 is halved into boxes, as for a cylinder, by distances in space; its
+lower side, ρ = 0, is a single point. Boxes are cut into triangles with straight sides. Triangles with a side on the
+surface are curved to fit it, by polynomials of degree 4 that meet it at five points per side.
 """
 
 import time
@@ -21,7 +20,7 @@ from pipeline.scene.model import FIXED, FREE, PROBE
 
 # Degree of the sides on the surface.
 ORDER = 4
-# No triangle spans more of the angle φ than this, times the growth: a quarter and a twelfth of π gave the same F.
+# Largest angle φ of a triangle, in units of the growth: a quarter and a twelfth of π gave the same F.
 _WIDEST = pi / 6
 
 
@@ -29,9 +28,9 @@ _WIDEST = pi / 6
 class EllipticMeridian:
     """An ellipsoid about the z axis, centred on the origin, under a disc on its upper pole; lengths in metres.
 
-    ``radius`` is its semi-axis across z, ``semi_height`` that along z. Its surface is held below the level
-    z = ``fixed``. The footprint is what projects along z into the disc of ``probe_radius``; ``kinks`` are radii (m)
-    within it at which the displacement that it prescribes is not smooth.
+    ``radius`` is its semi-axis across z, ``semi_height`` that along z. Its surface is fixed below the level
+    z = ``fixed``. The footprint is the part that projects along z into the disc of ``probe_radius``. ``kinks`` are
+    radii (m) within it at which the prescribed displacement is not smooth.
 
     Raises:
         ValueError: if that disc is as wide as the body.
@@ -44,7 +43,7 @@ class EllipticMeridian:
     kinks: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a footprint without an edge."""
+        """Raise an error for a footprint without an edge."""
         if not self.probe_radius < self.radius:
             raise ValueError(
                 f"a probe of radius {self.probe_radius:g} m covers all of an ellipsoid of {self.radius:g} m"
@@ -95,7 +94,7 @@ class _Outline:
     @property
     def sides(self) -> list[tuple[tuple[float, float], tuple[float, float], str]]:
         """Ends, in the coordinates φ and ρ - 1, and group of each side that bounds the body or is its axis."""
-        # Where the support reaches into the footprint, which is refused, it is told by their one common corner.
+        # A support that reaches into the footprint, which is refused later, must still share a corner with it.
         start = max(self.support, self.probe)
         parts = [(0.0, self.probe, PROBE), (self.probe, start, FREE), (start, pi, FIXED)]
         surface = [((low, 0.0), (high, 0.0), name) for low, high, name in parts if low < high]
@@ -103,7 +102,7 @@ class _Outline:
 
     @property
     def singular(self) -> list[tuple[float, FloatArray, float]]:
-        """Angles and points (r, z) of singular displacement, and how much larger than at the rim elements may be."""
+        """Angles and points (r, z) of singular displacement, and the largest element size there relative to the rim."""
         smallest = min(self.radius, self.height)
         rim = self.place(np.array([[self.probe, 0.0]]))[0]
         points = [(self.probe, rim, 1.0)]
@@ -113,7 +112,7 @@ class _Outline:
         return points + [(kink, self.place(np.array([[kink, 0.0]]))[0], KINK) for kink in self.kinks]
 
     def place(self, points: FloatArray) -> FloatArray:
-        """Return r and z of points (..., 2) given by φ and ρ - 1, as exact as they are far from the pole."""
+        """Return r and z of points (..., 2) with coordinates φ and ρ - 1, with full relative accuracy near the pole."""
         angle, rho = points[..., 0], 1 + points[..., 1]
         r = self.radius * rho * np.sin(np.minimum(angle, pi - angle))
         z = self.height * (points[..., 1] - 2 * rho * np.sin(angle / 2) ** 2)
@@ -144,10 +143,10 @@ def _boxes(outline: _Outline, grading: Grading) -> FloatArray:
 
 
 def _bend(outline: _Outline, points: FloatArray, cells: IntArray, surface: IntArray) -> FloatArray:
-    """Return the nodes (m, k, 2) of triangles of degree 4, those of ``surface`` edges on the ellipse.
+    """Return the nodes (m, k, 2) of triangles of degree 4, with those of ``surface`` edges on the ellipse.
 
-    What bends a side fades towards the opposite corner like the power that keeps the map a polynomial of that degree
-    (M. Lenoir, SIAM J. Numer. Anal. 23, 562, 1986).
+    The bulge of a side decays towards the opposite corner with the power for which the map is a polynomial of that
+    degree (M. Lenoir, SIAM J. Numer. Anal. 23, 562, 1986).
     """
     weights = _barycentric()
     nodes = np.einsum("kc,mcd->mkd", weights, outline.place(points)[cells])
@@ -165,9 +164,9 @@ def _bend(outline: _Outline, points: FloatArray, cells: IntArray, surface: IntAr
 
 
 def _numbered(nodes: FloatArray, cells: IntArray) -> tuple[FloatArray, IntArray]:
-    """Number the nodes (m, k, 2) of all cells: return where they are (n, 2), and those of each cell (m, k).
+    """Number the nodes (m, k, 2) of all cells: return their coordinates (n, 2), and the node numbers of cells (m, k).
 
-    A node is told by the corners of its cell and by how many steps it is from the side opposite to each.
+    A node is identified by the corners of its cell and the number of steps from the side opposite to each.
     """
     steps = np.rint(ORDER * _barycentric()).astype(np.int64)
     parts = np.where(steps > 0, cells[:, None, :] * ORDER + steps, 0)

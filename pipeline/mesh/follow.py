@@ -1,6 +1,6 @@
-"""Elements of a solid from a CAD file: how small they are along its rounded edges, and mid nodes on its true faces.
+"""Elements on a CAD solid: their size along rounded edges, and mid nodes on the true faces.
 
-Both ask the geometry kernel while its model is open.
+Both query the geometry kernel while its model is open.
 """
 
 from collections.abc import Iterator
@@ -14,16 +14,16 @@ from pipeline.scene.model import Scene
 from pipeline.shapes.bodies.cad import FromCad
 from pipeline.shapes.triangles import half_edges
 
-# Elements along a rounded edge, in units of its radius, but at least this share of the body, are so large.
+# Element size along a rounded edge, in units of its radius, and the least size as a share of the body.
 _PER_RADIUS, _LEAST = 0.5, 1 / 100
-# Edges of the model of which the distance is taken by points: so many an element, and at most.
+# Distance to curves of the model is taken from points on them: points per element, and most points.
 _POINTS, _MOST = 2, 4000
-# Faces and curves on which straight elements lie.
+# Types of curves and faces that straight elements fit exactly.
 _STRAIGHT = {1: "Line", 2: "Plane"}
 
 
 def rounded_sizes(scene: Scene, growth: float) -> Iterator[str]:
-    """Yield the sizes, as text for gmsh, that rounded edges ask for; they grow by ``growth`` for a unit of distance."""
+    """Yield the element sizes for rounded edges, as text for gmsh; they grow by ``growth`` per unit of distance."""
     body = scene.body
     if not isinstance(body, FromCad):
         return
@@ -42,12 +42,12 @@ def rounded_sizes(scene: Scene, growth: float) -> Iterator[str]:
 
 
 def _boundary() -> list[tuple[int, int]]:
-    """Return the faces of the model but those of inclusions."""
+    """Return the faces of the model except those of inclusions."""
     return list(gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False))
 
 
 def _curves_of(radius: float) -> list[int]:
-    """Return the curves round the faces of the model that are about as round as ``radius``, in its unit."""
+    """Return the boundary curves of faces with a radius of curvature near ``radius``, in the model's unit."""
     found: set[int] = set()
     for dim, face in sorted(_boundary()):
         if gmsh.model.getType(dim, face) == _STRAIGHT[dim]:
@@ -63,8 +63,8 @@ def _curves_of(radius: float) -> list[int]:
 def middle_nodes(position: IntArray, scale: float) -> tuple[IntArray, FloatArray]:
     """Return the edges (k, 2) of elements on curved faces and curves of the body, and their mid nodes (k, 3), in m.
 
-    ``position`` gives the number of a point by its tag in the model, whose unit is ``scale`` metres. Mid nodes are the
-    points of the face, or of the curve between faces, that are next to the middle of the straight edge.
+    ``position`` maps tags of the model, whose unit is ``scale`` metres, to point numbers. A mid node is the point of
+    the face, or of the curve between faces, nearest to the middle of the straight edge.
     """
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     at = np.zeros((int(tags.max()) + 1, 3))
@@ -95,7 +95,7 @@ def _put(middle: dict[tuple[int, int], FloatArray], dim: int, tag: int, pairs: I
     halves = at[edges].mean(axis=1)
     found, _ = gmsh.model.getClosestPoint(dim, tag, halves.ravel().tolist())
     points = np.array(found).reshape(-1, 3)
-    # A point that is off by half an edge is on another sheet of the surface: a straight element is the better one.
+    # A point half an edge away is on another sheet of the surface: a straight element is better.
     lengths = np.linalg.norm(at[edges[:, 0]] - at[edges[:, 1]], axis=1)
     near = np.linalg.norm(points - halves, axis=1) < 0.5 * lengths
     for edge, point in zip(edges[near].tolist(), points[near], strict=True):

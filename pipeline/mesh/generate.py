@@ -1,4 +1,4 @@
-"""Generate the tetrahedra of a scene with gmsh, on one process, into plain arrays."""
+"""Tetrahedral meshes of a scene from gmsh, on one process, as plain arrays."""
 
 import time
 from collections.abc import Iterator
@@ -21,16 +21,16 @@ from pipeline.shapes.bodies.cad import FromCad
 from pipeline.shapes.body import Drawn
 from pipeline.stages import stage
 
-# gmsh's HXT is 3 to 6 times faster, but numbers its points by memory address: no two runs give the same mesh,
-# on one thread either (gmsh 4.8.4). The sequential Delaunay algorithm repeats to the last bit.
+# gmsh's HXT is 3 to 6 times faster, but numbers its points by memory address: no two runs give the same mesh, not even
+# on one thread (gmsh 4.8.4). The sequential Delaunay algorithm is reproducible bit for bit.
 _DELAUNAY = 1
-# The integral of 1/size along edges: to 1e-9, as gmsh does it, it takes a third of the time of a small mesh.
+# Tolerance of the integral of 1/size along edges: gmsh's default, 1e-9, takes a third of the time of a small mesh.
 _ON_EDGES = 1e-6
 
-# A tetrahedron whose volume is this share of that of a box of its extent is flat: where one was left, the strain in it
-# was 80 times that beside it, F off by more than its error bar, and iterations did not converge.
+# A tetrahedron is flat if its volume is below this share of that of a box of its extent. In one mesh with a flat cell,
+# the strain in it was 80 times that beside it, F erred by more than its error bar, and iterations did not converge.
 _FLAT = 1e-5
-# Where gmsh fails, a round side gets the resolution of one with the body's extent divided by this.
+# If gmsh fails, a round side gets the resolution of a side with the body's extent divided by this.
 _RETRIES = (4, 8)
 
 
@@ -39,19 +39,19 @@ class MeshError(Exception):
 
 
 class GeometryError(MeshError):
-    """The scene itself could not be built: no other element sizes mend that."""
+    """The scene itself could not be built: other element sizes do not help."""
 
 
 @dataclass(frozen=True)
 class MeshArrays:
-    """A tetrahedral mesh as arrays, whole, on one process.
+    """A whole tetrahedral mesh as arrays, on one process.
 
-    ``points`` (n, 3) in metres; ``cells`` (m, 4), or (m, 10) once curved; ``facets`` maps the name of a group
-    to its boundary triangles (k, 3); ``rim`` holds the points on the probe's edge; ``seconds`` is what it took.
-    ``regions`` (m) numbers the region of each cell, among those of the body; None for a body of one material. A region
-    that the mesh does not reach has no cell. ``bent``, until cells are curved,
-    holds edges (k, 2) on faces that only the geometry kernel knows, and the mid nodes (k, 3) that it gave them, in m.
-    ``deviation`` (m) is how far points are from the surface of a file of triangles; not a number of other bodies.
+    ``points`` (n, 3) in metres; ``cells`` (m, 4), or (m, 10) once curved; ``facets`` maps the name of a group to its
+    boundary triangles (k, 3); ``rim`` are the points on the probe's edge; ``seconds`` is the time of meshing.
+    ``regions`` (m) are the cells' region numbers of the body; None for a body of one material. A region outside the
+    mesh has no cell. ``bent``, until cells are curved, has edges (k, 2) on faces that only the geometry kernel knows,
+    and their mid nodes (k, 3), in m. ``deviation`` (m) is the largest distance of points from the surface in a file of
+    triangles; NaN for other bodies.
     """
 
     points: FloatArray
@@ -68,11 +68,11 @@ class MeshArrays:
 def generate(scene: Scene, sizes: Sizes) -> MeshArrays:
     """Mesh ``scene``: the same input gives the same arrays, bit for bit, on the same version of gmsh.
 
-    gmsh now and then fails on elements that are large for the body; it is then asked for smaller ones, far away.
+    gmsh sometimes fails on elements that are large for the body; smaller elements far from the contact are then tried.
 
     Raises:
         GeometryError: at once, if there is nothing to mesh.
-        MeshError: with gmsh's own words, if the mesh fails.
+        MeshError: with gmsh's own message, if meshing fails.
     """
     start = time.perf_counter()
     for divisor in _RETRIES:
@@ -108,7 +108,7 @@ def _generate(scene: Scene, sizes: Sizes, start: float) -> MeshArrays:
 
 
 def _clear(last: int) -> None:
-    """Leave the model without its mesh and the fields up to the ``last``."""
+    """Remove the mesh of the model, and its fields up to the ``last``."""
     gmsh.model.mesh.clear()
     for field in range(1, last + 1):
         gmsh.model.mesh.field.remove(field)
@@ -126,9 +126,9 @@ def _built(scene: Scene) -> list[int]:
 
 @contextmanager
 def _model(scene: Scene) -> Iterator[dict[str, Any]]:
-    """Open gmsh; the next mesh of the same drawn ``scene`` finds the model that was built, and what is kept with it.
+    """Open gmsh; later meshes of the same ``scene`` reuse the model that was built, and the data stored with it.
 
-    Elements of other sizes on it are those of a model of their own, to the last bit.
+    Other element sizes give the same elements as on a new model, bit for bit.
     """
     drawn = scene if scene.straight else replace(scene, rim_segments=0)  # along curved edges segments are sizes
     with gmsh_session(drawn if isinstance(scene.body, Drawn) else None) as kept:
@@ -137,7 +137,7 @@ def _model(scene: Scene) -> Iterator[dict[str, Any]]:
 
 
 def model_options() -> None:
-    """Set gmsh's options: sizes are those of the field alone, and the same input gives the same mesh."""
+    """Set gmsh's options: sizes from the field alone, and reproducible meshes."""
     for name, value in {
         "General.Terminal": 0,
         "General.NumThreads": 1,
@@ -167,7 +167,7 @@ def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
         facets[name] = _elements(2, gmsh.model.getEntitiesForPhysicalGroup(dim, group), 3, position)
     assert set(facets) <= {PROBE, FIXED, FREE, CUT, SLIT, *MIRROR.values()}
     rim = [position[mesh.getNodes(1, curve, includeBoundary=True)[0]] for curve in rim_curves]
-    # Points that a cell uses are numbered without gaps.
+    # Used points are renumbered without gaps.
     used, rim_points = np.zeros(len(points), dtype=bool), np.unique(np.concatenate(rim))
     used[cells] = True
     number = np.cumsum(used) - 1
@@ -198,7 +198,7 @@ def _elements(dim: int, entities: list[int], size: int, position: IntArray) -> I
 
 
 def flat_cells(points: FloatArray, cells: IntArray) -> BoolArray:
-    """Tell which tetrahedra are flat: with one of them a mesh is unusable."""
+    """Return a mask of flat tetrahedra; a mesh with one of them is unusable."""
     corners = points[cells]
     volume = np.linalg.det(corners[:, 1:] - corners[:, :1])
     return np.asarray(~(np.abs(volume) > _FLAT * np.ptp(corners, axis=1).max(axis=1) ** 3))

@@ -1,12 +1,11 @@
-"""The half plane (r, z) of a round scene, meshed by triangles that shrink towards every singular point.
+"""The half plane (r, z) of an axisymmetric scene, meshed by triangles that are graded towards every singular point.
 
-The half plane is a rectangle, or several on top of each other where the body has layers: it is halved into boxes until
-each is small enough for where it lies, and the boxes are cut into triangles. This takes milliseconds, gives the same
-mesh with every version of every library, and goes down to elements that are 1e-9 of the body without harm; gmsh 4.8
-aborts the process at 1e-7.
+The half plane is a rectangle, or a stack of rectangles if the body has layers. It is halved into boxes until each is
+small enough for its place, and boxes are cut into triangles. This takes milliseconds, gives the same mesh with every
+version of every library, and allows elements of 1e-9 of the body; gmsh 4.8 aborts the process at 1e-7.
 
-Lengths of the mesh are in units of the footprint's radius a, rounded to 12 digits: a body of a millimetre and one
-of ten metres give the same mesh.
+Lengths of the mesh are in units of the footprint's radius a, rounded to 12 digits: a body of a millimetre and one of
+ten metres give the same mesh.
 """
 
 import time
@@ -30,11 +29,11 @@ Corner = tuple[float, float]
 AXIS = "axis"
 JOINT = "joint"
 
-# A body more slender than this is meshed by stretched boxes: nothing varies over a thickness far from the contact.
+# A more slender body is meshed with stretched boxes: nothing varies over a thickness far from the contact.
 _MOST_SLENDER = 1000
-# Where two held faces meet the displacement goes like r to a power between 1 (ν = 0.5) and 1.7, and not 1/2.
+# Where two fixed faces meet the displacement goes like r to a power between 1 (ν = 0.5) and 1.7, not 1/2.
 _MILD = 1e3
-# Below a kink of what presses, pressures have a logarithm at most.
+# Below a kink of the tool, pressure has at most a logarithmic singularity.
 KINK = 1e3
 
 
@@ -42,9 +41,9 @@ KINK = 1e3
 class Grading:
     """Element size: ``floor`` at the probe's edge, growing by ``growth`` per unit of distance, at most ``cap``.
 
-    ``floor`` is in units of a, ``cap`` in units of the smaller of the body's height and radius, or of a thousandth
-    of the larger. At an edge of the support at distance D the floor is larger by (D/a)², as the square of the strain
-    there is smaller.
+    ``floor`` is in units of a, ``cap`` in units of the smaller of the body's height and radius, or of a thousandth of
+    the larger. At an edge of the support at distance D the floor is (D/a)² times larger, since the squared strain there
+    is smaller by that factor.
     """
 
     floor: float = 1e-6
@@ -52,12 +51,12 @@ class Grading:
     cap: float = 4.0
 
     def near(self, distance: FloatArray, factor: float, least: float) -> FloatArray:
-        """Return sizes at distances (n,) from a singular point where the floor is ``factor`` larger, or ``least``."""
+        """Return sizes at distances (n,) from a singular point whose floor is ``factor`` times larger, or ``least``."""
         return min(self.floor * factor, least) + self.growth * distance
 
 
 def mildness(distance: float, radius: float, smallest: float) -> float:
-    """Return how much larger than at the rim elements may be at an edge of the support at a ``distance`` from it.
+    """Return the size of elements at an edge of the support, relative to the rim, at a ``distance`` from it.
 
     Lengths are in units of a: the body's ``radius``, and its ``smallest`` extent.
     """
@@ -68,9 +67,9 @@ def mildness(distance: float, radius: float, smallest: float) -> float:
 class MeridianArrays:
     """A mesh of the meridian, in units of ``unit`` metres.
 
-    ``points`` (n, 2) holds (r, z), ``cells`` (m, 3) the triangles, ``regions`` (m,) what each is made of; ``facets``
-    maps the name of a group of the boundary to its edges (k, 2); ``singular`` (s, 2) are the points to which the mesh
-    is graded. Of a higher ``order`` cells have more nodes, the corners first, in the order of the elements' own.
+    ``points`` (n, 2) are (r, z), ``cells`` (m, 3) the triangles, ``regions`` (m,) their region numbers. ``facets`` maps
+    the name of a boundary group to its edges (k, 2). ``singular`` (s, 2) are the points to which the mesh is graded.
+    With a higher ``order`` cells have more nodes, corners first, in the order of the elements.
     """
 
     points: FloatArray
@@ -87,12 +86,12 @@ class MeridianArrays:
 class Meridian:
     """A cylinder about the z axis, top at z = 0, under a disc on its axis; lengths in metres.
 
-    ``fixed`` says what is held: the bottom, the side, both, or all of the boundary below the level z = ``fixed`` < 0.
-    Of the body, only r < ``column`` is kept; the face of that cut is free, or held if ``column_fixed``.
-    ``interfaces`` are the heights z (m), from the top down, at which one layer ends and the next begins: regions 1, 2,
-    ... of the mesh. What lies below them all is another layer if ``is_filled``, else region 0. ``kinks`` are radii (m)
-    within the disc at which the displacement that it prescribes is not smooth. Of its face
-    the rings ``lost``, pairs of radii (m) from the innermost on, do not touch.
+    ``fixed`` is the support: the bottom, the side, both, or the boundary below the level z = ``fixed`` < 0. Only
+    r < ``column`` of the body is kept; the cut face is free, or fixed if ``column_fixed``. ``interfaces`` are the
+    heights z (m), from the top down, between layers, which are regions 1, 2, ... of the mesh. The part below all of
+    them is another layer if ``is_filled``, else region 0. ``kinks`` are radii (m) within the disc at which the
+    prescribed displacement is not smooth. The rings ``lost``, pairs of radii (m) from the innermost on, are not in
+    contact.
     """
 
     radius: float
@@ -113,17 +112,17 @@ class Meridian:
 
     @property
     def kept_radius(self) -> float:
-        """Radius (m) of what is kept of the body."""
+        """Radius (m) of the kept part of the body."""
         return min(self.column, self.radius)
 
     @property
     def unit(self) -> float:
-        """Radius a (m) of the part of the footprint that lies on what is kept: the unit of length of the mesh."""
+        """Radius a (m) of the footprint on the kept part: the unit of length of the mesh."""
         return min(self.probe_radius, self.kept_radius)
 
     @property
     def held_below(self) -> float:
-        """Height (m) below which the outer face is held: 0 if all of it is, -height if none is."""
+        """Height z (m) below which the outer face is fixed: 0 for all of it, -height for none."""
         if self.is_cut:
             return 0.0 if self.column_fixed else -self.height
         if isinstance(self.fixed, str):
@@ -132,7 +131,7 @@ class Meridian:
 
     @property
     def bottom_held(self) -> bool:
-        """Whether the bottom face is held."""
+        """Whether the bottom face is fixed."""
         return "bottom" in self.fixed if isinstance(self.fixed, str) else self.fixed >= -self.height
 
     def mesh(self, grading: Grading) -> MeridianArrays:
@@ -141,7 +140,7 @@ class Meridian:
         singular = _singular_points(self)
         boxes = _boxes(self, singular, grading)
         points, cells, box = triangulate(boxes)
-        layer = np.sum(boxes[box, 2, None] < np.array(_interfaces(self)), axis=1)  # as many interfaces are above it
+        layer = np.sum(boxes[box, 2, None] < np.array(_interfaces(self)), axis=1)  # number of interfaces above it
         regions = np.where((layer < len(self.interfaces)) | self.is_filled, layer + 1, 0)
         corners, groups = _outline(self)
         facets = name_edges(list(zip(corners, [*corners[1:], corners[0]], groups, strict=True)), points)
@@ -150,7 +149,7 @@ class Meridian:
 
 
 def split_regions(arrays: MeridianArrays) -> dict[int, MeridianArrays]:
-    """Return a mesh of each region, by its number; one alone is the mesh itself."""
+    """Return a mesh of each region, by its number; a single region is the mesh itself."""
     numbers = np.unique(arrays.regions)
     if len(numbers) == 1:
         return {int(numbers[0]): arrays}
@@ -173,7 +172,7 @@ def _part(arrays: MeridianArrays, chosen: BoolArray) -> MeridianArrays:
 def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, Int32Array]]:
     """Return the dolfinx mesh of ``arrays`` on this process alone, and the facets of each group.
 
-    What of its boundary is in no group of the body's is where it is joined to other regions.
+    Boundary edges without a group are interfaces with other regions.
     """
     mesh = compat.create_mesh(MPI.COMM_SELF, arrays.cells, arrays.points, arrays.order)
     exterior, ends = exterior_facets(mesh)
@@ -185,7 +184,7 @@ def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, Int32Array]]:
 
 
 def name_edges(sides: Sequence[tuple[Corner, Corner, str]], points: FloatArray) -> dict[str, IntArray]:
-    """Return the edges along ``sides``, each from one corner to another and of a group, by group."""
+    """Return the edges along ``sides``, by group; a side has two corners and a group."""
     facets: dict[str, list[IntArray]] = {}
     for start, end, name in sides:
         fixed = 0 if start[0] == end[0] else 1
@@ -239,12 +238,12 @@ def _outline(meridian: Meridian) -> tuple[list[tuple[float, float]], list[str]]:
 
 
 def _interfaces(meridian: Meridian) -> list[float]:
-    """Heights at which one layer ends and the next begins, in units of a, from the top."""
+    """Heights of the interfaces between layers, in units of a, from the top."""
     return [ratio(height, meridian.unit) for height in meridian.interfaces]
 
 
 def _singular_points(meridian: Meridian) -> list[tuple[float, float, float]]:
-    """Points (r, z) at which the displacement is singular, and how much larger than at the rim an element may be."""
+    """Points (r, z) of singular displacement, and the element size there relative to the rim."""
     corners, groups = _outline(meridian)
     radius = max(r for r, _ in corners)
     smallest = min(radius, -min(z for _, z in corners))
@@ -271,7 +270,7 @@ def _boxes(meridian: Meridian, singular: list[tuple[float, float, float]], gradi
     ends = [0.0, *_interfaces(meridian), float(z_end)]
     kinks = [ratio(radius, meridian.unit) for radius in meridian.kinks]
     marks = [np.unique([*corners[:, 0], *kinks]), np.unique([*corners[:, 1], *ends])]
-    # Boxes smaller than any distance between marks have all of them among their corners.
+    # Boxes smaller than the distances between marks have all of the marks among their corners.
     least = min(np.diff(m).min() for m in marks) / 4
 
     def judge(boxes: FloatArray) -> tuple[BoolArray, BoolArray]:

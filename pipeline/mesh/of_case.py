@@ -1,4 +1,4 @@
-"""The mesh that a case asks for: its geometry and sizes, meshed where symmetry leaves something, and reflected."""
+"""The mesh of a case: its geometry and sizes, meshed on the part that symmetry leaves, and reflected."""
 
 from dataclasses import replace
 from math import inf
@@ -21,7 +21,7 @@ from pipeline.study.sweep import Case
 if TYPE_CHECKING:
     from pipeline.mesh.organ.base import Kept
 
-# A free column wider than a round footprint by this share of its radius, or less, ends at the footprint's edge: gmsh
+# A free column that exceeds a round footprint by at most this share of its radius ends at the footprint's edge: gmsh
 # leaves flat tetrahedra in so thin a ring. F is then too small by twice this share.
 _THINNEST_RING = 1e-5
 
@@ -29,7 +29,7 @@ _THINNEST_RING = 1e-5
 def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" = None) -> MeshArrays:
     """Return the mesh of a case as arrays, of the part that ``mirrors`` leave of it.
 
-    ``kept`` holds what the meshes of one scanned body share.
+    ``kept`` stores what the meshes of one scanned body share.
     """
     start = perf_counter()
     straight, planes, sizes = case.mesh.degree == 1, mirror_planes(case), sizes_of(case)
@@ -44,7 +44,7 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" = None
 
 
 def _column(case: Case) -> float:
-    """Return the radius (m) of the kept column as it is meshed, infinite if the whole body is kept."""
+    """Return the radius (m) of the kept column as meshed, infinite if the whole body is kept."""
     column, footprint = case.column, case.probe.circumradius
     is_thin = 0 < column - footprint <= _THINNEST_RING * footprint
     return footprint if is_thin and case.mesh.outside == "free" and case.probe.is_round else column
@@ -52,14 +52,14 @@ def _column(case: Case) -> float:
 
 def _of_triangles(scene: Scene, body: Scanned, sizes: Sizes, kept: "Kept | None") -> MeshArrays:
     """Return the mesh of a scene on a scanned ``body``."""
-    # Here, since libigl and what else it needs take 80 ms to load, which other bodies do without.
+    # Imported here, since libigl and other libraries take 80 ms to load, which other bodies do not need.
     from pipeline.mesh.organ.make import mesh_scanned  # noqa: PLC0415
 
     return mesh_scanned(scene, body, sizes, kept)
 
 
 def upright(case: Case, arrays: MeshArrays) -> MeshArrays:
-    """Return the mesh of a case turned as it is solved: the probe presses along -z."""
+    """Return the mesh of a case rotated into the solver's frame: the probe presses along -z."""
     turn = case.frame.turn
     return arrays if turn is None else replace(arrays, points=arrays.points @ turn.T)
 
@@ -68,16 +68,16 @@ def sizes_of(case: Case) -> Sizes:
     """Return the element sizes of a case."""
     mesh = case.mesh
     epsilon = inf if case.is_full else mesh.epsilon
-    # A round side is resolved all along, the body's as well as the column's.
+    # Round sides, of the body and of the column, are resolved over their whole length.
     side = min(case.body.bend, inf if mesh.outside == "coarse" else epsilon)
     return Sizes(epsilon, mesh.fine, mesh.coarse, mesh.rim_size(case.probe.half_width), mesh.growth, side)
 
 
 def meridian_of(case: Case) -> Meridian | EllipticMeridian:
-    """Return the half plane of a round case.
+    """Return the half plane of an axisymmetric case.
 
     Raises:
-        ValueError: if its body is not round.
+        ValueError: if its body is not axisymmetric.
     """
     body, fixed = case.body.half_plane(), case.body.support.on_half_plane()
     if isinstance(body, HalfEllipse) and isinstance(fixed, float) and not case.is_truncated:

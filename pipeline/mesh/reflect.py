@@ -1,7 +1,7 @@
-"""Whole meshes from parts: reflect a mesh in the planes of symmetry that bound it.
+"""Whole meshes by reflection of a part in the planes of symmetry that bound it.
 
-A mirror-symmetric scene is always meshed by reflection, so that its discrete solution is symmetric, too, and the
-half or quarter model gives the same force to rounding.
+A scene with mirror symmetry is always meshed by reflection. Its discrete solution is then symmetric, too, and the half
+or quarter model gives the same force to rounding.
 """
 
 from dataclasses import replace
@@ -13,19 +13,19 @@ from pipeline.mesh.curve import EDGES
 from pipeline.mesh.generate import MeshArrays
 from pipeline.scene.model import MIRROR
 
-# Reflection turns tetrahedra inside out: corners 2 and 3 change places, and with them their edges' mid nodes.
+# Reflection inverts tetrahedra: corners 2 and 3 are swapped, and with them the mid nodes of their edges.
 _TURNED = {4: [0, 1, 3, 2], 10: [0, 1, 3, 2, 4, 6, 5, 8, 7, 9]}
 
 
 def reflect(mesh: MeshArrays, planes: tuple[str, ...]) -> MeshArrays:
-    """Return ``mesh`` joined with its images in ``planes`` ("x": x = 0, "y": y = 0), which bound it."""
+    """Return ``mesh`` joined with its mirror images in ``planes`` ("x": x = 0, "y": y = 0), which bound it."""
     for plane in planes:
         mesh = _reflect_once(mesh, plane)
     return mesh
 
 
 def reflect_vectors(mesh: MeshArrays, vectors: FloatArray, planes: tuple[str, ...]) -> FloatArray:
-    """Return a vector field (n, 3), its own mirror image, at the points of ``reflect(mesh, planes)``."""
+    """Return a mirror-symmetric vector field (n, 3) at the points of ``reflect(mesh, planes)``."""
     for plane in planes:
         images = vectors[~_on_plane(mesh, plane)]
         images[:, "xy".index(plane)] *= -1
@@ -52,15 +52,15 @@ def _reflect_once(mesh: MeshArrays, plane: str) -> MeshArrays:
 
 
 def _on_plane(mesh: MeshArrays, plane: str) -> np.ndarray:
-    """Mark the points in a plane that bounds the mesh."""
-    # Facets hold corners only: mid nodes in the plane are those between two corners in it.
+    """Return a mask of the points in a plane that bounds the mesh."""
+    # Facets have corners only: a mid node is in the plane if both ends of its edge are.
     marked = np.zeros(len(mesh.points), dtype=bool)
     marked[mesh.facets[MIRROR[plane]]] = True
     return marked | _mid_nodes_within(mesh.cells, marked)
 
 
 def _mid_nodes_within(cells: IntArray, corner: np.ndarray) -> np.ndarray:
-    """Mark the mid nodes of edges with both ends in the plane: they lie in it, too."""
+    """Return a mask of mid nodes of edges with both ends in the plane."""
     marked = np.zeros_like(corner)
     if cells.shape[1] == 10:
         for number, (i, j) in enumerate(EDGES, start=4):

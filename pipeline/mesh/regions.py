@@ -1,4 +1,4 @@
-"""Sizes that layers and inclusions ask for, besides those of the study."""
+"""Element sizes of layers and inclusions, in addition to those of the study."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,33 +14,33 @@ from pipeline.shapes.frame import Vector
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.regions import Inclusion
 
-# Elements on an inclusion in units of its smallest semi-axis, and in a layer below the probe in units of its
-# thickness: with elements of degree 2, F is then within .1 and .4 % of where those of half the size take it
-# (docs/accuracy.md), and the error bar knows of the rest.
+# Element size on an inclusion in units of its smallest semi-axis, and in a layer below the probe in units of its
+# thickness. With elements of degree 2, F is then within .1 and .4 % of its value for half these sizes
+# (docs/accuracy.md), and the error bar accounts for the rest.
 _ON_INCLUSION = 0.4
 _IN_LAYER = 0.5
-# Points on an inclusion of which the one nearest to anything else is taken for the nearest of all.
+# Sampling points on an inclusion, for the point nearest to anything else.
 _POINTS = 2000
 
 
-# Elements along the probe's edge may be this much longer than those that a thin layer below it asks for: at 4 times
-# some meshes have flat ones, at 10 most, and F errs by more than its bar.
+# Largest element size along the probe's edge, in units of the size for a thin layer below it. At 4 some meshes have
+# flat elements, at 10 most, and F errs by more than its bar.
 _LONGER = 2
 
 
 def longest_at_rim(body: Body) -> float:
-    """Return the length (m) that elements along the probe's edge may have above a thin layer; infinite without one."""
+    """Return the largest element size (m) along the probe's edge above a thin layer; infinite without one."""
     return _LONGER * _IN_LAYER * (body.heights[1] - body.interfaces[0]) if body.interfaces else inf
 
 
 def region_sizes(scene: Scene, growth: float) -> Iterator[str]:
-    """Yield the sizes that the regions of a body ask for, as text for gmsh in units of the model.
+    """Yield the element sizes of the regions of a body, as text for gmsh in units of the model.
 
-    They grow by ``growth`` for each unit of distance.
+    They grow by ``growth`` per unit of distance.
     """
     body, unit = scene.body, 1 / scene.scale
     low, high = body.heights
-    # What lies below the last interface, a layer or the rest of the body, is a layer like the others.
+    # The part below the last interface is treated as a layer, too.
     heights = (high, *body.interfaces, low) if body.interfaces else ()
     for top, bottom in pairwise(heights):
         yield _in_layer(scene, (unit * bottom, unit * top), growth)
@@ -50,9 +50,9 @@ def region_sizes(scene: Scene, growth: float) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class InclusionSizes:
-    """Sizes (m) that an inclusion asks for: on its ``surface``, and where it is ``nearest`` to anything else.
+    """Element sizes (m) of an inclusion: on its ``surface``, and at the point ``nearest`` to anything else.
 
-    There they are at most the ``room`` (m) between the two. They grow by ``growth`` for each unit of distance.
+    At that point they are at most the ``room`` (m) between the two. They grow by ``growth`` per unit of distance.
     """
 
     surface: Ovoid
@@ -66,7 +66,7 @@ class InclusionSizes:
         return np.minimum(on_it, self.room + self.growth * np.linalg.norm(points - np.array(self.nearest), axis=1))
 
     def terms(self, unit: float) -> tuple[str, str]:
-        """Write the two sizes, of which the smaller one counts, as text for gmsh, with ``unit`` units in a metre."""
+        """Return the two sizes, whose minimum counts, as text for gmsh, with ``unit`` units in a metre."""
         surface = self.surface
         least = unit * min(surface.axes)
         level = "+".join(
@@ -80,12 +80,12 @@ class InclusionSizes:
 
 
 def inclusion_sizes(body: Body, growth: float) -> tuple[InclusionSizes, ...]:
-    """Return the sizes that the inclusions of a body ask for."""
+    """Return the element sizes of the inclusions of a body."""
     return tuple(InclusionSizes(one.surface, *_nearest(body, one), growth) for one in body.inclusion)
 
 
 def _in_layer(scene: Scene, heights: tuple[float, float], growth: float) -> str:
-    """Write the size in a layer: fine below the probe, as far as the layer is deep."""
+    """Return the element size in a layer as text: fine below the probe, within the layer's thickness of it."""
     bottom, top = heights
     unit = 1 / scene.scale
     beyond = unit * scene.probe.circumradius + unit * scene.body.heights[1] - bottom
@@ -100,7 +100,7 @@ def _distance(point: Vector, unit: float) -> str:
 
 
 def _nearest(body: Body, inclusion: Inclusion) -> tuple[Vector, float]:
-    """Return the point of an inclusion that is the nearest to anything else, and its distance (m) from that."""
+    """Return the point of an inclusion that is nearest to anything else, and its distance (m) from that."""
     points = inclusion.surface.sample(_POINTS)
     rooms: list[FloatArray] = [body.inside(points)]
     rooms += [np.abs(points[:, 2] - height) for height in body.interfaces]

@@ -1,4 +1,4 @@
-"""The size field: fine within ε of the contact, growing to coarse, and refined to the probe's edge."""
+"""Size field: fine within ε of the contact, growing to coarse, and refined towards the probe's edge."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,15 +11,15 @@ from pipeline.arrays import FloatArray
 from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 
-# Arcs of an eighth of a turn fold cells, which give up their quarter points: F is then 3 to 40 times as far off.
+# Arcs of an eighth of a turn fold cells, which then lose their quarter points: F errs by 3 to 40 times as much.
 _FEWEST_SEGMENTS = 12
-# Where nothing is singular, fewer than this would not tell a disc from a box.
+# Without a singularity, fewer edges would turn a disc into a box.
 _FEWEST_REGULAR = 8
-# A quarter of a disc has a whole number of edges.
+# A quarter of a disc needs a whole number of edges.
 _SEGMENT_MULTIPLE = 4
-# A column is a dozen edges round at least, and a body a few elements thick wherever it is round.
+# A column has at least a dozen edges around it, and a body a few elements across wherever it is round.
 EDGES_PER_RADIUS = 2
-# The distance to a rim that is not plane is that to points on it, so many for each of the elements along it.
+# Points per element on a rim that is not plane; distance to the rim is distance to these points.
 _POINTS_PER_EDGE = 6
 
 
@@ -27,8 +27,8 @@ _POINTS_PER_EDGE = 6
 class Sizes:
     """Element sizes (m): ``fine`` within ``epsilon`` of the contact, ``rim`` at the probe's edge, else ``coarse``.
 
-    ``growth`` is the increase of size per unit of distance, both from the rim and beyond ``epsilon``;
-    a round side, with ``column`` its radius, is resolved all along, however far it reaches beyond ``epsilon``.
+    ``growth`` is the increase of size per unit of distance, both from the rim and beyond ``epsilon``. A round side,
+    with ``column`` its radius, is resolved over its whole length, also beyond ``epsilon``.
     """
 
     epsilon: float
@@ -52,7 +52,7 @@ class Sizes:
         return size
 
     def terms(self, contact: Vector, to_rim: str, unit: float) -> list[str]:
-        """Write what the size is the least of, as text for gmsh, with ``unit`` units in a metre.
+        """Return the terms whose minimum is the size, as text for gmsh, with ``unit`` units in a metre.
 
         ``to_rim`` is the text of the distance to the probe's edge.
         """
@@ -69,7 +69,7 @@ class Sizes:
         """Return the number of edges along a curved rim, 0 where it is straight."""
         if not probe.is_curved:
             return 0
-        # The footprint's edge may lie beyond where contact is expected to end, and elements are small.
+        # The footprint's edge may be outside the expected edge of contact, where elements are small.
         size = min(self.rim + self.growth * probe.rim_offset, max(self.rim, self.fine))
         quarters = ceil(probe.perimeter / size / _SEGMENT_MULTIPLE)
         fewest = _FEWEST_SEGMENTS if probe.has_singular_edge else _FEWEST_REGULAR
@@ -79,10 +79,10 @@ class Sizes:
 def set_size_field(
     sizes: Sizes, probe: Probe, frame: Frame, scale: float, more: Iterable[str] = (), rim: Sequence[int] = ()
 ) -> int:
-    """Make ``sizes`` the background field of gmsh's current model, whose unit is ``scale`` metres; return its number.
+    """Set ``sizes`` as background field of gmsh's current model, whose unit is ``scale`` metres; return its number.
 
-    ``more`` are sizes that elements must not be above either, written in that unit; ``rim`` are the curves of the
-    probe's edge where that is not plane. Where contact ends elsewhere, elements are small there.
+    ``more`` are further upper limits of the size, in that unit. ``rim`` are the curves of the probe's edge if that is
+    not plane. If contact ends elsewhere, elements are small there.
     """
     unit, field = 1 / scale, gmsh.model.mesh.field
     if rim and probe.has_singular_edge:
@@ -96,7 +96,7 @@ def set_size_field(
 
 
 def set_background(terms: Iterable[str]) -> int:
-    """Make the least of ``terms``, texts for gmsh, the background field of its current model; return its number."""
+    """Set the minimum of ``terms``, texts for gmsh, as background field of its current model; return its number."""
     field, tags = gmsh.model.mesh.field, []
     for term in terms:
         tags.append(field.add("MathEval"))

@@ -1,6 +1,6 @@
-"""A slit inside a mesh: the nodes of its faces are doubled, but for those on its front.
+"""A slit inside a mesh: the nodes of its faces are doubled, except on its front.
 
-Where the slit lies in a plane of symmetry there is nothing to double: reflection makes the other face.
+A slit in a plane of symmetry needs no doubling: reflection makes the other face.
 """
 
 from dataclasses import replace
@@ -17,7 +17,7 @@ def open_slit(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     """Return ``mesh``, of tetrahedra with four nodes each, cut open along its slit.
 
     Raises:
-        MeshError: if a part of the slit stays shut.
+        MeshError: if a part of the slit stays closed.
     """
     faces = np.concatenate([mesh.facets[PROBE], mesh.facets[SLIT]])
     opened = np.zeros(len(mesh.points), dtype=bool)
@@ -47,5 +47,5 @@ def _front(mesh: MeshArrays, faces: IntArray) -> IntArray:
 
 
 def _is_beyond(points: FloatArray, scene: Scene) -> BoolArray:
-    """Tell which points (n, 3) lie across the plane of the slit."""
+    """Return a mask of points (n, 3) on the far side of the slit's plane."""
     return np.asarray(scene.frame.local(points)[:, 1] > 0)

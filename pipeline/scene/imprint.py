@@ -1,4 +1,4 @@
-"""A footprint on a curved or inclined surface: what projects along the probe's axis into its outline."""
+"""Footprint on a curved or inclined surface: the part that projects along the probe's axis into its outline."""
 
 from dataclasses import replace
 from math import inf
@@ -14,14 +14,15 @@ from pipeline.shapes.probe import Probe
 
 Entity = tuple[int, int]
 
-# The tube goes on by this share of the footprint's radius above and below what it cuts out.
+# The tube extends by this share of the footprint's radius above and below the part that it cuts out.
 _BEYOND = 0.25
 
 
 def cut_out(body: Body, probe: Probe, frame: Frame, units: Units, volumes: list[Entity], skip: Any) -> list[Entity]:
-    """Add the pieces of the volumes' faces that the tube along the probe's axis cuts out, as faces of their own.
+    """Add the pieces of the volumes' faces that the tube along the probe's axis cuts out, as new faces.
 
-    The tube is the footprint drawn out along the axis. Faces for which ``skip`` holds are none of the body's surface.
+    The tube is the footprint extruded along the axis. Faces for which ``skip`` returns true are not part of the body's
+    surface.
     """
     occ = gmsh.model.occ
     occ.synchronize()
@@ -38,7 +39,7 @@ def cut_out(body: Body, probe: Probe, frame: Frame, units: Units, volumes: list[
 
 
 def _span(body: Body, probe: Probe, frame: Frame) -> tuple[float, float]:
-    """Return the heights (m), against the axis, from which and to which the tube reaches."""
+    """Return the heights (m), against the axis, of both ends of the tube."""
     rim = outline_points(probe)
     points, _ = body.lift(frame, np.concatenate([share * rim for share in (0.0, 0.25, 0.5, 0.75, 1.0)]))
     heights = frame.local(points)[:, 2]
@@ -47,7 +48,7 @@ def _span(body: Body, probe: Probe, frame: Frame) -> tuple[float, float]:
 
 
 def _connected(pieces: list[Entity], point: list[float]) -> list[Entity]:
-    """Return the pieces that hang together with the one nearest to a point, in the model's units."""
+    """Return the pieces connected to the one nearest to a point, in the model's units."""
     edges = {piece: {tag for _, tag in gmsh.model.getBoundary([piece], oriented=False)} for piece in pieces}
     if not pieces:
         return []
@@ -58,7 +59,7 @@ def _connected(pieces: list[Entity], point: list[float]) -> list[Entity]:
 
 
 def _distance(face: Entity, point: list[float]) -> float:
-    """Return a distance from a point to a face: to the nearest of many points on it."""
+    """Return an approximate distance from a point to a face: to the nearest of many points on it."""
     (u0, v0), (u1, v1) = gmsh.model.getParametrizationBounds(*face)
     u, v = (grid.ravel() for grid in np.meshgrid(np.linspace(u0, u1, 9), np.linspace(v0, v1, 9)))
     at = np.array(gmsh.model.getValue(*face, np.column_stack([u, v]).ravel().tolist())).reshape(-1, 3)

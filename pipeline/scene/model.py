@@ -1,7 +1,7 @@
 """The CAD model of a scene: the body, the probe's footprint imprinted on it, and named groups.
 
-Lengths in the model are in units of ``scale`` metres, chosen from the body's size, so that a body of a
-millimetre and one of ten metres give OpenCASCADE the same numbers, and the same mesh.
+Lengths in the model are in units of ``scale`` metres, chosen from the body's size. A body of a millimetre and one of
+ten metres then give OpenCASCADE the same numbers, and the same mesh.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,24 +29,23 @@ from pipeline.shapes.surface import Surface, Tube
 
 # Names of the physical groups. Every boundary face is in exactly one of them.
 TISSUE, PROBE, FIXED, FREE, CUT = "tissue", "probe", "fixed", "free", "cut"
-SLIT = "slit"  # what of a slit's faces the blade does not touch
+SLIT = "slit"  # the part of a slit's faces that the blade does not touch
 MIRROR = {"x": "mirror_x", "y": "mirror_y"}
 
 _BODY_SIZE = 100.0  # extent of the body in the model: OpenCASCADE's tolerance of 1e-7 is then 1e-9 of it
 _CLOSE = 1e-6 * _BODY_SIZE  # in the model's unit
-_NEAR = 1e-3  # within this share of the column's radius from the contact there is tissue of one piece
-# Surfaces whose points are all in one group, however their faces are trimmed; points a side on faces of others.
+_NEAR = 1e-3  # the tissue within this share of the column's radius of the contact is connected
+# Types of surfaces for the group of a face: their own points suffice; or faces are sampled, with points per side.
 _FILLED, _TRIMMED = ("Plane", "Cylinder"), 12
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Geometry of one scene: what is kept of the body, where the probe touches it, what is held.
+    """Geometry of one scene: the kept part of the body, the footprint, and the support.
 
-    ``column`` is the radius (m) of the piece that is kept round the probe's axis, or infinite; ``is_ball`` keeps what
-    is that near to the contact;
-    ``rim_segments`` is the number of edges along a round rim, which ``straight`` elements cannot bend;
-    ``mirrors`` are the planes of symmetry, of which only the positive side is modelled.
+    ``column`` is the radius (m) of the part kept around the probe's axis, or infinite; with ``is_ball`` the part within
+    that distance of the contact is kept. ``rim_segments`` is the number of edges along a round rim, for ``straight``
+    elements, which cannot be curved. ``mirrors`` are the planes of symmetry; only their positive side is modelled.
     """
 
     body: Body
@@ -60,7 +59,7 @@ class Scene:
 
     @property
     def frame(self) -> Frame:
-        """Where the probe meets the body."""
+        """Frame of the probe on the body."""
         return self.probe.frame_on(self.body)
 
     @property
@@ -69,7 +68,7 @@ class Scene:
         return self.body.extent / _BODY_SIZE
 
     def units(self, length: float) -> float:
-        """Return a length (m) in units of the model, to twelve digits: similar bodies make the same model."""
+        """Return a length (m) in units of the model, to twelve digits: similar bodies give the same model."""
         return float(f"{length / self.scale:.12g}")
 
     @property
@@ -79,7 +78,7 @@ class Scene:
 
     @property
     def footprint(self) -> Probe:
-        """The probe as it is drawn: with straight elements, so large that the polygon along its rim has its area."""
+        """The probe as it is drawn: for straight elements enlarged, so that the polygon along its rim has its area."""
         return self.probe.inscribed(self.rim_segments) if self.straight and self.rim_segments else self.probe
 
     @cached_property
@@ -89,12 +88,12 @@ class Scene:
 
     @property
     def has_inner_slit(self) -> bool:
-        """Whether there is a slit inside the model, and not in a plane of symmetry that bounds it."""
+        """Whether there is a slit inside the model, rather than in a plane of symmetry that bounds it."""
         return self.probe.slit is not None and mirror_of(self.frame, self.mirrors) is None
 
     @cached_property
     def cut_face(self) -> Surface:
-        """The side of the column, or of the ball."""
+        """The cut face: the side of the column, or of the ball."""
         if self.is_ball:
             return Ovoid(self.frame.point, (self.column, self.column, self.column))
         return Tube(self.frame.point, self.frame.axis, self.column)
@@ -127,7 +126,7 @@ def build(scene: Scene) -> list[int]:
     occ.synchronize()
     if scene.body.inclusion:
         remove_beyond({tag for pieces in children[: len(volumes)] for dim, tag in pieces if dim == 3})
-    # Pieces of a tool that stick out of the body bound no volume: drop them.
+    # Pieces of a tool outside the body bound no volume, and are removed.
     inside = {
         tag for volume in gmsh.model.getEntities(3) for _, tag in gmsh.model.getBoundary([volume], oriented=False)
     }
@@ -138,7 +137,7 @@ def build(scene: Scene) -> list[int]:
     parts = children[len(volumes) : len(volumes) + len(printed)]
     footprint = [tag for part in parts for _, tag in part if tag in inside]
     if not footprint:
-        raise SceneError("no part of the probe's footprint lies on the body")
+        raise SceneError("no part of the probe's footprint is on the body")
     inclusions = children[len(volumes) + len(printed) + len(heights) : first]
     regions = regions_of(scene.body, inclusions, scene.scale)
     if slit := scene.probe.slit:
@@ -165,7 +164,7 @@ def _add_body(scene: Scene) -> int:
 
 
 def _add_contact(scene: Scene, volumes: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-    """Add the faces that the probe touches and, of a slit, the rest of its faces, and its plane inside the body."""
+    """Add the faces that the probe touches; for a slit also the rest of its faces, and its plane inside the body."""
     if scene.probe.slit is None:
         return _add_footprint(scene, volumes), []
     far = 3 * scene.body.extent
@@ -174,7 +173,7 @@ def _add_contact(scene: Scene, volumes: list[tuple[int, int]]) -> tuple[list[tup
 
 
 def _add_footprint(scene: Scene, volumes: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Add the faces that the probe touches: as it is drawn where the surface is plane, else cut out of the surface."""
+    """Add the faces that the probe touches: drawn on a plane surface, otherwise cut out of the surface."""
     occ, frame = gmsh.model.occ, scene.frame
     if scene.is_flat:
         return [(2, scene.footprint.draw(occ, frame, scene.units))]
@@ -186,33 +185,33 @@ def _add_footprint(scene: Scene, volumes: list[tuple[int, int]]) -> list[tuple[i
 
 
 def _is_on_mirror(scene: Scene, points: FloatArray) -> bool:
-    """Tell whether points (n, 3), in the model's units, all lie in one of the planes of symmetry."""
+    """Return whether points (n, 3), in the model's units, are all in one of the planes of symmetry."""
     return any(bool(np.all(np.abs(points[:, "xy".index(plane)]) < _CLOSE)) for plane in scene.mirrors)
 
 
 def _add_positive_side(scene: Scene) -> int:
-    """Add a box that holds what lies on the positive side of every mirror plane."""
+    """Add a box that contains the positive side of every plane of symmetry."""
     size = 3 * _BODY_SIZE
     low = [0.0 if plane in scene.mirrors else -size for plane in "xy"]
     return gmsh.model.occ.addBox(*low, -size, size - low[0], size - low[1], 2 * size)
 
 
 def _add_column(scene: Scene) -> int:
-    """Add the cylinder round the probe's axis, through the tissue along it, or the ball round the contact."""
+    """Add the cylinder around the probe's axis, through the tissue along it, or the ball around the contact."""
     if scene.is_ball:
         centre = (scene.units(c) for c in scene.frame.point)
         return int(gmsh.model.occ.addSphere(*centre, scene.units(scene.column)))
     frame, depth = scene.frame, scene.units(scene.body.thickness(scene.frame))
     if is_level(scene.body, frame):
         length = depth
-    else:  # beyond the surface on both sides, which may rise beside the contact
+    else:  # beyond the surface on both sides, which may be higher beside the contact
         depth, length = 2 * _BODY_SIZE, 4 * _BODY_SIZE
     end = [scene.units(c) + depth * a for c, a in zip(frame.point, frame.axis, strict=True)]
     return int(gmsh.model.occ.addCylinder(*end, *(length * o for o in frame.outward), scene.units(scene.column)))
 
 
 def _touched(scene: Scene, pieces: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Return the piece that the probe touches, and remove the others: of a body with hollows, a column has several."""
+    """Return the piece that the probe touches, and remove the others: hollows may split a column."""
     if len(pieces) < 2:
         return pieces
     occ, radius = gmsh.model.occ, _NEAR * scene.units(scene.column)
@@ -246,7 +245,7 @@ def _name_groups(scene: Scene, footprint: list[int], regions: dict[int, list[int
         name = next((name for name, test in tests if test(points)), FREE)
         groups[FIXED if name == CUT and scene.column_fixed else name].append(tag)
     if not groups[FIXED]:
-        raise SceneError("no face of what is kept of the body is held: the tissue would float")
+        raise SceneError("no face of the kept part of the body is fixed: the tissue would float")
     for name, tags in groups.items():
         if tags:
             model.setPhysicalName(2, model.addPhysicalGroup(2, sorted(tags)), name)
@@ -255,7 +254,7 @@ def _name_groups(scene: Scene, footprint: list[int], regions: dict[int, list[int
 
 
 def _sample(face: int, is_trimmed: bool = False) -> FloatArray:
-    """Points, shape (n, 3), on a face, or, of one that is not known to be trimmed at random, on what carries it."""
+    """Return points (n, 3) on a face; on its carrier surface, unless the face ``is_trimmed`` arbitrarily."""
     (u0, v0), (u1, v1) = gmsh.model.getParametrizationBounds(2, face)
     steps = (0.25, 0.5, 0.75)
     parameters = np.array([(u0 + s * (u1 - u0), v0 + t * (v1 - v0)) for s in steps for t in steps])
@@ -271,7 +270,7 @@ def _sample(face: int, is_trimmed: bool = False) -> FloatArray:
 
 
 def _face_tests(scene: Scene) -> list[tuple[str, Callable[[Any], bool]]]:
-    """Tests, in order, that tell which group a face belongs to from points (m) of its surface."""
+    """Return tests, in order, for the group of a face, from points (m) of its surface."""
     close, surfaces = scene.scale * _CLOSE, scene.body.surfaces()
 
     def on_mirror(points: Any, axis: int) -> bool:

@@ -1,4 +1,4 @@
-"""Regions of a body in the geometry kernel: inclusions are drawn, and volumes told apart by their material."""
+"""Regions of a body in the geometry kernel: inclusions are drawn, and volumes assigned to materials."""
 
 from collections.abc import Collection, Sequence
 
@@ -24,7 +24,7 @@ def draw_inclusions(inclusions: Sequence[Inclusion], units: Units) -> list[Tag]:
 
 
 def remove_beyond(kept: Collection[int]) -> None:
-    """Remove what of the inclusions is beyond a mirror or a cut: all volumes but those ``kept``."""
+    """Remove the parts of inclusions outside a mirror plane or a cut: all volumes but those ``kept``."""
     beyond = [(3, tag) for _, tag in gmsh.model.getEntities(3) if tag not in kept]
     if beyond:
         gmsh.model.occ.remove(beyond, recursive=True)
@@ -34,7 +34,7 @@ def remove_beyond(kept: Collection[int]) -> None:
 def regions_of(body: Body, inclusions: Sequence[Sequence[Tag]], scale: float) -> dict[int, list[int]]:
     """Return the tags of the volumes of each region, by its number; ``scale`` is the model's unit in metres.
 
-    ``inclusions`` are the pieces of each of them; what else there is is told apart by its height.
+    ``inclusions`` are the pieces of each inclusion; other volumes are assigned by their height.
     """
     numbers: dict[Tag, int] = {}
     first = len(body.regions) - len(body.inclusion) + 1
@@ -48,7 +48,7 @@ def regions_of(body: Body, inclusions: Sequence[Sequence[Tag]], scale: float) ->
 
 
 def _layer_of(body: Body, volume: Tag, scale: float) -> int:
-    """Return the number of the layer that a volume is a piece of, 0 if it is below them."""
+    """Return the number of the layer that contains a volume, 0 if it is below all layers."""
     if not body.interfaces and not body.is_filled:
         return 0
     *_, height = gmsh.model.occ.getCenterOfMass(*volume)

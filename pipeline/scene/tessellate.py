@@ -1,7 +1,7 @@
 """Triangles of a solid in a CAD file: ``python -m pipeline.scene.tessellate FILE UNIT OUT.npz``.
 
-A program of its own, so that studies are checked without a geometry kernel in their process. It imports neither MPI
-nor solvers. What is wrong with the file is printed; the exit status is then 3.
+It is a separate program, so that a study is validated without a geometry kernel in its process. It imports neither MPI
+nor solvers. It prints what is wrong with a file, and then exits with status 3.
 """
 
 import sys
@@ -13,20 +13,20 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 
-# Edges round a circle, and in units of the solid's extent: triangles of which points are then taken with their normals.
+# Edges around a circle, and largest and smallest size of triangles, in units of the solid's extent.
 _ROUND, _LARGEST, _SMALLEST = 48, 1 / 5, 1 / 80
-# The kernel's bounding box is wider by its tolerance.
+# The kernel enlarges its bounding box by its tolerance.
 _TOLERANCE, _DIGITS = 1e-7, 6
 _REFUSED = 3
 _NAMES = {"m": "M", "cm": "CM", "mm": "MM", "um": "UM", "µm": "UM", "in": "INCH"}
 
 
 class NotASolid(Exception):
-    """What was found instead of one solid."""
+    """The file does not contain exactly one solid; the message says what was found."""
 
 
 def read_solid(path: str, unit: str, factor: float = 1.0) -> int:
-    """Add the one solid of a file to gmsh's current model, its numbers of a ``unit`` times ``factor``.
+    """Add the single solid of a file to gmsh's current model, its numbers in ``unit`` times ``factor``.
 
     Raises:
         NotASolid: if there is none, or several.
@@ -45,7 +45,7 @@ def read_solid(path: str, unit: str, factor: float = 1.0) -> int:
     if len(solids) == 1 and len(found) == 1:
         return int(solids[0])
     if len(solids) > 1:
-        raise NotASolid(f"has {len(solids)} solids, where one is the body: unite them, or export the one that it is")
+        raise NotASolid(f"has {len(solids)} solids, but a body is one: unite them, or export the one to be used")
     faces = len(gmsh.model.getEntities(2))
     raise NotASolid(
         f"has {faces} faces that bound no solid: sew them to a closed shell, make a solid of that, and export it"
@@ -54,7 +54,7 @@ def read_solid(path: str, unit: str, factor: float = 1.0) -> int:
 
 
 def tessellate(path: str, unit: str) -> dict[str, FloatArray]:
-    """Return the triangles of the solid, in the file's unit, with what the kernel knows of its faces."""
+    """Return the triangles of the solid, in the file's unit, with the kernel's data of its faces."""
     volume = read_solid(path, unit)
     box = np.array(gmsh.model.occ.getBoundingBox(3, volume)).reshape(2, 3)
     extent = float(np.ptp(box, axis=0).max())
@@ -85,10 +85,10 @@ def tessellate(path: str, unit: str) -> dict[str, FloatArray]:
 
 
 def _face(face: int, number: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return the triangles (n, 3) of a face, the normals (n, 3, 3) at their corners, and the least radius there."""
+    """Return the triangles (n, 3) of a face, the normals (n, 3, 3) at their corners, and its smallest radius there."""
     kinds, _, nodes = gmsh.model.mesh.getElements(2, face)
     if list(kinds) != [2]:
-        raise NotASolid(f"face {face} cannot be covered by triangles: check the solid in the CAD program")
+        raise NotASolid(f"face {face} cannot be triangulated: check the solid in the CAD program")
     corners = nodes[0].reshape(-1, 3)
     tags, _, parameters = gmsh.model.mesh.getNodes(2, face, includeBoundary=True, returnParametricCoord=True)
     normals = np.array(gmsh.model.getNormal(face, parameters)).reshape(-1, 3)
@@ -117,7 +117,7 @@ def main(path: str, unit: str, target: str) -> int:
         print(problem)
         return _REFUSED
     except Exception as error:  # gmsh raises bare Exception
-        print(f"its faces cannot be covered by triangles: {error}")
+        print(f"its faces cannot be triangulated: {error}")
         return _REFUSED
     finally:
         with suppress(Exception):

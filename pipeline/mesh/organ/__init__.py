@@ -1,1 +1,1 @@
-"""Meshes of bodies that files of triangles give: their surface is meshed anew, to the sizes that F asks for."""
+"""Meshes of bodies from files of triangles: their surface is remeshed to the sizes that F needs."""

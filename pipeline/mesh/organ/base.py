@@ -1,4 +1,4 @@
-"""The surface away from the contact: cut where it is held, and meshed as coarsely as it is round.
+"""Surface away from the contact: cut at the edge of the support, and meshed as coarsely as its curvature allows.
 
 It depends on the body alone, so that every place, tool and mesh on it shares it.
 """
@@ -23,24 +23,24 @@ from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.surface import Surface
 from pipeline.stages import stage
 
-# Raise by hand when the same file gives another surface.
+# Increase by hand when the same file gives another surface.
 _VERSION = 5
-# How far, in units of the largest elements, the surface between two meshings may be from the file's: points are put
-# back onto the file's after each.
+# Largest deviation from the file's surface in one remeshing, in units of the largest elements. After each remeshing,
+# points are projected back onto the file's surface.
 DEVIATION = 0.02
-# Elements near a contact in units of its radius, one over, and how fast they grow from twice that on.
+# Elements per contact radius near a contact, and the growth of their size beyond twice that radius.
 _PER_CONTACT, _GROWTH = 3, 0.3
-# How far round a tangle the file's own facets stay, in units of the facets there.
+# Distance around a tangle within which the file's own facets stay, in units of these facets.
 _REACH = 1.5
-# Points stay where they are to rounding, in units of the body.
+# Tolerance for points that must not move, in units of the body.
 _SAME = 1e-7
-# Facets that turn by more (cosine) as their points are put back have turned over; so often neighbours are looked at.
+# A facet has turned over if projection rotates it by more than this (cosine); rounds of a check of its neighbours.
 _TURNED, _ROUNDS = 0.2, 10
 
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """The coarse ``sheet``, and the ``level`` line (n, 2, 3), in m, at which what is held of the true surface ends.
+    """The coarse ``sheet``, and the line at which the support ends on the true surface, ``level`` (n, 2, 3), in m.
 
     ``as_is`` (k, 3) are the centres of facets that are the file's own.
     """
@@ -50,7 +50,7 @@ class Base:
     as_is: FloatArray
 
     def is_own(self, sheet: Sheet) -> BoolArray:
-        """Tell which facets of a ``sheet`` made of this one are still the file's own."""
+        """Return a mask of the facets of a remeshed ``sheet`` that are still the file's own."""
         if not len(self.as_is):
             return np.zeros(len(sheet.facets), dtype=bool)
         distance, _ = cKDTree(self.as_is).query(sheet.centres)
@@ -63,7 +63,7 @@ class Base:
 
 @dataclass(frozen=True)
 class Near:
-    """A contact at a ``point``, within whose ``radius`` elements are several; both in m."""
+    """A contact at a ``point``, with several elements within its ``radius``; both in m."""
 
     point: Vector
     radius: float
@@ -76,27 +76,27 @@ class Near:
 
 # Points, and numbers of points.
 Arrays = dict[str, Any]
-# Where attempts at a mesh failed, the first one first.
+# Failures of earlier attempts at a mesh, in order.
 Tangles = Sequence[TangledError]
 
 
 class Kept(Protocol):
-    """A place where arrays are kept from run to run."""
+    """A cache of arrays that persists between runs."""
 
     def arrays(self, key: str, make: Callable[[], Arrays]) -> Arrays:
-        """Return what is kept under ``key``, or what ``make`` returns, which is then kept."""
+        """Return the arrays cached under ``key``; without any, call ``make`` and cache its result."""
 
 
 def far_surface(
     body: Scanned, kept: Kept | None = None, finer: float = 1, tangles: Tangles = (), contact: Near | None = None
 ) -> Base:
-    """Return the surface of ``body`` away from any contact, out of what is ``kept`` if it is there.
+    """Return the surface of ``body`` away from any contact, from the cache ``kept`` if it is there.
 
-    Its elements are ``finer`` by this factor than the body's bend asks for. Round the ``tangles`` that other meshes of
-    it had, they are the facets of the file. Near a ``contact`` they are small, if it is given.
+    Its elements are smaller than the body's curvature requires, by the factor ``finer``. Around the ``tangles`` of
+    earlier attempts they are the facets of the file. Near a ``contact``, if given, they are small.
 
     Raises:
-        GeometryError: if nothing, or all, of it is held.
+        GeometryError: if nothing, or all, of it is fixed.
         MeshError: if the remesher fails.
     """
     (below,), (skin,), triangles = body.support.edges(), body.surfaces()["skin"], body.triangles
@@ -135,12 +135,12 @@ def base(
     tangles: Tangles = (),
     contact: Near | None = None,
 ) -> Base:
-    """Return the surface in elements of at most ``largest`` (m), held below the height ``below`` (m).
+    """Return the surface in elements of at most ``largest`` (m), fixed below the height ``below`` (m).
 
-    Round ``tangles`` the facets stay as they are. Near a ``contact`` elements are small.
+    Around ``tangles`` the facets stay unchanged. Near a ``contact`` elements are small.
 
     Raises:
-        GeometryError: if nothing, or all, is held.
+        GeometryError: if nothing, or all, is fixed.
         MeshError: if the remesher fails.
     """
     sheet = cut(*merged(points, facets), below)
@@ -151,7 +151,7 @@ def base(
     sheet = Sheet(sheet.points, sheet.facets, sheet.group, sharp_edges(sheet, largest))
     as_is = _round(sheet, tangles)
     made = Base(sheet, level, sheet.centres[as_is])
-    # With a contact twice: only the second time points are dense enough for sizes that change fast.
+    # Twice with a contact: only in the second pass points are dense enough for sizes that change fast.
     for _ in range(1 if contact is None else 2):
         size = np.full(len(sheet.points), largest)
         if contact is not None:
@@ -163,7 +163,7 @@ def base(
 
 
 def _round(sheet: Sheet, tangles: Tangles) -> BoolArray:
-    """Tell which facets of the file's surface are within reach of tangles, farther at each attempt."""
+    """Return a mask of the file's facets near tangles; the distance grows with each attempt."""
     near, centres = np.zeros(len(sheet.facets), dtype=bool), cKDTree(sheet.centres)
     for number, tangle in enumerate(tangles, start=1):
         _, nearest, _ = igl.point_mesh_squared_distance(tangle.places, sheet.points, sheet.facets)
@@ -177,9 +177,9 @@ def _round(sheet: Sheet, tangles: Tangles) -> BoolArray:
 def put_back(
     sheet: Sheet, skin: Surface, level: FloatArray, known: IntArray | None = None, places: FloatArray | None = None
 ) -> Sheet:
-    """Return the sheet with its points on the ``skin``, those of the support's edge on the ``level`` line.
+    """Return the sheet with its points projected onto the ``skin``, those of the support's edge onto the ``level``.
 
-    The ``known`` points (k) go to their ``places`` (k, 3); those on sharp edges stay, and so do those whose facets
+    The ``known`` points (k) move to their ``places`` (k, 3). Points on sharp edges stay, and so do points whose facets
     would turn over.
     """
     moved = skin.project(sheet.points)
@@ -192,7 +192,7 @@ def put_back(
 
 
 def _settled(sheet: Sheet, moved: FloatArray) -> Sheet:
-    """Move the points of a sheet, but not those whose facets would turn over by that."""
+    """Move the points of a sheet, except those whose facets would turn over."""
     before, points = sheet.normals, moved.copy()
     for _ in range(_ROUNDS):
         after = Sheet(points, sheet.facets, sheet.group, sheet.sharp)

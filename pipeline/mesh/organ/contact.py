@@ -1,6 +1,6 @@
-"""The surface round a contact: meshed in the plane of the probe, lifted along its axis, and set into the rest.
+"""Surface around a contact: meshed in the probe's plane, lifted along its axis, and inserted into the rest.
 
-The footprint's edge is then made of points that are on its true curve, at the distance that its elements ask for.
+The points of the footprint's edge are then on its true curve, at the distance of the elements there.
 """
 
 from collections.abc import Callable
@@ -21,25 +21,25 @@ from pipeline.shapes.rays import facing
 from pipeline.shapes.triangles import half_edges
 
 Lift = Callable[[FloatArray], FloatArray]
-# What is meshed anew reaches this far past the footprint, in units of its radius, if facets are small; less far where a
-# fold is next to it.
+# Radius of the remeshed patch, in units of the footprint's, if facets are small; smaller ones are tried where a fold
+# is close.
 _COLLARS = (1.25, 1.1, 1.0)
-# Corners of an outline turn by more than this (cosine).
+# A corner of an outline turns by more than this (cosine).
 _CORNER = 0.9
-# A round outline is followed this many times closer than its elements.
+# Points along a round outline, per element.
 _FOLLOW = 8
-_FOLDED = "the surface is folded round the contact: the probe's own plane cannot hold it"
+_FOLDED = "the surface is folded around the contact and cannot be projected into the probe's plane"
 
 
 class FoldedError(GeometryError):
-    """Facets round the contact are too large for the probe's plane: they reach over folds."""
+    """Facets around the contact are too large to be projected into the probe's plane: they reach over folds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Contact:
     """The ``sheet`` with the footprint in it; ``rim`` (k) are the points along its edge, in order.
 
-    ``edge`` (n, 3), in m, follows the true edge closely.
+    ``edge`` (n, 3), in m, are dense points along the true edge.
     """
 
     sheet: Sheet
@@ -48,7 +48,7 @@ class Contact:
 
 
 def rim_points(probe: Probe, sizes: Sizes) -> FloatArray:
-    """Return points (n, 2), in m, along the footprint's edge, at the distance that elements there have."""
+    """Return points (n, 2), in m, along the footprint's edge, at the distance of the elements there."""
     outline = probe.outline()
     if probe.is_curved:
         count = sizes.rim_segments(probe)
@@ -62,7 +62,7 @@ def rim_points(probe: Probe, sizes: Sizes) -> FloatArray:
 
 
 def edge_points(probe: Probe, rim: FloatArray) -> FloatArray:
-    """Return points (n, 2), in m, closer along the footprint's edge than those of its elements."""
+    """Return points (n, 2), in m, along the footprint's edge, denser than those of its elements."""
     following = np.roll(rim, -1, axis=0)
     share = np.arange(_FOLLOW)[:, None, None] / _FOLLOW
     return probe.to_edge((rim + share * (following - rim)).reshape(-1, 2))
@@ -81,17 +81,17 @@ def _legs(outline: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
 def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -> Contact:
     """Return the sheet with the footprint's surroundings meshed to ``sizes``, and its edge as edges of the mesh.
 
-    ``lift`` takes points (n, 2) of the probe's plane along its axis onto the true surface.
+    ``lift`` projects points (n, 2) of the probe's plane along its axis onto the true surface.
 
     Raises:
         GeometryError: if a part of the footprint has no tissue below it.
-        FoldedError: if facets round it reach over a fold.
+        FoldedError: if facets around it reach over a fold.
     """
     rim = rim_points(probe, sizes)
     edge = edge_points(probe, rim)
     lifted, followed = lift(rim), lift(edge)
     if not (np.isfinite(lifted).all() and np.isfinite(followed).all()):
-        raise GeometryError("a part of the footprint's edge has no tissue below it that is joined to the contact")
+        raise GeometryError("a part of the footprint's edge has no connected tissue below it")
     local = frame.local(sheet.points)
     for collar in _COLLARS:
         patch = _patch(sheet, local, collar * probe.circumradius + sizes.rim)
@@ -99,15 +99,15 @@ def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -
         if not _lines_cross(local[:, :2], loops, rim):
             break
     else:
-        raise FoldedError(f"{_FOLDED}; for a rough surface, `smooth` takes lengths that are taken off")
+        raise FoldedError(f"{_FOLDED}; for a rough surface, set `smooth` to the length of its bumps")
     if (sheet.group[patch] == FIXED).any():
-        raise GeometryError("the footprint lies on, or next to, what is held of the body")
+        raise GeometryError("the footprint is on, or next to, the fixed part of the body")
     plane = _mesh_plane(local[:, :2], loops, rim, probe, sizes)
     return _joined(sheet, patch, plane, lift, lifted, followed)
 
 
 def _patch(sheet: Sheet, local: FloatArray, radius: float) -> IntArray:
-    """Return the facets that meet the disc, or a little more: a patch without points where it touches itself."""
+    """Return the facets that meet the disc, enlarged until no point of the patch's boundary is used twice."""
     reachable = facing(local, sheet.facets, 4 * radius)
     corners = local[sheet.facets[reachable]][:, :, :2]
     chosen = reachable[_distance_to_origin(corners) <= radius]
@@ -128,7 +128,7 @@ def _patch(sheet: Sheet, local: FloatArray, radius: float) -> IntArray:
 
 
 def _lines_cross(local: FloatArray, loops: list[list[int]], rim: FloatArray) -> bool:
-    """Tell whether lines that bound the patch, and the rim, cross in the plane: gmsh would end the process."""
+    """Return whether boundary lines of the patch, and the rim, cross in the plane: gmsh would end the process."""
     closed = [local[loop] for loop in loops] + [rim]
     return cross(np.vstack(closed), np.vstack([np.roll(line, -1, axis=0) for line in closed]))
 
@@ -147,14 +147,14 @@ def _distance_to_origin(corners: FloatArray) -> FloatArray:
 
 
 def _outer_edges(facets: IntArray) -> IntArray:
-    """Edges (k, 2) of facets, in their sense, that no other of them has."""
+    """Return the oriented edges (k, 2) that belong to one of the facets only."""
     pairs = half_edges(facets)
     there = set(map(tuple, pairs.tolist()))
     return np.array([pair for pair in pairs.tolist() if (pair[1], pair[0]) not in there], dtype=np.int64)
 
 
 def _loops(facets: IntArray) -> list[list[int]]:
-    """Return the closed lines of points that bound facets."""
+    """Return the closed boundary lines of facets, as point numbers."""
     following = dict(_outer_edges(facets).tolist())
     loops = []
     while following:
@@ -180,7 +180,7 @@ class _Plane:
 
 
 def _mesh_plane(local: FloatArray, loops: list[list[int]], rim: FloatArray, probe: Probe, sizes: Sizes) -> _Plane:
-    """Mesh what ``loops`` of points bound, with the rim's edges in it."""
+    """Mesh the plane inside ``loops`` of points, with the rim's edges in it."""
     scale = probe.circumradius / 10
     with gmsh_session():
         model_options()
@@ -232,7 +232,7 @@ def _closed(tags: list[int]) -> int:
 def _joined(
     sheet: Sheet, patch: IntArray, plane: _Plane, lift: Lift, lifted: FloatArray, followed: FloatArray
 ) -> Contact:
-    """Put the plane's mesh, lifted, in the place of a patch of the sheet."""
+    """Replace a patch of the sheet by the lifted mesh of the plane."""
     number = np.full(len(plane.points), -1, dtype=np.int64)
     number[plane.outer] = plane.outer_of
     (new,) = np.nonzero(number < 0)
@@ -244,7 +244,7 @@ def _joined(
     points[is_rim] = lifted[on_rim[new[is_rim]]]
     points[~is_rim] = lift(plane.points[new[~is_rim]])
     if not np.isfinite(points).all():
-        raise GeometryError("a part of the surface round the footprint cannot be seen along the probe's axis")
+        raise GeometryError("a part of the surface around the footprint is hidden along the probe's axis")
     rest = np.ones(len(sheet.facets), dtype=bool)
     group = np.where(plane.inside, PROBE, sheet.group[patch[0]])
     rest[patch] = False
@@ -270,9 +270,9 @@ def _outside(sheet: Sheet, patch: IntArray) -> IntArray:
 
 
 def cross(start: FloatArray, end: FloatArray) -> bool:
-    """Tell whether any two of the segments from ``start`` (n, 2) to ``end`` (n, 2) that share no end meet."""
+    """Return whether any two segments from ``start`` (n, 2) to ``end`` (n, 2) without a common end meet."""
     sides = _sign(start[:, None], end[:, None], start[None]) * _sign(start[:, None], end[:, None], end[None])
-    # Pieces of one straight line are on no side of each other: they meet if they overlap along it.
+    # Segments of one straight line have no sides of each other: they meet if they overlap along it.
     low, high = np.minimum(start, end), np.maximum(start, end)
     apart = ((low[:, None] > high[None]) | (high[:, None] < low[None])).any(axis=-1)
     joined = _same(start, start) | _same(start, end) | _same(end, start) | _same(end, end)
@@ -280,7 +280,7 @@ def cross(start: FloatArray, end: FloatArray) -> bool:
 
 
 def _sign(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-    """Tell on which side of the lines from ``a`` to ``b`` the points ``c`` are."""
+    """Return on which side of the lines from ``a`` to ``b`` the points ``c`` are, as signs."""
     ab, ac = b - a, c - a
     return np.asarray(np.sign(ab[..., 0] * ac[..., 1] - ab[..., 1] * ac[..., 0]))
 

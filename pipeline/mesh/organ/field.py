@@ -1,4 +1,4 @@
-"""The size field round a footprint on a curved surface: distances are those in space from its true edge."""
+"""Size field around a footprint on a curved surface, from distances in space to its true edge."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,9 +16,9 @@ from pipeline.shapes.frame import Frame
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """``sizes`` round a ``frame``, and those that ``inclusions`` ask for.
+    """``sizes`` around a ``frame``, and those of ``inclusions``.
 
-    ``edge`` (n, 3), in m, are points close to each other along the footprint's edge.
+    ``edge`` (n, 3), in m, are dense points along the footprint's edge.
     """
 
     sizes: Sizes
@@ -39,7 +39,7 @@ class Field:
         return size
 
     def set(self, scale: float, kernel: Any) -> None:
-        """Make it the background field of gmsh's current model, whose unit is ``scale`` metres.
+        """Set the background field of gmsh's current model, whose unit is ``scale`` metres.
 
         Distances are those from points along the footprint's edge, which are added to the model with its ``kernel``.
         """

@@ -1,4 +1,4 @@
-"""The surfaces of inclusions as triangles to the size field, which the mesh of a body of triangles is made round."""
+"""Surfaces of inclusions in a body of triangles, as triangles that follow the size field."""
 
 from collections.abc import Sequence
 
@@ -13,15 +13,15 @@ from pipeline.mesh.organ.sheet import FREE, Sheet
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.regions import Inclusion
 
-# Points that the surface has before it is meshed to sizes, and how often it is: only the second time there are points
-# enough for sizes that change fast.
+# Points of the initial surface, and passes of remeshing: only in the second pass points are dense enough for sizes that
+# change fast.
 _POINTS, _PASSES = 1000, 2
-# How far chords may leave the surface, in units of the smallest semi-axis: elements have the sizes asked for.
+# Largest deviation of chords from the surface, in units of the smallest semi-axis; the field controls the sizes.
 _DEVIATION = 0.05
 
 
 def inclusion_surfaces(inclusions: Sequence[Inclusion], field: Field) -> list[tuple[FloatArray, IntArray]]:
-    """Return points (n, 3), in m, and facets (m, 3) of the surface of each inclusion, its points on the true one.
+    """Return points (n, 3), in m, and facets (m, 3) of the surface of each inclusion; points are on the true surface.
 
     Raises:
         MeshError: if the remesher fails.
@@ -42,7 +42,7 @@ def _to_sizes(surface: Ovoid, field: Field) -> tuple[FloatArray, IntArray]:
 
 
 def _evenly(surface: Ovoid) -> tuple[FloatArray, IntArray]:
-    """Return points spread over the surface, and the facets between them, seen from outside."""
+    """Return points spread evenly over the surface, and the facets between them, oriented outward."""
     points = surface.sample(_POINTS)
     on_ball = (points - np.array(surface.centre)) / np.array(surface.axes)
     facets = ConvexHull(on_ball).simplices.astype(np.int64)

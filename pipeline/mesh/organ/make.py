@@ -1,4 +1,4 @@
-"""The mesh of a scene on a body of triangles: coarse surface, contact, surface to the size field, volume, groups."""
+"""Mesh of a scene on a body of triangles: coarse surface, contact, surface by the size field, volume, groups."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,20 +23,21 @@ from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body
 from pipeline.shapes.scanned import Scanned
 
-# The surface is meshed twice: only the second time its points are dense where sizes change fast.
+# Passes of surface meshing: only in the second pass points are dense where sizes change fast.
 _PASSES = 2
-# Where the surface crosses itself, the file's own facets are kept there: attempts, each with those of all before.
+# Attempts that keep the file's own facets where the surface crosses itself, there and at all earlier such places.
 _ATTEMPTS = 5
-# Where that does not help, or anything else fails, elements of the whole surface are at most so many times smaller.
+# If these fail, elements of the whole surface are made smaller by these factors.
 _FINER = (1, 2, 4)
-# The file's own facets are not kept where they are larger than elements by this factor.
+# The file's own facets are not kept if they are larger than elements by this factor.
 _TOO_LARGE = 2
-# The remesher turns lengths into units of its own and back, which moves points by rounding.
+# Rounding of points, since the remesher converts lengths into units of its own and back.
 _SAME = 1e-6
-# Points are put back onto the file's surface, unless facets would turn over or cross by that: they stay away from it by
-# less than this share of elements there, as chords of folds of their size do.
+# Points are projected back onto the file's surface, unless facets would turn over or cross. Those stay off it by less
+# than this share of the elements there, like chords over folds of the same size.
 _MOST_OFF = 0.25
-# A share of the body's volume: chords of elements leave half a per cent of an organ out, which their curved edges bring
+# Largest change of the body's volume. Chords of elements leave out half a per cent of an organ, which curved edges
+# restore; with folds as fine as elements it is more, and F is not that of the file.
 # back; where folds are as fine as elements, it is more, and F not that of the file.
 MOST_EXCESS = 0.03
 
@@ -44,10 +45,10 @@ Lift = Callable[[FloatArray], FloatArray]
 
 
 def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = None) -> MeshArrays:
-    """Mesh a ``scene`` of a ``body`` of triangles; ``kept`` holds what its meshes share.
+    """Mesh a ``scene`` of a ``body`` of triangles; ``kept`` stores what its meshes share.
 
     Raises:
-        GeometryError: at once, if the footprint does not fit there, or the scene has what such a body cannot.
+        GeometryError: at once, if the footprint does not fit there, or the scene needs what such a body cannot have.
         MeshError: if a mesh generator fails with smaller elements, too.
     """
 
@@ -75,13 +76,13 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
 
 
 def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
-    """Mesh a ``scene`` whose body is bounded by triangles, from its surface ``far`` from the contact.
+    """Mesh a ``scene`` whose body is bounded by triangles, with ``far``, its surface away from the contact.
 
     The same input gives the same arrays, bit for bit.
 
     Raises:
-        GeometryError: if the footprint does not fit there, or the scene has what such a body cannot.
-        TangledError: if the surface crosses itself, or leaves no room for tetrahedra.
+        GeometryError: if the footprint does not fit there, or the scene needs what such a body cannot have.
+        TangledError: if the surface crosses itself, or leaves no space for tetrahedra.
         MeshError: if a mesh generator fails.
     """
     start = perf_counter()
@@ -106,53 +107,53 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
 
 
 def _check(scene: Scene) -> None:
-    """Refuse what is not meshed here."""
+    """Raise an error for scenes that are not supported here."""
     if scene.is_cut:
-        raise GeometryError(f'no column is cut out of a {scene.body.shape}: use outside = "coarse"')
+        raise GeometryError(f'a {scene.body.shape} has no columns: use outside = "coarse"')
     if scene.mirrors:
-        raise GeometryError(f"a {scene.body.shape} is not its own mirror image")
+        raise GeometryError(f"a {scene.body.shape} has no mirror symmetry")
 
 
 def _check_whole(sheet: Sheet, volume: float) -> None:
-    """Refuse a surface that is not the file's, of which ``volume`` (m³) is within.
+    """Check that a surface is that of the file, whose ``volume`` is in m³.
 
     Raises:
-        MeshError: if it is open, or holds much more or less.
+        MeshError: if it is open, or encloses much more or less.
     """
     edges_of(sheet.facets)
     if abs(excess := sheet.volume / volume - 1) > MOST_EXCESS:
         amount = "much" if excess > 0 else "little"
         raise MeshError(
-            f"the surface, meshed anew, holds {abs(excess):.2g} times the body's volume too {amount}: "
-            "smooth it, or give a smaller `fine`"
+            f"the remeshed surface encloses {abs(excess):.2g} times the body's volume too {amount}: "
+            "smooth it, or use a smaller `fine`"
         )
 
 
 def _deviation(sheet: Sheet, body: Body, field: Field) -> float:
-    """Return how far (m) points of the sheet are from the file's surface.
+    """Return the largest distance (m) of the sheet's points from the file's surface.
 
     Raises:
-        TangledError: if that is more than elements there allow.
+        TangledError: if that exceeds the limit given by elements there.
     """
     (skin,) = body.surfaces()["skin"]
     distance = skin.distance(sheet.points)
     far = distance > _MOST_OFF * field.at(sheet.points)
     if far.any():
-        what = f"the surface, meshed anew, leaves the file's by {1e3 * distance[far].max():.2g} mm"
+        what = f"the remeshed surface deviates from the file's by {1e3 * distance[far].max():.2g} mm"
         raise TangledError(sheet.points[far], distance[far], what)
     return float(distance.max())
 
 
 @dataclass(frozen=True, eq=False)
 class _Truth:
-    """Where points of the mesh belong: those in the footprint are lifted, the rest goes to the nearest ones."""
+    """Projection onto the true surface: points of the footprint are lifted, others move to the nearest point."""
 
     scene: Scene
     far: Base
     lift: Lift
 
     def put_back(self, sheet: Sheet, rim: IntArray, true_rim: FloatArray) -> Sheet:
-        """Return the sheet on the true surface; its ``rim`` points (k) are at ``true_rim`` (k, 3)."""
+        """Return the sheet on the true surface; its ``rim`` points (k) move to ``true_rim`` (k, 3)."""
         points = sheet.points.copy()
         points[rim] = true_rim
         inner = np.setdiff1d(np.unique(sheet.facets[sheet.group == PROBE]), rim)
@@ -166,7 +167,7 @@ class _Truth:
 
 
 def _to_sizes(contact: Contact, field: Field, truth: _Truth) -> Sheet:
-    """Mesh the surface to the sizes, its points on the true one and those of the footprint's edge as they are."""
+    """Remesh the surface to the size field; points are on the true surface, the footprint's edge is unchanged."""
     sheet, rim = contact.sheet, contact.rim
     true_rim, extent = sheet.points[rim], float(np.ptp(sheet.points, axis=0).max())
     for _ in range(_PASSES):

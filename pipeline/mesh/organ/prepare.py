@@ -1,4 +1,4 @@
-"""A file's surface made ready for the remesher: without specks, cut where it is held, its sharp edges known."""
+"""Preparation of a file's surface for the remesher: duplicates merged, cut at the support, sharp edges marked."""
 
 from collections.abc import Callable
 
@@ -12,16 +12,16 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ.sheet import FIXED, FREE, Sheet, compact, edges_of
 
-# Points nearer than this to each other, for the edges of the surface, are one: remeshers drop such specks.
+# Points closer than this, in units of the surface's edges, are merged: remeshers drop such details.
 _SAME = 0.05
-# A point this near to the level along an edge, in units of the edge, is moved onto it.
+# A point is moved along an edge onto the level within this share of the edge.
 _NEAR = 0.02
-# Facets that meet at a larger angle (cosine) make a sharp edge, if those at some distance from it do so, too.
+# An edge is sharp if its facets, and those at some distance, meet at a larger angle (cosine).
 _SHARP = 0.7
 
 
 def merged(points: FloatArray, facets: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return a closed surface with points that are next to each other made one, itself where that would open it."""
+    """Return a closed surface with neighbouring points merged; points stay where merging would open the surface."""
     edges, _ = edges_of(facets)
     length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
     near = edges[length < _SAME * np.median(length)]
@@ -33,7 +33,7 @@ def merged(points: FloatArray, facets: IntArray) -> tuple[FloatArray, IntArray]:
     middles = np.column_stack([np.bincount(label, points[:, k], minlength=groups) / share for k in range(3)])
     corners = label[facets].astype(np.int64)
     corners = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
-    # Two facets with the same corners, once a speck between them is gone, lie upon each other.
+    # Two facets with the same corners, left when a detail between them has gone, cancel.
     _, first, number = np.unique(np.sort(corners, axis=1), axis=0, return_inverse=True, return_counts=True)
     corners = corners[number[first.ravel()] == 1]
     try:
@@ -46,7 +46,7 @@ def merged(points: FloatArray, facets: IntArray) -> tuple[FloatArray, IntArray]:
 
 
 def cut(points: FloatArray, facets: IntArray, below: float) -> Sheet:
-    """Return the surface with edges along the level ``below`` (m), its facets free above and fixed below it."""
+    """Return the surface with edges along the level ``below`` (m); its facets are free above and fixed below it."""
     edges, _ = edges_of(facets)
     points = _moved_onto(points, edges, below)
     side = np.sign(points[:, 2] - below).astype(np.int64)
@@ -65,7 +65,7 @@ def cut(points: FloatArray, facets: IntArray, below: float) -> Sheet:
     low, high = side[facets].min(axis=1), side[facets].max(axis=1)
     whole = low * high >= 0
     pieces, groups = [facets[whole]], [np.where(low[whole] < 0, FIXED, FREE)]
-    # A facet that lies in the level is held if its neighbours below are: it is the bottom of what is above, or a top.
+    # A facet within the level is fixed if its normal points down: it is then a bottom, otherwise a top.
     flat = (low == 0) & (high == 0)
     normal_down = (
         np.cross(points[facets[:, 1]] - points[facets[:, 0]], points[facets[:, 2]] - points[facets[:, 0]])[:, 2] < 0
@@ -83,7 +83,7 @@ def cut(points: FloatArray, facets: IntArray, below: float) -> Sheet:
 
 
 def level_line(points: FloatArray, facets: IntArray, below: float) -> FloatArray:
-    """Return the line at the height ``below`` (m) as segments (k, 2, 3), one in each facet that reaches over it."""
+    """Return the line at the height ``below`` (m) as segments (k, 2, 3), one in each facet that crosses it."""
     over = points[:, 2] > below
     crossed = facets[over[facets].any(axis=1) & ~over[facets].all(axis=1)]
     ends = []
@@ -100,7 +100,7 @@ def level_line(points: FloatArray, facets: IntArray, below: float) -> FloatArray
 
 
 def _split(facet: list[int], side: list[int], middle: Callable[[int, int], int]) -> list[tuple[int, int, int, int]]:
-    """Split a facet across the level: a corner on it goes into two, others into a triangle and a quadrilateral."""
+    """Split a facet at the level: into two if a corner is on it, otherwise into a triangle and a quadrilateral."""
     if 0 in side:
         first = side.index(0)
         a, b, c = (facet[(first + k) % 3] for k in range(3))
@@ -115,7 +115,7 @@ def _split(facet: list[int], side: list[int], middle: Callable[[int, int], int])
 
 
 def _moved_onto(points: FloatArray, edges: IntArray, below: float) -> FloatArray:
-    """Move points that are next to the level onto it, along an edge: no facets that are needles then remain."""
+    """Move points close to the level onto it, along an edge, so that no sliver facets remain."""
     points = points.copy()
     z = points[edges][:, :, 2] - below
     crossing = z[:, 0] * z[:, 1] < 0
@@ -134,7 +134,7 @@ def _moved_onto(points: FloatArray, edges: IntArray, below: float) -> FloatArray
 
 
 def on_segments(points: FloatArray, segments: FloatArray) -> FloatArray:
-    """Return the nearest points of a line of segments (k, 2, 3) to ``points`` (n, 3) near it."""
+    """Return the points of a line of segments (k, 2, 3) that are nearest to ``points`` (n, 3) near it."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     length = np.linalg.norm(along, axis=1)
     middle = cKDTree(segments.mean(axis=1))
@@ -151,7 +151,7 @@ def on_segments(points: FloatArray, segments: FloatArray) -> FloatArray:
 
 
 def sharp_edges(sheet: Sheet, largest: float) -> IntArray:
-    """Return the edges (k, 2) at which the surface is sharp: not only facet by facet, as noise and voxels are."""
+    """Return the edges (k, 2) at which the surface is sharp, not only between two facets, as by noise and voxels."""
     edges, sides = edges_of(sheet.facets)
     normals = sheet.normals
     sharp = (normals[sides[:, 0]] * normals[sides[:, 1]]).sum(axis=1) < _SHARP
@@ -162,7 +162,7 @@ def sharp_edges(sheet: Sheet, largest: float) -> IntArray:
     centre = sheet.points[sheet.facets].mean(axis=1)
     mean = []
     for side in sides.T:
-        # Into the facet, as far as half an element reaches: the facets about there say which way the surface faces.
+        # Half an element into the facet: the facets around that point give the orientation of the surface.
         along = sheet.points[edges[:, 1]] - sheet.points[edges[:, 0]]
         inward = centre[side] - middle
         inward -= along * ((inward * along).sum(axis=1) / (along**2).sum(axis=1))[:, None]
@@ -177,7 +177,7 @@ def sharp_edges(sheet: Sheet, largest: float) -> IntArray:
 
 
 def _long_lines(sheet: Sheet, edges: IntArray, largest: float) -> IntArray:
-    """Return those of the edges that make lines as long as an element: a speck is no edge of a body."""
+    """Return those edges that form lines at least as long as an element; shorter ones are no edges of a body."""
     count = len(sheet.points)
     joined = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
     _, line = connected_components(joined, directed=False)

@@ -1,7 +1,6 @@
-"""Surfaces meshed anew to given sizes, by the program `mmgs` (C. Dapogny, C. Dobrzynski, P. Frey, JCP 262, 2014).
+"""Remeshing of surfaces to given sizes, by the program `mmgs` (C. Dapogny, C. Dobrzynski, P. Frey, JCP 262, 2014).
 
-It runs as a process of its own: what it may do wrong cannot take the program with it, and the same input gives the
-same output, bit for bit.
+It runs in a process of its own, so that its crashes do no harm. The same input gives the same output, bit for bit.
 """
 
 import subprocess
@@ -20,15 +19,15 @@ from pipeline.stages import stage
 
 _PACKAGE, _PROGRAM = "mmgpy", "bin/mmgs_O3"
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
-# Where nothing was asked for, the remesher neither finds ridges by itself nor smooths the sizes: both are given.
+# No detection of ridges and no smoothing of sizes: both are given.
 _OPTIONS = ("-v", "-1", "-nr", "-hgrad", "-1")
 _LONGEST = 600  # seconds
-# Elements may be this much smaller and larger than any size asked for.
+# Factor by which elements may be smaller or larger than any given size.
 _ROOM = 3.0
 
 
 def program() -> Path:
-    """Return where `mmgs` is.
+    """Return the path of `mmgs`.
 
     Raises:
         MeshError: if it is not installed.
@@ -41,7 +40,7 @@ def program() -> Path:
 
 
 def release() -> str:
-    """Return the version of what `mmgs` came with: another may make other meshes."""
+    """Return the version of the package of `mmgs`: another one may make other meshes."""
     try:
         return version(_PACKAGE)
     except PackageNotFoundError:
@@ -52,13 +51,13 @@ def release() -> str:
 def remesh(
     sheet: Sheet, size: FloatArray, deviation: float, kept: IntArray | None = None, as_is: BoolArray | None = None
 ) -> Sheet:
-    """Return the surface with elements of the ``size`` (n) asked for at its points, all in m.
+    """Return the surface with elements of the given ``size`` (n) at its points, all in m.
 
-    It stays within ``deviation`` (m) of what it was. Edges between groups stay, and so do the ``kept`` ones (k, 2),
-    with their points, and the facets that are to be left ``as_is`` (m).
+    It stays within ``deviation`` (m) of the input. Edges between groups stay, with their points, and so do the ``kept``
+    edges (k, 2) and the facets marked ``as_is`` (m).
 
     Raises:
-        MeshError: with what the remesher said, if it fails.
+        MeshError: if the remesher fails; with its message.
     """
     with TemporaryDirectory(prefix="surface-") as folder:
         source, result = Path(folder, "in.mesh"), Path(folder, "out.mesh")
@@ -142,13 +141,13 @@ def _read(text: str) -> Sheet:
 
 
 def _closed(sheet: Sheet) -> Sheet:
-    """Return the sheet without the fins that a remesher leaves, and with the holes closed where it drops a facet."""
+    """Return the sheet without fins left by the remesher, and with holes closed where it dropped a facet."""
     sheet = _without_fins(sheet)
     pairs = half_edges(sheet.facets)
     base = len(sheet.points)
     keys, back = pairs @ np.array([base, 1]), pairs @ np.array([1, base])
     alone = ~np.isin(keys, back)
-    # Round a hole one goes against its facets.
+    # The boundary of a hole runs opposite to its facets.
     following = {end: start for start, end in pairs[alone].tolist()}
     owner = dict(zip(pairs[alone][:, 1].tolist(), np.repeat(sheet.group, 3)[alone].tolist(), strict=True))
     facets, groups = [sheet.facets], [sheet.group]
@@ -165,7 +164,7 @@ def _closed(sheet: Sheet) -> Sheet:
 
 
 def _without_fins(sheet: Sheet) -> Sheet:
-    """Return the sheet without facets that hang on to it by one edge, or by none."""
+    """Return the sheet without facets that are connected by one edge or none."""
     while True:
         keys = _keys(half_edges(sheet.facets), len(sheet.points))
         _, number, times = np.unique(keys, return_inverse=True, return_counts=True)

@@ -1,4 +1,4 @@
-"""Triangulated surfaces whose facets belong to named groups, and the lines between the groups."""
+"""Triangulated surfaces whose facets belong to named groups, and the borders between the groups."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ from pipeline.mesh.generate import MeshError
 from pipeline.scene import model
 from pipeline.shapes.triangles import closed_edges, doubled_normals, enclosed, half_edges
 
-# Numbers of the groups, which the remesher keeps apart.
+# Group numbers; the remesher keeps the groups apart.
 FREE, FIXED, PROBE = 1, 2, 3
 
 
 def group_names() -> dict[int, str]:
-    """Return the names that the groups have in meshes."""
+    """Return the groups' names in meshes."""
     return {FREE: model.FREE, FIXED: model.FIXED, PROBE: model.PROBE}
 
 
@@ -22,7 +22,7 @@ def group_names() -> dict[int, str]:
 class Sheet:
     """A closed surface: ``points`` (n, 3) in m, ``facets`` (m, 3), and the group (m) of each facet.
 
-    ``sharp`` (k, 2) are edges that must stay, other than those between groups.
+    ``sharp`` (k, 2) are edges to be kept, besides those between groups.
     """
 
     points: FloatArray
@@ -39,7 +39,7 @@ class Sheet:
 
     @property
     def heights(self) -> FloatArray:
-        """Heights (m) of the facets over their longest edges, as shares of these."""
+        """Heights of the facets over their longest edges, as shares of these edges."""
         corners = self.points[self.facets]
         longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
         doubled = np.linalg.norm(doubled_normals(self.points, self.facets), axis=1)
@@ -53,17 +53,17 @@ class Sheet:
 
     @property
     def extents(self) -> FloatArray:
-        """Largest extents (m) of the facets along x, y and z, in m."""
+        """Largest extents (m) of the facets along x, y or z."""
         sizes: FloatArray = np.ptp(self.points[self.facets], axis=1).max(axis=1)
         return sizes
 
     @property
     def volume(self) -> float:
-        """Volume (m³) within."""
+        """Enclosed volume (m³)."""
         return enclosed(self.points, self.facets)
 
     def border(self, one: int, other: int | None = None) -> IntArray:
-        """Return the edges (k, 2), lower number first, between facets of group ``one`` and of the ``other``, or all."""
+        """Return edges (k, 2), lower number first, between facets of group ``one`` and the ``other`` (default: any)."""
         edges, facets = edges_of(self.facets)
         groups = self.group[facets]
         mine = groups == one
@@ -78,13 +78,13 @@ def edges_of(facets: IntArray) -> tuple[IntArray, IntArray]:
         MeshError: if it is not closed.
     """
     _, times = np.unique(np.sort(half_edges(facets), axis=1) @ np.array([facets.max() + 1, 1]), return_counts=True)
-    if (times % 2).any():  # a point or an edge where a surface touches itself is mended later
-        raise MeshError("the surface, meshed anew, is not closed")
+    if (times % 2).any():  # even numbers pass: where a surface touches itself it is repaired later
+        raise MeshError("the remeshed surface is not closed")
     return closed_edges(facets)
 
 
 def compact(sheet: Sheet) -> tuple[Sheet, IntArray]:
-    """Number the points that facets use without gaps; return the new number of each point, too, -1 for none."""
+    """Renumber the points that facets use without gaps; return the new number of each point, too, -1 for none."""
     used = np.zeros(len(sheet.points), dtype=bool)
     used[sheet.facets] = True
     number = np.where(used, np.cumsum(used) - 1, -1)

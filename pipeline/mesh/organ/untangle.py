@@ -1,4 +1,4 @@
-"""Surfaces that neither cross themselves nor fold upon themselves: no volume could be filled otherwise."""
+"""Untangling: removal of self-intersections and folds of a surface, so that its volume can be meshed."""
 
 from math import cos, radians
 
@@ -10,23 +10,23 @@ from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ.sheet import Sheet, edges_of
 from pipeline.shapes.files.crossings import crossings
 
-# Neighbours with less between them are folded: a tetrahedron in there would be flat. A fold of the file itself may be
-# as sharp as the second angle.
+# Neighbouring facets with a smaller angle between them are folded: a tetrahedron between them would be flat. A fold of
+# the file itself may have the second angle.
 _FOLDED, _SHARPEST = radians(10.0), radians(1.0)
-# Facets whose height is this share of their longest edge are needles, on which tetrahedra fail; the second share may
-# remain.
+# Facets with a height below this share of their longest edge are slivers, on which tetrahedra fail; those above the
+# second share may remain.
 _THIN, _THINNEST = 1e-3, 1e-6
-# Points of bad facets are moved so often; after so many rounds, those next to them are moved, too.
+# Rounds of moving the points of bad facets; after the second number of rounds their neighbours are moved, too.
 _ROUNDS, _WIDER = 12, 4
 
 
 class TangledError(MeshError):
-    """A surface is not that of a volume at ``places`` (n, 3), within the ``reach`` (n) round each, all in m."""
+    """A surface bounds no volume at ``places`` (n, 3), within a distance ``reach`` (n) of each, all in m."""
 
-    def __init__(self, places: FloatArray, reach: FloatArray, what: str = "the surface, meshed anew, crosses itself"):
+    def __init__(self, places: FloatArray, reach: FloatArray, what: str = "the remeshed surface crosses itself"):
         self.places, self.reach = places, reach
         x, y, z = 1e3 * places[0]
-        super().__init__(f"{what} at ({x:.4g}, {y:.4g}, {z:.4g}) mm; `smooth`, or `repair`, may mend the file there")
+        super().__init__(f"{what} at ({x:.4g}, {y:.4g}, {z:.4g}) mm; `smooth`, or `repair`, may help there")
 
     @staticmethod
     def at(corners: FloatArray, *what: str) -> "TangledError":
@@ -35,7 +35,7 @@ class TangledError(MeshError):
 
 
 def bad_facets(sheet: Sheet) -> BoolArray:
-    """Tell which facets cross others, are needles, or are folded upon a neighbour."""
+    """Return a mask of facets that cross others, are slivers, or are folded onto a neighbour."""
     return _crossing(sheet) | _misshapen(sheet, _FOLDED, _THIN)
 
 
@@ -46,7 +46,7 @@ def _crossing(sheet: Sheet) -> BoolArray:
 
 
 def _misshapen(sheet: Sheet, angle: float, height: float) -> BoolArray:
-    """Tell which facets have less than an ``angle`` (rad) to a neighbour, or a ``height`` (share) less than that."""
+    """Return a mask of facets with an angle (rad) to a neighbour, or a height (share), below these limits."""
     found = sheet.heights < height
     _, sides = edges_of(sheet.facets)
     normals = sheet.normals
@@ -55,12 +55,13 @@ def _misshapen(sheet: Sheet, angle: float, height: float) -> BoolArray:
 
 
 def untangled(sheet: Sheet, stay: IntArray) -> Sheet:
-    """Return the sheet with the points of bad facets in the middle of their neighbours, until no facet is bad.
+    """Return the sheet with points of bad facets moved to the middle of their neighbours, until no facet is bad.
 
-    The points ``stay`` do. Those on sharp edges do at first, and those between other groups remain in their level.
+    The points ``stay`` do not move. Points on sharp edges do not move at first, and those between other groups remain
+    in their level.
 
     Raises:
-        TangledError: if that does not mend them.
+        TangledError: if bad facets remain.
     """
     edges, sides = edges_of(sheet.facets)
     groups, count = sheet.group[sides], len(sheet.points)
@@ -83,7 +84,7 @@ def untangled(sheet: Sheet, stay: IntArray) -> Sheet:
         if number == _WIDER:
             fixed[:] = False
             fixed[stay] = True
-            # What is not mended moves on from here.
+            # Facets that remain bad are the start of the next rounds.
             stubborn = sheet.points[sheet.facets[bad]]
         moved = np.zeros(count)
         moved[sheet.facets[bad]] = 1.0

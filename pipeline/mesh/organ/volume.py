@@ -1,4 +1,4 @@
-"""Tetrahedra within a closed surface of triangles, and on both sides of others inside it, which stay as they are."""
+"""Tetrahedra within a closed surface of triangles, and on both sides of surfaces inside it, all unchanged."""
 
 from collections.abc import Sequence
 
@@ -14,12 +14,12 @@ from pipeline.mesh.reason import reason
 from pipeline.shapes.triangles import enclosed
 from pipeline.stages import stage
 
-# Cells below this quality are mended; below gmsh's own 0.3, flat ones may stay that lie in the surface with all four
-# corners, and whose curved edges then fold them.
+# Cells below this quality are optimised. With gmsh's default, 0.3, flat cells may remain that have all four corners in
+# the surface; their curved edges then fold them.
 _OPTIMISED = 0.5
 _TRIANGLE, _TETRAHEDRON = 2, 4
 MODEL_SIZE = 100.0  # extent of the model, in its unit
-# Tetrahedra fill a surface to rounding, or they are not those of the surface.
+# Relative tolerance on the volume of tetrahedra against that of their surface.
 _SAME = 1e-9
 
 Surface = tuple[FloatArray, IntArray]
@@ -31,12 +31,12 @@ def fill(
 ) -> tuple[FloatArray, IntArray, IntArray | None]:
     """Return the points (n, 3) and cells (m, 4) of a mesh, and the number (m) of the surface around each cell.
 
-    The first points, and the boundary, are those given; then come those of the ``inner`` surfaces, points and facets
-    of each, which are closed and clear of one another. The numbers count these from 1, and are 0 outside of them; they
-    are None where there are none.
+    The first points, and the boundary, are those given; then come the ``inner`` surfaces, points and facets of each,
+    which are closed and do not touch each other. Surface numbers count these from 1, and are 0 outside of them; they
+    are None without inner surfaces.
 
     Raises:
-        MeshError: with gmsh's own words, if it fails.
+        MeshError: with gmsh's own message, if it fails.
     """
     scale = float(np.ptp(points, axis=0).max()) / MODEL_SIZE
     surfaces = [(points, facets), *inner]
@@ -68,7 +68,7 @@ def fill(
 
 
 def _add_volumes(surfaces: Sequence[Surface]) -> list[int]:
-    """Add the volume inside the first surface and outside the others, and that inside each of these, to the model."""
+    """Add to the model the volume between the first surface and the others, and that inside each of the others."""
     model, skins, first = gmsh.model, [], 1
     for points, facets in surfaces:
         skin = model.addDiscreteEntity(2)
@@ -83,7 +83,7 @@ def _add_volumes(surfaces: Sequence[Surface]) -> list[int]:
 
 
 def _named(words: str, scale: float) -> MeshError:
-    """Return gmsh's failure, with the places (m) of the nodes that it blames, if any."""
+    """Return the error for a failure of gmsh, with the places (m) of the nodes that it names, if any."""
     nodes = gmsh.model.mesh.getLastNodeError()
     if not len(nodes):
         return MeshError(words)
@@ -92,7 +92,7 @@ def _named(words: str, scale: float) -> MeshError:
 
 
 def _check_filled(points: FloatArray, cells: IntArray, numbers: IntArray, inner: Sequence[Surface]) -> None:
-    """Refuse tetrahedra that fill more or less than the ``inner`` surfaces whose numbers they have."""
+    """Check that the tetrahedra with the number of an ``inner`` surface fill its volume."""
     corners = points[cells]
     volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
     filled = np.bincount(numbers, volumes)[1:]
@@ -104,7 +104,7 @@ def _check_filled(points: FloatArray, cells: IntArray, numbers: IntArray, inner:
 def _first(
     points: FloatArray, scaled: FloatArray, found: FloatArray, place: FloatArray, cells: IntArray
 ) -> tuple[FloatArray, IntArray]:
-    """Number the points of the surface as they were given, whatever gmsh made of them, then the others."""
+    """Number the points of the surface as they were given, then the others."""
     used = np.zeros(len(place), dtype=bool)
     used[cells] = True
     given = _rows(scaled)
