@@ -135,10 +135,10 @@ def test_a_study_names_any_file_that_can_be_read(folders, file, epsmesh):
     [
         ("none.stl", "cannot be read: No such file"),
         ("~/x.stl", "cannot be read: No such file"),  # no home is meant
-        ("/dev/zero", "it is no plain file"),
-        ("../meshes/zero.stl", "it is no plain file"),
-        ("../meshes/pipe.stl", "it is no plain file"),
-        ("..", "it is no plain file"),
+        ("/dev/zero", "it is not a regular file"),
+        ("../meshes/zero.stl", "it is not a regular file"),
+        ("../meshes/pipe.stl", "it is not a regular file"),
+        ("..", "it is not a regular file"),
         ("/etc/passwd", "read are .stl, .ply, .obj"),
     ],
 )
@@ -330,9 +330,9 @@ def test_the_data_of_an_image_lie_where_its_header_says_and_are_what_it_says(fol
     for file in (strange / "data.gz", "../../strange/data.gz"):
         np.testing.assert_array_equal(own, image(f"data file: {file} ").triangles.points)
     for file in ("none.gz", "/dev/zero"):
-        with pytest.raises(SurfaceError, match=r"file of its data.*cannot be read"):
+        with pytest.raises(SurfaceError, match=r"data file of its header.*cannot be read"):
             image(f"data file: {file}")
-    with pytest.raises(SurfaceError, match="become more than its header says"):
+    with pytest.raises(SurfaceError, match="more data than its header says"):
         image(data=gzip.compress(bytes(200_000)))
     with pytest.raises(SurfaceError, match="skips 1,000,000,000,000 lines"):
         image("line skip: 1000000000000", data=packed)

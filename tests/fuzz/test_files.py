@@ -119,7 +119,7 @@ def test_step_files_are_looked_through_before_the_kernel_reads_them(data):
 
 @pytest.mark.parametrize("point", [b"(0.(0.,1.E1)", b"(0.,0.)", b"(0.,0.,1.E1,2.)", b"(0.,0.,up)", b"()"])
 def test_a_point_that_is_none_is_named(point):
-    with pytest.raises(SurfaceError, match="is no point"):
+    with pytest.raises(SurfaceError, match="is not a point"):
         named_faces(entities_of(STEP.replace(b"(0.,0.,1.E1)", point)))
 
 

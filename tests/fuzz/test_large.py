@@ -79,7 +79,7 @@ LONGER = {
     "zeros.stl": ("surface", sparse(bytes(80) + _FACETS), "is 0 mm across"),
     "noise.stl": ("surface", noise, "points are not finite"),
     "text.stl": ("surface", repeated(b"solid a\n", _STL), "truncated"),
-    "text.ply": ("surface", repeated(_PLY, b"0.1 0.25 0.3 \n"), "which is no number of a point"),
+    "text.ply": ("surface", repeated(_PLY, b"0.1 0.25 0.3 \n"), "which is not an integer"),
     "facets.obj": ("surface", repeated(b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", b"f 1 2 3\n"), "12,500,000 facets, more than"),
     "points.step": ("step", repeated(b"ISO-10303-21;\nDATA;\n", _POINT, b"ENDSEC;\n"), "truncated"),
 }  # fmt: skip

@@ -117,7 +117,7 @@ def test_the_place_of_a_probe_is_that_of_what_it_covers(tmp_path):
 
 
 def test_a_place_beside_the_body_is_refused(a_body):
-    with pytest.raises(PlaceError, match="reaches from"):
+    with pytest.raises(PlaceError, match="extends from"):
         a_body.frame((70e-3, 0.0))
 
 

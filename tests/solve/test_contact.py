@@ -179,7 +179,7 @@ def test_what_may_touch_may_be_held_as_long_as_it_does_not():
     flat = Tool(lambda x: np.zeros(len(x)), lambda x: np.ones(len(x), dtype=bool))
     with (
         pressed(flat, mesh=COARSE | column) as (problem, law, movement),
-        pytest.raises(ContactError, match="runs into"),
+        pytest.raises(ContactError, match="reaches the fixed part"),
     ):
         problem.solve(law, movement)
 

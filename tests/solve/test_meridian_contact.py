@@ -50,7 +50,7 @@ def test_a_flat_tool_wider_than_a_column_covers_it():
     known = MeridianProblem(column, Conditions(bonded=False)).solve(LAW, Movement.along((0.0, 0.0, -0.1)))
     assert found.response.stiffness == pytest.approx(known.response.stiffness, rel=1e-9)
     assert found.contact.area == pytest.approx(4 * pi, rel=1e-12)
-    with pytest.raises(SolveError, match="edge of what is kept"):
+    with pytest.raises(SolveError, match="edge of the modelled part"):
         pressed(RoundTool(Rounded(0.0, 200.0).height, 200.0), 0.1, column)
 
 
@@ -126,7 +126,7 @@ def test_a_disc_on_a_stiff_skin_lifts_off_in_a_ring():
 
 
 def test_contact_as_wide_as_the_body_is_refused():
-    with pytest.raises(SolveError, match="edge of what is kept"):
+    with pytest.raises(SolveError, match="edge of the modelled part"):
         pressed(RoundTool(Rounded(0.0, 500.0).height, 500.0), 0.5, Meridian(5.0, 5.0, 1.0))
 
 

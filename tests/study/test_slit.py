@@ -29,7 +29,7 @@ def problems(**changes):
                                                                   "incision": "5.1 mm"}, "body": LAYERED}),
         ("probe.slice", "slides along without force", {"probe": {**SLIT, "contact": "frictionless",
                                                                 "slice": "0.1 mm"}}),
-        ("probe.ahead", "leaves nothing of the blade in the slit", {"probe": {**SLIT, "incision": "1 mm"}}),
+        ("probe.ahead", "leaves no part of the blade in the slit", {"probe": {**SLIT, "incision": "1 mm"}}),
         ("probe.ahead", "there is no incision", {"probe": {**BLADE, "ahead": "1 mm"}}),
         ("probe.ends", "there is no incision", {"probe": {**BLADE, "ends": "open"}}),
         ("probe.incision", "through the whole body", {"probe": {**SLIT, "incision": "20 mm"}}),

@@ -101,5 +101,5 @@ def test_the_data_that_a_header_names_count(folder):
     assert second.volume < 0.8 * first.volume
     assert image_again(path).triangles.hash == second.hash
     (folder / "ball.raw.gz").unlink()
-    with pytest.raises(SurfaceError, match=r"file of its data, .*ball\.raw\.gz`, cannot be read: No such file"):
+    with pytest.raises(SurfaceError, match=r"data file of its header, .*ball\.raw\.gz`, cannot be read: No such file"):
         image_again(path)

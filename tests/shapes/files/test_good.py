@@ -114,7 +114,7 @@ def test_copies_of_facets_and_facets_in_a_point_are_left_out_and_told(tmp_path: 
     points, facets = BALL
     loaded = _load(tmp_path, "copies.ply", ply((points, np.concatenate([facets, facets[:4], facets[:2, [0, 0, 1]]]))))
     assert loaded.triangles.volume == pytest.approx(VOLUME, rel=1e-6)
-    assert any("4 facets that are there twice" in notice for notice in loaded.notices)
+    assert any("4 duplicate facets" in notice for notice in loaded.notices)
     assert any("2 facets with two corners in one point" in notice for notice in loaded.notices)
 
 
@@ -135,14 +135,14 @@ def test_a_point_on_an_edge_costs_a_facet_without_area_which_is_turned_and_told(
     points = np.concatenate([points, [(points[a] + points[b]) / 2]])
     facets = np.concatenate([facets[1:], [(a, middle, c), (middle, b, c), (a, b, middle)]])
     loaded = _load(tmp_path, "flat.obj", obj((points, facets)))
-    assert any("without area turned" in notice for notice in loaded.notices)
+    assert any("without area flipped" in notice for notice in loaded.notices)
 
 
 def test_points_without_facets_and_bytes_after_the_last_one_do_no_harm(tmp_path: Path):
     loaded = _load(tmp_path, "loose.ply", ply((np.concatenate([[(500, 0, 0)], BALL[0]]), BALL[1] + 1)))
     assert loaded.triangles.points.shape == (642, 3)
     assert loaded.triangles.extent == pytest.approx(0.08)
-    assert any("are not read" in notice for notice in _load(tmp_path, "longer.stl", stl(BALL) + b"abc").notices)
+    assert any("are ignored" in notice for notice in _load(tmp_path, "longer.stl", stl(BALL) + b"abc").notices)
 
 
 def test_a_file_is_read_again_only_when_it_has_changed(tmp_path: Path):

@@ -136,11 +136,11 @@ def test_crumbs_hollows_and_the_image_s_end_are_told(tmp_path: Path):
     values[0:2, 0:2, 0:2] = 2
     values[25, 25, 25] = 7
     loaded = load_image(_nifti(tmp_path / "scan.nii", values, affine), 2)
-    assert any("1 pieces apart" in notice for notice in loaded.notices)
+    assert any("1 pieces besides" in notice for notice in loaded.notices)
     assert any("1 voxels that it encloses" in notice for notice in loaded.notices)
     assert loaded.triangles.volume == pytest.approx(VOLUME, rel=0.01)
     half = load_image(_nifti(tmp_path / "half.nii", values[25:], _affine(2.0, (10, -70, 5))), 2)
-    assert any("image's end on 1 of 6 sides" in notice for notice in half.notices)
+    assert any("image's boundary on 1 of 6 sides" in notice for notice in half.notices)
     more = np.pi * AXES[1] * AXES[2] * (CENTRE[0] - 9.0) * 1e-9  # the outermost voxels reach to x = 9 mm
     assert half.triangles.volume == pytest.approx(VOLUME / 2 + more, rel=0.01)
 
@@ -156,16 +156,16 @@ def test_what_is_no_label_map_is_refused(scan: Path, tmp_path: Path):
     files: dict[str, tuple[Any, int, str]] = {
         "missing.nii": (values, 5, "no voxel has label 5; there are 2"),
         "nothing.nii": (values * 0, 1, "all are 0"),
-        "grey.nii": (values * np.float32(0.37), 1, "no whole numbers"),
+        "grey.nii": (values * np.float32(0.37), 1, "not integers"),
         "times.nii": (np.stack([values, values], 3), 2, "4 dimensions"),
         "two.nii": (two, 2, "which one is meant"),
         "hollow.nii": (shell, 2, "encloses"),
-        "one.nii": ((values * 0)[:1, :1, :1] + 2, 2, "thinner than the filter"),
+        "one.nii": ((values * 0)[:1, :1, :1] + 2, 2, "thinner than the width of the filter"),
         "truncated.nii.gz": (scan.read_bytes()[:300], 2, "cannot be read as NIfTI"),
         "short.nii.gz": (broken, 2, "cannot be read as NIfTI"),
         "letter.nrrd": (b"Dear colleague", 2, "cannot be read as NRRD"),
         "empty.nii": (b"", 2, "is empty"),
-        "organ.mha": (b"x", 2, "label maps are read from"),
+        "organ.mha": (b"x", 2, "allowed label maps are"),
     }
     for name, (content, label, words) in files.items():
         path = tmp_path / name
