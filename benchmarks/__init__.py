@@ -1,1 +1,1 @@
-"""Measurements of speed and of accuracy, each in one run on one machine: ratios, not seconds, are what they say."""
+"""Benchmarks of speed and accuracy. Each runs on one machine at one time: compare its ratios, not its seconds."""

@@ -1,4 +1,4 @@
-"""What campaigns share: an end by Ctrl-C, a line for each result as soon as it exists, and data for JSON."""
+"""Helpers of campaigns: an end by Ctrl-C, a printed line for each result, and data for JSON."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -16,7 +16,7 @@ _INTERRUPTED = 130
 
 @contextmanager
 def ended_soon() -> Iterator[None]:
-    """End with status 130, on all ranks, if the program is asked to end."""
+    """End with status 130, on all ranks, if the program is interrupted."""
     workflow.load_solvers()
     try:
         with workflow.abort_on_exception(MPI.COMM_WORLD), workflow.ended_soon():
@@ -27,7 +27,7 @@ def ended_soon() -> Iterator[None]:
 
 
 def each(items: Iterable[T], words: Callable[[T], str] | None) -> Iterator[T]:
-    """Yield ``items``, each with its line printed at once, if there are ``words`` for it."""
+    """Yield ``items``; with ``words``, print a line for each at once."""
     for item in items:
         if words is not None:
             print(words(item), flush=True)
@@ -35,7 +35,7 @@ def each(items: Iterable[T], words: Callable[[T], str] | None) -> Iterator[T]:
 
 
 def finite(value: Any) -> Any:
-    """Return plain data with None for what JSON has no number for."""
+    """Return plain data with None for numbers that JSON does not have."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,10 +1,10 @@
-"""What ranks tell each other in one iteration, and how the work is shared out: one large case on 1 to 8 ranks.
+"""Communication and load balance of one iteration: one large case on 1 to 8 ranks.
 
     python -m benchmarks.communication [--ranks 1 2 4 8] [--fine "3 mm"] [--degree 2]
 
-Messages, bytes and reductions are counted at MPI's own interface (``communication.c``), and so is the processor's time
-outside of it: that tells what each rank computes, on a machine that is busy or has fewer cores than ranks, too. The
-forces must agree.
+Messages, bytes and reductions are counted at MPI's profiling interface (``communication.c``). Processor time outside
+MPI is measured there, too: it is the computation of each rank, also on a machine that is busy or has fewer cores than
+ranks. The forces must agree.
 """
 
 import ctypes
@@ -37,7 +37,7 @@ from pipeline.study.load import parse
 _TOLERANCE = 1e-8
 _MPI = ("messages", "bytes", "reductions")
 _BAR = "error bar"
-# What is reported, and how the names of its stages begin.
+# Reported times, and the prefixes of their stages' names.
 _STAGES: dict[str, tuple[str, ...]] = {
     "assembly": ("assembly",),
     "iterating": ("solve / iterations",),
@@ -47,7 +47,7 @@ _STAGES: dict[str, tuple[str, ...]] = {
 
 
 def measure(fine: str, degree: int) -> dict[str, Any]:
-    """Solve the case on all ranks; return what was counted, the largest of all ranks and their sum; collective."""
+    """Solve the case on all ranks; return the counts, the largest of all ranks and their sum; collective."""
     comm = MPI.COMM_WORLD
     study = LARGE | {"mesh": LARGE["mesh"] | {"fine": fine, "degree": degree}}
     case = parse(study).case(())
@@ -69,7 +69,7 @@ def measure(fine: str, degree: int) -> dict[str, Any]:
 
 
 def _stages() -> dict[str, float]:
-    """Return the processor's seconds of the stages of the solve, and of those of its error bar."""
+    """Return the processor seconds of the stages of the solve, and of those of its error bar."""
     return {
         name: sum(seconds for stage, seconds, _ in stages.table() if stage.startswith(begins))
         for name, begins in _STAGES.items()
@@ -84,7 +84,7 @@ def _counted() -> np.ndarray:
 
 @contextmanager
 def _watched() -> Iterator[dict[str, float]]:
-    """Count what is sent in iterations of conjugate gradients; make stages count the processor's time outside MPI."""
+    """Count messages in iterations of conjugate gradients; stages then count processor time outside MPI."""
     sent, iterate = dict.fromkeys((*_MPI, "iterations"), 0.0), LinearSolver.solve
 
     def counted(solver: LinearSolver, *arguments: Any, **options: Any) -> int:
@@ -104,7 +104,7 @@ def _watched() -> Iterator[dict[str, float]]:
 
 
 def table(runs: list[dict[str, Any]]) -> str:
-    """Return the runs as a table, of the busiest rank if nothing else is said."""
+    """Return the runs as a table; values are those of the busiest rank unless stated otherwise."""
     alone = runs[0]["most"]
     rows = [
         {
@@ -116,7 +116,7 @@ def table(runs: list[dict[str, Any]]) -> str:
             "reductions": run["most"]["reductions"],
             "s of assembly": run["most"]["assembly"],
             "s of iterations": run["most"]["iterating"],
-            "work of the solve shared out": alone["solve"] / run["most"]["solve"],
+            "load balance of the solve": alone["solve"] / run["most"]["solve"],
             "of its error bar": alone[_BAR] / run["most"][_BAR],
         }
         for run in runs

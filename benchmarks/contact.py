@@ -1,10 +1,10 @@
-"""What it takes to find the area of contact: against one that is prescribed on the same mesh, and over many depths.
+"""Cost of unilateral contact, relative to a prescribed footprint on the same mesh, and over many depths.
 
     python -m benchmarks.contact
 
-Seconds are those of a processor, medians of runs that alternate; forms are compiled before. A linear solve is all that
-a frictionless footprint takes on the mesh of a ball: spaces, assembly, set-up and iterations. Found contact is to take
-four of them at most, and the error bar to add what it adds there. About a minute.
+Times are processor seconds, medians of alternating runs; forms are compiled before. A linear solve is the cost of a
+frictionless footprint on the mesh of a ball: spaces, assembly, set-up and iterations. The limit for unilateral contact
+is four linear solves, and for its error bar that of a prescribed footprint. It runs for about a minute.
 """
 
 import time
@@ -35,11 +35,11 @@ _REPEATS = 3
 _BODY = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm", "fixed": "bottom"}
 _BALL = {"shape": "sphere", "radius": "10 mm", "contact": "unilateral"}
 _DEPTHS = [f"{0.05 + 0.2 * n / 11:.6g} mm" for n in range(12)]
-# Ways to solve many depths, with the reductions that each leaves out and whether all have one mesh.
+# Ways to solve many depths: reductions left out, and whether all depths have one mesh.
 _WAYS: dict[str, tuple[tuple[str, ...], bool]] = {
     "a mesh for each depth": (("reuse", "condensed"), False),
     "one mesh, each depth by itself": (("reuse", "condensed"), True),
-    "from the neighbours": (("condensed",), True),
+    "initial guess from neighbouring depths": (("condensed",), True),
     "condensed": ((), True),
 }
 
@@ -49,13 +49,13 @@ def _study(poisson: float, rim: str, depth: str | list[str], **probe: Any) -> di
 
 
 def found(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
-    """Find the area of contact of a case on its mesh; collective."""
+    """Solve a case with unilateral contact on its mesh; collective."""
     with Spaces(body) as spaces, problem_of(spaces, case) as problem:
         return problem.solve(law_of(case), movement_of(case), estimate=estimate)
 
 
 def prescribed(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
-    """Press all that a tool may touch, on the same mesh, as a frictionless punch would; collective."""
+    """Solve with the whole candidate region as a frictionless footprint, on the same mesh; collective."""
     with (
         Spaces(body) as spaces,
         QuasiStaticProblem(spaces, case.mesh.degree, Conditions(bonded=False), case.element) as problem,
@@ -64,7 +64,7 @@ def prescribed(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
 
 
 def in_linear_solves(poisson: float, rim: str = "0.12 mm", repeats: int = _REPEATS) -> dict[str, Any]:
-    """Return what found contact takes in units of a prescribed one, without and with the error bar."""
+    """Return the cost of unilateral contact in units of a prescribed footprint's, without and with the error bar."""
     (case,) = parse(_study(poisson, rim, "0.1 mm")).cases()
     body = mesh_case(case, model_planes(case), MPI.COMM_SELF)
     ways: dict[str, Callable[[], Solution]] = {
@@ -72,7 +72,7 @@ def in_linear_solves(poisson: float, rim: str = "0.12 mm", repeats: int = _REPEA
         for name, solve in (("found", found), ("prescribed", prescribed))
         for what, estimate in (("force", False), ("force and bar", True))
     }
-    solutions = {name: way() for name, way in ways.items()}  # compiles
+    solutions = {name: way() for name, way in ways.items()}  # also compiles
     spent = median_seconds(ways, repeats)
     return {
         "poisson": poisson,
@@ -85,7 +85,7 @@ def in_linear_solves(poisson: float, rim: str = "0.12 mm", repeats: int = _REPEA
 
 
 def sweeps(repeats: int = _REPEATS) -> dict[str, dict[str, float]]:
-    """Return what twelve depths take, mesh and error bars included, in each of the ways; by how much F differs."""
+    """Return the time of twelve depths, with meshes and error bars, in each way, and the difference in F."""
     found = by_turns({name: partial(_sweep, *way) for name, way in _WAYS.items()}, repeats)
     (_, plain), *_ = found["one mesh, each depth by itself"]
     return {
@@ -114,9 +114,9 @@ def main() -> None:
     rows = [in_linear_solves(poisson, repeats=asked.repeats) for poisson in (0.3, 0.49)]
     for row in rows:
         print(
-            f"ball, ν = {row['poisson']:g}, {row['dofs']:,} dofs of {row['element']} elements: contact found in "
-            f"{row['linear solves']:.1f} linear solves (asked: 4), with the error bar {row['with the error bar']:.1f} "
-            "times as long as prescribed contact with its bar"
+            f"ball, ν = {row['poisson']:g}, {row['dofs']:,} dofs of {row['element']} elements: contact takes "
+            f"{row['linear solves']:.1f} linear solves (limit: 4), with the error bar {row['with the error bar']:.1f} "
+            "times a prescribed footprint with its bar"
         )
     depths = sweeps(asked.repeats)
     for name, values in depths.items():

@@ -1,8 +1,8 @@
-"""Do the error bars hold the truth: random scenes and meshes, good and naive, against converged forces.
+"""Coverage of the error bars: random scenes and meshes, good and naive, compared with converged forces.
 
     python -m benchmarks.coverage [--family NAME] [--count N] [--seed N] [--json]
 
-Scenes are those of :mod:`benchmarks.families`. The exit status is 1 if the bars do not hold, or are idle.
+Scenes are those of :mod:`benchmarks.families`. The exit status is 1 if coverage is too low, or the bars too wide.
 """
 
 import json
@@ -29,16 +29,16 @@ from pipeline.verify.sections import Section
 SEED, COUNT = 2026, 160
 # A mesh is naive if its elements at the probe's edge are larger than this, in units of the half width of contact.
 _NAIVE = 0.35
-# What is asked of the bars of every group of trials that is large enough to tell; of the median, unless a family of
-# scenes asks for another: where F is no bound, a bar has to be on both sides.
+# Limits for every group with enough trials: coverage, and median bar over error. A family of scenes may have its own
+# limit of the median: where F is no bound, a bar applies to both sides.
 HELD, IDLE, ENOUGH = 0.95, 2.0, 40
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One random case: its force and error bar, and the truth with its own; or the message of what failed.
+    """One random case: its force and error bar, and the converged force with its own; or the message of a failure.
 
-    ``kind`` is the degree and the element, ``mesh`` "graded" or "naive"; a case is ``refused`` if its bar says that the
+    ``kind`` is the degree and the element, ``mesh`` "graded" or "naive". A case is ``refused`` if its bar says that the
     force is not known.
     """
 
@@ -54,40 +54,40 @@ class Trial:
 
     @property
     def error(self) -> float:
-        """The larger of those relative to the force and to the truth."""
+        """The error relative to the force, or to the converged force if that is larger."""
         return max(abs(self.truth / self.force - 1), abs(self.force / self.truth - 1))
 
     @property
     def is_held(self) -> bool:
-        """Whether the bar holds the truth, with no allowance for the truth's own error."""
+        """Whether the bar covers the converged force, without an allowance for that force's own error."""
         return self.error <= self.bar
 
     @property
     def ratio(self) -> float:
-        """How much larger the bar is than the error."""
+        """Bar over error."""
         return self.bar / self.error
 
 
 @dataclass(frozen=True)
 class Group:
-    """Trials of one kind, of which those that were refused say nothing of the bars."""
+    """Trials of one kind; refused trials do not count for the bars."""
 
     name: str
     trials: tuple[Trial, ...]
 
     @property
     def served(self) -> tuple[Trial, ...]:
-        """Those with a force."""
+        """Trials with a force."""
         return tuple(trial for trial in self.trials if not trial.refused)
 
     @property
     def held(self) -> int:
-        """How many bars hold the truth."""
+        """Number of bars that cover the converged force."""
         return sum(trial.is_held for trial in self.served)
 
     @property
     def share(self) -> float:
-        """Share of the bars that hold the truth."""
+        """Share of the bars that cover the converged force."""
         return self.held / len(self.served) if self.served else nan
 
     @property
@@ -98,17 +98,17 @@ class Group:
 
     @property
     def worst(self) -> float:
-        """The largest error, in bars."""
+        """The largest error, in units of its bar."""
         return max((1 / trial.ratio for trial in self.served if not trial.message), default=nan)
 
     def is_met(self, idle: float) -> bool:
-        """Tell whether the bars are 95 % bars, and not idle ones: their median at most ``idle`` errors."""
+        """Return whether coverage is 95 %, and the median bar at most ``idle`` errors."""
         return self.share >= HELD and self.ratio <= idle
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """What all trials say of the bars."""
+    """Coverage of the bars in all trials."""
 
     trials: tuple[Trial, ...]
     idle: float = IDLE
@@ -133,13 +133,13 @@ class Coverage:
 
     @property
     def is_met(self) -> bool:
-        """Whether all bars together, and those of every group that is large enough, are what they should be."""
+        """Whether all bars together, and those of every group with enough trials, are within the limits."""
         return all(
             group.is_met(self.idle) for group in self.groups if len(group.served) >= ENOUGH or group.name == "all"
         )
 
     def __str__(self) -> str:
-        """The table, a line for each group."""
+        """The table, one line per group."""
         lines = [_LINE.format("", "held", "", "bar / |error|", "worst", "refused")]
         lines += [
             _LINE.format(
@@ -162,7 +162,7 @@ _LINE = "{:32} {:>12} {:>7} {:>14} {:>6} {:>8}"
 
 
 def trials(comm: MPI.Comm, count: int = COUNT, seed: int = SEED, family: str = "design") -> Iterator[Trial]:
-    """Yield the trials of ``count`` random scenes of a family; the same seed gives the same ones; collective."""
+    """Yield the trials of ``count`` random scenes of a family, reproducible by the seed; collective."""
     random = np.random.default_rng(seed)
     thrown = FAMILIES[family]
     done = 0
@@ -173,7 +173,7 @@ def trials(comm: MPI.Comm, count: int = COUNT, seed: int = SEED, family: str = "
         }
         try:
             case, truth = _solve(comm, scene, mesh, ("axisymmetric",)), _solve(comm, scene, truth_mesh)
-        except StudyError:  # the dice made no sense: a footprint over the edge, a ratio that locks
+        except StudyError:  # an invalid draw: a footprint over the edge, a ratio that locks
             continue
         done += 1
         trial = _trial(scene, mesh, case, truth)
@@ -183,7 +183,7 @@ def trials(comm: MPI.Comm, count: int = COUNT, seed: int = SEED, family: str = "
 
 
 def _of_release(trial: Trial, case: Record, truth: Record) -> Trial:
-    """Return the trial of the energy that a slit's front releases, of the scene of that of its force."""
+    """Return a trial of the energy that a slit's front releases, from the trial of its force."""
     degree, element = trial.kind
     return replace(
         trial,
@@ -235,7 +235,7 @@ def _name(scene: Section, mesh: Section) -> str:
 
 
 def _size(body: Section) -> str:
-    """Write how large a body is."""
+    """Return the size of a body as text."""
     if body["shape"] == "surface":
         return str(body["file"])
     if body["shape"] == "cylinder":
@@ -244,7 +244,7 @@ def _size(body: Section) -> str:
 
 
 def _regions(body: Section) -> str:
-    """Write what a body is made of besides its material."""
+    """Return the regions of a body as text."""
     layers, inclusions = body.get("layer", ()), body.get("inclusion", ())
     sizes = [piece["thickness"] for piece in layers]
     sizes += [f"{p.get('radius') or ' × '.join(p['axes'])} at {' '.join(p['at'])}" for p in inclusions]

@@ -1,6 +1,6 @@
-"""Families of random scenes: ranges and shares, and what draws from them. The same seed gives the same scenes.
+"""Families of random scenes: ranges, shares, and drawing functions. The same seed gives the same scenes.
 
-Lengths are in mm, and in units of half the probe's or the contact's width, 1 mm, unless a family says otherwise.
+Lengths are in mm. The unit is half the width of the probe or of the contact, 1 mm, unless a family says otherwise.
 """
 
 import hashlib
@@ -23,9 +23,9 @@ from pipeline.verify.star import directions, star_file
 Range = tuple[float, float]
 Thrown = tuple[Section, Section]
 
-# Displacement elements of degree 1 are for Poisson's ratios less than this.
+# Poisson's ratio below which displacement elements of degree 1 are allowed.
 MOST_STRAIGHT = 0.45
-# A length without any bound.
+# An effectively unbounded length.
 _FAR = 60.0
 _BONDED = ("bonded", "frictionless")
 _HELD = ("bottom", "bottom", "sides", "bottom+sides")
@@ -33,52 +33,52 @@ _POISSON = (0.0, 0.2, 0.3, 0.4, 0.45, 0.48, 0.495, 0.5)
 _TO_THE_LIMIT = (0.0, 0.2, 0.3, 0.4, 0.45, 0.47, 0.49, 0.495, 0.499, 0.4999, 0.5)
 _OF_TOOLS = (0.0, 0.2, 0.3, 0.4, 0.45, 0.47, 0.49, 0.495, 0.499, 0.5)
 _OF_ORGANS = (0.2, 0.3, 0.4, 0.45, 0.47, 0.49, 0.499)
-# Kinds of scenes, with their share of the cases.
+# Kinds of scenes, with their shares of the cases.
 _DESIGNS = {"cylinder": 0.32, "layer": 0.15, "box": 0.18, "off centre": 0.12, "blade": 0.23}
 _CONTACTS = {"curved": 0.3, "layered": 0.35, "off axis": 0.2, "off the pole": 0.15}
-# Sizes of meshes, graded to the edge, or naive: as one would draw them who knows nothing of the edge.
+# Sizes of meshes: graded to the edge, or naive, as drawn without knowledge of the singularity.
 _GRADED = {"rim": (0.08, 0.3), "growth": (0.35, 0.6)}
 _NAIVE = {"rim": (0.4, 1.2), "growth": (0.5, 1.2), "fine": (1.2, 3.0)}
 _GRADED_TOOLS = {"rim": (0.1, 0.3), "growth": (0.35, 0.6)}
 _NAIVE_TOOLS = {"rim": (0.4, 0.8), "growth": (0.5, 1.0), "fine": (1.0, 3.0)}
 _GRADED_SLITS = {"rim": (0.12, 0.17), "growth": (0.5, 0.7)}
 _NAIVE_SLITS = {"rim": (0.2, 0.5), "growth": (0.5, 1.0), "fine": (1.0, 3.0)}
-# Points of an organ's surface: facets about as long as a tenth of the radius, or less. Waves on it: how many, from how
-# long to how short by their number round it, and their height (of the radius).
+# Points of an organ's surface: facets are at most about a tenth of the radius. Waves on it: how many, range of their
+# number around the body, and height (in units of the radius).
 _POINTS = (1500, 6000)
 _WAVES, _NUMBERS, _HEIGHT = 8, (1.5, 6.0), 0.08
 
 
 class Dice:
-    """A generator of random numbers, and what scenes ask of it."""
+    """A random generator with the draws that scenes need."""
 
     def __init__(self, random: np.random.Generator):
         self.random = random
 
     def log(self, low: float, high: float) -> float:
-        """Return a number to three places whose logarithm is uniform."""
+        """Return a number with uniform logarithm, to three places."""
         return float(np.round(np.exp(self.random.uniform(np.log(low), np.log(high))), 3))
 
     def between(self, low: float, high: float, places: int | None = None) -> float:
-        """Return a number, uniform, to so many places."""
+        """Return a uniform number, to the given decimal places."""
         value = float(self.random.uniform(low, high))
         return value if places is None else round(value, places)
 
     def chance(self, share: float) -> bool:
-        """Return whether something of this share of the cases happens."""
+        """Return true with probability ``share``."""
         return bool(self.random.random() < share)
 
     def one_of(self, choices: Sequence[Any]) -> Any:
-        """Return one, each as likely; numpy's types become Python's."""
+        """Return one of the choices, all equally likely, as a Python type."""
         return self.random.choice(choices).item()
 
     def kind(self, shares: Mapping[str, float]) -> str:
-        """Return one of those whose shares are given."""
+        """Return one of the keys, with the given probabilities."""
         return str(self.random.choice(list(shares), p=list(shares.values())))
 
 
 def mm(length: float, places: str = "") -> str:
-    """Write a length."""
+    """Return a length as text."""
     return f"{length:{places}} mm"
 
 
@@ -87,7 +87,7 @@ def _tissue(poisson: float, young: float = 10) -> Section:
 
 
 def _other_tissue(dice: Dice) -> Section:
-    """Return a tissue up to thirty times as stiff or as soft as the rest."""
+    """Return a tissue up to thirty times stiffer or softer than the rest."""
     return _tissue(young=dice.log(0.33, 300.0), poisson=dice.one_of(_POISSON))
 
 
@@ -100,7 +100,7 @@ def _box(*size: float, fixed: str = "bottom") -> Section:
 
 
 def _sizes(rim: float, growth: float, fine: float, coarse: float = _FAR, degree: int = 2) -> Section:
-    """Return a mesh of a whole body."""
+    """Return the mesh section of a whole body."""
     return {
         "epsilon": "full",
         "outside": "coarse",
@@ -113,14 +113,14 @@ def _sizes(rim: float, growth: float, fine: float, coarse: float = _FAR, degree:
 
 
 def _drawn_sizes(dice: Dice, graded: Mapping[str, Range], naive: Mapping[str, Range], far: float) -> Section:
-    """Return a mesh, graded (six of ten) or naive, whose sizes are in those ranges."""
+    """Return a mesh, graded (six of ten) or naive, with sizes drawn from the given ranges."""
     ranges = graded if dice.chance(0.6) else naive
     drawn: dict[str, Any] = {name: dice.between(*range_) for name, range_ in ranges.items()}
     return _sizes(**{"fine": far, "coarse": far} | drawn)
 
 
 def _mesh_of_design(dice: Dice, scene: Section) -> Section:
-    """Return a mesh for a prescribed footprint; of round scenes some keep only what is within ε."""
+    """Return a mesh for a prescribed footprint; some axisymmetric scenes keep only the part within ε."""
     degree = int(dice.one_of([1, 2, 2, 3]))
     if scene["material"]["poisson"] >= MOST_STRAIGHT:
         degree = max(degree, 2)
@@ -135,7 +135,7 @@ def _mesh_of_design(dice: Dice, scene: Section) -> Section:
 
 
 def _not_straight(scene: Section, mesh: Section) -> Thrown:
-    """Raise the degree where a piece of the body needs it."""
+    """Raise the degree if a region of the body requires it."""
     body = scene["body"]
     pieces = (scene["material"], *body.get("layer", ()), *body.get("inclusion", ()))
     if max(piece["poisson"] for piece in pieces) >= MOST_STRAIGHT:
@@ -170,7 +170,7 @@ def _ellipsoidal(dice: Dice, low: float, high: float) -> Section:
 
 
 def design(dice: Dice) -> Thrown:
-    """Cylinders, layers, boxes, discs off the axis and blades: what the bars are made for."""
+    """Cylinders, layers, boxes, discs off the axis and blades: the scenes for which the bars were calibrated."""
     scene = _scene_of_design(dice)
     return scene, _mesh_of_design(dice, scene)
 
@@ -192,7 +192,7 @@ def ellipses(dice: Dice) -> Thrown:
 def proportions(dice: Dice) -> Thrown:
     """Cylinders of any proportions under a disc of radius a on the axis; half of them nearly incompressible.
 
-    The mesh is fine within 2.5 a. The truth costs nothing: hundreds of them tell of each kind of element and mesh.
+    The mesh is fine within 2.5 a. The converged force is cheap, so that each kind of element and mesh gets hundreds.
     """
     a = dice.log(0.7, 5.0)
     poisson = dice.between(0, 0.45, 3) if dice.chance(0.5) else dice.between(0.45, 0.497, 3)
@@ -242,7 +242,7 @@ def regions(dice: Dice) -> Thrown:
 
 
 def _scene_of_organ(dice: Dice) -> Section:
-    """Return a lumpy body of triangles held over its lower part, and a tool on what is free of it."""
+    """Return a lumpy body of triangles whose lower part is fixed, and a tool on its free part."""
     surface = _lumpy(dice)
     low, high = surface[:, 2].min(), surface[:, 2].max()
     held = low + dice.between(0.15, 0.4) * (high - low)
@@ -261,13 +261,13 @@ def _scene_of_organ(dice: Dice) -> Section:
 
 
 def organs(dice: Dice) -> Thrown:
-    """Bodies of triangles like organs, lumpy and of any proportions, pressed anywhere on their upper side."""
+    """Organ-like bodies of triangles, lumpy and of any proportions, under a tool anywhere on their upper side."""
     scene = _scene_of_organ(dice)
     return scene, _mesh_of_design(dice, scene)
 
 
 def tumours(dice: Dice) -> Thrown:
-    """The same with an inclusion between the middle of the body and the place that is touched; some are refused."""
+    """Organ-like bodies with an inclusion between their centre and the contact; some are refused."""
     scene = _scene_of_organ(dice)
     mesh = _mesh_of_design(dice, scene)
     touched = np.array([float(length.removesuffix(" mm")) for length in scene["probe"]["at"]])
@@ -289,7 +289,7 @@ def _lumpy(dice: Dice) -> FloatArray:
 
 
 def _written(points: FloatArray) -> Path:
-    """Return the file of the surface through ``points``, each seen from the origin; it lives as long as the process."""
+    """Write the star-shaped surface through ``points`` to a temporary file of this process; return its path."""
     content = star_file(points)
     path = Path(_folder().name) / f"{hashlib.sha256(content).hexdigest()[:8]}.stl"
     path.write_bytes(content)
@@ -302,7 +302,7 @@ def _folder() -> TemporaryDirectory[str]:
 
 
 def _ball(dice: Dice, largest: float) -> Section:
-    """Return a ball so deep that it touches 1 mm of a half-space."""
+    """Return a ball at the depth of a contact radius of 1 mm on a half-space."""
     radius = dice.log(5.0, largest)
     return {"shape": "sphere", "radius": mm(radius), "depth": mm(1 / radius, ".6g")}
 
@@ -314,7 +314,7 @@ def _cone(dice: Dice) -> Section:
 
 
 def tools(dice: Dice) -> Thrown:
-    """Balls, cones and discs whose contact is found, on the axis of cylinders; the truth is that of the meridian."""
+    """Balls, cones and discs in unilateral contact, on the axis of cylinders; the truth is axisymmetric."""
     body = _cylinder(dice.log(3.5, 20.0), dice.log(0.5, 20.0), dice.one_of(["bottom", "bottom+sides"]))
     material, kind = _tissue(dice.one_of(_OF_TOOLS)), dice.one_of(["sphere", "sphere", "cone", "cone", "disc"])
     probe: Section = {"shape": "disc", "radius": "1 mm", "depth": "0.05 mm"}
@@ -325,7 +325,7 @@ def tools(dice: Dice) -> Thrown:
 
 
 def contact(dice: Dice) -> Thrown:
-    """Balls and cones whose contact is found, on ellipsoids, layers, and off the axis of their body."""
+    """Balls and cones in unilateral contact, on ellipsoids, layers, and off the axis of their body."""
     kind = dice.kind(_CONTACTS)
     if kind == "layered":
         height = dice.log(2.5, 12.0)
@@ -355,7 +355,7 @@ def contact(dice: Dice) -> Thrown:
 
 
 def wedges(dice: Dice) -> Thrown:
-    """Wedges, sharp and rounded, on boxes and cylinders, so deep that they touch 1 mm to either side."""
+    """Wedges, sharp and rounded, on boxes and cylinders, at the depth of a half contact width of 1 mm."""
     length, height = dice.log(3.0, 16.0), dice.log(1.5, 12.0)
     wide = 1.3 * length + dice.log(3.0, 12.0)
     body = _box(wide, dice.log(9.0, 30.0), height)
@@ -379,7 +379,7 @@ def wedges(dice: Dice) -> Thrown:
 
 
 def slits(dice: Dice) -> Thrown:
-    """Blades in slits, whose faces stick to them or slide; the unit is how far the slit runs ahead of the blade."""
+    """Blades in slits, bonded or sliding; the unit is how far the slit extends ahead of the blade."""
     tip, length = dice.log(1.0, 3.0), dice.log(1.5, 4.0)
     width, height = dice.log(8.0, 16.0), tip + 1 + dice.log(1.0, 6.0)
     is_open, bonded = dice.chance(0.3), dice.chance(0.5)
@@ -404,11 +404,11 @@ def slits(dice: Dice) -> Thrown:
 
 @dataclass(frozen=True)
 class Family:
-    """``draw`` returns the sections of a scene and the section of its mesh.
+    """A family: ``draw`` returns the sections of a scene and the section of its mesh.
 
-    ``truth`` is the accuracy of what is held to be true. It is to be known better than the best of the cases' errors:
-    ten times, where that does not take minutes. ``idle`` is how many errors bars may be in the median: more where F is
-    no bound, and bars are on both sides.
+    ``truth`` is the accuracy of the converged force. It should be ten times smaller than the errors of the best cases,
+    unless that takes minutes. ``idle`` is the limit of the median bar over error: larger where F is no bound, and bars
+    apply to both sides.
     """
 
     draw: Callable[[Dice], Thrown]
@@ -416,7 +416,7 @@ class Family:
     idle: float = 2.0
 
     def throw(self, random: np.random.Generator) -> Thrown:
-        """Return a scene and a mesh, the same for the same state of the generator."""
+        """Return a scene and a mesh, reproducible by the state of the generator."""
         return self.draw(Dice(random))
 
 
@@ -430,6 +430,6 @@ FAMILIES: dict[str, Family] = {
     "tools": Family(tools, "0.01 %", 3.0),
     "contact": Family(contact, "0.4 %", 3.0),
     "wedges": Family(wedges, "0.3 %", 3.0),
-    # Both truths are extrapolated, and then far better than their bars; more takes minutes at so many edges.
+    # Both converged forces are extrapolated, far within their bars; a tighter accuracy would take minutes.
     "slits": Family(slits, "2 %", 3.0),
 }

@@ -1,8 +1,8 @@
 """Folded closed surfaces by seed, each meshed and solved at 1 %: ``python -m benchmarks.folded FIRST COUNT``.
 
-A surface is an ellipsoid with narrow sulci along the nodal lines of smooth noise, the level of a random field by
-marching cubes, or a folded ellipsoid in a random flow, whose folds then overhang. All are closed, without crossings,
-of 5,000 to 20,000 facets. A disc of 1.5 mm presses on the highest point.
+A surface is an ellipsoid with narrow sulci along the nodal lines of smooth noise, a level set of a random field by
+marching cubes, or a folded ellipsoid deformed by a random flow, so that folds overhang. All are closed, without
+crossings, with 5,000 to 20,000 facets. A disc of 1.5 mm presses on the highest point.
 """
 
 import sys
@@ -52,7 +52,7 @@ def sphere(frequency: int) -> Surface:
 
 
 def with_sulci(random: np.random.Generator) -> Surface:
-    """Return an ellipsoid (mm) with sulci: star-shaped, so that it cannot cross itself."""
+    """Return an ellipsoid (mm) with sulci; it is star-shaped, so that it cannot cross itself."""
     directions, facets = sphere(int(random.integers(16, 32)))
     places = directions * random.uniform(35, 70, 3)
     depth, share = random.uniform(4, 10), np.zeros(len(places))
@@ -63,7 +63,7 @@ def with_sulci(random: np.random.Generator) -> Surface:
 
 
 def level(random: np.random.Generator) -> Surface:
-    """Return the largest part of a level (mm) of an ellipsoid's distance with folded noise, by marching cubes."""
+    """Return the largest part of a level set (mm): an ellipsoid's distance plus folded noise, by marching cubes."""
     axes, length = random.uniform(35, 65, 3), random.uniform(18, 34)
     folds, fine = noise(random, length), noise(random, 0.6 * length)
     depth = random.uniform(2, 5)
@@ -85,7 +85,7 @@ def level(random: np.random.Generator) -> Surface:
 
 
 def in_flow(random: np.random.Generator) -> Surface:
-    """Return an ellipsoid with sulci (mm) carried along by a random flow: folds lean over one another."""
+    """Return an ellipsoid with sulci (mm) deformed by a random flow, so that folds overhang."""
     points, facets = with_sulci(random)
     length = random.uniform(30, 60)
     potentials = [noise(random, length) for _ in range(3)]
@@ -99,7 +99,7 @@ def in_flow(random: np.random.Generator) -> Surface:
 
 
 def folded(seed: int) -> tuple[str, FloatArray, IntArray]:
-    """Return the kind, points (mm) and facets of the surface of a ``seed``: valid, or thrown again."""
+    """Return the kind, points (mm) and facets of the surface of a ``seed``; invalid surfaces are drawn again."""
     random = np.random.Generator(np.random.PCG64(seed))
     kind = KINDS[seed % len(KINDS)]
     make = {"sulci": with_sulci, "level": level, "flow": in_flow}[kind]
@@ -112,7 +112,7 @@ def folded(seed: int) -> tuple[str, FloatArray, IntArray]:
 
 
 def study_of(file: Path, points: FloatArray, exact: bool = False) -> Study:
-    """Return the study of a disc on the highest point of a surface where it fits, right to 1 %."""
+    """Return the study, at 1 %, of a disc on the highest point of a surface at which it fits."""
     low, high = points[:, 2].min(), points[:, 2].max()
     for top in points[np.argsort(-points[:, 2])]:
         try:
@@ -126,11 +126,11 @@ def study_of(file: Path, points: FloatArray, exact: bool = False) -> Study:
             })  # fmt: skip
         except StudyError:
             continue
-    raise ValueError("the disc fits nowhere")
+    raise ValueError("the disc does not fit anywhere")
 
 
 def main(first: int = 0, count: int = 10) -> int:
-    """Mesh and solve surfaces, print a row of each, and return how many failed."""
+    """Mesh and solve surfaces, print a row for each, and return the number of failures."""
     from mpi4py import MPI
 
     from pipeline.plan.plan import make_plan

@@ -1,12 +1,12 @@
-"""What a frame of the page of a real-time model takes in Chromium: 10,000 vertices, a hand that drags.
+"""Frame time of a real-time model's page in Chromium: 10,000 vertices under a dragged tool.
 
     python -m benchmarks.frames [MODEL] [--frames 300]
 
-Without a model, a face and a floor of 10,082 vertices with 91 modes, of random numbers. The tool goes round in the
-region; of each frame the formulas and the surface, the triangles put together, what is handed to WebGL, and what it
-takes until the picture is there (read back, which waits for it) are timed by themselves, by the clock; then the surface
-once more, by the processor's time. Last, the page is left to its own pace, and frames are counted. Headless Chromium
-draws on the processor: pictures there are slower than on any graphics card.
+Without a model, a face and a floor of 10,082 vertices with 91 modes of random numbers are used. The tool moves around
+the region. Parts of each frame are timed by the clock: formulas and surface, assembly of the triangles, upload to
+WebGL, and the time until the picture is ready (it is read back, which waits for it). The surface is timed again in
+processor time. Finally the page runs at its own pace, and frames are counted. Headless Chromium draws on the processor:
+pictures are slower than on any graphics card.
 """
 
 import argparse
@@ -31,7 +31,7 @@ _READY = """new Promise(done => {
   };
   look();
 })"""
-# Of a drag: what is timed of a frame, as the page's `draw` goes through it.
+# The timed parts of a frame, in the order of the page's `draw`.
 _TIMED = """(async count => {
   const {model, stage} = page, gl = stage.renderer.getContext(), pixel = new Uint8Array(4);
   const took = [[], [], [], [], [], [], []];
@@ -120,13 +120,13 @@ def main() -> None:
 
 
 def _processor(browser: Browser) -> float:
-    """Return the processor's time (s) that the page's thread has taken."""
+    """Return the processor time (s) of the page's thread."""
     metrics = browser.call("Performance.getMetrics")["metrics"]
     return next(float(metric["value"]) for metric in metrics if metric["name"] == "ThreadTime")
 
 
 def _random() -> Surface:
-    """Return a face and a floor of squares, and modes as small as a far field is."""
+    """Return a face and a floor of squares, with modes as small as a far field's."""
     made, rng = random_surface(rank=_MODES), np.random.default_rng(5)
     x, y = (np.linspace(-side, side, _SIDE) for side in made.model.sides)
     flat = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""What measured times belong to."""
+"""The machine, date and versions of measured times."""
 
 import platform
 from datetime import UTC, datetime
@@ -9,7 +9,7 @@ import psutil
 
 from pipeline import compat
 
-# One thread a rank; Open MPI asks before it runs as root.
+# One thread per rank; Open MPI refuses to run as root without these.
 MPI_ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 
 

@@ -1,10 +1,10 @@
-"""Are wrong numbers noticed? Random changes of the code that computes, and whether its tests fail.
+"""Mutation test: random changes of the numerical code, and whether the tests detect them.
 
     python -m benchmarks.mutants [--seed 1] [--count 20] [--room solve]...
 
-Draws lines of the rooms by a seed, changes an operator, a comparison or a number in each, one at a time, in a scratch
-copy of the checkout, and runs the room's tests up to the first failure. A change that survives is either equivalent or
-a number that no test sees: look at it. The table goes to ``results/mutants.md``.
+Draws lines of the rooms by a seed and changes an operator, a comparison or a number in each, one at a time, in a
+scratch copy of the checkout. Then it runs the room's tests up to the first failure. A change that survives is either
+equivalent or affects a number that no test checks: inspect it. The table is written to ``results/mutants.md``.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from tempfile import TemporaryDirectory
 ROOT = Path(__file__).parents[1]
 ROOMS = ("solve", "mesh", "scene", "shapes", "plan", "export", "realtime")
 _COPIED = ("pipeline", "tests", "realtime", "benchmarks", "studies", "meshes", "docs", "pyproject.toml")
-_SECONDS = 900  # after which a change has brought its tests to a halt
+_SECONDS = 900  # a change whose tests take longer counts as hanging
 _SWAPS: dict[type, type] = {
     ast.Add: ast.Sub,
     ast.Sub: ast.Add,
@@ -41,7 +41,7 @@ _SWAPS: dict[type, type] = {
 
 @dataclass(frozen=True)
 class Mutant:
-    """The ``file`` whose source becomes ``text``, and how its ``line`` reads then."""
+    """The ``file`` with its source replaced by ``text``, which changes ``line``."""
 
     file: Path
     line: int
@@ -54,7 +54,7 @@ class Mutant:
 
 
 def main(arguments: list[str]) -> int:
-    """Draw, try, and write the table; 2 if the tests fail without any change."""
+    """Draw, test, and write the table; return 2 if the tests fail without any change."""
     options = _options(arguments)
     draw = random.Random(options.seed)
     rooms = options.room or ROOMS
@@ -103,7 +103,7 @@ def _options(arguments: list[str]) -> argparse.Namespace:
 
 
 def _mutants(file: Path) -> Iterator[Mutant]:
-    """Yield every change of a file: operators and comparisons swapped, numbers doubled; strings and types stay."""
+    """Yield every mutant of a file: operators and comparisons swapped, numbers doubled; strings and types unchanged."""
     source = file.read_text()
     lines = source.splitlines(keepends=True)
     starts = [0]
@@ -139,7 +139,7 @@ def _run(tree: Path, room: str) -> str:
     """Return the first test of a room that fails, "it hangs", or "" if all pass."""
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", f"tests/{room}"]
     if not (tree / "tests" / room).exists():
-        command[-1] = "tests/mesh"  # scenes are drawn to be meshed
+        command[-1] = "tests/mesh"  # tests of meshes cover scenes
     environment = {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         found = subprocess.run(

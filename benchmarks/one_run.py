@@ -1,9 +1,9 @@
-"""One run in a process, or on ranks, of its own: what it takes and gives, as a line of JSON.
+"""One run in a process, or on ranks, of its own: its cost and its results, as a line of JSON.
 
     python benchmarks/one_run.py STUDY [OPTIONS]        both are JSON: a study, and arguments of ``measure``
 
-It imports ``pipeline`` alone, of whatever checkout: a change is seen on one machine at one time. Start-up, the compiler
-and what is loaded at the first solve are not counted.
+It imports only ``pipeline``, from any checkout, so that two versions can be compared on one machine at one time.
+Start-up, compilation and imports at the first solve are not counted.
 """
 
 import json
@@ -38,7 +38,7 @@ _OF_A_CASE = ("dofs", "iterations", "force", "memory", "time_mesh", "time_assemb
 
 @contextmanager
 def stages_by(clock: Callable[[], float]) -> Iterator[None]:
-    """Let stages, from nought, count the seconds of another ``clock``."""
+    """Let stages count the seconds of another ``clock``, starting at zero."""
     before = stages.time
     stages.table()
     stages.seconds.clear()
@@ -54,8 +54,8 @@ def measure(
 ) -> dict[str, Any]:
     """Run a study on all ranks; collective.
 
-    Reductions named ``without`` are left out; without a ``bar``, it is as if there were no memory for it. Times of the
-    first case, and of all error bars, are the processor's if ``by_processor``.
+    Reductions named ``without`` are left out. Without a ``bar`` the error bar is skipped, as for lack of memory. Times
+    of the first case, and of all error bars, are processor times if ``by_processor``.
     """
     comm, used, clock = MPI.COMM_WORLD, time.process_time, time.perf_counter
     if not bar:

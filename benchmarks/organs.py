@@ -1,8 +1,8 @@
-"""Organs at 1 %, from a file to the force with its bar, place by place: ``python -m benchmarks.organs``.
+"""Organs at 1 %, from a file to the force with its error bar, for several places: ``python -m benchmarks.organs``.
 
-Seconds are those of processors, the remesher's process included; forms are compiled before, no meshes are kept from
-earlier runs. Then the whole command for one place, and the same with the case stored, which is start-up, dataset and
-figures; at last a large file, checked for the first time and again. Two minutes.
+Times are processor seconds, the remesher's process included; forms are compiled before, and no meshes are cached. Then
+follow the whole command for one place, the same with a stored case (start-up, dataset and figures), and a large file,
+checked for the first time and again. It takes two minutes.
 """
 
 import json
@@ -55,7 +55,7 @@ SCENES: dict[str, Scene] = {
     "liver, ball, contact found": (LIVER, [0.45], BALL, THICK),
     "kidney, disc": (KIDNEY, [0.45], DISC, {"top": "0 mm 0 mm"}),
 }
-# Parts of a place, by how the names of their stages begin; the rest is what none of them begins with.
+# Parts of a place, by prefixes of their stages' names; all other stages are the rest.
 PARTS = {
     "far surface": ("meshing / mesh cache / far surface",),
     "mesh": ("meshing",),
@@ -75,12 +75,12 @@ COLUMNS = {
     **dict.fromkeys([*PARTS, "rest"], ".1f"),
 }
 WHOLE = {"what": "", "seconds": ".1f"}
-# How often each facet of the liver is cut into four to make a large file: 320,000 of them.
+# Subdivisions of the liver's facets, each into four, for a large file of 320,000 facets.
 _TIMES = 3
 
 
 class Meshes(Progress):
-    """Counts the meshes that were begun."""
+    """Counts the meshes begun."""
 
     begun = 0
 
@@ -89,13 +89,13 @@ class Meshes(Progress):
         self.begun += text.startswith(MESHING)
 
     def taken(self) -> int:
-        """Return how many meshes were begun since this was asked for."""
+        """Return the number of meshes begun since the last call."""
         meshes, self.begun = self.begun, 0
         return meshes
 
 
 def parts_of(seconds: Mapping[str, float]) -> dict[str, float]:
-    """Return the seconds by part of a place, of those by stage."""
+    """Return the seconds by part of a place, from those by stage."""
     parts = dict.fromkeys([*PARTS, "rest"], 0.0)
     for stage, spent in seconds.items():
         parts[next((part for part, begins in PARTS.items() if stage.startswith(begins)), "rest")] += spent
@@ -103,7 +103,7 @@ def parts_of(seconds: Mapping[str, float]) -> dict[str, float]:
 
 
 def study_of(scene: Scene) -> dict[str, Any]:
-    """Return the study of a scene, asked to be right to 1 %."""
+    """Return the study of a scene at an accuracy of 1 %."""
     body, ratios, probe, places = scene
     return {
         "body": body | {"file": str(MESHES / body["file"])},
@@ -115,7 +115,7 @@ def study_of(scene: Scene) -> dict[str, Any]:
 
 
 def measure(name: str, folder: Path) -> list[dict[str, Any]]:
-    """Return the rows of a scene, in the order in which they are computed; meshes are kept in ``folder``."""
+    """Return the rows of a scene, in the order of computation; meshes are cached in ``folder``."""
     plan = make_plan(parse(study_of(SCENES[name])))
     named = {at: place for place, at in SCENES[name][3].items()}
     cases = {solve.key: solve.case for solve in plan.solves}
@@ -153,10 +153,10 @@ def measure(name: str, folder: Path) -> list[dict[str, Any]]:
 
 
 def command(*arguments: str, folder: Path) -> float:
-    """Return the processor's seconds of a command of the program, which works in ``folder``."""
+    """Return the processor seconds of a command of the program that works in ``folder``."""
     start = processor_seconds()
     surroundings = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(MESHES.parent)}
-    if "--check" in arguments:  # a large file is known to be whole by a cache, which is to be empty
+    if "--check" in arguments:  # the cache of checked files must be empty
         surroundings["EPSMESH_CACHE"] = str(folder / "cache")
     whole = [sys.executable, "-m", "pipeline", *arguments]
     subprocess.run(whole, check=True, stdout=subprocess.DEVNULL, cwd=folder, env=surroundings)
@@ -164,7 +164,7 @@ def command(*arguments: str, folder: Path) -> float:
 
 
 def whole_commands(folder: Path) -> list[dict[str, Any]]:
-    """Return what whole commands take: one place of the liver, the same once it is stored, and a large file's check."""
+    """Return the times of whole commands: one place of the liver, the same when stored, a large file checked."""
     body, _, probe, places = SCENES["liver, disc"]
     scene = (body, [0.45], probe, dict([next(iter(places.items()))]))
     copy(MESHES / body["file"], folder)

@@ -1,7 +1,7 @@
-"""A path of 100 places against one of them: ``python -m benchmarks.paths``, two minutes.
+"""A path of 100 places relative to one place: ``python -m benchmarks.paths``, two minutes.
 
-Seconds are those of a processor, meshes and error bars included, start-up and the compiler not; ten times one place is
-asked for. Each measurement is a process of its own: what one finds out is not known to the next.
+Times are processor seconds, with meshes and error bars, without start-up and compilation. The limit is ten times one
+place. Each measurement is a process of its own and shares no results with the next.
 """
 
 from typing import Any
@@ -13,12 +13,12 @@ from benchmarks.tables import Table, options
 PLACES = 100
 _BODY = BOX | {"size": ["80 mm", "80 mm", "20 mm"]}
 _MESH = {"epsilon": "10 mm", "fine": "2 mm", "coarse": "8 mm", "rim": "0.4 mm", "growth": 0.6}
-# Off the planes of symmetry, so that no place is another one's image.
+# Off the planes of symmetry, so that no place is a mirror image of another.
 START, END = ["-14 mm", "3 mm"], ["15 mm", "4 mm"]
 LINE = {"line": {"from": START, "to": END, "steps": PLACES}}
 RASTER = {"raster": {axis: {"from": "-14 mm", "to": "13 mm", "steps": 10} for axis in "xy"}}
 CENTRED = {"raster": {axis: {"from": "-13.5 mm", "to": "13.5 mm", "steps": 10} for axis in "xy"}}
-# What is outside, path, ν.
+# Outside, path, ν.
 SCENES: dict[str, tuple[str, dict[str, Any], float]] = {
     "fixed, line": ("fixed", LINE, 0.3),
     "green, line": ("green", LINE, 0.3),

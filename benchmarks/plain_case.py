@@ -1,4 +1,4 @@
-"""One case as a capable FEniCSx user writes it: gmsh, ``model_to_mesh``, P2, conjugate gradients with GAMG, reaction.
+"""One case as an experienced FEniCSx user writes it: gmsh, ``model_to_mesh``, P2, CG with GAMG, reaction.
 
 Geometry and size field are the program's own, of the whole body. Material constants are ``fem.Constant``, so that forms
 compile once.
@@ -40,14 +40,14 @@ SOLVERS: dict[str, dict[str, Any]] = {
     },
     "mumps": {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"},
 }
-# Unknowns up to which MUMPS is as fast: measured on meshes of figure3.toml, as are the options above.
+# Number of unknowns up to which MUMPS is as fast: measured on meshes of figure3.toml, as are the options above.
 MOST_DIRECT = 150_000
 PREFIX = "plain_"
 
 
 @dataclass(frozen=True)
 class Solved:
-    """What one case gave: F (N), and the seconds that it took, in all and in parts."""
+    """Result of one case: F (N), and its time (s), total and by part."""
 
     case: str
     index: tuple[int, ...]
@@ -60,7 +60,7 @@ class Solved:
 
 
 def solve(case: Case, solver: str, most_direct: int) -> Solved:
-    """Mesh and solve one case from nothing: with MUMPS up to ``most_direct`` unknowns, then with one of ``SOLVERS``."""
+    """Mesh and solve one case: with MUMPS up to ``most_direct`` unknowns, above with one of ``SOLVERS``."""
     times, cpu = [time.perf_counter()], time.process_time()
     mesh, facets = make_mesh(case)
     times.append(time.perf_counter())
@@ -99,7 +99,7 @@ def solve(case: Case, solver: str, most_direct: int) -> Solved:
 
 
 def make_mesh(case: Case) -> tuple[Any, dict[str, np.ndarray]]:
-    """Return the mesh of the whole body, curved where its sides are round, and its facets on probe and support."""
+    """Return the mesh of the whole body, curved on round sides, and its facets on probe and support."""
     settings, probe = case.mesh, case.probe
     epsilon = inf if case.is_full else settings.epsilon
     column = inf if settings.outside == "coarse" else epsilon
@@ -118,7 +118,7 @@ def make_mesh(case: Case) -> tuple[Any, dict[str, np.ndarray]]:
         set_size_field(sizes, probe, scene.frame, scene.scale)
         gmsh.model.mesh.generate(3)
         if scene.is_cut or isfinite(case.body.bend):
-            gmsh.model.mesh.setOrder(2)  # a column with flat sides is a thinner one: F would be 1 % low
+            gmsh.model.mesh.setOrder(2)  # flat sides would make a column thinner, and F 1 % too low
         groups = {gmsh.model.getPhysicalName(2, tag): tag for _, tag in gmsh.model.getPhysicalGroups(2)}
         mesh, tags = model_to_mesh()
     mesh.geometry.x[:] *= scene.scale

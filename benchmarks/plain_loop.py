@@ -1,12 +1,12 @@
-"""A study without this program: the loop that a capable FEniCSx user writes, timed against the program's whole run.
+"""A study without this program: the loop that an experienced FEniCSx user writes, timed against the program's run.
 
-Every case is meshed, assembled and solved by itself (:mod:`benchmarks.plain_case`): nothing is shared, no error bars,
-no F_exact, no file is written. The program runs the same study with all of that, as ``epsmesh run --fresh`` does,
-start-up included, once more without F_exact, and a part of it once more with every case solved whole and for itself,
-which tells what the reductions save. Compiled forms are in their caches for all.
+The loop meshes, assembles and solves every case by itself (:mod:`benchmarks.plain_case`): nothing is shared, without
+error bars, F_exact, or output files. The program runs the same study with all of that, as ``epsmesh run --fresh`` does,
+start-up included. It runs it again without F_exact, and a part of it with every case solved whole and separately, which
+shows what the reductions save. All use cached compiled forms.
 
-``python -m benchmarks.plain_loop [STUDY]`` wants an idle machine, and takes an hour or two for figure3.toml;
-``--sample 24`` times so many cases, spread over the sizes of meshes, and extrapolates.
+``python -m benchmarks.plain_loop [STUDY]`` needs an idle machine, and takes an hour or two for figure3.toml.
+``--sample 24`` times that many cases, spread over the sizes of meshes, and extrapolates.
 """
 
 import os
@@ -33,19 +33,19 @@ from pipeline.plan import estimate
 from pipeline.study.load import load
 from pipeline.study.sweep import Case, Study
 
-# Compiles what a run of the program needs, in seconds.
+# Study that compiles all forms of a run, in seconds.
 _WARM_UP = ROOT / "studies" / "quick.toml"
-# Plain elements and quarter-point ones leave different errors at the rim.
+# Largest difference between plain elements and quarter-point elements, by their errors at the rim.
 _DIFFER = 0.02
 _WITH = "this program, error bars and F_exact"
-_WHOLE = "the same, every case whole and for itself"
+_WHOLE = "the same, every case whole and separately"
 
 
 def chosen(study: Study, count: int | None) -> list[tuple[Case, float]]:
-    """Return the cases to time and how many cases each stands for: ``count`` of them, or all.
+    """Return the cases to time and the number of cases that each represents: ``count`` of them, or all.
 
-    Cases are sorted by the size of their mesh, then by ν, cut into ``count`` runs of like length, and the middle of
-    each is taken.
+    Cases are sorted by the size of their mesh, then by ν, and divided into ``count`` groups of similar length; the
+    middle case of each is taken.
     """
     cases = sorted(study.cases(), key=lambda case: (estimate.cells(case), case.material.poisson, case.index))
     strata = np.array_split(np.arange(len(cases)), min(count or len(cases), len(cases)))
@@ -53,9 +53,9 @@ def chosen(study: Study, count: int | None) -> list[tuple[Case, float]]:
 
 
 def run_program(study: Study, folder: Path, *, exact: bool = True, parts: int = 0) -> dict[str, Any]:
-    """Run the program afresh on a study; return seconds, processor seconds, and the dataset's path.
+    """Run the program on a study without stored results; return seconds, processor seconds, and the dataset's path.
 
-    With ``parts``, nothing is reduced, one of so many parts that cost alike is run, and counted as often.
+    With ``parts``, no reductions are used, one of that many parts of similar cost is run, and its time multiplied.
     """
     text = study.text
     if not exact:
@@ -88,11 +88,11 @@ def _epsmesh(command: str, file: Path, *words: str) -> None:
 
 
 def run_loop(cases: Sequence[tuple[Case, float]], solver: str, most_direct: int) -> list[Solved]:
-    """Solve every case by itself, and tell of each."""
+    """Solve every case by itself, and print a line for each."""
     found = []
     for number, (case, _) in enumerate(cases):
         solved = solve(case, solver, most_direct)
-        if number == 0:  # the first one has loaded and compiled
+        if number == 0:  # the first run has loaded libraries and compiled forms
             solved = solve(case, solver, most_direct)
         found.append(solved)
         print(
@@ -104,7 +104,7 @@ def run_loop(cases: Sequence[tuple[Case, float]], solver: str, most_direct: int)
 
 
 def forces(dataset: Path) -> FloatArray:
-    """Return F (N) of all cases; not a number where there is none."""
+    """Return F (N) of all cases; NaN where there is none."""
     with xr.open_dataset(dataset) as data:
         return np.array(data["force"].values)
 
@@ -135,7 +135,7 @@ def report(study: Study, result: dict[str, Any]) -> str:
 
 
 def totals(cases: Sequence[tuple[Case, float]], solved: Sequence[Solved]) -> dict[str, Any]:
-    """Return what the whole loop takes, each case counted as often as it stands for others."""
+    """Return the cost of the whole loop, each case counted for all cases that it represents."""
 
     def total(value: Callable[[Solved], float]) -> float:
         return sum(weight * value(one) for (_, weight), one in zip(cases, solved, strict=True))
@@ -145,7 +145,7 @@ def totals(cases: Sequence[tuple[Case, float]], solved: Sequence[Solved]) -> dic
 
 
 def main() -> int:
-    """Time all; return 1 if their forces differ by more than the elements explain."""
+    """Run all; return 1 if the forces differ by more than the elements explain."""
     parser = options(__doc__)
     parser.add_argument("study", nargs="?", type=Path, default=ROOT / "studies" / "figure3.toml")
     parser.add_argument("--sample", type=int, help="time so many cases only, and extrapolate")

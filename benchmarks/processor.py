@@ -1,6 +1,6 @@
-"""How a benchmark measures: seconds of the processor, ways by turns, and processes of their own.
+"""Methods of measurement: processor seconds, alternating runs, and separate processes.
 
-Other programs on the machine lengthen processor time far less than the time that passes.
+Other programs on the machine affect processor time far less than elapsed time.
 """
 
 import json
@@ -18,19 +18,19 @@ from typing import Any, TypeVar
 from benchmarks.machine import MPI_ENVIRONMENT
 
 ROOT = Path(__file__).parents[1]
-# Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
+# Debian's own mpirun: another one on PATH would not match Debian's mpi4py.
 MPIRUN = ("/usr/bin/mpirun", "--oversubscribe", "-n")
 Answer = TypeVar("Answer")
 
 
 def processor_seconds() -> float:
-    """Return what this process and the children that it waited for have used of processors."""
+    """Return the processor seconds of this process and of finished children."""
     used = [resource.getrusage(whose) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used)
 
 
 def by_turns(ways: Mapping[str, Callable[[], Answer]], repeats: int) -> dict[str, list[Answer]]:
-    """Return what each way gives at each of its ``repeats``; ways take turns, to share what else the machine does."""
+    """Return the results of each way in each of ``repeats``; ways alternate, so that other load affects all equally."""
     found: dict[str, list[Answer]] = {name: [] for name in ways}
     for _ in range(repeats):
         for name, way in ways.items():
@@ -39,7 +39,7 @@ def by_turns(ways: Mapping[str, Callable[[], Answer]], repeats: int) -> dict[str
 
 
 def median_seconds(ways: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
-    """Return the median of the processor's seconds of this process that each way takes, by turns."""
+    """Return the median of each way's processor seconds in this process; ways alternate."""
 
     def timed(way: Callable[[], Any]) -> float:
         start = time.process_time()
@@ -57,13 +57,13 @@ def ask(
     launcher: Sequence[str] = (),
     longest: float | None = None,
 ) -> Any:
-    """Run Python with ``words`` in a process of its own, or on ``ranks``; return the last line, JSON, that it prints.
+    """Run Python with ``words`` in a separate process, or on ``ranks``; return the last line that it prints, JSON.
 
-    It has one thread, and imports what it needs from the checkout ``tree``. mpirun, of which ``launcher`` are more
-    words, binds each rank to a core: what is compared with two ranks runs on one rank, too, not on none.
+    It has one thread, and imports from the checkout ``tree``. mpirun, with further arguments ``launcher``, binds each
+    rank to a core: compare two ranks with one rank, not with no mpirun.
 
     Raises:
-        RuntimeError: with what it said, if it fails, or takes more than ``longest`` seconds.
+        RuntimeError: if it fails, with its output, or takes more than ``longest`` seconds.
     """
     many = [*MPIRUN, str(ranks), *launcher] if ranks else []
     paths = os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(tree)}
@@ -82,7 +82,7 @@ def ask(
 def alone(
     study: dict[str, Any], ranks: int = 0, tree: Path = ROOT, *, longest: float | None = None, **how: Any
 ) -> dict[str, Any]:
-    """Return what a run of ``study`` takes and gives in a process of its own: see :mod:`benchmarks.one_run`.
+    """Return cost and results of a run of ``study`` in a separate process: see :mod:`benchmarks.one_run`.
 
     Raises:
         RuntimeError: as :func:`ask` does.
@@ -93,7 +93,7 @@ def alone(
 
 
 def run(study: dict[str, Any], ranks: int = 0, tree: Path = ROOT, **how: Any) -> dict[str, Any]:
-    """Return the same of a study whose cases are all solved.
+    """Return the same as :func:`alone`, for a study whose cases must all succeed.
 
     Raises:
         RuntimeError: if a case fails.

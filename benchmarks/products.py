@@ -1,8 +1,8 @@
-"""A product with the operator, by who makes it: PETSc's matrix, cells: ``python -m benchmarks.products``.
+"""Products with the operator, assembled by PETSc or matrix-free: ``python -m benchmarks.products``.
 
-A disc on a box, a quarter of it, graded to the probe's edge, degrees 2 to 4. Milliseconds are those of the processor,
-medians; ways take turns, so that each has its share of what else the machine does. What it takes before the first
-product stands beside it: pattern and assembly of a matrix, or the layout of cells; and the bytes that are then kept.
+A disc on a box, a quarter of it, graded to the probe's edge, degrees 2 to 4. Times are processor milliseconds, medians
+of alternating runs. The table also has the cost before the first product, which is pattern and assembly of a matrix or
+the layout of cells, and the bytes of memory.
 """
 
 import time

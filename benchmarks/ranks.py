@@ -1,7 +1,7 @@
-"""What a second rank is worth: a study of many small cases, and one large solve: ``python -m benchmarks.ranks``.
+"""Speed-up by a second rank: a study of many small cases, and one large solve: ``python -m benchmarks.ranks``.
 
-Wants an idle machine with at least two cores. Each figure is the median of runs that alternate between one rank and
-two. Start-up is not counted; the mesh of the large case, which gmsh makes on one rank, is reported apart.
+Run it on an idle machine with at least two cores. Each figure is the median of runs that alternate between one rank and
+two. Start-up is not counted; the mesh of the large case, which gmsh makes on one rank, is reported separately.
 """
 
 import statistics
@@ -18,7 +18,7 @@ _TIMES = ("wall", "mesh", "solve", "bar")
 
 
 def measure(study: dict[str, Any], ranks: int) -> dict[str, float]:
-    """Return the seconds of a study on some ranks, those of the first case by part."""
+    """Return the seconds of a study on some ranks, and those of its first case by part."""
     found = run(study, ranks, by_processor=False)
     solve = found["time_assemble"] + found["time_setup"] + found["time_solve"]
     return {"mesh": found["time_mesh"], "solve": solve} | {

@@ -1,13 +1,13 @@
-"""How near real-time models come to full solves, and how long an answer takes, at a thousand a second.
+"""Real-time models against full solves: their error, and their latency at 1 kHz.
 
     python -m benchmarks.realtime [--touches 200] [--round 10] [--models box,...] [--minutes 60] [--seconds 60]
 
-A model that is missing is exported first. Its touches are random, of other seeds than what its bar was fitted to; those
-that were solved before are kept in results/realtime/, and a run goes on where the last one ended, model after model, a
-group of touches each in turn. --minutes of processor time later it solves no more, and the tables are of what there is;
---seconds 0 leaves latency out. All touches of all models take some hours.
-Balls and cones are judged by full solves that find the contact, whose own bars are longer than the model's.
-Beside each model stand what a half-space gives, and the model at the nearest place that its table was made from.
+A missing model is exported first. Touches are random, with other seeds than those of its calibration. Solved touches
+are kept in results/realtime/, and a run continues where the last one ended, model after model, a group of touches each
+in turn. After --minutes of processor time no more are solved, and the tables contain the existing ones. --seconds 0
+skips latency. All touches of all models take some hours.
+Balls and cones are compared with full solves in unilateral contact, whose own bars are wider than the model's.
+The tables also have the force of a half-space, and that of the model at the nearest place of its table.
 """
 
 import argparse
@@ -34,8 +34,8 @@ from pipeline.realtime.model import Model
 from pipeline.study.load import load as load_study
 
 _FOLDER = Path("results/realtime")
-# Of models; of the full solves that they are judged by, flat tools, those on organs, and others; how many their bars
-# are fitted to, and judged on as well.
+# Accuracy of models; accuracies of the full solves for flat tools, for those on organs, and for others; number of
+# touches for the calibration of a model's bars, and again for its test.
 ACCURACY, _PRECISE, _PRECISE_ORGAN, _PRECISE_ROUND, _CHECKS = 0.01, 0.0025, 0.005, 0.006, 12
 _COLUMNS = (
     "model", "tool", "touches", "places", "median error", "largest", "held", "with truth's bar", "bar/error",
@@ -53,7 +53,7 @@ radius = "5 mm"
 young = "40 kPa"
 poisson = 0.45
 """
-# Off the middle, no ball, less stiff: none that anything was developed on.
+# Off the centre, ellipsoidal, less stiff: unlike all models used in development.
 _NODULE = """[[body.inclusion]]
 name = "nodule"
 at = ["6 mm", "-4 mm", "-12 mm"]
@@ -123,7 +123,7 @@ def _records(name: str, tools: str = "touches") -> Path:
 
 
 def _touches(name: str, flat: int, others: int) -> Iterator[list[Check]]:
-    """Yield groups of touches of a model as they are solved, those of tools that are not flat first."""
+    """Yield groups of touches of a model as they are solved, tools that are not flat first."""
     model, solver = _model(name)
     coarser = replace(solver, accuracy=_PRECISE_ROUND)
     yield from add_groups(_records(name, "round"), model, coarser, others, range(len(TOOLS), len(NAMES)))
@@ -131,14 +131,14 @@ def _touches(name: str, flat: int, others: int) -> Iterator[list[Check]]:
 
 
 def _model(name: str) -> tuple[Model, Solver]:
-    """Return a model, and what solves its touches."""
+    """Return a model, and the solver of its touches."""
     model, scope = model_of(name, _FOLDER, _CHECKS)
     precise = _PRECISE if scope.body.half_sides else _PRECISE_ORGAN
     return model, Solver(scope.sections, scope.file, scope.young, precise)
 
 
 def model_of(name: str, folder: Path, checks: int) -> tuple[Model, Scope]:
-    """Return the model of a study by its ``name`` in :data:`STUDIES`, made in ``folder`` if there is none yet."""
+    """Return the model of a study by its ``name`` in :data:`STUDIES`, made in ``folder`` if there is none."""
     study, path = folder / f"{name}.toml", folder / f"{name}.epsm.nc"
     folder.mkdir(parents=True, exist_ok=True)
     study.write_text(STUDIES[name], encoding="utf-8")
@@ -149,7 +149,7 @@ def model_of(name: str, folder: Path, checks: int) -> tuple[Model, Scope]:
 
 
 def _rows(name: str, model: Model) -> Iterator[dict[str, str]]:
-    """Yield a row for each tool, and one for all that are flat."""
+    """Yield a row for each tool, and one for all flat tools."""
     flat, others = (_judged(model, groups_of(_records(name, tools))) for tools in ("touches", "round"))
     for tool, groups in [
         *((tool, flat) for tool in (*TOOLS, "all")),
@@ -166,7 +166,7 @@ def _judged(model: Model, groups: Mapping[int, Sequence[Check]]) -> list[list[Ch
 
 
 def _is_answered(model: Model, check: Check) -> bool:
-    """Tell whether a tool, drawn for another model of the body, is not too large, or aside, for this one."""
+    """Return whether a tool, drawn for another model of the body, is within the range of this one."""
     return check.radius <= model.largest * model.room(check.x, check.y) and model.table.holds(check.x, check.y)
 
 
@@ -205,9 +205,9 @@ def _half_space(model: Model, check: Check) -> float:
 
 
 def _nearest(model: Model, check: Check) -> float:
-    """Return F (N) of the same tool at the nearest place that the table was made from."""
+    """Return F (N) of the same tool at the nearest place of the model's table."""
     _, rows, columns = model.table.reciprocal.shape
-    # Not outside by rounding.
+    # Rounding must not put it outside.
     x = (1 - 1e-12) * model.table.reach[0] * shares(columns - 1, model.table.even[0])
     if model.table.is_round:
         radius = float(np.hypot(check.x, check.y))
@@ -216,7 +216,7 @@ def _nearest(model: Model, check: Check) -> float:
     else:
         y = (1 - 1e-12) * model.table.reach[1] * shares(rows - 1, model.table.even[1])
         at = (_closest(x, check.x, model.table.even[0]), _closest(y, check.y, model.table.even[1]))
-    # The tool may be larger than what the model takes there.
+    # The tool may be too large for the model at that place.
     wide = replace(model, sides=(1e3, 1e3), thickness=1e3, largest=1.0)
     return with_bar(wide, replace(check, x=at[0], y=at[1])).force
 
@@ -232,7 +232,7 @@ def _percent(value: float) -> str:
 
 
 def _latency(path: Path, seconds: float) -> str:
-    """Return what queries take in C and in numpy, and how many ticks of a loop at 1 kHz are late."""
+    """Return the time of queries in C and in numpy, and the late ticks of a loop at 1 kHz."""
     program = _FOLDER / "latency"
     sources = ["realtime/epsmesh_patch.c", "realtime/latency.c"]
     subprocess.run(["cc", "-std=c99", "-O2", *sources, "-o", str(program), "-lm"], check=True)
@@ -242,9 +242,9 @@ def _latency(path: Path, seconds: float) -> str:
 
 
 def _in_numpy(model: Model) -> Iterator[str]:
-    """Yield for each tool what 20,000 queries take, by the clock and of the processor, beside a call that does nothing.
+    """Yield for each tool the time of 20,000 queries, elapsed and of the processor, next to that of an empty call.
 
-    Tools take turns, so that what else the machine does falls on all of them.
+    Tools alternate, so that other load affects all of them equally.
     """
     size, rng = 0.05 * model.thickness, np.random.default_rng(11)
     blade = {"length": 2 * size, "width": 0.4 * size}

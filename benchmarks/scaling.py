@@ -1,9 +1,9 @@
-"""Time and memory of full-order cases over their size: ``python -m benchmarks.scaling``.
+"""Time and memory of full-order cases by size: ``python -m benchmarks.scaling``.
 
-A disc on a box, the whole of it without the error bar, and, as a study does by itself, a quarter with it; elements of
-degree 2, on two ranks. Dofs are those of the whole. Memory is the sum of the ranks' peaks; the slope is that
-of its logarithm over the logarithm of the dofs. From this come the bytes per dof in ``pipeline/plan/estimate.py``. Two
-million dofs, all of them modelled, want 1.6 GB of free memory without the error bar and 3.1 GB with it.
+A disc on a box, on two ranks, with elements of degree 2: the whole box without the error bar, and the program's own
+choice, a quarter with it. Dofs are those of the whole. Memory is the sum of the ranks' peaks; the slope is that of its
+logarithm over the logarithm of the dofs. The bytes per dof in ``pipeline/plan/estimate.py`` are from here. Two million
+dofs, all of them modelled, need 1.6 GB of free memory without the error bar and 3.1 GB with it.
 """
 
 from itertools import product
@@ -16,7 +16,7 @@ from benchmarks.tables import Table, options
 
 # Element size far from the probe (mm), for about 100,000, 500,000 and 2,000,000 dofs.
 SIZES = {"small": 2.5, "middle": 1.35, "large": 0.82}
-# Whether the error bar is computed, too.
+# Whether the error bar is computed.
 _MODELS = {"3d": False, "auto": True}
 _SETTING = {"degree": "d", "poisson": "g", "model": "", "ranks": "d", "bar": ""}
 _TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
@@ -41,7 +41,7 @@ def measure(size: str, setting: dict[str, Any]) -> dict[str, Any]:
 
 
 def slope(before: dict[str, Any] | None, row: dict[str, Any]) -> float:
-    """Return the slope of the memory from the row ``before``, where only the size differs."""
+    """Return the slope of the memory from the row ``before``, which differs in size only."""
     if before is None or any(before[name] != row[name] for name in _SETTING) or row["dofs"] <= before["dofs"]:
         return nan
     return log(row["memory"] / before["memory"]) / log(row["dofs"] / before["dofs"])

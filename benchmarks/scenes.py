@@ -1,4 +1,4 @@
-"""Scenes that benchmarks share, and studies of them."""
+"""Scenes shared by benchmarks, and studies of them."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ def graded(fine: str, coarse: str, rim: str, growth: float, **others: Any) -> di
 
 
 def many_small(cases: int, on_a_mesh: int = 10) -> dict[str, Any]:
-    """Return a study of small scenes, of which ``on_a_mesh`` share a mesh and none another's solution."""
+    """Return a study of small scenes: ``on_a_mesh`` cases share a mesh, and none can reuse another's solution."""
     meshes = max(cases // on_a_mesh, 1)
     body = BOX | {"size": ["30 mm", "30 mm", "15 mm"]}
     probe = DISC | {"radius": [f"{2 + i / meshes:.6f} mm" for i in range(meshes)], "depth": "0.1 mm"}

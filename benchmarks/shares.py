@@ -1,7 +1,7 @@
-"""Cases of all kinds: processor seconds, the share of the error bar, memory: ``python -m benchmarks.shares``.
+"""Cost of cases of all kinds: processor seconds, share of the error bar, memory: ``python -m benchmarks.shares``.
 
-Each case is a process of its own; start-up is not counted. ``--trees A B`` runs each case on the code of one checkout
-after the other, so that a change is seen on one machine at one time.
+Each case is a separate process; start-up is not counted. ``--trees A B`` runs each case on the code of one checkout
+after the other, so that two versions are compared on one machine at one time.
 """
 
 from pathlib import Path

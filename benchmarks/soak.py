@@ -1,13 +1,13 @@
-"""Tens of thousands of cases in one run: memory stays flat, the pace too, and the store answers in milliseconds.
+"""Tens of thousands of cases in one run: memory, pace and access to the store must stay constant.
 
     python -m benchmarks.soak [CASES]            mpirun -n 2 python -m benchmarks.soak
 
-Ten cases on each mesh, each solved, their records in a store on disk. Prints, at each twentieth of the way, the
-resident memory of the first rank, the processor time it takes for a case (which other programs on the machine hardly
-change), and the median of what the store takes to write a record and to find one.
+Ten cases on each mesh are solved, with their records in a store on disk. At each twentieth of the run it prints the
+resident memory of the first rank, the processor time per case (which hardly depends on other programs), and the median
+time to write a record to the store and to find one.
 
-Exit status 1 if a case fails; if memory grows, after a fifth of the way, by more than 30 kB a mesh (the types that
-ctypes keeps of gmsh's arrays take two thirds of it) and 4 kB a case (a record takes 3); if the pace of the last two
+The exit status is 1 if a case fails; if memory grows, after a fifth of the run, by more than 30 kB per mesh (two thirds
+of it are types that ctypes keeps of gmsh's arrays) and 4 kB per case (a record takes 3); if the pace of the last two
 fifths differs by more than 10 %; or if the store takes more than 10 ms to find a record.
 """
 
@@ -30,7 +30,7 @@ from pipeline.run.store import Store
 from pipeline.study.load import parse
 
 CASES, _ON_A_MESH = 20_000, 10
-_GROWTH, _RECORD = 30e3, 4e3  # bytes a mesh, and a case
+_GROWTH, _RECORD = 30e3, 4e3  # bytes per mesh, and per case
 _PACE = 0.1
 _ANSWER = 10e-3  # s
 _MARKS = 20
@@ -39,7 +39,7 @@ _ASKED = 50
 
 @dataclass
 class Log:
-    """What is seen on the way, by marks: cases, memory (bytes), processor time (s), and the store's times (s)."""
+    """Measurements at marks: cases, memory (bytes), processor time (s), and the store's times (s)."""
 
     store: Store
     every: int
@@ -50,7 +50,7 @@ class Log:
     start: float = field(default_factory=time.perf_counter)
 
     def keep(self, record: Record) -> None:
-        """Store a record; at each mark look at everything."""
+        """Store a record; at each mark measure everything."""
         before = time.perf_counter()
         self.store.put(record)
         self.puts.append(time.perf_counter() - before)
@@ -75,13 +75,13 @@ class Log:
         )
 
     def pace(self, first: int, last: int) -> float:
-        """Return the processor time of a case (s) between two marks."""
+        """Return the processor time per case (s) between two marks."""
         (n, _, before, *_), (m, _, after, *_) = self.marks[first], self.marks[last]
         return (after - before) / (m - n)
 
 
 def main(cases: int) -> int:
-    """Run the soak; collective. Returns the exit status."""
+    """Run the soak test; collective. Return the exit status."""
     comm = MPI.COMM_WORLD
     plan = make_plan(parse(many_small(cases, _ON_A_MESH)))
     with TemporaryDirectory() as folder:

@@ -1,10 +1,10 @@
-"""Linear solvers in units of what they are made of, applications of the operator: ``python -m benchmarks.solvers``.
+"""Cost of linear solvers in applications of the operator: ``python -m benchmarks.solvers``.
 
 A disc on a box, a quarter of it, graded to the probe's edge. Set-up and solve are in units of one application of the
-finest operator (a product with its blocked matrix), measured around them: so the figures mean the same on another
-machine, and on a busy one, as times are those of the processor. Each row is a process of its own, since a process's
-peak memory is that of its largest solve. From this come ``DIRECT_LIMIT`` in ``pipeline/solve/krylov.py`` and
-``pipeline/solve/elements/mixed.py``, and the bytes per dof in ``pipeline/plan/estimate.py``.
+finest operator (a product with its blocked matrix), measured before and after. The figures therefore mean the same on
+another machine, and on a busy one, as times are those of the processor. Each row is a separate process, since the peak
+memory of a process is that of its largest solve. ``DIRECT_LIMIT`` in ``pipeline/solve/krylov.py`` and
+``pipeline/solve/elements/mixed.py`` is from here, and so are the bytes per dof in ``pipeline/plan/estimate.py``.
 """
 
 import itertools
@@ -30,7 +30,7 @@ LARGE = {1: ((1, 0.2), (0.6, 0.2)), 2: ((1.7, 0.2), (1.0, 0.2), (0.63, 0.2)), 3:
 RATIOS = {"displacement": (0.3, 0.45, 0.49), "mixed": (0.45, 0.49, 0.4999)}
 YOUNG = 10e3
 PRESS = Motion((0.0, 0.0, -1.0))
-# Solves that take longer than so many seconds vary by less than what they are told to.
+# Solves that take longer than this (s) are not repeated: they vary little.
 _ENOUGH = 8.0
 COLUMNS = {
     "element": "",
@@ -105,7 +105,7 @@ def case_of(degree: int, size: tuple[float, float]) -> Any:
 
 
 def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
-    """Return the operator, and what assembles, sets up and solves once."""
+    """Return the operator, and a function that assembles, sets up and solves once."""
     from pipeline.solve.balance import TOLERANCE
     from pipeline.solve.compiled import vector
     from pipeline.solve.linear_solver import LinearSolver
@@ -134,7 +134,7 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
 
 
 def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
-    """The same for mixed elements; a set-up that serves all ratios counts for one."""
+    """Return the same for mixed elements; a set-up that serves all Poisson's ratios counts once."""
     from pipeline.solve.balance import TOLERANCE
     from pipeline.solve.elements.mixed import LAME
     from pipeline.solve.saddle import SaddleSolver
@@ -143,7 +143,7 @@ def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[A
     start = time.process_time()
     saddle = elements.saddle(LAME, stack, direct=direct)
     assemble = time.process_time() - start
-    # Neither a product without entries nor the matrix of a direct solve is what others multiply with.
+    # The unit is a matrix-free product of the displacement block, as in the other rows.
     unit = stack.enter_context(elements.displacements.lend(LAME, entries=False))
     press = Movement((PRESS,), (1.0,))
 
@@ -175,7 +175,7 @@ def _application(matrix: Any, times: int = 9) -> float:
 
 
 def _entries(matrix: Any) -> float:
-    """Return the bytes of a matrix, or of what a product cell by cell keeps."""
+    """Return the bytes of a matrix, or of a matrix-free product."""
     is_product = matrix.getType() == "python"
     return matrix.getPythonContext().nbytes if is_product else matrix.getInfo()["nz_used"] * (8 + 4 / 9)
 
@@ -192,7 +192,7 @@ def _stream() -> float:
 
 
 def crossovers(rows: list[dict[str, Any]]) -> dict[str, int]:
-    """Return the dofs at which both methods take the same time, for each element and degree, by interpolation."""
+    """Return the dofs at which both methods take equal time, for each element and degree, by interpolation."""
     found = {}
     for kind in sorted({(row["element"], row["degree"]) for row in rows}):
         times: dict[int, dict[str, float]] = {}
@@ -238,7 +238,7 @@ def main() -> None:
     for case in plan(asked.largest)[: asked.rows]:
         try:
             table.add(ask(["-m", "benchmarks.solvers", "--one", json.dumps(case), "--repeats", str(asked.repeats)]))
-        except RuntimeError as error:  # without the memory for one of them the others are still worth something
+        except RuntimeError as error:  # if one row lacks memory, the others are still useful
             print(f"failed: {error}", file=sys.stderr)
     crossed = crossovers(table.rows)
     said = "".join(f"- {name}: {dofs} dofs\n" for name, dofs in crossed.items())

@@ -1,11 +1,10 @@
-"""What the commands that need no solver cost before they answer: seconds of the processor, modules loaded.
+"""Start-up of the commands that need no solver: processor seconds, and number of modules loaded.
 
 python -m benchmarks.start_up                  this program
-python -m benchmarks.start_up ../earlier ...   and other checkouts of it, by turns, on the studies of the last one
+python -m benchmarks.start_up ../earlier ...   and other checkouts, alternating, on the studies of the last one
 
-Each command runs in a process of its own, as where it is installed: with the bytecode
-that Python keeps. Seconds of the processor depend less than those of the clock on what else the machine does; the least
-of them depends least.
+Each command runs in a separate process, with cached bytecode as after an installation. Processor seconds depend less on
+other programs than elapsed time; their minimum depends least.
 """
 
 import os
@@ -31,7 +30,7 @@ _REPEATS = 15
 
 
 def main() -> None:
-    """Measure, print and write: by checkout and command, the least and the median of the seconds, and the modules."""
+    """Measure, print and write, by checkout and command: minimum and median of the seconds, and number of modules."""
     parser = options(__doc__)
     parser.add_argument("others", nargs="*", type=Path, help="other checkouts")
     parser.add_argument("--repeats", type=int, default=_REPEATS)
@@ -47,7 +46,7 @@ def main() -> None:
                     shutil.copytree(trees[-1] / "studies", place / "studies", ignore=shutil.ignore_patterns("results"))
                     if turn:
                         seconds[tree, name].append(_seconds(tree, arguments, place))
-                    else:  # also writes the bytecode
+                    else:  # this run also writes the bytecode
                         modules[tree, name] = _modules(tree, arguments, place)
                     shutil.rmtree(place)
     found = {
@@ -83,10 +82,10 @@ def _seconds(tree: Path, arguments: list[str], place: Path) -> float:
 
 
 def _modules(tree: Path, arguments: list[str], place: Path) -> int:
-    """Return how many modules are loaded; fail where those are not of ``tree``."""
+    """Return the number of modules loaded; fail if they are not from ``tree``."""
     found = _run(tree, ["-c", "import pipeline, sys; print(pipeline.__file__, file=sys.stderr)"], place)
     if Path(found.strip()).parents[1] != tree:
-        raise RuntimeError(f"{tree}: Python takes {found.strip()} for it")
+        raise RuntimeError(f"{tree}: Python imports {found.strip()} instead")
     return sum(
         line.startswith("import time:")
         for line in _run(tree, ["-X", "importtime", "-m", "pipeline", *arguments], place).splitlines()

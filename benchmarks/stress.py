@@ -1,10 +1,10 @@
-"""Numerical stability as a matrix: extreme values of every input, each against a reference: ``make stress``.
+"""Numerical stability as a matrix: extreme values of every input, each compared with a reference: ``make stress``.
 
     python -m benchmarks.stress [ROW ...] [--quick] [--json]
 
-A word takes all rows whose name holds it, such as ``poisson layer``. A cell passes if its force agrees with the
-reference within the two error bars, or if it is refused where no answer can be expected. What must never happen is a
-wrong number with a good status. The exit status is 1 if any cell fails.
+A word selects all rows whose name contains it, such as ``poisson layer``. A cell passes if its force agrees with the
+reference within both error bars, or if it is refused where no answer can be expected. A wrong number with a good status
+must never occur. The exit status is 1 if any cell fails.
 """
 
 import json
@@ -28,20 +28,20 @@ from pipeline.run.record import UNFORESEEN, Record
 from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
 
-# What should not change must not change by more than this.
+# Largest relative change under an exact invariance.
 INVARIANT = 1e-8
-# An error bar above this is no answer: the case should have been refused.
+# Largest useful error bar: above it the case should have been refused.
 IDLE = 1.0
-# Cells are solved in three dimensions, with the mesh that they give; the references of round scenes are not.
+# Cells are solved in three dimensions, with the mesh given; references of axisymmetric scenes are not.
 _WITHOUT = ("axisymmetric",)
-_ON_RANKS = 300  # seconds, after which a cell on ranks of its own has failed
+_ON_RANKS = 300  # seconds until a cell on ranks of its own counts as failed
 _LINE = "{:8} {:30} {:56} {:>12} {:>12} {:>5} {:>8} {:>6}  {}"
-_LONGEST = 110  # characters of a message in the table; the JSON has all of it
+_LONGEST = 110  # characters of a message in the table; JSON has all of it
 
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a cell; ``error`` and ``bar``, the case's plus the reference's, are relative to the reference."""
+    """Result of a cell; ``error`` and ``bar``, the sum of case's and reference's, are relative to the reference."""
 
     row: str
     value: str
@@ -56,12 +56,12 @@ class Result:
 
     @property
     def is_good(self) -> bool:
-        """Whether nothing is amiss."""
+        """Whether the cell passed."""
         return self.status != "FAIL"
 
 
 def judge(cell: Cell, record: Record, reference: Record | None, seconds: float = 0.0) -> Result:
-    """Return the verdict on ``record``; ``reference`` is None if none was needed.
+    """Return the verdict on ``record``; ``reference`` is None if it was not needed.
 
     Forces of ``reference`` are for a ``scale`` of 1.
     """
@@ -90,7 +90,7 @@ def judge(cell: Cell, record: Record, reference: Record | None, seconds: float =
         words = f"no reference: {reference.message if reference else 'not computed'}"
         return replace(found, message=f"{idle} {words}".strip())
     if cell.against == "truth" and record.origin == reference.origin == "axisymmetric":
-        return replace(found, message="case and reference were computed in the same way: nothing is compared")
+        return replace(found, message="case and reference were computed in the same way: the comparison is void")
     ratio = record.force / cell.scale / reference.force
     bar = INVARIANT if cell.against == "base" else min(1.0, abs(ratio)) * record.force_error + reference.force_error
     found = replace(found, error=ratio - 1, bar=bar)
@@ -102,7 +102,7 @@ def judge(cell: Cell, record: Record, reference: Record | None, seconds: float =
 
 
 def refused(cell: Cell, message: str) -> Result:
-    """Return the verdict on a study that was refused before anything was computed."""
+    """Return the verdict on a study that was refused before computing."""
     status: Literal["refused", "FAIL"] = "refused" if cell.expect != "right" and message else "FAIL"
     return Result(cell.row, cell.value, status, message=message)
 
@@ -110,7 +110,7 @@ def refused(cell: Cell, message: str) -> Result:
 def run(comm: MPI.Comm, names: Collection[str] | None = None, *, quick: bool = False) -> Iterator[Result]:
     """Yield the results of the rows in ``names``, of all by default, as they are computed; collective.
 
-    ``quick`` leaves one or a few cells of most rows.
+    ``quick`` keeps one or a few cells of most rows.
 
     Raises:
         ValueError: as :func:`rows_of` does.
@@ -124,21 +124,21 @@ def run(comm: MPI.Comm, names: Collection[str] | None = None, *, quick: bool = F
 
 
 def rows_of(names: Collection[str] | None, known: Collection[str]) -> set[str]:
-    """Return the ``known`` rows that are meant by ``names``: the row of that name, or all whose name holds it.
+    """Return the ``known`` rows selected by ``names``: the row of that name, or all whose name contains it.
 
     Raises:
-        ValueError: if there is none of a name.
+        ValueError: if a name selects none.
     """
     found: dict[str, set[str]] = {}
     for name in names or known:
         found[name] = {name} if name in known else {row for row in known if name.lower() in row.lower()}
     if unknown := sorted(name for name, rows in found.items() if not rows):
-        raise ValueError(f"no row {', '.join(unknown)}; there are: {'; '.join(known)}")
+        raise ValueError(f"no row {', '.join(unknown)}; rows are: {'; '.join(known)}")
     return set().union(*found.values())
 
 
 class _Matrix:
-    """Keeps what cells are compared with."""
+    """Cache of the references of cells."""
 
     def __init__(self, comm: MPI.Comm):
         self._comm = comm
@@ -146,7 +146,7 @@ class _Matrix:
         self._bases: dict[tuple[str, str], Record] = {}
 
     def result(self, cell: Cell) -> Result:
-        """Compute a cell and its reference, and judge it; collective."""
+        """Compute a cell and its reference, and return the verdict; collective."""
         if cell.ranks and (reason := _why_not(self._comm)):
             return Result(cell.row, cell.value, "skipped", message=reason)
         start = time.perf_counter()
@@ -168,7 +168,7 @@ class _Matrix:
         return _compute(self._comm, cell.study, without=_WITHOUT)
 
     def _truth(self, cell: Cell) -> Record:
-        """Return the force of the cell's scene with an accuracy asked for; a miss leaves a wider bar."""
+        """Return the force of the cell's scene at a required accuracy; if it is not reached, the bar is wider."""
         sizes = cell.study["mesh"]
         kept = ("epsilon", "outside") if sizes.get("outside", "coarse") != "coarse" else ()
         if sizes["epsilon"] == "full":
@@ -191,14 +191,14 @@ def _compute(comm: MPI.Comm, scene: dict[str, Any], without: tuple[str, ...] = (
 
 
 def _why_not(comm: MPI.Comm) -> str:
-    """Return why ranks cannot be started from here, or nothing."""
+    """Return why ranks cannot be started from here, or an empty text."""
     if comm.size > 1:
         return "under mpirun already"
     return "" if shutil.which("mpirun") else "there is no mpirun"
 
 
 def _on_ranks(ranks: int, scene: dict[str, Any]) -> Record:
-    """Return the record of a study of one case, computed on so many ranks of their own."""
+    """Return the record of a study of one case, computed on separate ranks."""
     try:
         found = alone(scene, ranks, longest=_ON_RANKS, without=_WITHOUT)
     except RuntimeError as error:
@@ -234,7 +234,7 @@ def _relative(value: float, sign: str = "") -> str:
 
 
 def summary(results: Sequence[Result]) -> str:
-    """Return the counts, and how many of the failures are wrong numbers."""
+    """Return the counts, and the number of wrong numbers among the failures."""
     counts = {s: sum(r.status == s for r in results) for s in ("pass", "refused", "skipped", "FAIL")}
     wrong = sum(r.wrong for r in results)
     words = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
@@ -248,7 +248,7 @@ def table(results: Iterable[Result]) -> str:
 
 
 def to_json(results: Iterable[Result]) -> str:
-    """Return a JSON list with an object for each result; what is not a number is null."""
+    """Return a JSON list with an object for each result; NaN becomes null."""
     return json.dumps([finite(asdict(result)) for result in results], indent=2, ensure_ascii=False)
 
 

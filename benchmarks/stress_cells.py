@@ -1,4 +1,4 @@
-"""The cells of the stress matrix: each row takes one input to its extremes, the last one takes two together."""
+"""The cells of the stress matrix: each row takes one input to its extremes, the last one combines two extremes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ _NU = (0, 0.2, 0.3, 0.4, 0.44, 0.45, 0.49, 0.495, 0.499, 0.4999, 0.49999, 0.5)
 
 @dataclass(frozen=True)
 class Cell:
-    """One study of one case, and what is expected of it.
+    """One study of one case, and the expected result.
 
-    ``against`` is "truth", the same scene with an accuracy asked for, or "base", the row's cell of that ``group``
-    which has no error to hide behind: F / ``scale`` is to be the same to 1e-8. ``expect`` is "right", "refused", or
-    "either" where giving up is as good as the right answer. ``ranks`` is how many are started for it, 0 for none.
+    ``against`` is "truth", the same scene at a required accuracy, or "base", the row's reference cell of that
+    ``group``, compared without error bars: F / ``scale`` must agree to 1e-8. ``expect`` is "right", "refused", or
+    "either" where a refusal is as good as the right answer. ``ranks`` is the number of ranks to start, 0 for none.
     """
 
     row: str
@@ -36,7 +36,7 @@ class Cell:
 
 
 def cells() -> tuple[Cell, ...]:
-    """Return all cells, row by row; those of an invariance follow the one that they are compared with."""
+    """Return all cells, row by row; cells of an invariance follow their reference cell."""
     rows = (_poisson, _young, _size, _depth, _probe, _layer, _jump, _growth, _edge, _epsilon, _blade, _degree, _locking)
     return tuple(cell for row in (*rows, _support, _method, _ranks, _corners) for cell in row())
 
@@ -69,7 +69,7 @@ def _depth() -> Iterator[Cell]:
 
 
 def _same(row: str, value: str, scene: dict[str, object], scale: float, group: str = "") -> Cell:
-    """Return a cell of an invariance; the one of scale 1 is compared with the truth."""
+    """Return a cell of an invariance; the cell of scale 1 is compared with the truth."""
     first = scale == 1.0
     return Cell(row, value, scene, "truth" if first else "base", scale=scale, group=group, quick=group != "nu 0.4999")
 
@@ -120,7 +120,7 @@ def _epsilon() -> Iterator[Cell]:
     for outside in ("coarse", "free", "fixed"):
         for label, epsilon in (near | far).items():
             clash = outside == "fixed" and epsilon <= _A
-            barely = outside == "fixed" and epsilon < 1.2 * _A  # less room than an element at the rim
+            barely = outside == "fixed" and epsilon < 1.2 * _A  # narrower than an element at the rim
             expect: Expect = "refused" if clash else "either" if barely else "right"
             scene = study(sizes=mesh(fine=4, epsilon=epsilon, outside=outside))
             quick = label in ("a", "R - 1e-7")
@@ -181,7 +181,7 @@ def _ranks() -> Iterator[Cell]:
 
 
 def _corners() -> Iterator[Cell]:
-    """Extremes together: where two of them meet, things break that hold at each of them."""
+    """Extremes in pairs, which may fail where each alone is fine."""
     for compare in (_thin, _slender, _held, _columns, _blades, _naive):
         for value, scene, expect in compare():
             yield Cell("corners", value, scene, expect=expect, accuracy="0.5 %")
@@ -244,7 +244,7 @@ def _blades() -> Iterator[_Corner]:
         probe = blade(10, 2, slice=f"{slice_} mm")
         yield f"blade slices {100 * slice_:g} times its depth", study(0.3, box(), probe, mesh(0.2)), "right"
     off = blade(10, 2, slice="1 mm", at=["20 mm", "25 mm"])
-    # The work of the slice hides what the depth takes: the bar may say that F is not known.
+    # The work of the slice dominates that of the depth: the bar may say that F is not known.
     yield "slices in a corner, nu 0.5", study(0.5, box(), off, mesh(0.2)), "either"
 
 

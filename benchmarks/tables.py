@@ -1,4 +1,4 @@
-"""Tables of Markdown, as the pages on performance have them, and the files that a benchmark leaves in ``results/``."""
+"""Tables in markdown, as on the pages on performance, and output files of benchmarks in ``results/``."""
 
 import argparse
 import json
@@ -11,14 +11,14 @@ RESULTS = Path("results")
 
 
 def markdown(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> str:
-    """Return ``rows`` as a table of ``columns``: the name of each, and how its values are formatted."""
+    """Return ``rows`` as a table; ``columns`` maps the name of each column to the format of its values."""
     lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
     lines += ["| " + " | ".join(format(row[name], how) for name, how in columns.items()) + " |" for row in rows]
     return "\n".join(lines) + "\n"
 
 
 def write(name: str, output: Path, content: Any, text: str = "") -> None:
-    """Write ``content`` to NAME.json in the folder ``output``, and a ``text``, if there is one, to NAME.md."""
+    """Write ``content`` to NAME.json in the folder ``output``, and ``text``, if not empty, to NAME.md."""
     output.mkdir(parents=True, exist_ok=True)
     (output / f"{name}.json").write_text(json.dumps(content, indent=1) + "\n")
     if text:
@@ -27,13 +27,13 @@ def write(name: str, output: Path, content: Any, text: str = "") -> None:
 
 @dataclass
 class Table:
-    """Rows of ``columns`` that are printed as they come, and written at last."""
+    """Rows of ``columns``, printed as they come and written at the end."""
 
     columns: Mapping[str, str]
     rows: list[dict[str, Any]] = field(default_factory=list)
 
     def add(self, row: dict[str, Any]) -> None:
-        """Keep a row, and print it."""
+        """Add a row, and print it."""
         self.rows.append(row)
         print(markdown([row], self.columns).splitlines()[-1], flush=True)
 
@@ -43,7 +43,7 @@ class Table:
 
 
 def options(description: str | None, *, writes: bool = True) -> argparse.ArgumentParser:
-    """Return what reads the options of a benchmark: ``--output`` of one that ``writes``, to which each adds its own."""
+    """Return the parser of a benchmark's options, with ``--output`` if it ``writes``; each adds its own."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     if writes:
         parser.add_argument("--output", type=Path, default=RESULTS, help="folder of what is written")

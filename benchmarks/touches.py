@@ -1,8 +1,8 @@
-"""Held-out touches of a real-time model by full solves of the program: groups on one mesh each, kept on file.
+"""Held-out touches of a real-time model, by full solves of the program: groups on one mesh each, stored in a file.
 
-A group is one place and one flat tool, a disc, a blade or a bonded disc, at four of the Poisson's ratios that the model
-takes, or at the one. Depths, and moduli, are no touches of their own: force is proportional to both. Balls and cones,
-whose contact is found, are groups of one touch each, on a file of their own.
+A group is one place and one flat tool, a disc, a blade or a bonded disc, at four of the Poisson's ratios of the model,
+or at its single one. Depths and moduli are not varied: force is proportional to both. Balls and cones, in unilateral
+contact, are groups of one touch each, in a separate file.
 """
 
 import json
@@ -17,16 +17,16 @@ from pipeline.export.checks import TOOLS, Check, random_place, random_touch, sol
 from pipeline.export.full import Solver, Tool
 from pipeline.realtime.model import Model
 
-# Seeds of groups; Poisson's ratios of one, each from a quarter of the range.
+# Seed of groups; number of Poisson's ratios in one, each from a quarter of the range.
 _SEED, _RATIOS = 5000, 4
-# All tools by their number, the last two not flat: contact radii in units of the largest that the model takes, radii of
-# balls in units of that of contact, half angles of cones (degrees), and where their shafts begin.
+# All tools by their number, the last two not flat: contact radii in units of the largest allowed by the model, radii of
+# balls in units of the contact radius, half angles of cones (degrees), and radius of their shafts.
 NAMES = (*TOOLS, "ball", "cone")
 _CONTACTS, _BALLS, _ANGLES, _SHAFT = (0.2, 0.8), (2.0, 7.0), (55.0, 80.0), 1.6
 
 
 def groups_of(path: Path) -> dict[int, list[Check]]:
-    """Return the touches on file, by the number of their group."""
+    """Return the stored touches, by the number of their group."""
     found: dict[int, list[Check]] = {}
     if path.exists():
         for line in path.read_text(encoding="utf-8").splitlines():
@@ -38,7 +38,7 @@ def groups_of(path: Path) -> dict[int, list[Check]]:
 
 
 def add_groups(path: Path, model: Model, solver: Solver, count: int, kinds: Sequence[int]) -> Iterator[list[Check]]:
-    """Yield groups of tools of these ``kinds`` in turn until so many touches are on file, each written when solved."""
+    """Yield groups of tools of these ``kinds`` in turn until ``count`` touches are stored, each when it is solved."""
     known = groups_of(path)
     held, number = sum(map(len, known.values())), max(known, default=-1) + 1
     while held < count:
@@ -51,7 +51,7 @@ def add_groups(path: Path, model: Model, solver: Solver, count: int, kinds: Sequ
 
 
 def flat_kinds(model: Model) -> range:
-    """Return the numbers of the flat tools that a model answers for."""
+    """Return the numbers of the flat tools of a model."""
     return range(len(TOOLS) if len(model.table.tensors) else 1)
 
 
@@ -67,7 +67,7 @@ def _solve(model: Model, solver: Solver, number: int, kind: int) -> list[Check]:
 
 
 def _random_round(model: Model, rng: np.random.Generator, kind: int) -> Check:
-    """Return a touch of a ball or a cone, not solved yet, pressed so deep that a half-space would touch ``radius``."""
+    """Return an unsolved touch of a ball or a cone, at the depth of a contact ``radius`` on a half-space."""
     x, y = random_place(model, rng)
     a = model.largest * model.room(x, y) * float(np.exp(rng.uniform(*np.log(_CONTACTS))))
     poisson = float(rng.uniform(*model.table.poisson))
@@ -81,7 +81,7 @@ def _random_round(model: Model, rng: np.random.Generator, kind: int) -> Check:
 
 
 def _turned(model: Model, asked: Check) -> Check:
-    """Return a touch of a round tool on a round body where the program solves half of it: above the x axis."""
+    """Return a touch of a round tool on a round body, rotated to y = 0, where the program solves a half."""
     if not model.table.is_round or asked.tool.name == "blade":
         return asked
     return replace(asked, x=hypot(asked.x, asked.y), y=0.0)

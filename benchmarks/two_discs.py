@@ -1,4 +1,4 @@
-"""Two frictionless discs on a box or a cylinder by plain quadratic elements of dolfinx: no solver of the program's."""
+"""Two frictionless discs on a box or a cylinder, by quadratic elements in plain dolfinx: an independent solver."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ from pipeline.shapes.tissue import lame
 from pipeline.solve.compiled import cellwise_space, form, vector_space
 
 Disc = tuple[float, float, float]
-# Of the height and of radii: a point this near is on a face, or on an edge.
+# A point is on a face or an edge within this share of the height or radius.
 _CLOSE = 1e-6
 
-# Elements at the edge of a disc and within it, in units of its radius; how they grow away from it, and the largest, in
+# Element size at the edge of a disc and within it, in units of its radius; growth away from it; and largest size, in
 # units of the height, or of the first layer's thickness.
 _EDGE, _GROWTH, _COARSE = 0.09, 0.35, 0.25
 
@@ -38,7 +38,7 @@ class Mesh:
 
 
 def meshed(size: Sequence[float], discs: Sequence[Disc], finer: float = 1.0, ends: Sequence[float] = ()) -> Mesh:
-    """Return a body, its top at z = 0, held at the bottom, with ``discs`` (x, y, radius, in m) on it.
+    """Return a body with its top at z = 0, fixed bottom, and ``discs`` (x, y, radius, in m) on it.
 
     It is a box of three ``size``s (m), or a cylinder of a radius and a height; layers end at depths ``ends`` (m).
     """
@@ -58,7 +58,7 @@ def meshed(size: Sequence[float], discs: Sequence[Disc], finer: float = 1.0, end
             way = f"Sqrt({edge}^2+z^2)"
             mesh.field.setString(fields[-1], "F", f"{_EDGE * r / finer!r}+{_GROWTH / finer!r}*{way}")
         fields.append(mesh.field.add("MathEval"))
-        # As coarse below the first layer as the height allows, within it as its thickness does.
+        # Size limits: by the height below the first layer, by the layer's thickness within it.
         below = f"(Abs(z+{depths[1]!r})-(z+{depths[1]!r}))/2"
         mesh.field.setString(fields[-1], "F", f"{_COARSE * depths[1] / finer!r}+{_GROWTH / finer!r}*{below}")
         least = mesh.field.add("Min")
@@ -81,9 +81,9 @@ def _slab(size: Sequence[float], top: float, bottom: float) -> int:
 def forces(
     mesh: Mesh, poisson: float, depths: Sequence[float], layers: Sequence[tuple[float, float, float]] = ()
 ) -> tuple[list[float], list[float]]:
-    """Return the force (N) on each disc by itself, and on each while all press, at ``depths`` (m), for E = 1.
+    """Return the force (N) on each disc alone, and on each while all press, at ``depths`` (m), for E = 1.
 
-    ``layers`` are E, ν, and the depth (m) that each ends at, instead of one material.
+    ``layers`` are E, ν and lower depth (m) of each, instead of one material.
     """
     space = vector_space(mesh.mesh, 2)
     stiffness = _assembled(space, layers or [(1.0, poisson, np.inf)])
@@ -126,7 +126,7 @@ def _pressed(stiffness: "PETSc.Mat", held: Array, under: Sequence[BoolArray], de
 
 
 def _assembled(space: Any, layers: Sequence[tuple[float, float, float]]) -> "PETSc.Mat":
-    """Return the stiffness of all dofs (N/m), three a node, without conditions."""
+    """Return the stiffness of all dofs (N/m), three per node, without conditions."""
     mesh, constants = space.mesh, cellwise_space(space.mesh, ())
     corners = mesh.geometry.x[compat.geometry_dofs(mesh)[:, :4]]
     layer = np.searchsorted([end for _, _, end in layers[:-1]], -corners[:, :, 2].mean(axis=1))

@@ -1,11 +1,11 @@
-"""Two discs at once: real-time models against quadratic elements that know both, and whether the bars hold.
+"""Two discs at once: real-time models compared with quadratic elements of both, and coverage of the bars.
 
     python -m benchmarks.two_tools [--pairs 6] [--models box,cylinder,layers] [--finer 0.8]
 
-A model that is missing is exported first, into results/two_tools/. Pairs are random: places of the region, radii of
-0.04 to 0.25 of the room there, and depths, at both ends of the range of Poisson's ratio on one mesh. What a force on
-one disc sinks the other is taken from the elements (``benchmarks.two_discs``): the mesh at the edges, by which a disc's
-own force is off most, changes it least. With the model's own compliances it tells what both should feel.
+A missing model is exported first, into results/two_tools/. Pairs are random: places, radii of 0.04 to 0.25 of the
+available size, and depths, at both ends of the range of Poisson's ratio on one mesh. The settlement of one disc by a
+force on the other is taken from the elements (``benchmarks.two_discs``), where the mesh at the edges, the main error of
+a disc's own force, matters least. Together with the model's own compliances it gives the reference forces.
 """
 
 import argparse
@@ -28,15 +28,15 @@ from pipeline.shapes.body import Layered
 
 _FOLDER = Path("results/two_tools")
 _CHECKS, _SIZES, _DEPTHS, _SEED = 6, (0.04, 0.25), (5e-5, 2e-4), 77
-# Middles are up to so many times both radii apart: beyond, there is little to see.
+# Largest distance of the centres, in units of the sum of both radii: beyond it the interaction is small.
 _APART = 8.0
 
 
 @dataclass(frozen=True)
 class Felt:
-    """Of one disc of a pair: the way between both, in units of both radii, and the share of its force that it loses.
+    """One disc of a pair: distance of both, in units of the sum of radii, and the share of its force that is lost.
 
-    ``error`` is that of the model's force, relative, and ``bar`` its bar.
+    ``error`` is the relative error of the model's force, and ``bar`` its bar.
     """
 
     apart: float
@@ -76,7 +76,7 @@ def _lines(name: str, pairs: int, finer: float) -> Iterator[str]:
 
 
 def _pair(model: Model, rng: np.random.Generator) -> list[Disc]:
-    """Return two discs that a model answers for, not too far from each other."""
+    """Return two discs within the range of a model, not too far from each other."""
     while True:
         discs = []
         for _ in range(2):
@@ -90,7 +90,7 @@ def _pair(model: Model, rng: np.random.Generator) -> list[Disc]:
 def _solved(
     model: Model, scope: Scope, discs: list[Disc], depths: list[float], finer: float
 ) -> Iterator[tuple[float, list[Felt]]]:
-    """Yield what both feel, for each Poisson's ratio."""
+    """Yield the forces of both, for each Poisson's ratio."""
     body = scope.body
     assert isinstance(body, Layered)
     height = body.heights[1] - body.heights[0]

@@ -1,1 +1,1 @@
-"""Runs that are killed at any moment, and what is left of them."""
+"""Fault injection: runs killed at random moments, and checks of what they leave."""

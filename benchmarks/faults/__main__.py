@@ -1,13 +1,13 @@
-"""Runs are killed at random moments: what is finished stays, and the next run ends as if nothing had happened.
+"""Runs are killed at random moments: finished cases must remain, and the next run must end as if undisturbed.
 
     python -m benchmarks.faults [MOMENTS] [--seed N] [--first N]
 
-Each moment has a signal (SIGKILL, SIGTERM, SIGINT), one rank or two, of which one alone may be struck, and a phase:
-while forms are compiled, while gmsh meshes, while it is solved, while records or results are written. After it all
-processes must be gone within 30 s, the store must be sound and hold every record that it held, no file be torn; and a
-run on the same store must end with the dataset of one that nobody disturbed. After SIGKILL the case that was under way
-may have failed in that run, which says so, and the one after it must end so. Ends with 1 if anything is wrong.
-``--first`` leaves the moments before it out: a hundred may be gone through in parts.
+Each moment has a signal (SIGKILL, SIGTERM, SIGINT), one rank or two (where one alone may receive it), and a phase:
+compilation of forms, meshing, solving, or writing of records or results. Afterwards all processes must end within 30 s,
+the store must be intact with every record that it had, and no file may be truncated. A run on the same store must then
+give the dataset of an undisturbed run. After SIGKILL the case in progress may fail in that run, which must report it;
+the run after that must then end so. The exit status is 1 if a check fails. ``--first`` skips the moments before it: a
+hundred may be run in parts.
 """
 
 import argparse
@@ -24,9 +24,9 @@ from tests.compare import assert_same
 from tests.studies import small_text
 
 MOMENTS, SEED = 100, 1
-# Of the compiled forms, so many are missing: their compilation is a phase of every run.
+# Number of compiled forms that are removed, so that every run has a compilation phase.
 _MISSING = 1
-# What a run says of cases that failed because the process of an earlier one was killed.
+# Message for cases that failed because the process of an earlier one was killed.
 _BLAMED = "the process of an earlier run ended"
 STUDY = small_text(
     material={"poisson": [0.3, 0.4]},
@@ -61,7 +61,7 @@ def main(arguments: list[str]) -> int:
 
 
 def undisturbed(folder: Path) -> Scene:
-    """Return the scene of a run that nobody disturbs: its compiled forms are those of the others."""
+    """Return the scene of an undisturbed run; the other runs use its compiled forms."""
     (folder / "cache").mkdir()
     whole = Scene(folder / "whole", STUDY, folder / "cache", 0, random.Random())
     if status := whole.run_on():
@@ -70,7 +70,7 @@ def undisturbed(folder: Path) -> Scene:
 
 
 def one(folder: Path, whole: Scene, moment: Moment, dice: random.Random) -> tuple[Left, list[str]]:
-    """Strike once; return what was left, and what is wrong with what the next run makes of it."""
+    """Disturb one run; return what it left, and the faults of the next run."""
     scene = Scene(folder, STUDY, whole.folder / "cache", _MISSING, dice)
     left = scene.strike(moment)
     ranks = 1 if moment.ranks > 1 and dice.random() < 0.5 else moment.ranks

@@ -1,6 +1,6 @@
-"""The command ``epsmesh``, telling in a file in which stage it is: ``python -m benchmarks.faults.victim FILE run …``.
+"""The command ``epsmesh``, which writes its current stage to a file: ``python -m benchmarks.faults.victim FILE run …``.
 
-The file has a name of the process's own, ``FILE-<number of the process>``, and holds the stage it is in, padded.
+Each process has a file of its own, ``FILE-<number of the process>``, with the padded name of the stage.
 """
 
 import os
@@ -11,7 +11,7 @@ WIDTH = 40
 
 
 class _Told(list[str]):
-    """The stack of stages of :mod:`pipeline.stages`, which is written down whenever it changes."""
+    """The stack of stages of :mod:`pipeline.stages`, written to the file at every change."""
 
     def __init__(self, path: Path):
         super().__init__()
@@ -31,7 +31,7 @@ class _Told(list[str]):
 
 
 def main() -> None:
-    """Run the command of the rest of the arguments."""
+    """Run the command in the remaining arguments."""
     from pipeline import stages
     from pipeline.__main__ import main as run
 

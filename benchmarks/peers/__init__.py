@@ -1,5 +1,5 @@
-"""The same scenes in other programs: NGSolve and scikit-fem against this one, time to a true error of F.
+"""The same scenes in other programs: time to a true error of F, compared with NGSolve and scikit-fem.
 
-``make peers`` runs it. Each program works in a process of its own, NGSolve and scikit-fem in a venv of their own
+``make peers`` runs the comparison. Each program works in a process of its own, NGSolve and scikit-fem in their own venv
 (``scripts/peers.sh``), and answers jobs in JSON: :mod:`benchmarks.peers.worker`.
 """

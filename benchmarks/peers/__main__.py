@@ -1,6 +1,6 @@
 """Time to a true error of F in this program, NGSolve and scikit-fem: ``python -m benchmarks.peers``.
 
-Wants an idle machine. Writes peers.json, peers.md and peers.png into the folder of results.
+Run it on an idle machine. It writes peers.json, peers.md and peers.png into the folder of results.
 """
 
 import argparse
@@ -19,12 +19,12 @@ from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth, converge, known
 from benchmarks.tables import options, write
 
-# Runs of more processor seconds vary too little to be repeated.
+# Runs with more processor seconds vary too little to need repeats.
 _LONG = 3.0
 
 
 def main() -> int:
-    """Run everything that is asked for; return 1 if a setting failed or two truths differ."""
+    """Run the requested comparisons; return 1 if a setting failed or two converged forces differ."""
     asked = _options()
     truths = {name: converge(name) if asked.truth else known(TASKS[name]) for name in asked.scenes}
     print(truths_table(truths), flush=True)
@@ -69,7 +69,7 @@ def _options() -> argparse.Namespace:
 
 
 def _jobs(asked: argparse.Namespace) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield who is asked for what: all in turn, again and again, as no machine is always as fast."""
+    """Yield programs and jobs, in turn and repeatedly, since the speed of a machine varies."""
     for name, _ in product(asked.scenes, range(asked.repeats)):
         for program in asked.programs:
             if not _settings(program, name, 1):
@@ -89,7 +89,7 @@ def _settings(program: str, scene: str, threads: int) -> Settings:
 
 
 def _answers(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield a program's answers; if it breaks down, that is the last of them: the others go on."""
+    """Yield a program's answers; a crash is the last of them, so that the others continue."""
     try:
         yield from ask(program, job)
     except RuntimeError as error:
@@ -109,7 +109,7 @@ def _line(run: Run) -> str:
 
 
 def _scan(asked: argparse.Namespace, truths: dict[str, Truth]) -> None:
-    """Print, for each peer and scene, the settings that reach each true error soonest, by processor time."""
+    """Print, for each peer and scene, the settings that reach each true error first, by processor time."""
     for name in asked.scenes:
         for program in (p for p in asked.programs if name in LADDERS.get(p, {})):
             job = {"scene": name, "threads": 1, "settings": _grid(program, name), "warm": False}

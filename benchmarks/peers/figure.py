@@ -23,7 +23,7 @@ _LOOKS = {
 
 
 def draw(runs: Sequence[Run], path: Path) -> Path:
-    """Draw the runs on one thread: all as marks, the best of each program joined."""
+    """Draw the runs on one thread: all as marks, the best of each program connected."""
     names = list(dict.fromkeys(run.scene for run in runs))
     with mpl.rc_context(STYLE):
         width = 2.6 * len(names) + 0.9 + 1.2 * (len(names) == 1)

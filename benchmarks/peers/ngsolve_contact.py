@@ -1,4 +1,4 @@
-"""A ball in contact without friction, in NGSolve: Nitsche's method, and Newton's on which points touch.
+"""A ball in frictionless contact, in NGSolve: Nitsche's method, with Newton's method for the active points.
 
 The method is consistent, so that its error falls with the order as that of the elements does (F. Chouly, P. Hild,
 Math. Comp. 82, 1089 (2013)): with P(u) = γ (u·n - gap) - σₙ(u) the pressure is max(P, 0), and γ = ``gamma`` p²/h.
@@ -11,16 +11,16 @@ import ngsolve as ng
 from benchmarks.peers.tasks import Task
 from benchmarks.peers.worker import Answer, Parts
 
-# The ball's candidates for contact reach this far, in units of its contact on a half-space.
+# Radius of the candidates for contact, in units of the contact radius on a half-space.
 REACH = 1.4
 _MOST_STEPS = 25
 
 
 def contact_force(scene: Task, mesh: Any, order: int, gamma: float, tolerance: float, parts: Parts) -> Answer:
-    """Return F; the steps end when one changes it by less than ``tolerance`` of it.
+    """Return F; steps end when F changes by less than the relative ``tolerance``.
 
     Raises:
-        RuntimeError: if they do not end.
+        RuntimeError: if they do not converge.
     """
     mu = 1 / (2 * (1 + scene.poisson))
     lam = 2 * mu * scene.poisson / (1 - 2 * scene.poisson)
@@ -45,7 +45,7 @@ def contact_force(scene: Task, mesh: Any, order: int, gamma: float, tolerance: f
 
     displacement = ng.GridFunction(space)
     pressure = pressed(displacement) + stiff * below
-    # It begins with Hertz's circle.
+    # The initial guess is Hertz's circle.
     first, inside = ng.Parameter(1.0), ng.IfPos(scene.half_width**2 - ng.x**2 - ng.y**2, 1, 0)
     touches = ng.IfPos(first - 0.5, inside, ng.IfPos(pressure, 1, 0))
     contact = ng.BilinearForm(space)
@@ -72,7 +72,7 @@ def contact_force(scene: Task, mesh: Any, order: int, gamma: float, tolerance: f
 
 
 def _penetration(scene: Task) -> Any:
-    """Return how far the ball reaches below the surface where neither has moved."""
+    """Return the penetration of the undeformed ball and surface."""
     radius = scene.probe[1]
     assert scene.at == (0, 0)
     return scene.depth - radius + ng.sqrt(radius**2 - ng.x**2 - ng.y**2)

@@ -1,4 +1,4 @@
-"""The scenes in NGSolve, as one who knows it would: curved elements, hp-refined rim, condensation, a part by symmetry.
+"""The scenes in NGSolve, set up by its own best practice: curved elements, hp-refined rim, condensation, symmetry.
 
 ``python -m benchmarks.peers.ngsolve_model`` answers a job (:mod:`benchmarks.peers.worker`).
 """
@@ -34,10 +34,11 @@ def solve(
 ) -> Answer:
     """Return F: order p, elements of ``rim`` half widths at the probe's edge, growing by ``grading`` to ``maxh`` mm.
 
-    The edge, and with ``corners`` a blade's corners, are then refined ``levels`` times towards themselves, each time by
-    ``factor``. ``solver``: "sparsecholesky",
-    or "bddc" for conjugate gradients with that preconditioner. Below a ball all elements are of that size; ``gamma``
-    and ``tolerance`` are those of :func:`contact_force`.
+    The edge, and with ``corners`` a blade's corners, are then refined geometrically ``levels`` times by ``factor``.
+    ``solver`` is "sparsecholesky", or "bddc" for conjugate gradients with that preconditioner. Below a ball all
+    elements have the rim's size; ``gamma`` and ``tolerance`` are those of :func:`contact_force`.
+
+    Lengths are in mm.
     """
     ng.SetNumThreads(threads)
     parts = Parts()
@@ -56,13 +57,13 @@ def solve(
 
 def _mesh(scene: Task, rim: float, maxh: float, grading: float, safety: float = 2.0, corners: bool = True) -> Any:
     geometry = OCCGeometry(_shape(scene, rim, corners))
-    # Netgen's own threads wait by spinning, which costs more than all of such a mesh.
+    # Netgen's own threads spin while they wait, which costs more than such a mesh.
     sizes = {"maxh": maxh, "grading": grading, "curvaturesafety": safety}
     return ng.Mesh(geometry.GenerateMesh(**sizes, parallel_meshing=False, nthreads=1))
 
 
 def _shape(scene: Task, rim: float, corners: bool) -> Any:
-    """Return the part of the body that symmetry leaves, with the footprint in its surface and all faces named."""
+    """Return the part of the body that symmetry leaves, with the footprint in its surface and named faces."""
     if scene.body[0] == "box":
         _, length, width, height = scene.body
         reach = max(length, width)
@@ -134,14 +135,14 @@ def _force(scene: Task, mesh: Any, order: int, solver: str, parts: Parts) -> Ans
     else:
         inverse = stiffness.mat.Inverse(free, inverse=solver)
     displacement.vec.data += inverse * residual
-    # What was condensed carries no residual: the energy, F·d, is that of the coupling unknowns.
+    # Condensed unknowns have no residual: the energy, F·d, is that of the coupling unknowns.
     work = ng.InnerProduct(displacement.vec, (stiffness.mat * displacement.vec).Evaluate())
     parts.end("solve")
     return Answer(2 ** len(scene.planes) * work, space.ndof, parts.seconds)
 
 
 def area(scene: Task, **sizes: float) -> float:
-    """Return the area (mm²) of the meshed footprint over the true one: that geometry and names are right."""
+    """Return the area (mm²) of the meshed footprint over the exact one, a check of geometry and names."""
     mesh = _mesh(scene, sizes["rim"] * scene.half_width, sizes["maxh"], sizes["grading"])
     mesh.Curve(3)
     found = ng.Integrate(1.0, mesh, definedon=mesh.Boundaries("probe")) * 2 ** len(scene.planes)

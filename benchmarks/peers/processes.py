@@ -1,4 +1,4 @@
-"""Processes of the programs that are compared: how each is started, and what it answers."""
+"""Processes of the compared programs: how each is started, and what it returns."""
 
 import json
 import os
@@ -16,13 +16,13 @@ PEERS = ("NGSolve", "scikit-fem")
 
 
 def ask(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield a program's answers to ``job``, as soon as each exists; its threads, or ranks, are the job's.
+    """Yield a program's answers to ``job``, each as soon as it exists; threads, or ranks, are the job's.
 
     Raises:
-        RuntimeError: with the end of what it said, if it breaks down, or its venv is not there.
+        RuntimeError: if it crashes, with the end of its output; or if its venv does not exist.
     """
     if program in PEERS and not PEERS_PYTHON.exists():
-        raise RuntimeError(f"{PEERS_PYTHON} is not there: scripts/peers.sh makes it")
+        raise RuntimeError(f"{PEERS_PYTHON} does not exist: scripts/peers.sh makes it")
     python = str(PEERS_PYTHON if program in PEERS else sys.executable)
     ranks = job.get("threads", 1) if program == "program" else 1
     launcher = [*MPIRUN, str(ranks)] if ranks > 1 else []
@@ -51,7 +51,7 @@ def ask(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _environment(job: dict[str, Any]) -> dict[str, str]:
-    """One thread for every library that would take more; ranks and NGSolve's tasks are counted apart."""
+    """Restrict every library to one thread; ranks and NGSolve's tasks are set separately."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH", "")) if part)

@@ -1,4 +1,4 @@
-"""The scenes in this program, from the study to the record, error bar and second tries included.
+"""The scenes in this program, from the study to the record, with error bar and further attempts.
 
 ``python -m benchmarks.peers.program`` answers a job (:mod:`benchmarks.peers.worker`).
 """
@@ -19,12 +19,12 @@ from pipeline.study.sweep import Study
 
 YOUNG = 1e4  # Pa: F is proportional to it
 _MM = 1e-3
-# Depths in units of the task's: F is proportional to it, but for a ball.
+# Depth in units of the task's: F is proportional to it, except for a ball.
 _SMALL = 0.1
 
 
 def solve(scene: Task, threads: int, *, accuracy: str, model: str = "3d", **mesh: Any) -> Answer:
-    """Return F, asked for to ``accuracy``: ``model`` "3d" uses mirror symmetry, "auto" axisymmetry, too.
+    """Return F at a required ``accuracy``: ``model`` "3d" uses mirror symmetry, "auto" axisymmetry, too.
 
     ``threads`` are ranks here, those of the world.
     """
@@ -38,7 +38,7 @@ def record_of(scene: Task, model: str, mesh: dict[str, Any]) -> Record:
     """Return the record of a scene with a ``mesh`` section; collective on the world.
 
     Raises:
-        RuntimeError: if the program missed the accuracy.
+        RuntimeError: if the program did not reach the accuracy.
     """
     without = ("axisymmetric",) if model == "3d" else ()
     (record,) = compute(make_plan(study(scene, mesh), without=without), MPI.COMM_WORLD).values()
@@ -48,7 +48,7 @@ def record_of(scene: Task, model: str, mesh: dict[str, Any]) -> Record:
 
 
 def study(scene: Task, mesh: dict[str, Any]) -> Study:
-    """Return the study of a scene, whose one case is solved, and nothing else."""
+    """Return the study of a scene with one case and no F_exact."""
     body: dict[str, Any] = {"shape": scene.body[0]}
     probe: dict[str, Any] = {"shape": scene.probe[0], "depth": f"{_depth(scene)} mm", "at": _mm(*scene.at)}
     body |= {"size": _mm(*scene.body[1:])} if scene.body[0] == "box" else _named(scene.body, "radius", "height")
@@ -65,7 +65,7 @@ def study(scene: Task, mesh: dict[str, Any]) -> Study:
 
 
 def _depth(scene: Task) -> float:
-    """Return how far the probe is pushed in, in mm."""
+    """Return the depth of the probe, in mm."""
     return scene.depth if scene.probe[0] == "ball" else _SMALL
 
 

@@ -1,4 +1,4 @@
-"""What the runs say: the fastest of each program that reaches a true error, tables, JSON."""
+"""Results of the runs: the fastest of each program within a true error, tables, JSON."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -33,19 +33,19 @@ class Run:
     all_seconds: tuple[float, ...] = ()
 
     def on(self, clock: str) -> float:
-        """Return what it took by ``clock``: "seconds", or "cpu" (of two ranks, the first one's)."""
+        """Return the time by ``clock``: "seconds", or "cpu" (of two ranks, the first one's)."""
         return self.cpu if clock == "cpu" else self.seconds
 
     @property
     def asked(self) -> float | None:
-        """The accuracy that this program was asked for."""
+        """The accuracy required of this program."""
         text = self.setting.get("accuracy")
         return float(text.split()[0]) / 100 if text else None
 
 
 @dataclass(frozen=True)
 class Standing:
-    """The fastest runs within a true error: this program's as asked for it, and in hindsight, and each peer's."""
+    """The fastest runs within a true error: this program's as required, its best in hindsight, and each peer's."""
 
     scene: str
     threads: int
@@ -63,13 +63,13 @@ class Standing:
 
     @property
     def ratio(self) -> float | None:
-        """This program's time, asked for the accuracy, over the best peer's."""
+        """Time of this program, at the required accuracy, over the best peer's."""
         best = self.best_peer
         return self.asked.on(self.clock) / best.on(self.clock) if self.asked and best else None
 
 
 def medians(runs: Iterable[Run]) -> list[Run]:
-    """Return for each setting the middle one of its repeats, with the middle of their processor times."""
+    """Return the median of each setting's repeats, with the median of their processor times."""
     repeats: dict[str, list[Run]] = {}
     for run in runs:
         repeats.setdefault(json.dumps([run.scene, run.program, run.threads, run.setting]), []).append(run)
@@ -82,7 +82,7 @@ def medians(runs: Iterable[Run]) -> list[Run]:
 
 
 def standings(runs: Sequence[Run], clock: str = "seconds") -> list[Standing]:
-    """Return who stands where by ``clock``, for every scene, number of threads and accuracy that was run."""
+    """Return the comparison by ``clock``, for every scene, number of threads and accuracy that was run."""
     found = []
     for name, threads in dict.fromkeys((run.scene, run.threads) for run in runs):
         here = [run for run in runs if (run.scene, run.threads) == (name, threads)]
@@ -104,7 +104,7 @@ def _fastest(runs: Iterable[Run], clock: str) -> Run | None:
 
 
 def table(found: Sequence[Standing]) -> str:
-    """Return the standings in markdown."""
+    """Return the comparison in markdown."""
     names = ("program, asked", "program, hindsight", "meridian", *PEERS)
     rows = []
     for s in found:
@@ -125,7 +125,7 @@ def _cell(run: Run | None, clock: str) -> str:
 
 
 def breakdown(found: Sequence[Standing]) -> str:
-    """Return, in markdown, where the time of this program goes, and of the best peer."""
+    """Return, in markdown, the parts of the time of this program and of the best peer."""
     rows = [
         _place(s, s.scene)
         | {
@@ -142,7 +142,7 @@ def breakdown(found: Sequence[Standing]) -> str:
 
 
 def truths_table(truths: dict[str, Truth]) -> str:
-    """Return, in markdown, what F is and who says so."""
+    """Return, in markdown, the converged F by source."""
     rows = [
         {
             "scene": TASKS[name].title,
@@ -161,7 +161,7 @@ def truths_table(truths: dict[str, Truth]) -> str:
 def to_json(
     truths: dict[str, Truth], runs: Sequence[Run], machine: dict[str, Any], failures: list[Any]
 ) -> dict[str, Any]:
-    """Return all of it as JSON's types."""
+    """Return all results in JSON's types."""
     ratios = [
         {"scene": s.scene, "threads": s.threads, "target": s.target, "ratio": s.ratio, "ratio_cpu": by_cpu.ratio}
         for s, by_cpu in zip(standings(runs), standings(runs, "cpu"), strict=True)

@@ -1,13 +1,13 @@
-"""What each program is run with: a short ladder for each scene, found by ``--scan`` over the grids below."""
+"""Settings of each program: a short ladder for each scene, found by ``--scan`` over the grids below."""
 
 from itertools import product
 from typing import Any
 
 Settings = tuple[dict[str, Any], ...]
 
-# What this program is asked for. The first three are the targets; the others show what it would have got away with.
+# Accuracies required of this program. The first three are the targets; the others show the cost of a tighter one.
 PROGRAM: Settings = tuple({"accuracy": f"{percent} %"} for percent in ("3", "2", "1", "0.5", "0.3", "0.2", "0.1"))
-# Round scenes, in two dimensions: the same for every accuracy above 1e-5.
+# Axisymmetric scenes, in two dimensions: the same for every accuracy above 1e-5.
 MERIDIAN: Settings = ({"accuracy": "0.1 %", "model": "auto"},)
 
 

@@ -1,4 +1,4 @@
-"""The scenes in scikit-fem: gmsh's tetrahedra of order 2, graded to the rim, quadratic elements, PARDISO or others.
+"""The scenes in scikit-fem: gmsh's quadratic tetrahedra, graded to the rim, with PARDISO or another solver.
 
 ``python -m benchmarks.peers.skfem_model`` answers a job (:mod:`benchmarks.peers.worker`).
 """
@@ -27,9 +27,9 @@ _PAIRS = [(i, j) for i in range(3) for j in range(i, 3)]
 def solve(
     scene: Task, threads: int, *, rim: float, growth: float, quarter: bool = False, solver: str = "pardiso"
 ) -> Answer:
-    """Return F: sizes are ``rim`` half widths at the probe's edge and grow by ``growth`` with the distance from it.
+    """Return F: element sizes are ``rim`` half widths at the probe's edge and grow by ``growth`` with the distance.
 
-    ``quarter`` moves the mid nodes of edges that end on the rim to their quarter points. ``solver``: "pardiso",
+    ``quarter`` moves the mid nodes of edges that end on the rim to their quarter points. ``solver`` is "pardiso",
     "cholmod", or "amg" for conjugate gradients with smoothed aggregation.
     """
     assert threads == 1
@@ -54,7 +54,7 @@ def solve(
 
 
 def _mesh(scene: Task, rim: float, growth: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points (n, 3), cells (m, 10), and which points are on the probe's edge."""
+    """Return points (n, 3), cells (m, 10), and a mask of the points on the probe's edge."""
     if not gmsh.isInitialized():
         gmsh.initialize([""], readConfigFiles=False)
         options = {
@@ -150,7 +150,7 @@ def _slopes(u: Any, v: Any, w: Any) -> Any:
 
 
 def _stiffness(basis: Basis, nu: float) -> sp.csr_matrix:
-    """Return the stiffness of E = 1, unknowns by node: six scalar forms are far cheaper than one of 30 × 30."""
+    """Return the stiffness for E = 1, unknowns by node: six scalar forms are far cheaper than one of 30 × 30."""
     mu = 1 / (2 * (1 + nu))
     lam = 2 * mu * nu / (1 - 2 * nu)
     size = basis.Nbfun
@@ -172,7 +172,7 @@ def _stiffness(basis: Basis, nu: float) -> sp.csr_matrix:
 
 
 def _prescribed(scene: Task, basis: Basis) -> tuple[np.ndarray, np.ndarray]:
-    """Return the prescribed displacement and which unknowns it holds."""
+    """Return the prescribed displacement, and the indices of its unknowns."""
     x, y, z = basis.doflocs
     offset = np.abs(np.array([x - scene.at[0], y - scene.at[1]]))
     if scene.probe[0] == "disc":

@@ -1,4 +1,4 @@
-"""What all programs are asked for, without any of their libraries. Lengths in mm, F in units of E·d·mm."""
+"""The tasks of all programs, independent of their libraries. Lengths in mm, F in units of E·d·mm."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -25,19 +25,19 @@ class Task:
 
     @property
     def planes(self) -> tuple[str, ...]:
-        """Planes of mirror symmetry, "x" for x = 0: all bodies and probes here have both, but for their place."""
+        """Planes of mirror symmetry, "x" for x = 0; a place off the centre breaks them."""
         return tuple(axis for axis, place in zip("xy", self.at, strict=True) if place == 0.0)
 
     @property
     def half_width(self) -> float:
-        """Half of the probe's least width, to which sizes at its edge are given; of a ball, Hertz's contact radius."""
+        """Half of the probe's least width, the unit of sizes at its edge; for a ball, Hertz's contact radius."""
         if self.probe[0] == "ball":
             return sqrt(self.probe[1] * self.depth)
         return self.probe[1] if self.probe[0] == "disc" else self.probe[-1] / 2
 
     @property
     def depth(self) -> float:
-        """How far the probe is pushed in: 1, since F is proportional to it, unless it is a ball."""
+        """Depth of the probe: 1, since F is proportional to it, except for a ball."""
         return self.probe[2] if self.probe[0] == "ball" else 1.0
 
     @property

@@ -1,4 +1,4 @@
-"""F of a scene converged by two programs that share nothing, each with its bar."""
+"""Converged F of a scene from two independent programs, each with its bar."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,10 +6,10 @@ from typing import Any
 from benchmarks.peers.processes import ask
 from benchmarks.peers.tasks import TASKS, Task
 
-# NGSolve: one mesh, refined to a two-thousandth of its size at the rim, ever higher orders.
+# NGSolve: one mesh, refined to a two-thousandth of its size at the rim, with increasing orders.
 _MESH = {"rim": 0.7, "maxh": 20, "grading": 0.4, "levels": 4, "factor": 0.15}
 _ORDERS = (3, 4, 5)
-# Of a ball: smaller elements below it. Nitsche's F is no bound, and jitters.
+# For a ball: smaller elements below it. Nitsche's F is no bound, and does not converge monotonically.
 _CONTACT = {"order": 3, "maxh": 15, "grading": 0.3, "levels": 0, "safety": 1.0, "gamma": 5.0, "tolerance": 1e-5}
 _RIMS = (0.4, 0.3, 0.2)
 _PROGRAM = {"accuracy": "0.05 %"}
@@ -17,7 +17,7 @@ _PROGRAM = {"accuracy": "0.05 %"}
 
 @dataclass(frozen=True)
 class Truth:
-    """F (E·d·mm), its relative bar, and what each program makes of it."""
+    """F (E·d·mm), its relative bar, and the value of each program."""
 
     force: float
     bar: float
@@ -31,15 +31,15 @@ class Truth:
 
 
 def known(scene: Task) -> Truth:
-    """Return what was found before."""
+    """Return the stored value."""
     return Truth(*scene.truth, {"stored": scene.truth})
 
 
 def converge(name: str) -> Truth:
-    """Return the truth of a scene, NGSolve's and this program's, and what is stored of it.
+    """Return the converged F of a scene, from NGSolve, this program, and the stored value.
 
     Raises:
-        RuntimeError: if a program breaks down.
+        RuntimeError: if a program crashes.
     """
     sources = {"stored": TASKS[name].truth, "NGSolve": _ngsolve(name), "program": _program(name)}
     best = min(sources.values(), key=lambda found: found[1])
@@ -47,9 +47,9 @@ def converge(name: str) -> Truth:
 
 
 def _ngsolve(name: str) -> tuple[float, float]:
-    """Return F and its bar: F falls with the order, and its steps by a factor that they show themselves.
+    """Return F and its bar: F falls with the order, in steps whose ratio is extrapolated.
 
-    Of a ball: the last F, and the largest step.
+    For a ball: the last F, and the largest step.
     """
     if TASKS[name].probe[0] == "ball":
         jobs = {"scene": name, "settings": [_CONTACT | {"rim": rim} for rim in _RIMS], "warm": False}
@@ -59,7 +59,7 @@ def _ngsolve(name: str) -> tuple[float, float]:
     forces = [_done(answer) for answer in ask("NGSolve", {"scene": name, "settings": settings, "warm": False})]
     before, last = forces[-3] - forces[-2], forces[-2] - forces[-1]
     rest = last * last / (before - last)
-    # The rest of a geometric sequence, half of it in doubt.
+    # The rest of a geometric sequence, with half of it as the bar.
     return forces[-1] - rest, 0.5 * rest / forces[-1]
 
 

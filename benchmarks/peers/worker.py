@@ -1,6 +1,6 @@
-"""How a program is asked: one job in JSON on its standard input, one line of JSON for each setting that is done.
+"""Protocol of a program: one job in JSON on its standard input, one line of JSON for each setting when done.
 
-Libraries are loaded and each setting has run once before it is timed: cold of mesh, warm of compiler.
+Libraries are loaded, and each setting has run once before it is timed: the mesh is new, forms are compiled.
 """
 
 import gc
@@ -17,7 +17,7 @@ from benchmarks.peers.tasks import TASKS, Task
 
 @dataclass(frozen=True)
 class Answer:
-    """F (E·d·mm), the unknowns it was solved for, and the seconds that parts of the work took."""
+    """F (E·d·mm), the number of unknowns, and the seconds of parts of the work."""
 
     force: float
     dofs: int
@@ -28,9 +28,9 @@ Solve = Callable[..., Answer]
 
 
 def answers(solve: Solve, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield, for each of the job's settings, what ``solve(scene, threads, **setting)`` gave and what it cost.
+    """Yield, for each of the job's settings, the result of ``solve(scene, threads, **setting)`` and its cost.
 
-    With ``warm`` each setting runs once before it is timed, otherwise the first setting alone does.
+    With ``warm`` each setting runs once before it is timed, otherwise only the first setting does.
     """
     scene, threads = TASKS[job["scene"]], job.get("threads", 1)
     for number, setting in enumerate(job["settings"]):
@@ -38,7 +38,7 @@ def answers(solve: Solve, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
             if job.get("warm", True) or number == 0:
                 solve(scene, threads, **setting)
             found = _timed(solve, scene, threads, setting)
-        except Exception as error:  # one setting that fails is no reason to lose the rest
+        except Exception as error:  # a failed setting does not end the others
             found = {"failed": f"{type(error).__name__}: {error}"}
         yield {"setting": setting, **found}
 
@@ -51,9 +51,9 @@ def _timed(solve: Solve, scene: Task, threads: int, setting: dict[str, Any]) -> 
 
 
 def serve(solve: Solve, share: Callable[[Any], Any] = lambda job: job, *, speaks: bool = True) -> None:
-    """Answer the job on standard input. What the libraries themselves print goes to standard error.
+    """Answer the job on standard input. Output of the libraries goes to standard error.
 
-    Of several ranks the one that ``speaks`` reads and answers; ``share`` gives the others what it read.
+    Of several ranks the one that ``speaks`` reads and answers; ``share`` broadcasts the job to the others.
     """
     job = share(json.load(sys.stdin) if speaks else None)
     out = os.fdopen(os.dup(1), "w")

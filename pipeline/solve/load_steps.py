@@ -225,7 +225,7 @@ class LoadSteps(Solver):
         reached, force, _ = walk.path[-1]
         whole = 2.0 ** len(self._elements.body.mirrored) * force
         return (
-            f"load steps ended at {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {whole:.4g} N "
+            f"load steps reached {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {whole:.4g} N "
             f"(Newton's method: {why}); the tissue becomes unstable, or elements at the probe's edge are flattened; "
             "use a smaller depth, or a larger rim"
         )

@@ -184,7 +184,7 @@ def test_a_footprint_over_the_edge_is_refused(file):
         frame = a_scene.body.frame((57e-3, 0.0), (0.0, 0.0, -1.0))
 
     aside = Aside(a_scene.body, probe(), rim_segments=a_scene.rim_segments)
-    with pytest.raises(MeshError, match="no tissue below it"):
+    with pytest.raises(MeshError, match="no connected tissue below it"):
         mesh_organ(aside, SIZES, far_surface(a_scene.body))
 
 
@@ -230,7 +230,7 @@ def test_a_surface_that_is_not_the_files_is_never_filled(file, monkeypatch):
         return replace(sheet, points=points)
 
     monkeypatch.setattr(make, "_to_sizes", drawn_out)
-    with pytest.raises(TangledError, match=r"leaves the file's by \d"):
+    with pytest.raises(TangledError, match=r"deviates from the file's by \d"):
         mesh_organ(a_scene, SIZES, far)
     opened = replace(far.sheet, facets=far.sheet.facets[1:], group=far.sheet.group[1:])
     monkeypatch.setattr(make, "_to_sizes", lambda *given: opened)

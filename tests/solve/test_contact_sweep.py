@@ -123,7 +123,7 @@ def test_keys_of_tools_without_a_range_and_of_the_exact_force_do_not_know_of_it(
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"probe": sphere("0.2 mm")}, r"probe\.depth.*is not within depth_range, 0\.04 mm to 0\.12 mm"),
+        ({"probe": sphere("0.2 mm")}, r"probe\.depth.*is outside depth_range, 0\.04 mm to 0\.12 mm"),
         ({"probe": sphere("0.1 mm") | {"depth_range": ["0.2 mm", "0.1 mm"]}}, "must begin with the smaller depth"),
         ({"mesh": {"accuracy": "1 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))},
          "is for meshes with sizes of your own"),

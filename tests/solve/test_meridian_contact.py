@@ -169,5 +169,5 @@ def test_a_pull_is_judged_by_the_mean_pressure(scale, steep, pulls):
     if not pulls:
         check_signs(*asked, tool=tool, depth=1e-4)
         return
-    with pytest.raises(LiftsOff, match=r"1.99 mm from the axis the tool would pull with 1.5% of the mean"):
+    with pytest.raises(LiftsOff, match=r"1.99 mm from the axis it has a tension of 1.5% of the mean"):
         check_signs(*asked, tool=tool, depth=1e-4)

@@ -58,7 +58,7 @@ def test_a_value_that_is_not_known_is_not_nought(monkeypatch):
         hookes += 2 * cells.lame_mu * cells.principal_strains[:, -1]
         return np.full_like(hookes, np.nan) if cells.is_mixed else hookes
 
-    monkeypatch.setitem(cell_values.LARGEST, "stress", stress)
+    monkeypatch.setitem(cell_values.CELL_MAXIMA, "stress", stress)
     case = case_of()
     mesh = mesh_case(case, ("x", "y"), MPI.COMM_SELF)
     law, strains = MaterialLaw.of_moduli(10e3, 0.3), np.array([-3e-3, 1e-3, -2e-3])

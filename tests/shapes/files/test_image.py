@@ -154,7 +154,7 @@ def test_what_is_no_label_map_is_refused(scan: Path, tmp_path: Path):
     shell[15:35, 18:32, 20:30] = 0
     broken = gzip.compress(gzip.decompress(scan.read_bytes())[:5000])
     files: dict[str, tuple[Any, int, str]] = {
-        "missing.nii": (values, 5, "no voxel has label 5; there are 2"),
+        "missing.nii": (values, 5, "no voxel has label 5; labels are 2"),
         "nothing.nii": (values * 0, 1, "all are 0"),
         "grey.nii": (values * np.float32(0.37), 1, "not integers"),
         "times.nii": (np.stack([values, values], 3), 2, "4 dimensions"),
