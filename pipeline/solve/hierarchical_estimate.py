@@ -65,7 +65,7 @@ def _sum(ksp: PETSc.KSP, checked: "_Checked", residual: PETSc.Vec, solution: PET
     solution.set(0.0)
     ksp.solve(residual, solution)
     if ksp.getConvergedReason() == INDEFINITE and not checked.is_rounding(test.total):
-        if not checked.solver.look_closer():
+        if not checked.solver.refine_eigenvalues():
             raise SolveError("the preconditioner of the error estimate is not positive definite")
         solution.set(0.0)
         ksp.solve(residual, solution)

@@ -84,7 +84,7 @@ class LinearSolver:
         levels = self.levels
         if len(levels) == 1:
             return algebraic(self.matrix, self._stack)
-        below = below if below is not None and below.carries(levels) else None
+        below = below if below is not None and below.supports(levels) else None
         known = 1 if below is None else len(levels) - 1
         smoothed = [SmoothedLevel(operator_of(level.matrix), jumps=level.jumps) for level in levels[known:]]
         between = list(map(interpolation, levels[known - 1 :], levels[known:]))
@@ -117,7 +117,7 @@ class LinearSolver:
         with explained():
             self.ksp.solve(rhs, solution)
             before = 0
-            if self.ksp.getConvergedReason() == INDEFINITE and self.look_closer():
+            if self.ksp.getConvergedReason() == INDEFINITE and self.refine_eigenvalues():
                 before = int(self.ksp.its)
                 self.ksp.solve(rhs, solution)
         return before + check_converged(self.ksp)
@@ -146,7 +146,7 @@ class LinearSolver:
         size = comm.allreduce(max(1, self.matrix.getLocalSize()[0]), op=MPI.MAX)
         self.ksp.setUseFischerGuess(_IN_ENERGY, max(2, min(_MOST_RECYCLED, _RECYCLED_BYTES // (8 * size))))
 
-    def look_closer(self) -> bool:
+    def refine_eigenvalues(self) -> bool:
         """Repair an indefinite preconditioner once: return whether a better estimate of its eigenvalues was made.
 
         The smoothers' estimate of their largest eigenvalue was too small. Only a multigrid cycle has one.
@@ -154,10 +154,10 @@ class LinearSolver:
         if self.cycle is None or self._looked_closer:
             return False
         self._looked_closer = True
-        self.cycle.look_closer()
+        self.cycle.refine_eigenvalues()
         return True
 
-    def carries(self, levels: list[Level]) -> bool:
+    def supports(self, levels: list[Level]) -> bool:
         """Return whether this set-up serves a cycle of ``levels``, one more than its own."""
         same = len(levels) == len(self.levels) + 1 and all(map(operator.is_, levels, self.levels))
         return same and not self._is_direct and all(level.held is None for level in levels)

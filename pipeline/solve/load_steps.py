@@ -23,7 +23,7 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.compiled import assemble, global_sum, vector
-from pipeline.solve.elements.base import Column, Enriched, Products, Solver
+from pipeline.solve.elements.base import Column, HierarchicalEstimate, Products, Solver
 from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.hierarchical_estimate import energy_decrements
@@ -44,7 +44,7 @@ _WORK, _ROUNDING = 3e-4, 1e-13
 
 
 @dataclass
-class Walk:
+class LoadPath:
     """A load path: how far a ``motion`` of the probe has proceeded in a body of a ``law``.
 
     ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part. ``displacement`` (owned dofs)
@@ -62,7 +62,7 @@ class Walk:
         """The depth (m) of the last step."""
         return self.path[-1][0]
 
-    def leads_to(self, law: MaterialLaw, movement: Movement) -> bool:
+    def can_reach(self, law: MaterialLaw, movement: Movement) -> bool:
         """Return whether this path can be continued to the movement under this law."""
         return (self.law, (self.motion,)) == (law, movement.motions) and self.reached <= movement.amounts[0]
 
@@ -73,15 +73,15 @@ class LoadSteps(Solver):
     ``stored`` is the energy (J) of the modelled part at the end. What is made is freed with the stack.
     """
 
-    def __init__(self, elements: DisplacementElements, walk: Walk, stack: ExitStack, *, direct: bool):
-        """Set up for the law and motion of a load path, ``walk``; collective.
+    def __init__(self, elements: DisplacementElements, load_path: LoadPath, stack: ExitStack, *, direct: bool):
+        """Set up for the law and motion of a load path, ``load_path``; collective.
 
         Raises:
             SolveError: if the preconditioner cannot be set up.
         """
-        super().__init__(elements, walk.law, is_exact=True)
-        self._elements, self._walk, self._law = elements, walk, walk.law
-        law = walk.law
+        super().__init__(elements, load_path.law, is_exact=True)
+        self._elements, self._load_path, self._law = elements, load_path, load_path.law
+        law = load_path.law
         self._space = elements.displacements
         self._levels = elements.levels(law, stack, direct=direct)
         solver = stack.enter_context(LinearSolver(self._levels, direct=direct))
@@ -126,7 +126,9 @@ class LoadSteps(Solver):
         work = global_sum(space.comm, np.array([residual[held] @ column.prescribed[held]]))
         return Products(space, [moved], [residual], work[None], work)
 
-    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
+    def hierarchical_estimate(
+        self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
+    ) -> HierarchicalEstimate:
         """Return the hierarchical estimate, from the residuals of the solution and of its rate; collective.
 
         Raises:
@@ -162,7 +164,7 @@ class LoadSteps(Solver):
                 f"no error bar: it needs elements of degree {finer.degree}, which fail at the probe's edge; "
                 "use a smaller depth, a larger rim, or degree 2"
             )
-        return Enriched(elements, [], iterations, decrements=np.array([[taken]]))
+        return HierarchicalEstimate(elements, [], iterations, decrements=np.array([[taken]]))
 
     def _at(self, column: Column, displacement: PETSc.Vec) -> None:
         """Write the solution at the depth of a column into ``displacement``."""
@@ -178,33 +180,33 @@ class LoadSteps(Solver):
         Raises:
             LargeError: if a step becomes too small; the path keeps the steps that converged.
         """
-        walk, depth, space = self._walk, column.amount, self._space.space
-        displacement.array[:] = walk.displacement
+        load_path, depth, space = self._load_path, column.amount, self._space.space
+        displacement.array[:] = load_path.displacement
         longest = depth / _FEWEST
-        step = min(walk.step, longest)
+        step = min(load_path.step, longest)
         with ExitStack() as stack:
             unit, rate, trial, forces = (stack.enter_context(vector(space)) for _ in range(4))
             unit.array[:] = column.prescribed[: self._space.owned]
-            while (reached := walk.reached) < depth:
+            while (reached := load_path.reached) < depth:
                 self._body.move(displacement, unit, rate)
-                step, steps = self._step(displacement, rate, trial, walk, step, depth)
+                step, steps = self._step(displacement, rate, trial, load_path, step, depth)
                 displacement.array[:] = trial.array
                 energy = self._body.energy(displacement)
                 self._body.forces(displacement, forces)
                 there = depth if step >= depth - reached else reached + step
-                walk.path.append((there, forces.dot(unit), energy))
-                walk.displacement[:] = displacement.array
-                walk.step = step = min(step * (2 if steps <= _EASY else 1), longest)
-        return np.array(walk.path)
+                load_path.path.append((there, forces.dot(unit), energy))
+                load_path.displacement[:] = displacement.array
+                load_path.step = step = min(step * (2 if steps <= _EASY else 1), longest)
+        return np.array(load_path.path)
 
     def _step(
-        self, displacement: PETSc.Vec, rate: PETSc.Vec, trial: PETSc.Vec, walk: Walk, step: float, depth: float
+        self, displacement: PETSc.Vec, rate: PETSc.Vec, trial: PETSc.Vec, load_path: LoadPath, step: float, depth: float
     ) -> tuple[float, int]:
         """Write the equilibrium a ``step`` (m) farther into ``trial``; return the step and its Newton iterations.
 
         ``rate`` is the tangent at ``displacement``, per metre; the path ends at ``depth`` (m).
         """
-        reached = walk.reached
+        reached = load_path.reached
         if step > (1 - _SLIVER) * (depth - reached):
             step = depth - reached  # no further step for a rounding error
         with vector(self._space.space) as forces:
@@ -218,11 +220,11 @@ class LoadSteps(Solver):
                 except LargeError as error:
                     step /= 2
                     if step < _SMALLEST * depth:
-                        raise LargeError(self._stopped(walk, depth, error)) from error
+                        raise LargeError(self._stopped(load_path, depth, error)) from error
 
-    def _stopped(self, walk: Walk, depth: float, why: LargeError) -> str:
+    def _stopped(self, load_path: LoadPath, depth: float, why: LargeError) -> str:
         """Return the message about a path that ends before ``depth`` (m)."""
-        reached, force, _ = walk.path[-1]
+        reached, force, _ = load_path.path[-1]
         whole = 2.0 ** len(self._elements.body.mirrored) * force
         return (
             f"load steps reached {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {whole:.4g} N "

@@ -147,7 +147,7 @@ class HyperelasticBody:
         """
         try:
             self._counted(solver, solve)
-            if ksp.getConvergedReason() == INDEFINITE and self._solver.look_closer():
+            if ksp.getConvergedReason() == INDEFINITE and self._solver.refine_eigenvalues():
                 self._counted(solver, solve)
         except PETSc.Error as error:
             raise LargeError(explain(error)) from error

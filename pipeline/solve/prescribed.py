@@ -18,7 +18,7 @@ from pipeline.solve.balance import MOST_ROUNDS, check_balance, rest, sums
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.elements.base import Column, Elements, Equilibrium, Products, Solver, close_far
 from pipeline.solve.elements.displacement import DisplacementElements
-from pipeline.solve.load_steps import LoadSteps, Walk
+from pipeline.solve.load_steps import LoadSteps, LoadPath
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import LoadResponse, Response, load_response_of, reaction
@@ -41,7 +41,7 @@ class PrescribedMotion:
         self._reuse = reuse and elements.element == "displacement"
         self.corrections: dict[Motion, tuple[FloatArray, ...]] = {}
         self._law: MaterialLaw | None = None  # of the corrections
-        self._walk: Walk | None = None  # load path to the last depth, for a nonlinear law
+        self._load_path: LoadPath | None = None  # load path to the last depth, for a nonlinear law
 
     def close(self) -> None:
         """Free what is kept between solves."""
@@ -116,11 +116,11 @@ class PrescribedMotion:
             return self._elements.set_up(law, stack, direct=direct, keep=keep)
         if not isinstance(self._elements, DisplacementElements):
             raise SolveError(f"the law {law.name} needs displacement elements")
-        walk = self._walk
-        if walk is None or not walk.leads_to(law, movement):
-            walk = Walk(law, movement.motions[0], np.zeros(self._elements.displacements.owned))
-        self._walk = walk if self._reuse else None
-        return LoadSteps(self._elements, walk, stack, direct=direct)
+        load_path = self._load_path
+        if load_path is None or not load_path.can_reach(law, movement):
+            load_path = LoadPath(law, movement.motions[0], np.zeros(self._elements.displacements.owned))
+        self._load_path = load_path if self._reuse else None
+        return LoadSteps(self._elements, load_path, stack, direct=direct)
 
 
 def respond(

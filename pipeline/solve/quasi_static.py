@@ -135,7 +135,9 @@ class QuasiStaticProblem(Problem):
         elements, columns, movement = self.elements, found.columns, found.movement
         whole = 2.0 ** len(self._body.mirrored)
         with ExitStack() as stack:
-            finer = found.solver.enrich(columns, movement, stack, keep=self._conditions.front is not None)
+            finer = found.solver.hierarchical_estimate(
+                columns, movement, stack, keep=self._conditions.front is not None
+            )
             form = _form(solution.response, solution.load_response)
             if finer.decrements is None:
                 products = finer.elements.products(law, finer.columns, checked=False)

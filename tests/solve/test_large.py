@@ -88,7 +88,7 @@ def test_a_preconditioner_that_is_not_definite_is_mended(monkeypatch):
     known = force(**changes)
     monkeypatch.setattr(multigrid, "_LANCZOS", 1)
     assert force(**changes) == pytest.approx(known, rel=1e-8)
-    monkeypatch.setattr(multigrid.Cycle, "look_closer", lambda self: None)
+    monkeypatch.setattr(multigrid.Cycle, "refine_eigenvalues", lambda self: None)
     (record,) = solve(**changes).values()
     assert record.status == "failed"
 
@@ -107,15 +107,15 @@ def test_a_depth_that_is_not_reached_fails_and_says_where():
     assert "mm of 9 mm, where F is" in record.message
 
 
-def test_depths_of_a_sweep_share_one_walk(monkeypatch):
-    """Those that are reached have the forces of depths alone; those beyond the walk's end fail, and say where it is."""
+def test_depths_of_a_sweep_share_one_load_path(monkeypatch):
+    """Depths on the load path have the forces of single depths; deeper ones fail, and name the depth reached."""
     depths = {"depth": ["9 mm", "0.4 mm", "8 mm", "0.8 mm"]}
     ends: list[tuple[float, float]] = []
     step = LoadSteps._step
 
     def counted(self, *arguments):
-        *_, walk, _, depth = arguments
-        ends.append((walk.reached, depth))
+        *_, load_path, _, depth = arguments
+        ends.append((load_path.reached, depth))
         return step(self, *arguments)
 
     monkeypatch.setattr(LoadSteps, "_step", counted)

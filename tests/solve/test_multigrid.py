@@ -36,7 +36,7 @@ def test_a_smoother_that_took_its_largest_eigenvalue_for_too_small_looks_closer(
     found = solved("displacement", 2, law(0.3))
     assert found.reaction[2] == pytest.approx(known.reaction[2], rel=1e-8)
     assert found.bar == pytest.approx(known.bar, rel=0.02)
-    monkeypatch.setattr(multigrid.Cycle, "look_closer", lambda self: None)
+    monkeypatch.setattr(multigrid.Cycle, "refine_eigenvalues", lambda self: None)
     with pytest.raises(SolveError, match="indefinite"):
         solved("displacement", 2, law(0.3))
 

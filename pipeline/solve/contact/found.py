@@ -24,7 +24,7 @@ from pipeline.solve.contact.geometry import Area, contact_area
 from pipeline.solve.contact.levels import HeldOperator, normal_dofs
 from pipeline.solve.contact.surface import CONDITIONS
 from pipeline.solve.contact.sweep import Sweep
-from pipeline.solve.elements.base import Column, Elements, Enriched
+from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate
 from pipeline.solve.elements.mixed import MixedSolver
 from pipeline.solve.estimate import error_bar, found_again_bar, found_bar
 from pipeline.solve.hierarchical_estimate import energy_decrements
@@ -92,7 +92,9 @@ class FoundContact:
         on_probe = np.array([[0.0, 0.0, -per_depth]])
         return reaction(movement, np.array([[per_depth]]), on_probe, self._plug.body.mirrored, balance)
 
-    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
+    def hierarchical_estimate(
+        self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
+    ) -> HierarchicalEstimate:
         """Return the change of the force in one degree more, and its error bar.
 
         Each depth has its own bar where loads act, or where the surface is not condensed.
@@ -106,7 +108,7 @@ class FoundContact:
                 sweep.keep_bar(depth, taken, share, movement.far)
         else:
             taken, share = known
-        return Enriched(
+        return HierarchicalEstimate(
             self._plug,
             [],
             iterations,

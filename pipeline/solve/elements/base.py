@@ -59,7 +59,7 @@ class Products:
 
 
 @dataclass(frozen=True, eq=False)
-class Enriched:
+class HierarchicalEstimate:
     """Hierarchical estimate of n solutions, from one degree more.
 
     ``columns`` are the solutions in ``elements`` of that degree, if requested. ``decrements`` (n, n), J, is the
@@ -76,14 +76,16 @@ class Enriched:
     area_bar: float = nan
 
 
-class Enriching(Protocol):
+class HierarchicalEstimator(Protocol):
     """An object with a hierarchical estimate from one degree more."""
 
     @property
     def stored(self) -> float | None:
         """The energy (J) of the modelled part, unless it is half the work of the force."""
 
-    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
+    def hierarchical_estimate(
+        self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
+    ) -> HierarchicalEstimate:
         """Return the hierarchical estimate; what is made is freed with the ``stack``; collective.
 
         ``keep`` requests the solutions of that degree, too.
@@ -94,7 +96,7 @@ class Enriching(Protocol):
 class Equilibrium:
     """The solution of a ``solver`` for a ``movement``: columns of its motions and loads, and the response."""
 
-    solver: Enriching
+    solver: HierarchicalEstimator
     columns: list[Column]
     movement: Movement
     iterations: int
@@ -142,7 +144,9 @@ class Solver(ABC):
         """Reduce the error to this ``share`` of what the last solve left; return the iterations."""
 
     @abstractmethod
-    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
+    def hierarchical_estimate(
+        self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
+    ) -> HierarchicalEstimate:
         """Return the hierarchical estimate: see :class:`HierarchicalEstimator`."""
 
 

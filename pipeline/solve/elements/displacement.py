@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve.compiled import vector
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements.base import Column, Elements, Enriched, Fields, Solver, level_of
+from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate, Fields, Solver, level_of
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import DIRECT_LIMIT
 from pipeline.solve.linear_solver import Level, LinearSolver
@@ -119,7 +119,9 @@ class DisplacementSolver(Solver):
         """Reduce it to this ``share`` of what the last solve left; return the iterations."""
         return self.solve(columns, share * self._tolerance)
 
-    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
+    def hierarchical_estimate(
+        self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
+    ) -> HierarchicalEstimate:
         """Return the hierarchical estimate, from the residuals in one degree more."""
         coarse = self.elements
         if self.linear.cycle is None and coarse.degree > 1:
@@ -143,4 +145,4 @@ class DisplacementSolver(Solver):
             (values,) = fields = stack.enter_context(finer.fields())
             values.array[:] = solution + correction
             kept.append(Column(np.zeros(len(space.forms.displacement.x.array)), None, (), fields))
-        return Enriched(finer, kept, iterations, decrements=decrements)
+        return HierarchicalEstimate(finer, kept, iterations, decrements=decrements)

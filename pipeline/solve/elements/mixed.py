@@ -21,7 +21,7 @@ from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements.base import Column, Elements, Enriched, Fields, Solver
+from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate, Fields, Solver
 from pipeline.solve.elements.pressures import Pressures
 from pipeline.solve.krylov import keep
 from pipeline.solve.linear_solver import Level
@@ -223,7 +223,9 @@ class MixedSolver(Solver):
         """Reduce it to this ``share`` of what the last solve left; return the iterations."""
         return self.solve(columns, share)
 
-    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
+    def hierarchical_estimate(
+        self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
+    ) -> HierarchicalEstimate:
         """Return the hierarchical estimate, from elements of one degree more."""
         coarse, finer = self.elements, self.elements.finer()
         below = coarse._solvers.get(False, (None, None))[0]
@@ -235,4 +237,4 @@ class MixedSolver(Solver):
             finer.start_from(coarse, fine.unknown, fine.prescribed)
             finer.lift(fine, self.law, checked=False)
         iterations = above.solve(found, _ESTIMATE_TOLERANCE)
-        return Enriched(finer, found, iterations, unseen=above.first_energies)
+        return HierarchicalEstimate(finer, found, iterations, unseen=above.first_energies)

@@ -91,7 +91,7 @@ class SmoothedLevel:
         self.hold(self._held)
         self._most = _RAISED * self._largest_eigenvalue(_LANCZOS_JUMPS if jumps else _LANCZOS)
 
-    def look_closer(self) -> None:
+    def refine_eigenvalues(self) -> None:
         """Estimate the largest eigenvalue again with many more steps, and use it from now on; collective."""
         held = self._held
         self.hold(np.empty(0, dtype=np.int32))  # the operator ignores the dofs that the smoother fixes
@@ -199,10 +199,10 @@ class Cycle:
         """Return a cycle with more levels on top; it shares the present ones."""
         return Cycle([*self._levels, *levels], [*self._interpolations, *interpolations], self.coarse)
 
-    def look_closer(self) -> None:
+    def refine_eigenvalues(self) -> None:
         """Estimate the largest eigenvalue of each level again with many more steps."""
         for level in self._levels:
-            level.look_closer()
+            level.refine_eigenvalues()
 
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Write the correction of one cycle for ``residual`` into ``result``; collective."""
