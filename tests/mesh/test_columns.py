@@ -1,4 +1,4 @@
-"""Columns cut out along a tilted axis, or out of a curved body: their volume, and what they do to the force."""
+"""Columns cut out along a tilted axis, or out of a curved body: their volume, and their effect on the force."""
 
 import subprocess
 import sys
@@ -39,7 +39,7 @@ def volume(**changes) -> float:
 
 
 def test_a_tilted_column_reaches_through_the_body():
-    """It rises to the top on the side where that is above the contact: between two planes, pi r² h / cos."""
+    """Its top follows the surface: volume between two planes, pi r² h / cos."""
     assert volume(**SCENES["tilted"]) == pytest.approx(pi * RADIUS**2 * 20e-3 / cos(TILT), rel=2e-4)
 
 
@@ -51,7 +51,7 @@ def test_a_column_of_a_curved_body_ends_at_its_surface():
 
 @pytest.mark.parametrize("name", SCENES)
 def test_a_free_column_is_softer_than_the_body_and_a_fixed_one_stiffer(name):
-    """What is cut away stored energy; what is held stores none. Wider columns are nearer to the whole."""
+    """The removed tissue stored energy, fixed tissue stores none. Wider columns are closer to the whole body."""
     sizes = {"epsilon": ["9 mm", "14 mm", "full"], "outside": ["free", "fixed"]}
     found = solve(mesh=sizes, **SCENES[name])
     assert all(record.status == "ok" for record in found.values()), [record.message for record in found.values()]
@@ -69,8 +69,8 @@ def test_the_sides_of_a_column_are_round():
 
 
 @pytest.mark.parametrize("axis", [[0.0, 0.0, -1.0], AXIS])
-def test_of_a_hollow_body_the_piece_is_kept_that_the_probe_touches(tmp_path, axis):
-    """Held at its side, it is a plate like any other; what of the column lies below the hollow is none of it."""
+def test_the_column_of_a_hollow_body_is_the_connected_piece_below_the_probe(tmp_path, axis):
+    """It is a plate with fixed sides; the part of the column below the hollow is removed."""
     file = tmp_path / "hollow.brep"
     subprocess.run([sys.executable, "-c", _DRAW, str(file)], check=True, capture_output=True)
     hollow = {"shape": "cad", "file": str(file), "unit": "mm", "fixed": {"below": "-16 mm"}}

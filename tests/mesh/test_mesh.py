@@ -1,4 +1,4 @@
-"""Meshes: repeatable to the last node, true to the geometry, sized as asked."""
+"""Meshes: reproducible bit for bit, true to the geometry, with the required sizes."""
 
 import subprocess
 import sys
@@ -65,8 +65,8 @@ def test_same_input_same_mesh_in_this_process_and_in_another():
     ],
     by_day=3,
 )  # fmt: skip
-def test_elements_of_other_sizes_on_a_model_that_is_kept_are_those_of_one_of_its_own(changes):
-    """Whatever was meshed on it before, to the last bit."""
+def test_a_reused_model_gives_the_same_mesh_as_a_new_one(changes):
+    """Whatever was meshed on it before, bit for bit."""
     sizes = [SIZES, replace(SIZES, rim=0.7e-3), replace(SIZES, fine=4e-3, epsilon=inf)]
     found = [generate(scene(**changes), sizes[number]) for number in (0, 1, 2, 0)]
     for number, mesh in zip((0, 1, 2, 0), found, strict=True):
@@ -101,7 +101,7 @@ def test_groups_cover_the_surface(body, probe):
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("column", [3e-3, 6e-3, 25e-3])
 def test_column(column, held):
-    """A column of 25 mm sticks out of the sides of the box, whose corners it cuts off; 3 mm is the disc's radius."""
+    """A column of 25 mm extends beyond the sides of the box, and cuts its corners off; 3 mm is the disc's radius."""
     mesh = generate(scene(column, held), replace(SIZES, column=column))
     assert ("cut" in mesh.facets) is not held
     assert volume(mesh) == pytest.approx({25e-3: 31.14e-6}.get(column, pi * column**2 * 20e-3), rel=0.06)
@@ -167,7 +167,7 @@ def test_blade_corners_are_refined():
 
 @pytest.mark.parametrize("straight", [True, False])
 def test_reflection_joins_without_a_seam(straight):
-    """The whole has twice the volume, its surface is closed, and what was a plane of symmetry is inside."""
+    """The whole has twice the volume, its surface is closed, and the plane of symmetry is inside."""
     half = replace(scene(straight=straight), mirrors=("x", "y"))
     part = generate(half, SIZES) if straight else curve(generate(half, SIZES), half)
     whole = reflect(part, ("x", "y"))
@@ -183,7 +183,7 @@ def test_reflection_joins_without_a_seam(straight):
 
 
 def test_a_scene_that_cannot_be_built_is_refused_at_once(monkeypatch):
-    """No other element sizes hold what floats."""
+    """No element sizes fix tissue that floats."""
     begun = []
     session = gmsh.initialize
     monkeypatch.setattr("gmsh.initialize", lambda *args, **more: (begun.append(1), session(*args, **more)))

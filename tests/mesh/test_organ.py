@@ -1,4 +1,4 @@
-"""Meshes of bodies of triangles: true to the file where it is finer than the elements, and where it is coarser."""
+"""Meshes of bodies of triangles: true to the file, whether it is finer or coarser than the elements."""
 
 import subprocess
 import sys
@@ -44,7 +44,7 @@ def surface(path, **changes) -> FromSurface:
 
 
 class Placed(Scene):
-    """A scene whose probe stands upright at (5, 3) mm."""
+    """A scene with an upright probe at (5, 3) mm."""
 
     @property
     def frame(self) -> Frame:
@@ -124,7 +124,7 @@ def test_the_footprint_is_what_projects_into_the_disc(meshed):
 
 
 def test_elements_are_as_asked_however_the_file_is(tmp_path, meshed):
-    """Files of 1,280, 5,120 and 46,080 facets make much the same mesh."""
+    """Files of 1,280, 5,120 and 46,080 facets give similar meshes."""
     counts = []
     for frequency in (8, 48):
         path = write_stl(tmp_path / f"{frequency}.stl", *ellipsoid(frequency))
@@ -167,7 +167,7 @@ def test_what_is_sharp_stays_sharp(tmp_path):
 
 
 def test_a_blade_has_straight_edges_in_its_own_plane(file):
-    """Of which each is several elements long."""
+    """Each edge has several elements."""
     blade = study(probe={"shape": "blade", "length": "8 mm", "width": "2 mm", "depth": "0.1 mm"}).case(()).probe
     a_scene = Placed(surface(file), blade, rim_segments=0)
     mesh = mesh_organ(a_scene, SIZES, far_surface(a_scene.body))
@@ -195,7 +195,7 @@ def test_a_column_is_refused(file):
 
 
 def test_specks_and_needles_of_the_file_do_not_matter(tmp_path):
-    """Marching cubes leaves edges of micrometres, whose facets look any way."""
+    """Marching cubes leaves edges of micrometres, whose facets have arbitrary normals."""
     points, facets = ellipsoid(24)
     taken = np.zeros(len(points), dtype=bool)
     for one, other, _ in facets[::40]:
@@ -210,7 +210,7 @@ def test_specks_and_needles_of_the_file_do_not_matter(tmp_path):
 
 
 def test_a_surface_that_is_not_the_files_is_never_filled(file, monkeypatch):
-    """Too small a one, one that is drawn out at a point, and an open one, are failures that are told."""
+    """A surface that is too small, drawn out at a point, or open must fail with a message."""
     a_scene = scene(file)
     far = far_surface(a_scene.body)
     to_sizes = make._to_sizes
@@ -239,7 +239,7 @@ def test_a_surface_that_is_not_the_files_is_never_filled(file, monkeypatch):
 
 
 def test_a_thin_brim_is_meshed_whatever_the_elements_of_the_ball_are(tmp_path):
-    """A ball with a brim: elements as large as the ball allows cross in the brim."""
+    """A ball with a brim: elements as large as the ball allows would cross in the brim."""
     directions, facets = sphere(24)
     brim = ((directions / np.array([60e-3, 60e-3, 4e-3])) ** 2).sum(axis=1) ** -0.5
     points = directions * ((35e-3**12 + brim**12) ** (1 / 12))[:, None]
@@ -252,7 +252,7 @@ def test_a_thin_brim_is_meshed_whatever_the_elements_of_the_ball_are(tmp_path):
 
 @sampled("seed", [7, 8], by_day=1)
 def test_a_folded_surface_is_meshed(tmp_path, seed):
-    """Large elements cross in its folds: points are moved apart, or the file's own facets stay where that fails."""
+    """Large elements cross in its folds: points are moved apart, or the file's own facets are kept."""
     _, points, facets = folded(seed)
     file = tmp_path / "folded.stl"
     file.write_bytes(written(points, facets))
@@ -268,7 +268,7 @@ def test_a_folded_surface_is_meshed(tmp_path, seed):
 
 
 def test_a_footprint_next_to_a_fold_is_set_in_with_a_narrower_collar(tmp_path):
-    """What lies a quarter of the radius beside the disc is folded; the disc itself fits."""
+    """The surface is folded at a quarter of the radius from the disc; the disc itself fits."""
     _, points, facets = folded(402)
     file = tmp_path / "folded.stl"
     file.write_bytes(written(points, facets))
@@ -283,8 +283,8 @@ def test_a_footprint_next_to_a_fold_is_set_in_with_a_narrower_collar(tmp_path):
     np.testing.assert_allclose(np.hypot(*rim[:, :2].T), 1.5e-3, rtol=1e-9)
 
 
-def test_a_tangle_that_nothing_mends_is_told_by_its_place(file, monkeypatch):
-    """Two surfaces, one through the other, cannot be drawn apart."""
+def test_a_tangle_without_a_repair_is_reported_with_its_place(file, monkeypatch):
+    """Two surfaces that intersect cannot be separated."""
     points, facets = sphere(6)
     both = np.vstack([points, points + np.array([1.0, 0, 0])])
     sheet = Sheet(both, np.vstack([facets, facets + len(points)]), np.full(2 * len(facets), FREE), _NO_EDGES)
@@ -294,7 +294,7 @@ def test_a_tangle_that_nothing_mends_is_told_by_its_place(file, monkeypatch):
 
 
 def test_facets_folded_upon_each_other_are_opened():
-    """A point of a ball is drawn over its neighbours; the footprint's edge does not move for it."""
+    """A point of a ball is moved over its neighbours; the footprint's edge must not move."""
     points, facets = sphere(12)
     a, b, c = facets[np.argmax((facets != 0).all(axis=1) & (points[facets][..., 2] < 0).all(axis=1))]
     points = points.copy()
@@ -311,7 +311,7 @@ def test_facets_folded_upon_each_other_are_opened():
 
 
 def test_a_facet_without_height_is_opened():
-    """A corner of a ball's facet lies on the edge across: no neighbours are folded, and yet tetrahedra fail."""
+    """A corner of a ball's facet is on the opposite edge: no neighbours are folded, but tetrahedra would fail."""
     points, facets = sphere(12)
     a, b, c = facets[np.argmax((points[facets][..., 2] < 0).all(axis=1))]
     points = points.copy()
@@ -322,8 +322,8 @@ def test_a_facet_without_height_is_opened():
     assert bad_facets(sheet).any() and not bad_facets(opened).any()
 
 
-def test_fins_and_holes_that_a_remesher_leaves_are_mended():
-    """A facet that hangs on by an edge goes, and so does one behind it; one that is missing is put back."""
+def test_fins_and_holes_of_the_remesher_are_repaired():
+    """A facet connected by one edge is removed, and so is the one behind it; a missing facet is restored."""
     points, facets = sphere(6)
     a, b, _ = facets[0]
     count = len(points)
@@ -343,6 +343,6 @@ def test_fins_and_holes_that_a_remesher_leaves_are_mended():
 
 
 def sharpest(sheet):
-    """The smallest angle between neighbouring facets, 0 where they lie upon each other."""
+    """Return the smallest angle between neighbouring facets, 0 if they overlap."""
     sides = sheet.normals[edges_of(sheet.facets)[1]]
     return pi - np.arccos(np.clip((sides[:, 0] * sides[:, 1]).sum(axis=1), -1, 1)).max()

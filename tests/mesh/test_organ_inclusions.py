@@ -1,4 +1,4 @@
-"""Inclusions in bodies of triangles and in solids of CAD files: whose cells are whose, how true their surface is."""
+"""Inclusions in bodies of triangles and in CAD solids: regions of cells, and accuracy of their surface."""
 
 from math import pi
 
@@ -45,12 +45,12 @@ def test_every_inclusion_has_its_volume_and_its_number(meshed):
     assert sum(found.values()) == pytest.approx(1e9 * case.body.volume, rel=5e-3)
     for number, inclusion in enumerate(case.body.inclusion, start=1):
         level = inclusion.surface.level(mesh.points[mesh.cells[:, :4]].mean(axis=1))
-        clear = np.abs(level - 1) > 0.05  # of its surface, which flat cells lie in
+        clear = np.abs(level - 1) > 0.05  # of its surface, where flat cells are
         np.testing.assert_array_equal((mesh.regions == number)[clear], (level < 1)[clear])
 
 
 def test_nodes_between_materials_are_on_the_true_ellipsoid(meshed):
-    """But for the middle of edges of cells so flat in it that bent ones would fold."""
+    """Except mid nodes of cells so flat that curved edges would fold them."""
     case, mesh = meshed
     for number, inclusion in enumerate(case.body.inclusion, start=1):
         inner, outer = (np.unique(mesh.cells[chosen]) for chosen in (mesh.regions == number, mesh.regions != number))
@@ -61,7 +61,7 @@ def test_nodes_between_materials_are_on_the_true_ellipsoid(meshed):
 
 
 def test_elements_on_an_inclusion_and_in_a_narrow_gap_are_small(body):
-    """A millimetre below the surface, whose elements are 15 mm elsewhere."""
+    """A millimetre below the surface, where elements elsewhere have 15 mm."""
     near = CYST | {"at": ["5 mm", "0 mm", "22.1 mm"]}
     case = case_of(body, near, probe=PROBE | {"at": ["-30 mm", "0 mm", "25 mm"]})
     assert 0.4e-3 < case.body.room(case.body.inclusion[0].surface) < 1.2e-3
@@ -79,7 +79,7 @@ def test_the_mesh_is_of_places_not_of_materials(body):
 
 
 def test_a_surface_that_meets_the_bodys_is_never_filled(body, monkeypatch):
-    """The check of the study refuses it; the mesh must not be one of something else where that fails."""
+    """The check of the study refuses it; if that check fails, the mesh must not be another body's."""
     case = case_of(body, CYST)
 
     def shifted(inclusions, field):

@@ -1,4 +1,4 @@
-"""Meshes of layers and inclusions: whose cells are whose, how large a piece is, and what the cache keeps."""
+"""Meshes of layers and inclusions: regions of cells, volumes, and the cache."""
 
 from dataclasses import replace
 from math import pi
@@ -27,7 +27,7 @@ def case_of(body, **mesh):
 
 
 def volumes(mesh) -> dict[int, float]:
-    """Return the volume (mm³) of each region, of cells as curved as they are."""
+    """Return the volume (mm³) of each region, with curved cells."""
     points, weights = basix.make_quadrature(basix.CellType.tetrahedron, 6)
     degree = 1 if mesh.cells.shape[1] == 4 else 2
     element = basix.create_element(
@@ -59,7 +59,7 @@ def test_ellipsoids_off_centre_have_their_volume_and_leave_one_plane():
     case = case_of({"inclusion": [BALL, OVOID]}, fine="3 mm")
     assert mirror_planes(case) == ("x",)
     found = volumes(mesh_arrays(case, ()))
-    # Cells with all their corners on an inclusion stay straight: more of them with gmsh 4.13 than with 4.8.
+    # Cells with all corners on an inclusion stay straight: gmsh 4.13 makes more of them than 4.8.
     assert found[1] == pytest.approx(4 / 3 * pi * 4**3, rel=5e-3)
     assert found[2] == pytest.approx(4 / 3 * pi * 5 * 4 * 2, rel=5e-3)
 
@@ -90,7 +90,7 @@ def test_a_column_cuts_an_inclusion_or_passes_it(epsilon):
 
 
 def test_the_lowest_layer_has_elements_as_small_as_its_thickness_asks_for():
-    """Whether it is the last of the layers, or what remains below them."""
+    """Whether it is the last of the layers, or the rest of the body below them."""
     body = {"shape": "box", "size": ["40 mm", "40 mm", "5 mm"]}
     thick, rest = SKIN | {"thickness": "4 mm"}, {"name": "fascia", "young": "900 kPa", "poisson": 0.3}
     for layers in ([thick], [thick, rest]):
@@ -103,7 +103,7 @@ def test_the_lowest_layer_has_elements_as_small_as_its_thickness_asks_for():
 
 @pytest.mark.parametrize(("contact", "poisson"), [("frictionless", 0.3), ("bonded", 0.49)])
 def test_a_column_without_the_inclusion_is_one_of_the_other_tissue(contact, poisson):
-    """From the study to the force, by displacements and by displacements and pressures."""
+    """From the study to the force, with displacement elements and with mixed ones."""
     changes = {
         "mesh": {"epsilon": ["6 mm", "full"], "outside": "free"},
         "material": {"poisson": poisson},

@@ -1,4 +1,4 @@
-"""Solids of CAD files: sizes, places, names, keys, refusals, and meshes beside those of the shapes that they are."""
+"""CAD solids: sizes, places, names, keys, refusals, and meshes compared with those of the equivalent shapes."""
 
 import subprocess
 import sys
@@ -64,7 +64,7 @@ def _native(name: str, fixed: object) -> Body:
     return Cylinder.model_validate({"shape": "cylinder", "radius": "50 mm", "height": "50 mm", "fixed": fixed})
 
 
-# The faces of the box are numbered differently, which the mesher's choices depend on.
+# gmsh's mesh depends on the numbers of the faces, which differ for the box.
 @pytest.mark.parametrize(("name", "close"), [("box", 1e-3), ("cylinder", 1e-12)])
 def test_the_solid_has_the_mesh_of_the_shape_that_it_is(drawn: Path, name: str, close: float) -> None:
     solid, native, probe = _solid(drawn / f"{name}.step"), _native(name, {"below": "-15 mm"}), _disc("0 mm", "0 mm")
@@ -76,7 +76,7 @@ def test_the_solid_has_the_mesh_of_the_shape_that_it_is(drawn: Path, name: str, 
     assert {name: len(facets) for name, facets in first.facets.items()} == {
         name: len(facets) for name, facets in second.facets.items()
     }
-    # gmsh 4.13 and 4.15 make a few cells more of one of two boxes that are alike: 0.8 %.
+    # gmsh 4.13 and 4.15 make 0.8 % more cells for one of two equal boxes.
     assert len(first.cells) == pytest.approx(len(second.cells), rel=1e-2)
     places = [np.quantile(np.linalg.norm(mesh.points, axis=1), np.linspace(0, 1, 41)) for mesh in (first, second)]
     assert np.abs(places[0] - places[1]).max() < max(close, 5e-3) * native.extent

@@ -1,6 +1,6 @@
-"""What every shape must get right, whatever it is: each is asked, and its answers are held against each other.
+"""Contract of every shape: its properties are compared with each other and with a mesh.
 
-A new shape is found in the registry, with the examples in its own words; nothing need be added here.
+A new shape is found in the registry, with the examples in its own words; nothing needs to be added here.
 """
 
 import tomllib
@@ -23,14 +23,14 @@ from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import words_of
 from tests.cases import study
 
-# A body that is not drawn has a file: tests/shapes/test_scanned.py.
+# A body that is not drawn has a file: see tests/shapes/test_scanned.py.
 DRAWN = {name: model for name, model in BODIES.items() if issubclass(model, Drawn)}
 SUPPORTS = ("bottom", "sides", "bottom+sides", {"below": "-6 mm"})
 SIZES = Sizes(epsilon=inf, fine=3e-3, coarse=6e-3, rim=0.4e-3, growth=0.6)
 
 
 def example(model, **changes):
-    """Return a shape of the examples in its own words."""
+    """Return a shape made from the examples in its own words."""
     required = {name for name, field in model.model_fields.items() if field.is_required()} - {"shape"}
     examples = tomllib.loads("\n".join(f"{name} = {words_of(model, name).example}" for name in sorted(required)))
     (shape,) = model.model_fields["shape"].annotation.__args__
@@ -39,13 +39,13 @@ def example(model, **changes):
 
 
 def body(shape: str, fixed=None) -> Body:
-    """Return an example, held on its bottom if it has one."""
+    """Return an example, with its bottom fixed if it has one."""
     has_faces = not BODIES[shape].model_fields["fixed"].is_required()
     return example(BODIES[shape], **({"fixed": fixed or "bottom"} if fixed or has_faces else {}))
 
 
 def supports(shape: str) -> tuple:
-    """Return ways to hold a body."""
+    """Return the supports to test."""
     return SUPPORTS if not BODIES[shape].model_fields["fixed"].is_required() else SUPPORTS[3:]
 
 
@@ -54,7 +54,7 @@ def has_edges(body: Body) -> bool:
 
 
 def probe(shape: str, **changes) -> Probe:
-    """Return an example that lies across the axes, if it has a direction."""
+    """Return an example, oblique to the axes if it has a direction."""
     turned = {"direction": (1.0, 2.0, 0.0)} if "direction" in PROBES[shape].model_fields else {}
     return example(PROBES[shape], **turned, **changes)
 
@@ -134,7 +134,7 @@ def test_outline_lies_on_the_body(a_body):
 
 @pytest.mark.parametrize(("shape", "fixed"), [(shape, fixed) for shape in DRAWN for fixed in supports(shape)], ids=str)
 def test_mirror_planes_and_half_plane_are_true(shape, fixed):
-    """Images of points of the boundary are on it, too, and held where the points are."""
+    """Mirror images of boundary points are on the boundary, and fixed where the points are."""
     found, random = body(shape, fixed), np.random.default_rng(2)
     surfaces = found.surfaces()
     images = [np.diag(1 - 2 * np.array(PLANES[plane])) for plane in found.mirror_planes]
@@ -167,7 +167,7 @@ def test_gap_is_the_distance_to_the_edge_of_the_top(a_body):
         return
     top = ConvexHull(np.vstack([line for line in a_body.outline() if np.ptp(line[:, 2]) == 0])[:, :2])
     for x, y in ((0.0, 0.0), (3e-3, -2e-3), (-9e-3, 5e-3), (40e-3, 0.0)):
-        off = -np.max(top.equations @ [x, y, 1.0])  # for the nearest side, or its line where the point is outside
+        off = -np.max(top.equations @ [x, y, 1.0])  # from the nearest side, or from its line if the point is outside
         assert a_body.gap((x, y, 0.0)) == pytest.approx(off, rel=1e-3)
 
 
@@ -185,7 +185,7 @@ def test_sizes_of_a_footprint_are_those_of_its_outline(a_probe):
 
 
 def test_mirror_lines_and_roundness_of_a_footprint_are_true(a_probe):
-    """In every line in which it says so, and in no other, the outline is its own image."""
+    """The outline is symmetric in exactly those lines in which the probe says so."""
     outline, sizes = a_probe.outline(), a_probe.circumradius
     dense = np.vstack([np.linspace(start, end, 30) for start, end in pairwise(outline)])
 
@@ -212,7 +212,7 @@ def distance_to_outline(probe, points):
 
 
 def edge_distance(probe, points):
-    """Return what the probe's own text says of the distance of points (n, 3), in its own coordinates, to its edge."""
+    """Return the distance of points (n, 3), in own coordinates, to the edge by the probe's own text."""
     names = {"Sqrt": np.sqrt, "Max": np.maximum, "Min": np.minimum, "Fabs": np.abs}
     x, y, z = 1e3 * points.T
     return 1e-3 * eval(probe.edge_distance("x", "y", "z", 1e3).replace("^", "**"), names, {"x": x, "y": y, "z": z})
@@ -231,7 +231,7 @@ def test_edge_distance_is_nought_at_the_edge_and_near_the_truth_elsewhere(a_prob
 
 
 def drawn_edge(probe, body):
-    """Return points of every curve of the footprint as it is drawn, in its own coordinates, and their kinds."""
+    """Return points of every curve of the drawn footprint, in its own coordinates, and the curves' types."""
     import gmsh
 
     from pipeline.compat import gmsh_session
@@ -249,8 +249,8 @@ def drawn_edge(probe, body):
     return np.vstack(curves), kinds
 
 
-def test_the_edge_that_is_drawn_is_the_one_that_is_told_of(a_probe, a_body):
-    """Every curve of it; and where one of them is not straight, elements are bent to follow."""
+def test_the_drawn_edge_is_that_of_edge_distance(a_probe, a_body):
+    """For every curve; if one of them is not straight, elements are curved."""
     points, kinds = drawn_edge(a_probe, a_body)
     assert np.abs(points[:, 2]).max() < 1e-12
     assert edge_distance(a_probe, points).max() < 1e-9 * a_probe.circumradius
@@ -258,7 +258,7 @@ def test_the_edge_that_is_drawn_is_the_one_that_is_told_of(a_probe, a_body):
 
 
 def test_to_edge_returns_the_nearest_points_of_a_curved_edge(a_probe):
-    """From beside it, where the middles of straight edges are."""
+    """From points near the edge, such as the middles of straight edges."""
     outline = a_probe.outline()
     points = outline[:: len(outline) // 50 + 1]
     points = points + 0.05 * a_probe.half_width * np.random.default_rng(5).normal(size=points.shape)
@@ -310,7 +310,7 @@ def test_curved_edges_lie_on_the_outline(meshed):
         along &= on_surface[middle] < 1e-12
     local = scene.frame.local(mesh.points[np.unique(middle[along])])[:, :2]
     edge = local[np.linalg.norm(scene.probe.to_edge(local) - local, axis=1) < 0.02 * SIZES.rim]
-    # Along a rim that is not plane, gmsh makes as many edges as the sizes there say.
+    # Along a rim that is not plane, gmsh makes as many edges as the sizes there require.
     assert len(edge) >= (1 if scene.is_flat else 0.85 if scene.probe.has_singular_edge else 0.7) * SIZES.rim_segments(
         scene.probe
     )
@@ -325,8 +325,8 @@ def test_gap_is_the_least_over_the_outline(a_body, a_probe, at):
 
 
 @pytest.mark.parametrize("slender", [2.0, 8.0])
-def test_nothing_under_a_slender_ellipse_is_taken_to_be_far_from_its_edge(slender):
-    """Elements grow with that distance: one taken for larger than it is leaves the footprint to a few of them."""
+def test_edge_distance_of_a_slender_ellipse_is_never_too_large(slender):
+    """Elements grow with that distance: if it were too large, the footprint would have few of them."""
     for axes in ((f"{slender} mm", "1 mm"), ("1 mm", f"{slender} mm")):
         ellipse = probe("ellipse", axes=axes)
         names = {"Sqrt": np.sqrt, "Max": np.maximum}
@@ -340,7 +340,7 @@ def test_nothing_under_a_slender_ellipse_is_taken_to_be_far_from_its_edge(slende
 
 
 def test_cases_share_a_record_only_if_all_that_force_is_proportional_to_changes_together(a_probe):
-    """Whatever a shape is proportional to: with one of several changed alone it is another force."""
+    """If only one of several keys changes, the force is another one."""
     keys = a_probe.PROPORTIONAL_TO
     (case,) = study().cases()
     moved = a_probe.model_copy(update={key: 0.1e-3 * (2 + n) for n, key in enumerate(keys)})
@@ -390,7 +390,7 @@ def test_what_f_is_proportional_to_moves_the_footprint_and_leaves_its_shape(a_pr
     once, twice = (a_probe.model_copy(update=dict.fromkeys(keys, much)) for much in (1e-4, 2e-4))
     assert np.linalg.norm(once.travel(frame)) > 0
     assert twice.travel(frame) == pytest.approx(2 * np.array(once.travel(frame)))
-    # Where more touches the deeper a tool is, nothing is proportional.
+    # Where the contact area grows with the depth, F is not proportional to it.
     assert np.array_equal(once.outline(), twice.outline()) == bool(a_probe.PROPORTIONAL_TO)
     assert once.frame_on(a_body) == twice.frame_on(a_body)
 
@@ -407,7 +407,7 @@ def test_a_profile_is_finite_over_the_footprint_and_begins_at_the_lowest_point(a
     height = a_probe.profile(points)
     assert np.all((height >= 0) & np.isfinite(height))
     assert a_probe.profile(np.zeros((1, 2)))[0] == 0
-    # Where the tool ends nothing is beyond; where it goes on, all that it may touch is within.
+    # Where the tool ends there is nothing beyond; elsewhere the footprint contains all that it may touch.
     outline = a_probe.outline()
     beyond, ends = a_probe.profile(1.001 * outline), a_probe.ends_at(outline)
     assert np.all(np.isinf(beyond[ends]))
@@ -416,7 +416,7 @@ def test_a_profile_is_finite_over_the_footprint_and_begins_at_the_lowest_point(a
 
 
 def test_elements_are_small_where_contact_is_expected_to_end(a_probe):
-    """Within the footprint, at its edge if that is singular; and for a band of some width if it is not known."""
+    """Within the footprint, at its edge if that is singular; over a band if the edge of contact is not known."""
     names = {"Sqrt": np.sqrt, "Max": np.maximum, "Min": np.minimum, "Fabs": np.abs}
     points = 1e3 * inside(a_probe, 20_000)
     code = a_probe.rim_distance("x", "y", "z", 1e3).replace("^", "**")
@@ -445,7 +445,7 @@ def test_a_frame_turns_forth_and_back():
 
 
 def test_a_frame_places_what_is_drawn_and_writes_its_coordinates():
-    """A rectangle drawn upright comes to lie in the frame's plane, along its direction, wherever that points."""
+    """A rectangle drawn upright is rotated into the frame's plane, along its direction."""
     import gmsh
 
     from pipeline.compat import gmsh_session
@@ -473,7 +473,7 @@ def test_a_frame_places_what_is_drawn_and_writes_its_coordinates():
     ("model", "base"), [*((body, Body) for body in DRAWN.values()), *((probe, Probe) for probe in PROBES.values())]
 )
 def test_a_shape_that_leaves_something_out_cannot_be_made(model, base):
-    """What may be wrong silently has no default: without any one answer there is no shape."""
+    """Values that could be wrong silently have no default: without one of them there is no shape."""
     for name in base.__abstractmethods__:
         incomplete = type("Incomplete", (model,), {name: getattr(base, name), "__module__": __name__})
         with pytest.raises(TypeError, match=name):

@@ -1,4 +1,4 @@
-"""Tools whose area of contact is found: their section, what they may touch, and what of them makes no sense."""
+"""Tools in unilateral contact: their section, their candidates, and values that are refused."""
 
 from math import asin, cos, inf, log, pi, sqrt, tan
 
@@ -37,7 +37,7 @@ def test_a_ball_ends_at_its_equator_and_is_a_paraboloid_at_its_pole():
 
 
 def test_the_contact_on_a_half_space_is_that_of_closed_forms():
-    """I. N. Sneddon (1965): cone, ball, and the ball that a cone ends in."""
+    """I. N. Sneddon (1965): cone, ball, and rounded cone."""
     assert Rounded(pi / 3).contact_radius(1e-3) == pytest.approx(2 / pi * tan(pi / 3) * 1e-3)
     a = Rounded(0.0, 3e-3).contact_radius(0.5e-3)
     assert a / 2 * log((3e-3 + a) / (3e-3 - a)) == pytest.approx(0.5e-3)
@@ -104,7 +104,7 @@ def test_steep_tools_are_warned_of(probe, warned):
 
 @pytest.mark.parametrize("outside", ["coarse", "free"])
 def test_a_small_epsilon_is_held_against_what_may_touch(outside):
-    """What may touch of a ball is no radius of it, and contact may well end within ε."""
+    """The candidates of a ball extend beyond its radius of contact, so contact may well end within ε."""
     (warning,) = (w for w in study(probe=SPHERE, mesh={"epsilon": "1 mm", "outside": outside}).warnings if "less" in w)
     assert "1.152 mm, up to which the sphere may touch" in warning
     assert ("column" in warning) == (outside == "free")
@@ -112,8 +112,8 @@ def test_a_small_epsilon_is_held_against_what_may_touch(outside):
 
 @pytest.mark.parametrize("tool", [*TOOLS, "disc"])
 def test_f_is_proportional_to_stress_alone(tool):
-    """Each depth of a tool that touches more the deeper it is is a record of its own, of a flat one none is; no modulus
-    is; no basis is made of Poisson's ratios, and it says why.
+    """F is a record of its own for each depth of a tool whose contact area grows, but not of a flat one, and not for
+    each modulus. There is no basis in Poisson's ratios, and the plan says why.
     """
     probe = TOOLS.get(tool, {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "unilateral"})
     ratios = [round(0.30 + 0.01 * n, 2) for n in range(9)]
@@ -128,7 +128,7 @@ def test_f_is_proportional_to_stress_alone(tool):
     shallow, deep = (found.case((0, 0, depth)) for depth in (0, 1))
     assert shallow.proportional_to == ("young",)
     assert case_key(shallow, scaled=True) != case_key(deep, scaled=True)
-    # What a flat tool may touch is its face; another depth of a ball has small elements elsewhere.
+    # The candidates of a flat tool are its face; the mesh of a ball depends on its depth.
     assert (mesh_key(shallow) == mesh_key(deep)) == (tool == "disc")
 
 

@@ -1,4 +1,4 @@
-"""Nearest points of ellipsoids, and the sample that stands for them."""
+"""Ellipsoids: nearest points, and sampling points."""
 
 import numpy as np
 import pytest

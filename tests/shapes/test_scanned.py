@@ -1,4 +1,4 @@
-"""Bodies of triangles: where probes touch them, how large they are, and what they are known by."""
+"""Bodies of triangles: frames of probes on them, their size, and their keys."""
 
 import shutil
 from math import hypot, pi
@@ -91,7 +91,7 @@ def test_distances_hold_the_body(a_body):
 
 
 def test_the_normal_is_not_one_facets(tmp_path):
-    """Noise of a tenth of the facets' size turns facets by up to 20 degrees, their mean by less than one."""
+    """Noise of a tenth of the facets' size turns facets by up to 20 degrees, their mean normal by less than one."""
     points, facets = sphere(30)
     noise = np.random.default_rng(2).normal(size=len(points))
     path = write_stl(tmp_path / "noisy.stl", 30e-3 * points * (1 + 3e-3 * noise[:, None]), facets)

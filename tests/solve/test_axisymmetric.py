@@ -1,4 +1,4 @@
-"""The solver for round scenes obeys mechanics: closed forms, published tables, limits, invariances, its error bar."""
+"""Mechanics of the axisymmetric solver: closed forms, published tables, limits, invariances, its error bar."""
 
 from itertools import product
 from math import inf, pi
@@ -37,15 +37,15 @@ def solve_layers(meridian, moduli, bonded, *, depth=1.0, **options):
 
 @sampled("bonded, poisson", product((True, False), (0.0, 0.3, 0.45, 0.49, 0.4999, 0.5)), by_day=4)
 def test_half_space(bonded, poisson):
-    """In a body a million times as wide as the disc F is that of a half-space (closed forms), to 1e-6."""
+    """In a body a million times as wide as the disc, F is that of a half-space (closed forms), to 1e-6."""
     exact, _ = known.half_space_disc(1.0, poisson, 1.0, 1.0, "bonded" if bonded else "frictionless")
     assert solve_axisymmetric(Meridian(1e6, 1e6, 1), poisson, bonded).reaction[2] == pytest.approx(exact, rel=3e-6)
 
 
 def test_element_does_not_depend_on_youngs_modulus():
-    """F/E is one number whatever the unit of E, at the Poisson's ratio where mixed elements begin, too."""
+    """F/E does not depend on the unit of E, also at the Poisson's ratio from which elements are mixed."""
     meridian = Meridian(20.0, 10.0, 1.0)
-    moduli = (1.0, 23.0, 820000.0)  # the last two give λ and μ of a ratio below 0.49 by rounding
+    moduli = (1.0, 23.0, 820000.0)  # rounding makes the ratio of the last two slightly less than 0.49
     found = [solve_axisymmetric(meridian, 0.49, True, young=young) for young in moduli]
     assert len({solution.dofs for solution in found}) == 1
     ratios = [solution.reaction[2] / young for solution, young in zip(found, moduli, strict=True)]
@@ -55,7 +55,7 @@ def test_element_does_not_depend_on_youngs_modulus():
 @pytest.mark.parametrize("column", [inf, 1.0])
 @pytest.mark.parametrize("bonded", [True, False])
 def test_uniaxial_compression(bonded, column):
-    """Without lateral contraction, what a probe covers entirely is in uniform strain: F = E A d/H."""
+    """Without lateral contraction, tissue wholly under a probe is in uniform strain: F = E A d/H."""
     meridian = Meridian(1 if column == inf else 9, 2, 3, column=column)
     solution = solve_axisymmetric(meridian, 0.0, bonded)
     assert solution.reaction[2] == pytest.approx(pi / 2, rel=1e-10)
@@ -72,7 +72,7 @@ def test_incompressible_thin_layer(bonded, factor):
 
 
 def test_clamped_thin_plate():
-    """A sheet held at its side bends: F = 16π D d/R², D = E h³/(12(1 - ν²)), up to the shear under a small disc."""
+    """A sheet with fixed sides bends: F = 16π D d/R², D = E h³/(12(1 - ν²)), up to the shear under a small disc."""
     h, radius, nu = 1.0, 300.0, 0.3
     force = solve_axisymmetric(Meridian(radius, h, 1, "sides"), nu, True).reaction[2]
     assert force == pytest.approx(16 * pi * h**3 / (12 * (1 - nu**2)) / radius**2, rel=1e-3)
@@ -110,7 +110,7 @@ def test_units_do_not_matter(unit, young):
 
 
 def test_more_support_is_stiffer():
-    """Holding more of the boundary can only raise F; so does keeping more of the body."""
+    """A larger support can only raise F; so can keeping more of the body."""
 
     def force(**change):
         return solve_axisymmetric(Meridian(3, 2, 1, **change), 0.45, False).reaction[2]
@@ -126,7 +126,7 @@ def test_more_support_is_stiffer():
 
 @sampled("seed", range(6), by_day=2)
 def test_error_bar_holds_the_truth(seed, monkeypatch):
-    """The bar of a rough mesh holds the answer of a fine one of higher degree."""
+    """The bar of a coarse mesh covers the result of a fine one of higher degree."""
     random = np.random.default_rng(seed)
     radius, height = (float(np.exp(random.uniform(*np.log(ends)))) for ends in ((1.05, 300), (0.1, 100)))
     support = [-height * random.uniform(0.05, 1), "bottom", "sides", "bottom+sides"][seed % 4]
@@ -178,7 +178,7 @@ LAYERED = [
 
 @sampled("number", range(len(LAYERED)), by_day=3)
 def test_error_bar_of_layers_holds_the_truth(number, monkeypatch):
-    """The bar of a rough mesh holds the answer of a fine one of higher degree, and the fine one has 1e-5."""
+    """The bar of a coarse mesh covers the result of a fine one of higher degree, which has a bar of 1e-5."""
     meridian, moduli = LAYERED[number]
     exact = solve_layers(meridian, moduli, number % 2 == 0)
     assert exact.bar < 1e-5

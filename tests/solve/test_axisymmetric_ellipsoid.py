@@ -1,4 +1,4 @@
-"""Ellipsoids under a disc on their pole obey mechanics: limits, invariances, agreement of elements, their error bar."""
+"""Mechanics of ellipsoids under a disc on their pole: limits, invariances, agreement of elements, error bar."""
 
 from math import pi
 
@@ -40,7 +40,7 @@ def solve(meridian, poisson, bonded, *, young=1.0, depth=1.0, **options):
 
 @pytest.mark.parametrize(("bonded", "poisson"), [(True, 0.3), (False, 0.5)])
 def test_half_space(bonded, poisson):
-    """A disc on a ball a million times as large presses on a half-space."""
+    """A disc on a ball a million times as large is a disc on a half-space."""
     exact, _ = known.half_space_disc(1.0, poisson, 1.0, 1.0, "bonded" if bonded else "frictionless")
     found = solve(EllipticMeridian(1e6, 1e6, 1, 0), poisson, bonded)
     assert found.reaction[2] == pytest.approx(exact, rel=5e-6)
@@ -49,7 +49,7 @@ def test_half_space(bonded, poisson):
 
 @sampled("name, bonded, poisson", [(name, *of) for name in SCENES for of in ((True, 0.3), (False, 0.5))], by_day=4)
 def test_error_bar_holds_the_truth(name, bonded, poisson, monkeypatch):
-    """The bar of a rough mesh holds the answer of a fine one of higher degree, and the fine one has 1e-5."""
+    """The bar of a coarse mesh covers the result of a fine one of higher degree, which has a bar of 1e-5."""
     exact = solve(SCENES[name], poisson, bonded)
     assert exact.bar < 1e-5
     assert exact.balance < 1e-9
@@ -59,7 +59,7 @@ def test_error_bar_holds_the_truth(name, bonded, poisson, monkeypatch):
 
 
 def test_arcs_are_followed_closely_enough(monkeypatch):
-    """Triangles that span half of the angle change nothing."""
+    """Triangles with half of the angle give the same F."""
     before = solve(SCENES["slender"], 0.3, False).reaction[2]
     monkeypatch.setattr("pipeline.mesh.elliptic_meridian._WIDEST", pi / 12)
     assert solve(SCENES["slender"], 0.3, False).reaction[2] == pytest.approx(before, rel=1e-7)

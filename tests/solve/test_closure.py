@@ -1,4 +1,4 @@
-"""A half ball, closed by the far field of a point force: work, symmetry, places; its forces are known to `verify`."""
+"""Far-field coupling of a half ball: work, symmetry, places; `verify` has its known forces."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ MESH = {"epsilon": "6 mm", "fine": "3 mm", "rim": "0.3 mm", "outside": "halfspac
 
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
 def test_energy_and_force_beyond_a_half_ball(poisson):
-    """Work on the half sphere is the energy beyond it, and traction there adds up to the force."""
+    """The work on the half sphere is the energy beyond it, and its traction sums up to the force."""
     nodes, weights = np.polynomial.legendre.leggauss(30)
     cosine, weights = (nodes + 1) / 2, weights / 2
     field = PointForce(poisson, (0.1, 0.0, 0.0), 2.0)
@@ -28,7 +28,7 @@ def test_energy_and_force_beyond_a_half_ball(poisson):
 
 
 def smooth(poisson):
-    """Return polynomials that stand for what a body adds to the field."""
+    """Return polynomials in the place of a body's regular part."""
     values = np.random.default_rng(2).uniform(-1, 1, (len(_EXPONENTS), 3))
     field = Smooth((0.1, -0.2, 0.0), 1.5, values)
     return field, lambda at, normal: field.traction(at, normal, 2 * poisson / (1 - 2 * poisson))
@@ -52,15 +52,15 @@ def test_traction_is_that_of_the_displacement(of):
 
 
 def test_quarter_and_whole_agree():
-    """The far field has the symmetry that the tool has, and its energy is shared out."""
+    """The far field has the symmetry of the tool, and the energy of a part is its share of the whole."""
     mesh = {**MESH, "epsilon": "5 mm", "fine": "5 mm", "rim": "1 mm", "growth": 2.0}
     quarter, whole = (solve(mesh={**mesh, "model": model})[()] for model in ("auto", "3d"))
     assert quarter.force == pytest.approx(whole.force, rel=1e-6)
     assert quarter.origin == "symmetric" and whole.origin == "solved"
 
 
-def test_young_and_depth_scale_and_poisson_is_solved():
-    """Nothing but what F is proportional to is shared."""
+def test_young_and_depth_scale_and_each_poisson_is_solved():
+    """Cases share a solve only if F is proportional to what differs."""
     ratios = [0.02 * n for n in range(10)]
     plan = make_plan(study(material={"young": ["1 kPa", "2 kPa"], "poisson": ratios}, mesh=MESH))
     assert len(plan.solves) == len(ratios) and not any(solve.reduced for solve in plan.solves)
@@ -69,8 +69,8 @@ def test_young_and_depth_scale_and_poisson_is_solved():
     assert len(both.solves) == len(both.meshes) == 2
 
 
-def test_half_balls_of_a_path_stand_on_one_mesh():
-    """Far fields differ, of which one factorisation gives all: forces are those of meshes of their own, within bars."""
+def test_half_balls_of_a_path_share_one_mesh():
+    """Far fields differ, from one factorisation: forces are within the bars of those on separate meshes."""
     path = {"points": [["1 mm", "2 mm"], ["-9 mm", "4 mm"], ["5 mm", "-11 mm"]]}
     mesh = {**MESH, "epsilon": "5 mm", "fine": "5 mm", "rim": "1 mm", "growth": 2.0, "outside": "green"}
     changes = {"probe": {"radius": "2 mm", "path": path}, "mesh": mesh}
@@ -97,8 +97,8 @@ def test_half_balls_of_a_path_stand_on_one_mesh():
     assert "not of the closure" in build(plan, shared)["force_error"].attrs["comment"]
 
 
-def test_force_aside_is_not_told():
-    """A bonded tool beside the middle pulls sideways: a far field of the force along its axis knows nothing of that."""
+def test_a_sideways_force_is_not_reported():
+    """A bonded tool off the centre also pulls sideways, which the far field of an axial force does not contain."""
     mesh = {**MESH, "epsilon": "5 mm", "fine": "5 mm", "rim": "1 mm", "growth": 2.0}
     (record,) = solve(probe={"at": ["3 mm", "0 mm"]}, mesh=mesh).values()
     x, y, z = record.force_vector
@@ -106,7 +106,7 @@ def test_force_aside_is_not_told():
 
 
 def test_stress_is_that_of_the_displacement():
-    """Of a point force, for which tractions on half spheres are written down, too; none on the face."""
+    """For a point force, whose traction on half spheres has a separate formula; there is none on the face."""
     field = PointForce(0.3, (0.0, 0.0, 0.0), 1.0)
     at = np.array([[0.3, 0.4, -0.5], [0.0, 0.0, -0.7], [0.6, 0.1, 0.0]])
     normal = at / np.linalg.norm(at, axis=1, keepdims=True)
@@ -115,7 +115,7 @@ def test_stress_is_that_of_the_displacement():
 
 
 def test_force_does_not_depend_on_the_other_places_of_its_study():
-    """Equal keys, equal forces: whichever places come first, or share the mesh of the far field."""
+    """Equal keys, equal forces: whichever places are first, or share the mesh of the far field."""
     mesh = {**MESH, "epsilon": "5 mm", "fine": "5 mm", "rim": "1 mm", "growth": 2.0, "outside": "green"}
     here, there, others = ["1 mm", "2 mm"], ["-9 mm", "4 mm"], [["5 mm", "-11 mm"], ["8 mm", "7 mm"]]
     forces: dict[str, list[float]] = {}

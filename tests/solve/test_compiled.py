@@ -1,4 +1,4 @@
-"""dolfinx stays as it is: forms with kernels of our own are objects of our own, and what we lack it does."""
+"""Compiled forms: dolfinx's modules stay unchanged, and forms may use hand-written kernels."""
 
 import inspect
 import subprocess
@@ -55,7 +55,7 @@ def first_kernel(made) -> int:
 
 @pytest.fixture()
 def _alone():
-    """Others, too, compile into the folder."""
+    """Other processes compile into the same folder."""
     with compiling():
         yield
 
@@ -63,7 +63,7 @@ def _alone():
 @pytest.mark.usefixtures("_alone")
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_plain_form_has_the_generated_kernel(degree):
-    """Even of the very expression, in the very folder, of which a form with another kernel was made before."""
+    """Even after a form of the same expression, in the same folder, was made with another kernel."""
     space = vector_space(make_mesh(mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh, degree)
     expression = stiffness(space)
     address = cell_kernel(degree, of_regions=False)
@@ -81,7 +81,7 @@ def test_a_plain_form_has_the_generated_kernel(degree):
 
 @pytest.mark.usefixtures("_alone")
 def test_a_kernel_of_ones_own_is_used():
-    """The kernel of the stiffness, put into the form of a mass with the same constants, gives the stiffness."""
+    """The kernel of the stiffness, in the form of a mass with the same constants, gives the stiffness."""
     space = vector_space(make_mesh(mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh, 2)
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
     lame = fem.Constant(space.mesh, 1.7), fem.Constant(space.mesh, 0.6)

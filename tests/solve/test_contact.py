@@ -1,4 +1,4 @@
-"""Contact that finds its own area: known forces, no tension, no penetration, the same however it is solved."""
+"""Unilateral contact: known forces, no tension, no penetration, independent of the solver."""
 
 import json
 from contextlib import contextmanager
@@ -31,7 +31,7 @@ KNOWN = {}
 
 
 def record(comm=MPI.COMM_SELF, mesh=None, **changes):
-    """Solve a scene, once in all tests."""
+    """Solve a scene, once for all tests."""
     scene = {"body": SMALL, "probe": SPHERE, "mesh": {**COARSE, **(mesh or {})}} | changes
     key = comm.size, json.dumps(scene, sort_keys=True)
     if key not in KNOWN:
@@ -43,7 +43,7 @@ def record(comm=MPI.COMM_SELF, mesh=None, **changes):
 
 @contextmanager
 def pressed(tool=None, **changes):
-    """Lend the problem of a scene, with another tool, perhaps, on its candidates; and its material and loads."""
+    """Lend the problem of a scene, its material and its movement; optionally with another tool on its candidates."""
     (case,) = study(**{"body": SMALL, "probe": SPHERE, "mesh": COARSE} | changes).cases()
     body = mesh_case(case, ("y",) if tool else ("x", "y"), MPI.COMM_SELF)
     with Spaces(body) as spaces:
@@ -77,7 +77,7 @@ def swept(mesh, depths, probe=SPHERE, body=LARGE, **changes):
 
 
 def test_contact_radius_grows_smoothly_with_depth():
-    """Hertz: a² = R d. Within 3 % on meshes of one and a half to five elements a radius, between nodes as well."""
+    """Hertz: a² = R d, within 3 % on meshes of one and a half to five elements a radius, also between nodes."""
     depths = np.geomspace(0.02e-3, 0.2e-3, 25)
     found = swept({"rim": "0.3 mm"}, 1e3 * depths)
     radii = np.array([record.contact_radius for record in found])
@@ -91,14 +91,14 @@ def test_contact_radius_grows_smoothly_with_depth():
 
 
 def test_contact_on_few_nodes_has_an_error_bar_that_tells_how_coarse_its_elements_are():
-    """Of a cone that touches four nodes; Sneddon's force, with the share that the body's end adds."""
+    """A cone that touches four nodes: Sneddon's force, corrected for the finite body."""
     (found,) = swept({"rim": "0.3 mm"}, [0.02], CONE | {"depth_range": ["0.02 mm", "0.2 mm"]})
     exact = known.half_space_cone(10e3, 0.3, radians(86), 0.02e-3)
     assert abs(found.force / exact - 1) < found.force_error < 0.15
 
 
 def test_small_depths_on_the_mesh_of_a_range_have_bars_and_areas_that_are_worth_something():
-    """A ball on a column of little more than its radius, on elements as large as its contact."""
+    """A ball on a column little wider than the ball, on elements as large as its contact."""
     depths = [0.05e-3, 0.1e-3, 0.2e-3, 0.4e-3]
     ball = {"shape": "sphere", "radius": "4 mm", "depth_range": ["0.02 mm", "0.4 mm"]}
     body = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}
@@ -115,7 +115,7 @@ def test_flat_probe_that_does_not_lift_off_is_the_frictionless_one():
 
 
 def test_face_that_is_inclined_lifts_off_on_one_side():
-    """If it stuck to the surface, tilting would add no force: pull on one side what it presses on the other."""
+    """If it stuck to the surface, tilting would add no force: tension on one side, pressure on the other."""
     inclined = Tool(lambda points: 0.15 * points[:, 0], lambda points: np.ones(len(points), dtype=bool))
     with pressed(inclined, probe=DISC) as (problem, law, movement):
         force = problem.solve(law, movement).reaction[2]
@@ -169,8 +169,8 @@ def test_contact_that_is_cut_off_is_refused():
         problem.solve(law, movement)
 
 
-def test_what_may_touch_may_be_held_as_long_as_it_does_not():
-    """In a held column narrower than the candidates F is that of the meridian; a tool that reaches its side fails."""
+def test_candidates_may_be_on_the_support_unless_they_become_active():
+    """In a fixed column narrower than the candidates F is the axisymmetric one; a tool that reaches its side fails."""
     column = {"epsilon": "1.6 mm", "outside": "fixed"}
     known = solve(body=SMALL, probe=SPHERE, mesh=COARSE | column, plan={"without": []})[()]
     found = record(mesh=column)
@@ -184,8 +184,8 @@ def test_what_may_touch_may_be_held_as_long_as_it_does_not():
         problem.solve(law, movement)
 
 
-def test_a_tool_may_come_as_near_to_a_held_column_as_it_does_not_go_below_the_surface_there():
-    """What a study is refused for is what a run would fail for: 10 mm - (10² - r²)^½ = 0.1 mm at r = 1.411 mm."""
+def test_a_fixed_column_must_be_wider_than_the_tool_at_the_surface():
+    """The study is refused exactly where a run would fail: 10 mm - (10² - r²)^½ = 0.1 mm at r = 1.411 mm."""
     for model in ("auto", "3d"):
         mesh = COARSE | {"outside": "fixed", "rim": "0.2 mm", "model": model}
         (found,) = solve(body=SMALL, probe=SPHERE, mesh=mesh | {"epsilon": "1.413 mm"}, plan={"without": []}).values()
@@ -221,8 +221,8 @@ def test_ranks_agree(poisson):
     assert together.force_error == pytest.approx(alone.force_error, rel=0.05)
 
 
-def test_accuracy_that_is_asked_for_is_met():
-    """Off the axis of its body, so that the mesh is one in three dimensions; the truth is that on the axis, about."""
+def test_the_required_accuracy_is_reached():
+    """Off the axis of its body, on a three-dimensional mesh; the truth is approximately that on the axis."""
     (found,) = solve(
         body=LARGE, probe=SPHERE | {"at": ["1 mm", "0 mm"]},
         mesh={"accuracy": "2 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree")),

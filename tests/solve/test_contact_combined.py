@@ -1,4 +1,4 @@
-"""Found contact with loads, with a far field, and under tilted tools."""
+"""Unilateral contact with loads, with a far field, and under tilted tools."""
 
 from math import pi
 
@@ -34,7 +34,7 @@ def pulled(pressure):
 
 @pytest.mark.parametrize(("load", "poisson"), [(GRAVITY, 0.3), (pulled(0.5), 0.49)], ids=["gravity", "cap"])
 def test_disc_that_does_not_lift_off_is_the_prescribed_one_moved_from_its_first_touch(load, poisson):
-    """F = k (d + sag) + the force of the loads on a disc that is held: superposition."""
+    """F = k (d + sag) + the force of the loads on a fixed disc: superposition."""
     scene = {"load": load, "material": TISSUE | {"poisson": poisson}, "mesh": {"rim": "0.5 mm"}}
     found = record(probe=DISC | {"contact": "unilateral"}, **scene)
     held = record(probe=DISC | {"contact": "frictionless"}, **scene)
@@ -44,7 +44,7 @@ def test_disc_that_does_not_lift_off_is_the_prescribed_one_moved_from_its_first_
 
 
 def test_depth_counts_from_the_first_touch_of_the_surface_as_loads_leave_it():
-    """The body sinks by 0.2 μm or so; what changes F is how its surface bends below the tool, which is little."""
+    """The body sinks by 0.2 μm; F changes only with the bending of the surface below the tool, which is small."""
     alone, loaded = record(material=TISSUE), record(material=TISSUE, load=GRAVITY)
     assert loaded.sag == pytest.approx(1060 * 9.81 * 0.02**2 / 2 / 13.46e3, rel=0.3)  # a column's: ρ g H² / 2 M
     assert loaded.force == pytest.approx(alone.force, rel=0.002)
@@ -68,7 +68,7 @@ def test_loads_on_a_quarter_a_half_and_the_whole_agree():
 
 
 def test_force_is_not_scaled_where_loads_bend_the_surface():
-    """Not with the modulus: a softer body bends more. Twice as stiff under twice the load, F is twice as large."""
+    """Not with the modulus: a softer body bends more. At twice the stiffness and load, F is twice as large."""
     load = pulled(1)
     soft = record(load=load, material={"young": "10 kPa"})
     stiff = record(load=pulled(2), material={"young": "20 kPa"})
@@ -83,7 +83,7 @@ ON_ONE_MESH = SPHERE | {"depth": DEPTHS, "depth_range": [DEPTHS[0], DEPTHS[-1]]}
 
 @pytest.mark.parametrize("scene", [{"load": pulled(1.0)}, {"mesh": MESH | BALL}], ids=["loads", "half ball"])
 def test_depths_on_one_mesh_are_those_of_each_alone(scene):
-    """On the condensed surface, of ten depths; each by itself, of three of these."""
+    """Ten depths on the condensed surface, compared with three of them solved separately."""
     scene, chosen = {"body": BOX, "mesh": MESH} | scene, (0, 4, 9)
     together = solve(**scene, probe=ON_ONE_MESH)
     some = ON_ONE_MESH | {"depth": [DEPTHS[number] for number in chosen]}
@@ -123,7 +123,7 @@ def test_half_ball_that_a_half_space_closes_is_hertz(degree):
 
 
 def test_half_ball_of_a_much_larger_body_is_that_body():
-    """But for what the two meshes differ by, which is another number with each version of gmsh (.1 and .46 %)."""
+    """Up to the difference of the two meshes, which depends on the version of gmsh (.1 and .46 %)."""
     large = {"shape": "box", "size": ["200 mm", "200 mm", "100 mm"], "fixed": "bottom"}
     whole = record(body=large, mesh={"epsilon": "8 mm", "coarse": "20 mm"})
     part = record(body=large, mesh={"epsilon": "8 mm", "coarse": "20 mm", "outside": "green"})
@@ -131,7 +131,7 @@ def test_half_ball_of_a_much_larger_body_is_that_body():
 
 
 def test_half_ball_that_a_half_space_closes_is_the_same_at_every_place():
-    """All places share one mesh, on which the tool is where the mesh is made for it."""
+    """All places share one mesh, made for the tool at its centre."""
     centre, beside = (record(probe=SPHERE | {"at": [at, "0 mm"]}, mesh=BALL) for at in ("0 mm", "3 mm"))
     assert beside.force == pytest.approx(centre.force, rel=1e-8)
     timed = record(probe=SPHERE | {"at": ["3 mm", "0 mm"]}, mesh=BALL, solve={"timing": True})
@@ -177,7 +177,7 @@ def test_mixed_elements_take_a_far_field(poisson):
 
 
 def test_tilted_disc_touches_first_at_its_edge_and_its_depth_counts_from_there():
-    """Tilted by 6°, its edge is 0.1 mm ahead of its middle; upright, all of it touches at once."""
+    """Tilted by 6°, its edge is 0.1 mm ahead of its centre; upright, the whole face touches at once."""
     disc = DISC | {"contact": "unilateral"}
     tilted, upright = record(probe=disc | {"axis": [0.1, 0, -1]}), record(probe=disc)
     assert 0.1 * upright.force < tilted.force < 0.6 * upright.force
@@ -186,14 +186,14 @@ def test_tilted_disc_touches_first_at_its_edge_and_its_depth_counts_from_there()
 
 
 def test_tilted_ball_is_pressed_by_what_its_depth_is_across_the_surface():
-    """Of a ball that goes in along an axis at 6° to the normal: d cos 6° across; forces are along the axis alone."""
+    """A ball moves along an axis at 6° to the normal: the indentation is d cos 6°; forces are along the axis alone."""
     ball = {"shape": "sphere", "radius": "5 mm", "depth": "0.2 mm"}
     tilted, upright = record(probe=ball | {"axis": [0.1, 0, -1]}), record(probe=ball)
     assert tilted.force == pytest.approx(upright.force, rel=0.02 + tilted.force_error)
     assert tilted.contact_radius == pytest.approx(upright.contact_radius, rel=0.05)
 
 
-def test_tool_that_would_touch_where_contact_is_not_looked_for_is_refused():
+def test_tool_that_would_touch_outside_the_searched_region_is_refused():
     found = solve(body=BOX, mesh=MESH, probe={"shape": "sphere", "radius": "3 mm", "depth": "0.1 mm"})
     assert all(one.status == "ok" for one in found.values())
     with pytest.raises(Exception, match="from its axis"):

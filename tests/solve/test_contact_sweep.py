@@ -1,4 +1,4 @@
-"""Depths of one tool on one mesh: each begins from its neighbours, or on a condensed surface, with the same forces."""
+"""Depths of one tool on one mesh: initial guesses from neighbours, or a condensed surface, give the same forces."""
 
 from contextlib import ExitStack
 
@@ -25,7 +25,7 @@ MESH = {"fine": "2 mm", "coarse": "2 mm", "rim": "0.4 mm", "growth": 0.6}
 
 
 def sphere(depths, *, on_one_mesh=True):
-    """Return a ball beside the axis of its body, so that half of that is solved."""
+    """Return a ball off the axis of its body, so that half of the body is solved."""
     ends = {"depth_range": [DEPTHS[0], DEPTHS[-1]]} if on_one_mesh else {}
     return {"shape": "sphere", "radius": "6 mm", "depth": depths, "at": ["0.5 mm", "0 mm"], **ends}
 
@@ -40,7 +40,7 @@ def run(depths, without=(), stored=(), **changes):
 
 @pytest.fixture(scope="module")
 def plainly():
-    """What each depth gives by itself."""
+    """Return the forces of depths solved separately."""
     return run(DEPTHS, ("condensed", "reuse"))[1]
 
 
@@ -53,14 +53,14 @@ def test_force_is_that_of_each_depth_by_itself(plainly, without):
     np.testing.assert_allclose(found["force"], plainly["force"], rtol=1e-8)
     for name in ("contact_area", "energy", "max_strain"):
         np.testing.assert_allclose(found[name], plainly[name], rtol=1e-6)
-    # What elements take to make belongs to every depth that they serve.
+    # Each depth gets the whole cost of the shared elements.
     assert (found["time_assemble"] > 0).all()
     assert (found["time_setup"] > 0).all()
     assert float(found["iterations"].mean()) < 0.75 * float(plainly["iterations"].mean())
 
 
 def test_bars_on_a_condensed_surface_are_not_smaller(plainly):
-    """Some depths have their own, the others those of these."""
+    """Some depths have bars of their own, the others get theirs from these."""
     _, found = run(DEPTHS)
     ratio = (found["force_error"] / plainly["force_error"]).values
     assert ratio[[0, -1]] == pytest.approx(1.0, rel=0.05)
@@ -69,7 +69,7 @@ def test_bars_on_a_condensed_surface_are_not_smaller(plainly):
 
 
 def test_some_of_the_depths_have_the_forces_of_all(plainly):
-    """As in a run that goes on where another one ended: other neighbours, too few to condense for."""
+    """As in a run that continues an interrupted one: other neighbours, too few depths to condense."""
     some = [8, 3, 5]
     plan, found = run([DEPTHS[number] for number in some])
     assert "condensed" not in {struck.name for struck in plan.struck}
@@ -145,7 +145,7 @@ def test_ranks_agree():
 def test_bars_between_two_depths_are_those_of_the_worse_one():
     sweep = Sweep(MaterialLaw.of(1.0, 1.0), "auto", object.__new__(CondensedElements), ExitStack())
     sweep.keep_bar(1e-4, 3e-3, 1e-2)
-    assert sweep.bar(1.2e-4) is None  # of one depth nothing follows for another
+    assert sweep.bar(1.2e-4) is None  # one depth alone gives no bar for another
     sweep.keep_bar(1.5e-4, 2e-3, 2e-2)
     sweep.keep_bar(4e-4, 1e-3, 1e-2)
     assert sweep.bar(1e-4) == (3e-3, 1e-2)

@@ -1,4 +1,4 @@
-"""Error bars are made of what can be measured on the mesh, and hold whichever force they are taken of."""
+"""Error bars cover the error of F, on the meshes for which they are computed."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from pipeline.study.load import parse
 from tests.cases import BLADE, solve, study
 from tests.sampling import sampled
 
-# Scenes of random proportions on meshes with elements as large as the probe, whose bars were too small:
+# Random scenes on meshes with elements as large as the probe, for which earlier bars were too small:
 # radius, height (mm), fixed, ν, contact, probe's radius, fine, coarse, rim (mm), degree.
 MISSED = [
     (6.39, 13.43, "bottom", 0.137, "bonded", 1.644, 2.515, 6.931, 0.8134, 1),
@@ -61,7 +61,7 @@ def test_bars_of_coarse_meshes_hold_the_truth(case):
 
 @sampled("case", [(MISSED[number],) for number in (0, 4, 7, 9)], by_day=1)
 def test_extrapolation_from_a_coarse_mesh_holds_the_truth(case):
-    """An accuracy may be asked of sizes that the study file insists on, but for ε, which chosen sizes need not."""
+    """With a required accuracy a study may fix sizes itself, except ε, which chosen sizes do not need."""
     content, mesh = scene(*case)
     del mesh["epsilon"]
     found = force(content, {**mesh, "accuracy": "20 %"}, solid=True)
@@ -73,8 +73,8 @@ def test_extrapolation_from_a_coarse_mesh_holds_the_truth(case):
 @pytest.mark.parametrize("degree", [1, 2, 3])
 @pytest.mark.parametrize("decrement", [1e-3, 0.1, 0.3])
 def test_bar_is_relative_to_both_forces(decrement, degree):
-    """With F_exact at the lower end, F is off by the bar as a share of F_exact, and by less as a share of F."""
-    share = decrement * (1 + degree**2 / (2 * degree + 1))  # all of θ s is left
+    """With F_exact at the lower end of the bar, F errs by the bar relative to F_exact, and by less relative to F."""
+    share = decrement * (1 + degree**2 / (2 * degree + 1))  # the whole θ s remains
     bar = error_bar(decrement, degree)
     assert bar >= share / (1 - min(share, 0.9)) * (1 - 1e-12)
     assert bar > share
@@ -91,7 +91,7 @@ def test_bar_grows_with_what_is_doubtful():
 
 
 def extrapolated(s, bar, element="displacement", **options):
-    """Return the value that degree 2 tends to, from 1, and its relative bar."""
+    """Return the limit of the sequence of degrees for degree 2 and F = 1, and its relative bar."""
     unseen = np.array([options.pop("unseen")]) if "unseen" in options else None
     one = (np.full((1, 1), value) for value in (1.0, s, bar))
     stiffness, left = extrapolate(*one, 2, element, unseen=unseen, **options)
@@ -100,7 +100,7 @@ def extrapolated(s, bar, element="displacement", **options):
 
 @pytest.mark.parametrize(("element", "centre", "spread"), [("displacement", 0.4, 0.25), ("mixed", 0.38, 0.3)])
 def test_extrapolation_from_a_graded_mesh(element, centre, spread):
-    """F is between what a share of θ s more and less takes away; coarse meshes and plain rims are less sure."""
+    """The limit is a share of θ s below, within a spread; coarse meshes and plain rims have a larger spread."""
     s, theta = 0.01, 0.8
     factor, left = extrapolated(s, error_bar(s, 2, element), element)
     assert factor == pytest.approx(1 - s * (1 + centre * theta))
@@ -110,8 +110,8 @@ def test_extrapolation_from_a_graded_mesh(element, centre, spread):
 
 
 @pytest.mark.parametrize("s", [0.01, -0.01, 1e-4, 0.0])
-def test_what_two_errors_leave_of_each_other_makes_no_bar_small(s):
-    """The energy of the correction, N, knows of both; where it is twice s and less, s tells."""
+def test_errors_of_opposite_sign_do_not_make_the_bar_small(s):
+    """The energy of the correction, N, contains both errors; s alone decides where N is at most twice s."""
 
     def left(unseen, **options):
         return extrapolated(s, error_bar(s, 2, "mixed", unseen=unseen), "mixed", unseen=unseen, **options)[1]
@@ -121,8 +121,8 @@ def test_what_two_errors_leave_of_each_other_makes_no_bar_small(s):
     assert left(0.05) < left(0.1)
 
 
-# Thin bodies, nearly incompressible, in which what one degree more changes is small by chance; the last is a plate that
-# is held at its side, where most of the error is.
+# Thin, nearly incompressible bodies, in which the change by one degree more is small by chance. The last one is a plate
+# with fixed sides, where most of the error is.
 THIN = [
     (3.89, 0.72, "bottom", 0.468, "frictionless", 1.0, 0.36, 4.6, 0.30, 2),
     (10.2, 0.45, "bottom", 0.496, "bonded", 1.0, 0.225, 10.6, 0.33, 2),
@@ -160,13 +160,13 @@ def test_quarter_points_are_found():
 
 @pytest.mark.parametrize("size", ["1.8 mm", "2.7 mm", "4.9 mm"])
 def test_however_large_elements_may_be_a_disc_keeps_its_quarter_points(size):
-    """Eight edges round it would fold some of the cells."""
+    """Eight edges around it would fold some of the cells."""
     assert share(mesh={"rim": size, "fine": "5 mm"}) == 0.0
 
 
 @pytest.mark.mpi
 def test_long_arcs_cost_quarter_points():
-    """Some of an ellipse's fold cells; the same on the whole body, its parts, and any number of ranks."""
+    """Some arcs of an ellipse fold cells; the share is equal on the whole body, its parts, and any number of ranks."""
     flat = {"shape": "ellipse", "axes": ["3 mm", "2 mm"], "depth": "0.2 mm"}
     coarse = {"probe": flat, "mesh": {"rim": "1.5 mm", "fine": "2 mm"}}
     quarter = share(**coarse)
@@ -177,7 +177,7 @@ def test_long_arcs_cost_quarter_points():
 
 @pytest.mark.parametrize(("degree", "limit"), [(2, 0.05), (3, 0.015)])
 def test_the_largest_elements_at_an_edge_are_a_few_per_cent_off(degree, limit):
-    """With eight edges they were 7.0 and 1.9 % off; the meridian has none of them."""
+    """With eight edges F was 7.0 and 1.9 % off; the axisymmetric solver gives the reference."""
     content = {"body": {"shape": "cylinder", "radius": "20 mm", "height": "20 mm", "fixed": "bottom"}}
     mesh = {"rim": "2.9 mm", "fine": "4 mm", "growth": 0.8, "degree": degree}
     (found,), (truth,) = solve(**content, mesh=mesh).values(), solve(**content, plan={"without": []}).values()

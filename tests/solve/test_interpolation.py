@@ -1,4 +1,4 @@
-"""Interpolation between degrees carries polynomials over exactly, and leaves prescribed dofs alone."""
+"""Prolongation between degrees is exact for polynomials, and ignores prescribed dofs."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -28,7 +28,7 @@ def polynomial(degree):
 
 
 def carried(coarse, fine, degree):
-    """Return what is made of the interpolation in ``coarse``, and the interpolation in ``fine``."""
+    """Return the prolongation of the interpolant in ``coarse``, and the interpolant in ``fine``."""
     functions = [fem.Function(side.space) for side in (coarse, fine)]
     for function in functions:
         function.interpolate(polynomial(degree))
@@ -41,7 +41,7 @@ def carried(coarse, fine, degree):
 @pytest.mark.mpi
 @pytest.mark.parametrize(("low", "high"), [(1, 2), (2, 3), (3, 4), (1, 4)])
 def test_polynomials_are_carried_over(low, high):
-    """On a mesh of straight cells a polynomial of the lower degree belongs to both spaces."""
+    """On straight cells a polynomial of the lower degree belongs to both spaces."""
     mesh = make_mesh(MPI.COMM_WORLD, mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh
     coarse, fine = (Side(vector_space(mesh, d), np.zeros(0, dtype=np.int32)) for d in (low, high))
     found, expected = carried(coarse, fine, low)

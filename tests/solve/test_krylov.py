@@ -1,4 +1,4 @@
-"""Conjugate gradients with multigrid: exact enough for F, balanced near locking, indifferent to the mesh's size."""
+"""Conjugate gradients with multigrid: accurate for F, balanced near locking, independent of the mesh size."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_default_tolerance_is_enough_for_f(degree, poisson):
 
 
 def test_force_of_a_probe_that_slices_is_as_exact():
-    """Its force along the axis is not the work alone: both movements are solved for."""
+    """Its force along the axis does not follow from the work alone: both motions are solved for."""
     slicing = Movement.along((DEPTH / 2, 0.0, -DEPTH))
     with QuasiStaticProblem(Spaces(make_mesh(mirrors=("y",))), 2, Conditions()) as problem:
         usual, direct = (problem.solve(law(0.45), slicing, method=method) for method in ("iterative", "direct"))
@@ -48,7 +48,7 @@ def test_forces_that_do_not_balance_are_a_failure():
 
 
 def test_what_does_not_converge_is_a_failure():
-    """An operator that is not positive definite: no energy is smallest, and conjugate gradients give up."""
+    """For an indefinite operator no energy is smallest, and conjugate gradients fail."""
     matrix = PETSc.Mat().createAIJ(2, nnz=2, comm=PETSc.COMM_SELF)
     matrix.setValues([0, 1], [0, 1], [1.0, 3.0, 3.0, 1.0])
     matrix.assemble()
@@ -74,7 +74,7 @@ def test_iterations_do_not_grow_with_the_mesh(degree):
 
 
 def test_a_tolerance_after_a_target_is_kept():
-    """What one solve was allowed to leave, in joules, the next one is not."""
+    """The absolute target (J) of one solve does not apply to the next."""
     with (
         QuasiStaticProblem(Spaces(make_mesh()), 2, Conditions()) as problem,
         problem.solver(law(0.3), "iterative") as solver,
@@ -120,7 +120,7 @@ def test_forces_that_do_not_balance_are_refused_and_so_is_no_number(balance):
 
 
 def test_decrements_are_energies_from_below():
-    """r·A⁻¹·r by a few iterations against a factorisation, for two right-hand sides and between them."""
+    """r·A⁻¹·r by a few iterations, compared with a factorisation, for two right-hand sides and their product."""
     with (
         Spaces(make_mesh()) as spaces,
         QuasiStaticProblem(spaces, 2, Conditions()) as problem,
@@ -143,7 +143,7 @@ def test_decrements_are_energies_from_below():
 
 
 def test_a_solve_begins_from_the_best_sum_of_earlier_ones():
-    """A sum of loads that were solved for takes no more iterations than to see that nothing is left."""
+    """A linear combination of earlier loads needs only the iterations that detect convergence."""
     with (
         Spaces(make_mesh()) as spaces,
         QuasiStaticProblem(spaces, 2, Conditions()) as problem,

@@ -1,4 +1,4 @@
-"""Large displacements: neo-Hookean bodies are linear ones at small depths, and obey closed forms at any."""
+"""Large displacements: hyperelastic bodies are linear at small depths, and agree with closed forms at any."""
 
 import re
 from typing import get_args
@@ -27,12 +27,12 @@ SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}
 
 @pytest.mark.parametrize("stretch", [0.6, 1.0, 1.5])
 def test_uniform_stretch(stretch):
-    """Pulled along z with free sides: what is stored, and the force on each face, are the closed form's."""
+    """Uniaxial stretch along z with free sides: energy, and force on each face, are those of the closed form."""
     (planned,) = make_plan(study(material=LARGE)).solves
     body = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
     law = MaterialLaw.of_moduli(10e3, 0.3)
     (lame_lambda,), (mu,) = law.lame_lambda, law.lame_mu
-    # Of the sides: μ (b - 1/b) + λ (J - 1) b stretch = 0 with J = b² stretch, by Newton's method.
+    # Free sides: μ (b - 1/b) + λ (J - 1) b stretch = 0 with J = b² stretch, by Newton's method.
     b = 1.0
     for _ in range(50):
         volume = b * b * stretch
@@ -82,8 +82,8 @@ def test_quarter_is_the_whole_and_force_goes_with_the_modulus():
     assert stiff.energy == pytest.approx(3 * quarter.energy, rel=1e-12)
 
 
-def test_a_preconditioner_that_is_not_definite_is_mended(monkeypatch):
-    """It is set up on a guess of the largest eigenvalue, which a few slender elements make too small."""
+def test_an_indefinite_preconditioner_is_repaired(monkeypatch):
+    """Its set-up estimates the largest eigenvalue, which a few slender elements make too small."""
     changes = {"material": LARGE, "solve": {"method": "iterative"}}
     known = force(**changes)
     monkeypatch.setattr(multigrid, "_LANCZOS", 1)
@@ -145,7 +145,7 @@ def test_a_force_that_is_not_the_derivative_of_the_energy_is_refused():
     wrong = np.column_stack([depth, 50 * depth, 25.1 * depth**2])
     with pytest.raises(LargeError, match="not the derivative"):
         check_path(wrong, 0.0)
-    check_path(wrong * (1e-5, 1e-5, 1e-10), 1e-16)  # of so little energy rounding takes more away
+    check_path(wrong * (1e-5, 1e-5, 1e-10), 1e-16)  # for so small an energy rounding is larger
 
 
 def test_a_study_takes_every_law_and_no_other():
@@ -154,7 +154,7 @@ def test_a_study_takes_every_law_and_no_other():
 
 @pytest.mark.parametrize("law", LAWS)
 def test_laws_are_linear_at_small_strains(law):
-    """The tangent without displacement is the stiffness of linear elasticity."""
+    """The tangent at zero displacement is the stiffness of linear elasticity."""
     (planned,) = make_plan(study()).solves
     body = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
     space = vector_space(body.mesh, 2)
@@ -170,7 +170,7 @@ def test_laws_are_linear_at_small_strains(law):
 
 
 def test_laws_of_one_space_have_forms_of_their_own(monkeypatch):
-    """Forms of a second law are not taken for those of the first."""
+    """Forms of a second law are not confused with those of the first."""
     monkeypatch.setitem(LAWS, "stiffer", lambda *of: 2 * LAWS["neo-hookean"](*of))
     (planned,) = make_plan(study()).solves
     body = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)

@@ -1,4 +1,4 @@
-"""Weights and tractions obey mechanics: closed forms, superposition, symmetry, and the energy that they leave."""
+"""Mechanics of weights and tractions: closed forms, superposition, symmetry, and the stored energy."""
 
 from math import pi
 
@@ -29,13 +29,13 @@ SIDES = {"on": "sides", "pressure": "100 Pa"}
 
 @pytest.fixture(scope="module")
 def body() -> BodyMesh:
-    """Return a quarter of the box in straight cells, on which polynomials are exact."""
+    """Return a quarter of the box in straight cells, for which polynomials are exact."""
     mesh = mesh_case(study(mesh={"degree": 1}).case(()), ("x", "y"), MPI.COMM_SELF)
     return mesh
 
 
 def own_weight(x: FloatArray) -> FloatArray:
-    """Displacement (m) of a column of ν = 0 that stands on z = -H and bears its own weight."""
+    """Displacement (m) of a column of ν = 0 fixed at z = -H, under its own weight."""
     above = x[2] + HEIGHT
     return np.vstack([0 * above, 0 * above, -WEIGHT / YOUNG * (HEIGHT * above - above**2 / 2)])
 
@@ -69,7 +69,7 @@ def test_resultants_are_those_of_the_loads(body):
         with Spaces(body) as spaces:
             space = spaces.get(2, Conditions()).space
             found.append(apply_loads(loads_of(study(material=HEAVY, load=kept).case(())), body, space).resultant)
-    # Of a quarter of the box, in which half of the cap lies.
+    # A quarter of the box contains half of the cap.
     assert found[0] == pytest.approx([0, 0, -WEIGHT * 20e-3**3], abs=1e-12)
     assert found[1] == pytest.approx([100 * 2 * 20e-3 * 20e-3, 0, 0], abs=1e-12)
     assert found[2] == pytest.approx(np.array([1000, 0, 200]) * pi / 2 * 3e-3**2, rel=2e-3)
@@ -102,8 +102,8 @@ def test_loads_add_up_and_leave_the_force_of_the_depth(pulled):
 
 
 @pytest.mark.mpi
-def test_what_ranks_add_for_each_other_counts():
-    """Shape functions add up to 1: so do the forces of all dofs to the resultant, wherever they are owned."""
+def test_nodal_forces_include_those_from_other_ranks():
+    """Shape functions sum up to 1: so nodal forces sum up to the resultant, wherever dofs are owned."""
     load = {**GRAVITY, "traction": [PULL]}
     body = mesh_case(study(mesh={"degree": 1}).case(()), ("x", "y"), MPI.COMM_WORLD)
     with Spaces(body) as spaces:
@@ -114,7 +114,7 @@ def test_what_ranks_add_for_each_other_counts():
 
 
 def test_loads_grow_apart_from_depth_and_modulus(pulled):
-    """The force that loads leave on a held probe hangs on neither; how far they take a free one falls with E."""
+    """The loads' force on a fixed probe depends on neither; the sag of a free probe decreases with E."""
     (other,) = solve(
         load={"traction": [PULL]}, material={"young": "20 kPa"}, probe={"depth": "0.4 mm"}
     ).values()  # fmt: skip
@@ -122,13 +122,13 @@ def test_loads_grow_apart_from_depth_and_modulus(pulled):
     assert other.load_force == pytest.approx(pulled.load_force, rel=1e-5)
     assert other.load_energy == pytest.approx(pulled.load_energy / 2, rel=1e-5)
     assert other.sag == pytest.approx(pulled.sag / 2, rel=1e-5)
-    # At the depth of the sag the probe bears nothing.
+    # At a depth equal to the sag the force is zero.
     assert pulled.force * pulled.sag / pulled.depth + pulled.load_force == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize("contact", ["bonded", "frictionless"])
 def test_pressure_on_incompressible_tissue_is_borne_by_the_probe(contact):
-    """Held all round, with the pressure on what is left of the top: it is the same everywhere, and nothing moves."""
+    """With fixed sides and pressure on the rest of the top, pressure is uniform, and nothing moves."""
     (record,) = solve(
         body={"fixed": "bottom+sides"}, material={"poisson": 0.5}, probe={"contact": contact},
         load={"traction": [{"on": "free", "pressure": "100 Pa"}]},
@@ -138,7 +138,7 @@ def test_pressure_on_incompressible_tissue_is_borne_by_the_probe(contact):
 
 
 def test_on_a_tilted_probe_loads_are_in_the_coordinates_of_the_body():
-    """Beneath an ellipsoid's side, tissue pushes the probe out along the normal."""
+    """Under the side of an ellipsoid, tissue pushes the probe out along the normal."""
     (record,) = solve(
         body={"shape": "ellipsoid", "axes": ["20 mm", "18 mm", "15 mm"], "fixed": {"below": "-4 mm"}},
         material={"young": "10 kPa", "poisson": 0.5}, probe={"at": ["8 mm", "5 mm", "11 mm"]},
@@ -157,8 +157,8 @@ def test_the_bar_holds(pulled):
 
 
 @pytest.mark.parametrize("element", ["displacement", "mixed"])
-def test_the_bar_tells_errors_apart_that_are_at_other_places(element):
-    """As wide as the root of both bars where both err alike, a share of it where they do not, and never none."""
+def test_the_bar_is_narrower_if_errors_are_at_different_places(element):
+    """It is the geometric mean of both bars if both have the same error, a fraction of it otherwise, and never zero."""
     root, bars = 6.0, np.array([[4.0, 6.0], [6.0, 9.0]])
     alike, apart, none = (np.array([[1.0, s], [s, 4.0]]) for s in (2.0, 0.2, 0.0))
     found = [load_bars(bars, decrements, element)[0, 1] for decrements in (alike, apart, none)]

@@ -1,4 +1,4 @@
-"""Contact whose area is found, on the meridian of round scenes: closed forms, work, and what is no round patch."""
+"""Unilateral contact of axisymmetric scenes: closed forms, work, and contact that is not one round patch."""
 
 from math import log, pi, sqrt
 from types import SimpleNamespace
@@ -44,7 +44,7 @@ def flat(radius):
 
 
 def test_a_flat_tool_wider_than_a_column_covers_it():
-    """Tissue that cannot lift off is pressed as below the frictionless tool that moves as far."""
+    """Tissue that cannot lift off is pressed as by a frictionless tool of the same depth."""
     column = Meridian(12.0, 6.0, 3.0, column=2.0)
     found = pressed(flat(3.0), 0.1, column)
     known = MeridianProblem(column, Conditions(bonded=False)).solve(LAW, Movement.along((0.0, 0.0, -0.1)))
@@ -60,8 +60,8 @@ def test_a_flat_tool_wider_than_a_column_covers_it():
     ids=["ball", "cone"],
 )
 def test_force_and_depth_on_a_deep_body_are_those_of_the_half_space(section, kinks, depth):
-    """F of the radius hardly feels that the body ends, since the singular stresses at the edge decide; the depth does:
-    the surface of a body of 200 radii sinks less by c F, c of about 0.4 % of 1 / (2 E* a).
+    """F at a given radius hardly depends on the body's size, since singular stresses at the edge dominate. The depth
+    does: the surface of a body of 200 radii sinks less by c F, with c about 0.4 % of 1 / (2 E* a).
     """
     found = pressed(RoundTool(section.height, 20.0 if kinks else 8.0, kinks), depth, Meridian(200.0, 200.0, 1.0))
     exact = half_space_contact(1.0, 0.3, section.slope, found.contact.radius)
@@ -75,7 +75,7 @@ def test_force_and_depth_on_a_deep_body_are_those_of_the_half_space(section, kin
 
 
 def test_a_flat_disc_touches_with_all_of_its_face():
-    """As the prescribed footprint does, and to the same bar: nothing lifts off."""
+    """It agrees with the prescribed footprint, and has the same bar: nothing lifts off."""
     meridian, depth = Meridian(50.0, 50.0, 3.0), 0.5
     found = pressed(flat(3.0), depth, meridian)
     known = MeridianProblem(meridian, Conditions(bonded=False)).solve(LAW, Movement.along((0.0, 0.0, -depth)))
@@ -85,7 +85,7 @@ def test_a_flat_disc_touches_with_all_of_its_face():
 
 
 def test_a_thin_layer_is_touched_as_far_as_it_is_pressed_down():
-    """On a layer much thinner than contact is wide a ball touches up to where it and the surface intersect."""
+    """On a layer much thinner than the contact, a ball touches up to its intersection with the surface."""
     ball, depth = Rounded(0.0, 200.0), 0.005
     found = pressed(RoundTool(ball.height, 200.0), depth, Meridian(20.0, 0.04, 1.0), MaterialLaw.of(0.0, 0.5))
     assert found.contact.radius == pytest.approx(sqrt(2 * 200.0 * depth), rel=0.01)
@@ -94,7 +94,7 @@ def test_a_thin_layer_is_touched_as_far_as_it_is_pressed_down():
 
 @pytest.mark.nightly
 def test_the_work_of_the_force_is_the_energy():
-    """Between depths dU = F dd, on a body that is round itself: force, radius and energy belong together."""
+    """Between depths dU = F dd, on an ellipsoid: force, radius and energy are consistent."""
     section, semi_height, radius = Rounded(pi / 2.4, 0.5), 25.0, 40.0
 
     def gap(r):
@@ -110,8 +110,8 @@ def test_the_work_of_the_force_is_the_energy():
 
 
 def test_a_disc_on_a_stiff_skin_lifts_off_in_a_ring():
-    """It is carried by its edge and its middle. Held everywhere, it would pull in between, and take more force; what is
-    not flat but smooth has no such edge. In three dimensions F is 2.087 with a bar of 0.95 %, the area 16.7.
+    """It presses at its edge and its centre. A prescribed face would have tension between, and take more force. A
+    smooth tool has no such edge. In three dimensions F is 2.087 with a bar of 0.95 %, the area 16.7.
     """
     skin, depth = Meridian(30.0, 20.0, 5.0, interfaces=(-1.0,)), 0.1
     stiff = MaterialLaw.of(0.3 / 1.3 / 0.4 * 30, 0.5 / 1.3 * 30)
@@ -131,7 +131,7 @@ def test_contact_as_wide_as_the_body_is_refused():
 
 
 def test_a_round_study_has_area_and_radius_of_contact():
-    """By two moduli and two depths: F is proportional to the modulus, the radius does not know of it."""
+    """With two moduli and two depths: F is proportional to the modulus, the radius does not depend on it."""
     found = study(
         body={"shape": "cylinder", "radius": "30 mm", "height": "20 mm", "size": None},
         material={"young": ["10 kPa", "20 kPa"]}, solve={"exact": False}, plan={"without": []},
@@ -153,7 +153,7 @@ def test_a_round_study_has_area_and_radius_of_contact():
 @pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
 @pytest.mark.parametrize(("steep", "pulls"), [(1.0, False), (1.016, False), (1.02, True)])
 def test_a_pull_is_judged_by_the_mean_pressure(scale, steep, pulls):
-    """Pressures 1 - c r² over a patch of radius 1, whose mean is 1 - c/2, of elements of degree 2."""
+    """Pressures 1 - c r² over a patch of radius 1, with mean 1 - c/2, in elements of degree 2."""
     ends, radii = np.linspace(0.0, 1.0, 81), np.linspace(0.0, 1.0, 161)
     place, weights = np.polynomial.legendre.leggauss(5)
     shapes = np.stack([place * (place - 1) / 2, 1 - place**2, place * (place + 1) / 2])

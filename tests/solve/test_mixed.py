@@ -1,4 +1,4 @@
-"""Mixed elements obey mechanics up to and including ν = ½, and their bars hold."""
+"""Mechanics of mixed elements up to and including ν = ½, and coverage of their bars."""
 
 from dataclasses import replace
 from typing import Any
@@ -24,7 +24,7 @@ from tests.sampling import sampled
 DEPTH = 0.2e-3
 YOUNG = 10e3
 QUARTER = ("x", "y")
-# What mixed elements are for.
+# The range of Poisson's ratio for mixed elements.
 EXACT = {(name, nu): value for (name, nu), value in known.CYLINDER.items() if nu >= 0.45}
 
 
@@ -47,7 +47,7 @@ def solve(body: BodyMesh, poisson: float, degree: int = 2, *, bonded: bool = Tru
 
 @sampled("name, poisson", EXACT, by_day=2)
 def test_cylinder_is_within_the_bar(name, poisson):
-    """The truth is within the bar, and the bar is of use."""
+    """The truth is within the bar, and the bar is narrow enough to be useful."""
     body = make_mesh(
         body=known.CYLINDER_BODY, mesh={"fine": "15 mm", "coarse": "15 mm", "rim": "0.5 mm", "growth": 0.5}
     )
@@ -81,7 +81,7 @@ def test_direct_and_iterative_agree(degree, poisson, bonded):
 
 
 def test_degree_four():
-    """On a mesh of its own size: the next degree is within the bar of the last."""
+    """On a mesh of its own size: the next degree is within the bar of this one."""
     body = make_mesh(mesh={"rim": "2 mm", "fine": "8 mm"})
     cubic = solve(body, 0.5, 3, estimate=True)
     direct, iterative = (solve(body, 0.5, 4, method=method).reaction[2] for method in ("direct", "iterative"))
@@ -106,7 +106,7 @@ def test_incompressible_is_the_limit():
 
 @pytest.mark.parametrize("bonded", [True, False])
 def test_iterations_are_bounded(bonded):
-    """In ν, and when the mesh is refined."""
+    """With ν, and under refinement of the mesh."""
     counts, dofs = [], []
     for rim, fine in (("1 mm", "5 mm"), ("0.25 mm", "3 mm")):
         body = make_mesh(mesh={"rim": rim, "fine": fine, "growth": 0.5})
@@ -122,7 +122,7 @@ def test_iterations_are_bounded(bonded):
 
 @pytest.mark.parametrize("method", ["direct", "iterative"])
 def test_units_do_not_matter(method):
-    """Neither those of E nor those of length: every relative number stays."""
+    """Neither units of E nor of length: every relative number is unchanged."""
     arrays = mesh_arrays(study().case(()), QUARTER)
     numbers = []
     for young, size in ((1e-3, 1.0), (YOUNG, 1.0), (1e12, 1.0), (YOUNG, 0.025), (YOUNG, 250.0)):

@@ -1,4 +1,4 @@
-"""A probe that moves in several ways: its stiffness obeys mechanics, and forces superpose."""
+"""Several rigid motions of a probe: mechanics of its stiffness, and superposition of forces."""
 
 from functools import cache
 
@@ -42,7 +42,7 @@ def all_six(centre=(4e-3, 2e-3, 0.0), travel=TRAVEL):
 @KINDS
 @pytest.mark.parametrize("method", ["direct", "iterative"])
 def test_movements_superpose(kind, poisson, method):
-    """Press and slide, each solved for, give the force and the energy of both at once."""
+    """Press and slide, solved separately, give force and energy of both at once."""
     norm = float(np.linalg.norm(TRAVEL))
     together = Movement((Motion(tuple(t / norm for t in TRAVEL)),), (norm,))
     options = {"method": method, "tolerance": 1e-10, "comm": MPI.COMM_WORLD}
@@ -54,25 +54,25 @@ def test_movements_superpose(kind, poisson, method):
 
 @KINDS
 def test_stiffness_of_all_motions(kind, poisson):
-    """Symmetric and positive; forces are its rows; another point of reference is another description of the same."""
+    """Symmetric and positive; forces are its rows; another reference point transforms it."""
     here = run(kind, all_six(), poisson, tolerance=1e-9)
     stiffness = here.stiffness
     assert stiffness.shape == (6, 6)
     assert np.array_equal(stiffness, stiffness.T)
     assert np.linalg.eigvalsh(stiffness).min() > 0
     assert here.reaction == pytest.approx(-stiffness[:3] @ here.response.amounts, rel=1e-12)
-    for j, force in enumerate(here.response.forces):  # Newton's: what the residuals sum up to, linear in their error
+    for j, force in enumerate(here.response.forces):  # sums of residuals, linear in the solver's error
         assert force == pytest.approx(-stiffness[:3, j], abs=1e-6 * np.abs(stiffness[:3, j]).max())
     arm = np.array([1e-3, -2e-3, 3e-3])
     there = run(kind, all_six(tuple(np.array([4e-3, 2e-3, 0.0]) + arm)), poisson, tolerance=1e-9).stiffness
-    # Turning about a point at c + arm is turning about c and moving by arm × ω.
+    # A rotation about c + arm is a rotation about c plus a translation by arm × ω.
     shift = np.eye(6)
     shift[:3, 3:] = np.cross(np.eye(3), -arm).T
     assert there == pytest.approx(shift.T @ stiffness @ shift, rel=1e-7, abs=1e-7 * np.abs(there).max())
 
 
 def test_rotations_are_those_of_the_residuals():
-    """Reciprocity: the torque of the pressed probe's residual is what turning it takes along the axis."""
+    """Reciprocity: the torque of the pressed probe's residual is the axial force of a rotation."""
     found = run("displacement", all_six(), tolerance=1e-10)
     with Spaces(make_mesh(mirrors=(), **OFF)) as spaces, QuasiStaticProblem(spaces, 2, Conditions()) as problem:
         turned = problem.solve(law(0.3), Movement((all_six().motions[3],), (1.0,)), tolerance=1e-10)
@@ -99,8 +99,8 @@ def on_half_space(poisson):
 
 @pytest.mark.parametrize("poisson", [0.0, 0.3])
 def test_bonded_disc_on_half_space(poisson):
-    """In closed form: torsion 16/3, whatever the material (E. Reissner and H. F. Sagoci 1944); the press
-    is D. A. Spence's (1968). What is far adds the stiffness of a body of 60 a to the latter: 1 %.
+    """Closed forms: torsion 16/3, whatever the material (E. Reissner and H. F. Sagoci 1944), and D. A. Spence's press
+    (1968). The finite body of 60 a is stiffer by 1 % in the latter.
     """
     stiffness, bars = on_half_space(poisson)
     assert stiffness[5, 5] == pytest.approx(16 / 3, abs=bars[5, 5] + 1e-4)
@@ -108,7 +108,7 @@ def test_bonded_disc_on_half_space(poisson):
     mu = 1 / (2 * (1 + poisson))
     press = known.half_space_disc(1.0, poisson, 1.0, 1.0, "bonded")[0] / mu
     assert 0 < stiffness[2, 2] / press - 1 < 0.02
-    # Round: both slides alike, both tilts alike, and no press or torsion in either.
+    # Axisymmetric: both slides are equal, both tilts are equal, and neither couples to press or torsion.
     assert stiffness[0, 0] == pytest.approx(stiffness[1, 1], abs=2 * bars[0, 0])
     assert stiffness[3, 3] == pytest.approx(stiffness[4, 4], abs=2 * bars[3, 3])
     assert stiffness[0, 4] == pytest.approx(-stiffness[1, 3], abs=2 * bars[0, 4])
@@ -117,8 +117,8 @@ def test_bonded_disc_on_half_space(poisson):
 
 
 def test_slide_and_tilt_of_a_bonded_disc():
-    """At ν = ½ the slide takes no pressure, and the press and the tilt no shear: the closed forms of frictionless
-    discs and of Mindlin's slide hold, 8 μ a, 16/3 μ a³ and 16/3 μ a. A body held all round is stiffer.
+    """At ν = ½ the slide needs no pressure, and press and tilt need no shear. The closed forms of frictionless discs
+    and of Mindlin's slide then apply: 8 μ a, 16/3 μ a³ and 16/3 μ a. A body with fixed sides is stiffer.
     """
     changes = {
         "body": {"shape": "cylinder", "radius": "60 mm", "height": "60 mm", "fixed": "bottom+sides"},
@@ -140,7 +140,7 @@ def test_slide_and_tilt_of_a_bonded_disc():
 
 @KINDS
 def test_bars_of_movements_hold_those_of_finer_meshes(kind, poisson):
-    """The entries of the stiffness, and the forces, of a coarse mesh against those of a finer one of higher degree."""
+    """Entries of the stiffness, and forces, of a coarse mesh compared with those of a finer one of higher degree."""
     coarse, fine = (make_mesh(mirrors=(), mesh={"rim": rim}, **OFF) for rim in ("1.5 mm", "0.5 mm"))
     rough = run(kind, all_six(), poisson, mesh=coarse, estimate=True)
     with Spaces(fine) as spaces, QuasiStaticProblem(spaces, 3, Conditions(), kind) as problem:
@@ -151,7 +151,7 @@ def test_bars_of_movements_hold_those_of_finer_meshes(kind, poisson):
 
 
 def test_one_movement_is_a_matrix_of_one():
-    """What one degree more takes away, and the bars, are the same whether a movement is solved for alone or not."""
+    """Decrements and bars are the same whether a motion is solved for alone or with others."""
     press = Movement.along((0.0, 0.0, -1.0))
     alone, among = (
         run("displacement", movement, estimate=True) for movement in (press, Movement.along((1.0, 0.0, -1.0)))
@@ -162,7 +162,7 @@ def test_one_movement_is_a_matrix_of_one():
 
 
 def test_decrements_are_those_of_the_higher_degree():
-    """K_p - K_{p+1}, entry by entry, to what the few iterations leave of it."""
+    """K_p - K_{p+1}, entry by entry, within the error of the few iterations."""
     mesh = make_mesh(mirrors=(), **OFF)
     found = run("displacement", all_six(), mesh=mesh, estimate=True)
     with Spaces(mesh) as spaces, QuasiStaticProblem(spaces, 3, Conditions()) as problem:
@@ -174,7 +174,7 @@ def test_decrements_are_those_of_the_higher_degree():
 
 @pytest.mark.parametrize("poisson", [0.3, 0.49])
 def test_study_asks_for_the_stiffness(poisson):
-    """By a study: the force is that of the press alone, and scales; symmetry of the scene shows in the stiffness."""
+    """In a study the force is that of the press alone, and scales; the stiffness has the symmetry of the scene."""
     material = {"poisson": poisson}
     alone, found = (next(iter(solve(material=material, probe={"motion": m}).values())) for m in ("press", "all"))
     assert alone.stiffness == ()
@@ -223,7 +223,7 @@ def solved_dataset(**changes):
 
 
 def test_what_several_movements_change_in_a_plan():
-    """No symmetry, no meridian and no reduced basis for all motions; F_exact is of the press."""
+    """No symmetry, no axisymmetry and no reduced basis for all motions; F_exact is that of the press."""
     round_body = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm"}
     ratios = [0.0, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4]
     press, every = (
@@ -250,7 +250,7 @@ def test_estimates_count_the_movements():
 
 
 def test_a_slide_takes_a_finer_mesh():
-    """The bar on the force along the axis holds what the slide adds to it, unless symmetry keeps them apart."""
+    """The bar on the axial force includes the error of the slide, unless symmetry decouples them."""
     finest = []
     for changes in ({"at": ["3 mm", "0 mm"]}, {"at": ["3 mm", "0 mm"], "slice": "0.3 mm"}, {"slice": "0.3 mm"}):
         plan = make_plan(study(probe=BLADE | changes, mesh={"accuracy": "0.3 %", "epsilon": None, "fine": None,
@@ -261,8 +261,8 @@ def test_a_slide_takes_a_finer_mesh():
 
 
 @pytest.mark.parametrize("mirrored", [(), (0,), (0, 1)])
-def test_forces_that_do_not_balance_are_told_by_what_a_motion_is_worth(mirrored):
-    """Of a translation by its force; of a turn, which may take none, by what its energy is worth in a translation."""
+def test_imbalance_is_relative_to_a_translation_of_the_same_energy(mirrored):
+    """For a translation relative to its force; for a rotation, whose force may vanish, to that translation's."""
     movement = Movement((Motion(direction=(0.0, 0.0, 1.0)), Motion(rotation=(0.0, 0.0, 1.0))), (1.0, 1.0))
     energies, off = np.array([400.0, 1.0]), 1e-3
     straight = np.array([[0.0, 0.0, 400.0], [0.0, 0.0, 0.0]])

@@ -1,4 +1,4 @@
-"""The cycle in single precision: a preconditioner as good as the one in double, in any units, or none at all."""
+"""Multigrid in single precision: as good a preconditioner as in double precision, in any units."""
 
 import numpy as np
 import pytest
@@ -29,8 +29,8 @@ def test_a_tolerance_below_that_of_a_float_is_met():
     assert exact.reaction[2] == pytest.approx(found.reaction[2], rel=1e-9)
 
 
-def test_a_smoother_that_took_its_largest_eigenvalue_for_too_small_looks_closer(monkeypatch):
-    """As a few slender elements make it do, of which a few steps from noise tell nothing."""
+def test_a_too_small_estimate_of_the_largest_eigenvalue_is_repaired(monkeypatch):
+    """A few slender elements cause it: few Lanczos steps from random vectors do not find their eigenvalue."""
     known = solved("displacement", 2, law(0.3))
     monkeypatch.setattr(multigrid, "_LANCZOS", 1)
     found = solved("displacement", 2, law(0.3))

@@ -1,4 +1,4 @@
-"""What is solved with operators made of tensors of the reference cell is what dolfinx's forms give."""
+"""Operators from tensors of the reference cell agree with dolfinx's forms."""
 
 from contextlib import ExitStack
 
@@ -23,7 +23,7 @@ from tests.solve.test_regions import SKIN
 
 @pytest.mark.mpi
 def test_what_is_lent_stays_as_it_is():
-    """An operator is its borrower's: those made after it are others."""
+    """A borrower may change an operator: those lent later are unaffected."""
     space = ElasticSpace(make_mesh(MPI.COMM_WORLD), 2, Conditions())
     with space.lend(MaterialLaw.of(2.0, 1.0)) as first:
         before = first.norm()
@@ -34,7 +34,7 @@ def test_what_is_lent_stays_as_it_is():
 
 
 def test_a_point_of_very_many_cells():
-    """The number of cells that a pair of points shares is counted in no small integer."""
+    """The number of cells that share a pair of points must not overflow a small integer."""
     count = 512  # a fan around the edge from (0, 0, 0) to (0, 0, 1)
     angle = 2 * np.pi * np.arange(count) / count
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
@@ -83,7 +83,7 @@ def test_operators_are_those_that_dolfinx_assembles(degree, mirrors, changes, ke
         theirs.mult(x, z)
         assert (y - z).norm() < 1e-12 * z.norm()
         assert ours.getType() == theirs.getType() and ours.getBlockSize() == theirs.getBlockSize() == 3
-        if degree > 1:  # nor is that of the cells, without entries, another product
+        if degree > 1:  # the matrix-free product agrees, too
             product = stack.enter_context(space.lend(material, entries=False))
             x.array[space.prescribed_owned] = 0.0
             product.mult(x, y)
@@ -114,7 +114,7 @@ def test_operators_are_those_that_dolfinx_assembles(degree, mirrors, changes, ke
     by_day=7,
 )
 def test_solutions_of_several_ranks_are_those_of_one(kind, degree, poisson, bonded, mirrors, changes, method):
-    """Of one process: force, energy and the error bar, made of one degree more, on curved and on straight cells."""
+    """Compared with one process: force, energy and the error bar, on curved and on straight cells."""
     found = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         mesh = make_mesh(comm, mirrors, **changes)

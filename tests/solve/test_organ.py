@@ -1,4 +1,4 @@
-"""Forces on bodies of triangles are those on the bodies that they stand for, inclusions too."""
+"""Forces on bodies of triangles agree with those on the exact bodies, with inclusions, too."""
 
 from dataclasses import replace
 from math import isnan
@@ -48,7 +48,7 @@ def test_a_box_given_as_triangles_is_a_box(tmp_path_factory, contact):
     ("contact", "axis"), [("bonded", None), ("frictionless", [-0.3, 0.1, -1.0])], ids=["normal", "inclined"]
 )
 def test_an_ellipsoid_given_as_triangles_is_an_ellipsoid_wherever_it_is_touched(tmp_path, contact, axis):
-    """Pressed on its flank: force, its direction and what is in balance are those of the exact surface."""
+    """Pressed on its side: force, its direction and balance agree with the exact surface."""
     path = write_stl(tmp_path / "ellipsoid.stl", *ellipsoid(24))
     given = {"shape": "surface", "file": str(path), "unit": "mm", "fixed": {"below": "-10 mm"}}
     native = {"shape": "ellipsoid", "axes": ["60 mm", "45 mm", "30 mm"], "fixed": {"below": "-10 mm"}}

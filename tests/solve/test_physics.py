@@ -1,4 +1,4 @@
-"""The force obeys mechanics: closed forms, invariances, bounds."""
+"""Mechanics of the force: closed forms, invariances, bounds."""
 
 from math import pi
 
@@ -10,7 +10,7 @@ from tests.sampling import sampled
 
 CAP = {"around": ["9 mm", "0 mm", "0 mm"], "radius": "3 mm"}
 BALL = {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"}
-# What displacement elements of degree 2 are for.
+# The range of Poisson's ratio for displacement elements of degree 2.
 EXACT = {(contact, nu): value for (contact, nu), value in known.CYLINDER.items() if nu <= 0.45}
 UNIT = 10e3 * 0.2e-3 * 1e-3
 
@@ -19,7 +19,7 @@ UNIT = 10e3 * 0.2e-3 * 1e-3
 def test_uniaxial_strain(degree, tolerance):
     """Without lateral contraction a column under a probe that covers it is in uniform strain: F = E A d / H.
 
-    What is left is the shape of the column's side: straight facets, or quadratic ones.
+    The remaining error is the shape of the column's side, by straight facets or quadratic ones.
     """
     value = force(
         material={"poisson": 0},
@@ -53,7 +53,7 @@ def test_force_falls_with_refinement_and_degree():
 
 
 def test_conforming_mesh_is_never_softer_than_full_order():
-    """The finer mesh gives the smaller F. Two different meshes may differ by 0.5 % in what both leave out."""
+    """The finer mesh gives the smaller F. Two different meshes may differ by 0.5 % in their common error."""
     records = solve(mesh={"epsilon": ["4 mm", "8 mm", "full"], "fine": "2 mm", "growth": 0.5, "rim": "0.4 mm"})
     near, far, full = (record.force for record in records.values())
     assert near > far * 0.995
@@ -61,7 +61,7 @@ def test_conforming_mesh_is_never_softer_than_full_order():
 
 
 def test_column_in_free_space_gives_the_paper_s_curve():
-    """Converged values for a disc of 2 mm bonded to tissue of 20 mm, of which only r < ε is kept."""
+    """Converged values for a disc of 2 mm bonded to tissue of 20 mm; only r < ε is kept."""
     poisson = [0.30, 0.45]
     records = solve(
         body={"shape": "cylinder", "radius": "34 mm", "height": "20 mm"},
@@ -81,7 +81,7 @@ def test_held_column_is_stiffer_and_free_column_softer_than_the_body():
 
 
 def test_blade_direction_and_slice():
-    """A blade turned by 90° in a square body takes the same force; slicing pulls along the blade only."""
+    """A blade turned by 90° in a square body has the same force; slicing adds a force along the blade only."""
     mesh = {"rim": "0.5 mm", "fine": "4 mm"}
     records = solve(probe=BLADE | {"slice": ["0 mm", "0.1 mm"]}, mesh=mesh)
     (turned,) = solve(probe=BLADE | {"direction": [0.0, 1.0, 0.0]}, mesh=mesh).values()
@@ -112,7 +112,7 @@ def test_blade_direction_and_slice():
     }.values(),
 )
 def test_symmetric_part_gives_the_force_of_the_whole(planes, changes):
-    """Half or quarter of the body, and the whole that it is reflected to: the same discrete solution."""
+    """Half or quarter of the body, and the whole made by reflection, have the same discrete solution."""
     mesh = changes.pop("mesh", {})
     # Force across the probe's axis is linear in the solver's error.
     precise = {"solve": {"tolerance": 1e-10}}
@@ -131,7 +131,7 @@ def test_symmetric_part_gives_the_force_of_the_whole(planes, changes):
 
 @sampled("contact, poisson, degree", [(*scene, degree) for scene in EXACT for degree in (1, 2, 3)], by_day=4)
 def test_error_bar_holds_the_truth(contact, poisson, degree):
-    """The error is from above, within the bar, and the bar is not much larger than the error."""
+    """F is an upper bound, the error is within the bar, and the bar is not much larger than the error."""
     (record,) = solve(
         body=known.CYLINDER_BODY,
         material={"poisson": poisson},

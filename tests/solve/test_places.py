@@ -1,4 +1,4 @@
-"""A probe anywhere on a body: what is solved in the probe's own frame comes back in the coordinates of the body."""
+"""A probe anywhere on a body: results of the probe's own frame are returned in the body's coordinates."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ DISC = {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm"}
 MESH = {"epsilon": "full", "fine": "6 mm", "coarse": "8 mm", "rim": "1 mm", "growth": 0.8, "model": "3d"}
 TOP = {"shape": "box", "size": ["40 mm", "30 mm", "20 mm"], "fixed": "bottom"}
 ELLIPSOID = {"shape": "ellipsoid", "axes": ["20 mm", "20 mm", "20 mm"], "fixed": {"below": "-10 mm"}}
-# x, y, z of the box that is pressed on its top become z, x, y of the one that is pressed on its side.
+# x, y, z of the box pressed on its top become z, x, y of the box pressed on its side.
 TO_SIDE = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
@@ -50,7 +50,7 @@ def at(*millimetres):
     ids=["bonded", "frictionless", "all", "slicing"],
 )
 def test_a_box_pressed_on_its_side_is_the_one_pressed_on_its_top(probe):
-    """The same mesh, turned: forces, stiffness and bars turn with it, to rounding."""
+    """On the same mesh, rotated: forces, stiffness and bars rotate with it, to rounding."""
     top = case_of(body=TOP, probe=probe | {"at": at(4, -3)})
     turned = {"direction": list(TO_SIDE @ [1.0, 0.0, 0.0])} if "width" in probe else {}
     side = case_of(
@@ -58,7 +58,7 @@ def test_a_box_pressed_on_its_side_is_the_one_pressed_on_its_top(probe):
         probe=probe | turned | {"at": at(10, 4, -18)},
     )
     arrays = mesh_arrays(top, ())
-    # Of the box that is pressed on its side, the middle of the top is the origin.
+    # The origin of the box pressed on its side is the centre of its top.
     points = arrays.points @ TO_SIDE.T + [10e-3, 0.0, -15e-3]
     here, there = record_on(arrays, top), record_on(replace(arrays, points=points), side)
     assert there.force == pytest.approx(here.force, rel=1e-6)
@@ -72,8 +72,8 @@ def test_a_box_pressed_on_its_side_is_the_one_pressed_on_its_top(probe):
         np.testing.assert_allclose(there.stiffness_error, both @ bars @ both.T, atol=0.02 * bars.max())
 
 
-def test_an_inclined_axis_takes_the_force_that_the_stiffness_of_the_probe_tells():
-    """Of the same footprint, on the same mesh: F = K d."""
+def test_the_force_along_an_inclined_axis_follows_from_the_stiffness():
+    """For the same footprint, on the same mesh: F = K d."""
     level = case_of(body=TOP, probe=DISC | {"motion": "all", "at": at(4, -3)})
     inclined = case_of(body=TOP, probe=DISC | {"axis": [0.4, -0.2, -1.0], "at": at(4, -3)})
     arrays = mesh_arrays(level, ())
@@ -85,7 +85,7 @@ def test_an_inclined_axis_takes_the_force_that_the_stiffness_of_the_probe_tells(
 
 
 def test_an_inclined_needle_presses_on_what_projects_into_it():
-    """Its footprint on a flat top is that of an ellipse, longer by 1 / cos of the inclination."""
+    """Its footprint on a flat top is an ellipse, longer by 1 / cos of the inclination."""
     tilt = np.radians(40)
     axis = [float(np.sin(tilt)), 0.0, -float(np.cos(tilt))]
     case = case_of(body=TOP, probe=DISC | {"axis": axis})
@@ -96,7 +96,7 @@ def test_an_inclined_needle_presses_on_what_projects_into_it():
 
 
 def test_round_bodies_take_the_same_force_all_round():
-    """A cylinder on its side, a ball wherever it is touched, as far from what is held."""
+    """A cylinder on its side, a ball touched anywhere, at equal distances from the support."""
     cylinder = {"shape": "cylinder", "radius": "20 mm", "height": "40 mm", "fixed": "bottom"}
     places = [at(20, 0, -15), at(0, 20, -15), at(12, -16, -15)]
     found = [*solve(body=cylinder, mesh=MESH, probe=DISC | {"at": places}).values()]
@@ -112,7 +112,7 @@ def test_round_bodies_take_the_same_force_all_round():
 
 @pytest.mark.parametrize("shape", [DISC, {"shape": "blade", "length": "6 mm", "width": "2 mm", "depth": "0.1 mm"}])
 def test_a_footprint_on_a_ball_is_what_projects_into_it_and_no_more(shape):
-    """Its edge lies on the ball, mid nodes too, and the far side is not touched."""
+    """Its edge is on the ball, mid nodes included, and the far side is not touched."""
     case = case_of(body=ELLIPSOID, probe=shape | {"at": at(8, 6, 17.3)})
     mesh = mesh_arrays(case, ())
     touched = np.unique(mesh.facets["probe"])
@@ -122,7 +122,7 @@ def test_a_footprint_on_a_ball_is_what_projects_into_it_and_no_more(shape):
     assert local[touched, 2].min() > -2e-3
     edge = local[mesh.rim, :2]
     np.testing.assert_allclose(case.probe.to_edge(edge), edge, atol=1e-9)
-    # The area of the cap is π (a² + h²): the footprint's corners hold the polygon within it.
+    # The area of the cap is π (a² + h²); the footprint's corners give that of the inscribed polygon.
     corners = mesh.points[mesh.facets["probe"]]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
     if shape is DISC:

@@ -1,4 +1,4 @@
-"""The reduced basis: what it gives is the Galerkin solution, and asking it costs nothing that stays."""
+"""The reduced basis: it gives the Galerkin solution, and evaluations keep no memory."""
 
 import numpy as np
 import psutil
@@ -27,7 +27,7 @@ def law_of(poisson: float) -> MaterialLaw:
 
 @pytest.mark.mpi
 def test_energy_falls_towards_that_of_a_solve_with_each_solution():
-    """A combination of more solutions has less energy, never less than the solution itself."""
+    """A larger basis gives less energy, never less than the solution itself."""
     with QuasiStaticProblem(Spaces(make_mesh(MPI.COMM_WORLD)), 2, Conditions()) as problem:
         wanted = problem.solve(law_of(0.4), PRESS).energy
         found = []

@@ -1,4 +1,4 @@
-"""Files with what goes wrong with surfaces of organs, each with the words by which it is refused."""
+"""Typical defects of organ surfaces, each with words of the message that refuses it."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from tests.shapes.files.solids import Surface, ball, both, obj, ply, stl, stl_te
 
 @dataclass(frozen=True)
 class Broken:
-    """A file and what is said of it; ``repairs`` if `repair = true` makes a body of it."""
+    """A file and words of its message; ``repairs`` if `repair = true` makes a body of it."""
 
     name: str
     data: bytes
@@ -24,7 +24,7 @@ def _near(points: FloatArray, place: tuple[float, float, float]) -> int:
 
 
 def _without(surface: Surface, *places: tuple[float, float, float]) -> Surface:
-    """The facets round points of a surface taken out."""
+    """The surface without the facets around some points."""
     points, facets = surface
     gone = np.zeros(len(facets), dtype=bool)
     for place in places:
@@ -51,7 +51,7 @@ def _fin(surface: Surface) -> Surface:
 
 
 def _wall(surface: Surface) -> Surface:
-    """A wall within, from one side to the other."""
+    """A wall inside, from one side to the other."""
     points, facets = surface
     rim = np.nonzero(np.abs(points[:, 2]) < 1e-9)[0]
     rim = rim[np.argsort(np.arctan2(points[rim, 1], points[rim, 0]))]
@@ -70,7 +70,7 @@ def _sheet(count: int = 12) -> Surface:
 
 
 def _klein(count: int = 40) -> Surface:
-    """A closed surface with one side: a tube that closes upon itself inside out."""
+    """A closed one-sided surface: a Klein bottle."""
     i, j = np.meshgrid(np.arange(count), np.arange(8), indexing="ij")
 
     def number(u: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -85,7 +85,7 @@ def _klein(count: int = 40) -> Surface:
 
 
 def _pinched() -> Surface:
-    """A ball pressed together until top and bottom are one point."""
+    """A ball whose top and bottom are one point."""
     points, facets = ball(3)
     top, bottom = _near(points, (0, 0, 20)), _near(points, (0, 0, -20))
     points = points.copy()
@@ -114,7 +114,7 @@ def _half_welded() -> Surface:
 
 
 def _slit(surface: Surface) -> Surface:
-    """Open along a line: two points where one should be."""
+    """A surface open along a line: two points where there should be one."""
     points, facets = surface
     facets = facets.copy()
     one = _near(points, (0, 0, 20))

@@ -1,4 +1,4 @@
-"""Closed surfaces in mm, and how they are written: the good files that the broken ones are made from."""
+"""Closed surfaces in mm, and their file formats: the good files from which the broken ones are made."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What was checked once is not checked again, and is the same."""
+"""Cache of checked surfaces: each is checked once, and the cached surface is the same."""
 
 import nrrd
 import numpy as np
@@ -92,7 +92,7 @@ def test_the_surface_round_a_label_is_made_once(name, folder, monkeypatch):
 
 
 def test_the_data_that_a_header_names_count(folder):
-    """Of a header beside its data only the data change: within one process, and on disk."""
+    """If only the data file beside a header changes, the surface changes: within one process, and on disk."""
     path = write_ball(folder / "ball.nhdr")
     header, first = path.read_bytes(), load_image(path, 1).triangles
     write_ball(path, radius=8.0)

@@ -1,4 +1,4 @@
-"""Which facets cross is decided exactly, whatever a search in floating point makes of those that share a corner."""
+"""Crossing facets are decided exactly, also where a search in floating point is wrong about a common corner."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_two_facets_with_a_corner_in_common(other, cross):
 
 
 def test_pairs_that_are_found_by_mistake_are_dropped(monkeypatch):
-    """All neighbours of a good surface are said to cross: those with one corner in common are seen not to."""
+    """The search reports all neighbours of a good surface: those with one common corner are recognised as errors."""
     points, facets = sphere(4)
     share = (facets[:, None, :, None] == facets[None, :, None, :]).any(axis=3).sum(axis=2)
     pairs = np.argwhere(np.triu(share == 1, 1))

@@ -1,4 +1,4 @@
-"""Files that are right, in every way of writing them: they hold the same body."""
+"""Valid files in all variants of the formats give the same body."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -33,7 +33,7 @@ def _quads() -> Surface:
 
 
 def _backwards(text: bytes, points: int) -> bytes:
-    """The facets of an OBJ file with numbers that count from the last point."""
+    """The facets of an OBJ file with negative numbers, which count from the last point."""
     lines = text.splitlines()
     turned = [
         b"f " + b" ".join(b"%d" % (int(k) - points - 1) for k in line.split()[1:]) for line in lines if line[:1] == b"f"
@@ -128,7 +128,7 @@ def test_corners_that_differ_by_rounding_are_welded_and_told(tmp_path: Path):
 
 
 def test_a_point_on_an_edge_costs_a_facet_without_area_which_is_turned_and_told(tmp_path: Path):
-    """Half of one edge belongs to a facet that has no area: as programs for drawing leave it."""
+    """Half of one edge belongs to a facet without area, as drawing programs write it."""
     points, facets = ball(2)
     a, b, c = facets[0]
     middle = len(points)

@@ -1,4 +1,4 @@
-"""Label maps: the surface round a label, where the header says, and what is wrong with files that are none."""
+"""Label maps: the surface of a label, its position by the header, and refusals."""
 
 import gzip
 from pathlib import Path
@@ -39,7 +39,7 @@ def _nifti(path: Path, values: np.ndarray, affine: FloatArray, unit: str = "mm")
 
 
 def _distances(triangles: Triangles) -> FloatArray:
-    """Distances (m) of its points from the ellipsoid, to first order."""
+    """Return distances (m) of its points from the ellipsoid, to first order."""
     place, axes = triangles.points - CENTRE / 1e3, AXES / 1e3
     level = np.sqrt(((place / axes) ** 2).sum(axis=1))
     return (level - 1) * level / np.linalg.norm(place / axes**2, axis=1)

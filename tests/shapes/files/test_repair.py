@@ -1,4 +1,4 @@
-"""What `repair = true` and `smooth` make of files, and that they tell it."""
+"""Effects of `repair = true` and `smooth`, and their notices."""
 
 import sys
 from pathlib import Path
@@ -63,7 +63,7 @@ def test_smoothing_a_ball_shrinks_it_as_its_filter_says(tmp_path: Path):
     path.write_bytes(stl(ball(4, (30.0, 30.0, 30.0))))
     radius = np.linalg.norm(load_surface(path, 1e-3, smooth=6e-3).triangles.points, axis=1)
     plain = np.linalg.norm(load_surface(path, 1e-3).triangles.points, axis=1)
-    # The coordinates of a ball are waves with k² = 2 / R².
+    # Coordinates of a ball are waves with k² = 2 / R².
     assert np.allclose(radius / plain, 1 / (1 + 4 * 0.2**4), rtol=1e-3)
 
 
