@@ -99,7 +99,7 @@ def test_interrupted_run_leaves_what_is_done_and_goes_on(epsmesh, small, whole, 
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
     )  # fmt: skip
     assert process.stderr is not None
-    while "[2/" not in process.stderr.readline():
+    while "[solve 2/" not in process.stderr.readline():
         assert process.poll() is None
     process.send_signal(signal.SIGTERM)
     _, errors = process.communicate(timeout=60)
@@ -119,7 +119,7 @@ def test_interrupted_parallel_run_writes_what_is_done(epsmesh, small, tmp_path):
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True, cwd=ROOT, env=ENVIRONMENT,
     )  # fmt: skip
     assert process.stderr is not None
-    while "[2/" not in process.stderr.readline():
+    while "[solve 2/" not in process.stderr.readline():
         assert process.poll() is None
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)

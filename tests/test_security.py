@@ -224,7 +224,7 @@ def test_a_store_is_data(tmp_path, program):
     with pytest.raises(StoreError, match=r"no case store|not that of a case store"):
         known_of(path, make_plan(study()))
     opened = Store(path)
-    assert "was moved to" in opened.notice
+    assert "was renamed to" in opened.notice
     opened.close()
 
 

@@ -130,10 +130,14 @@ def _print_result(exported: "Exported", wanted: float, path: Path) -> None:
     if exported.unseen:
         warning(f"{path} has no deforming surface: {exported.unseen}")
     found = exported.summary(wanted) | {"file": str(path)}
+    checked = len(exported.fitted) + len(exported.judged)
     say(
         found,
         repr(exported.model),
+        f"tools: {exported.tools}",
         f"wrote {path}: {counted(int(found['places']), 'place')} solved, {found['coefficients']} coefficients",
+        f"touches solved in full: {counted(checked, 'force')} of {1e3 * found['smallest_force']:.3g} to "
+        f"{1e3 * found['largest_force']:.3g} mN",
         f"test on {found['judged']} touches: the error bar covers {100 * found['held']:.0f} % of the errors; largest "
         f"error {100 * found['largest_error']:.2g} %, median error bar {100 * found['median_bar']:.2g} %",
     )

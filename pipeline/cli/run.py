@@ -5,6 +5,7 @@ import time
 from collections import Counter
 from pathlib import Path
 from shlex import quote
+from textwrap import shorten
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
@@ -41,8 +42,8 @@ if TYPE_CHECKING:
 
 # So many failed cases are listed; `status` lists all.
 _MOST_FAILURES = 20
-# So many reasons are given in a line.
-_MOST_REASONS = 2
+# The line of a study has so many reasons, of so many letters each.
+_MOST_REASONS, _LONGEST_REASON = 2, 120
 
 
 def run(
@@ -157,7 +158,9 @@ def _announce(plan: "Plan", opened: "Opened", *, quiet: bool, verbose: bool) -> 
         )
     if plan.solves:
         steps = plan.meshes
-        print(f"  to do: {counted(len(steps), 'mesh')}, {counted(len(plan.solves), 'solve')}", flush=True)
+        exact = sum(solve.is_reference for solve in plan.solves)
+        of_exact = f" ({exact} of them for F_exact)" if exact else ""
+        print(f"  to do: {counted(len(steps), 'mesh')}, {counted(len(plan.solves), 'solve')}{of_exact}", flush=True)
         for number, step in enumerate(steps if verbose else (), start=1):
             print(f"    step {number}: {counted(len(step.solves), 'solve')}: {step.solves[0].label}", flush=True)
 
@@ -205,7 +208,8 @@ def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, sh
         if not count and state != "failed":
             continue
         reasons = _reasons(plan, opened, state)
-        why = "; ".join(text for text, _ in reasons.most_common(_MOST_REASONS) if text)
+        most = [shorten(text, _LONGEST_REASON, placeholder=" …") for text, _ in reasons.most_common(_MOST_REASONS)]
+        why = "; ".join(dict.fromkeys(filter(None, most)))
         more = "; …" if len(reasons) > _MOST_REASONS else ""
         counts.append(f"{count} {state}{f' ({why}{more})' if why and state in ('failed', 'skipped') else ''}")
     stored = _read_back(plan)

@@ -9,13 +9,23 @@ import typer
 
 from pipeline.cli.console import say
 from pipeline.cli.faults import fail, of_file
-from pipeline.cli.words import Json, check_output
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, by_name, check_output
 
-MODEL = ".epsm.nc"  # what `export` writes
+MODEL = ".epsm.nc"  # the suffix of models that `export` writes
+
+
+def _by_study(file: Path) -> Path:
+    """Return a model: ``file`` itself, or the one in results/ of a study's file or name, if it exists."""
+    of_study = DEFAULT_OUTPUT / f"{by_name(file).stem}{MODEL}"
+    is_study = file.suffix == ".toml" or not file.exists()
+    return of_study if is_study and not file.name.endswith(MODEL) and of_study.is_file() else file
 
 
 def touch(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model that `epsmesh export` made.")],
+    model: Annotated[
+        Path,
+        typer.Argument(metavar="MODEL", help="A model that `epsmesh export` made, or its study.", callback=_by_study),
+    ],
     output: Annotated[
         Path | None,
         typer.Option(
@@ -58,8 +68,10 @@ def touch(
 
 def _meant(file: Path) -> str:
     """Return the command that makes a model, if ``file`` is not one."""
-    study = quote(str(file if file.suffix == ".toml" else file.with_suffix(".toml").name))
-    return "" if file.name.endswith(MODEL) else f"; a model ends in {MODEL}: `epsmesh export {study}` makes one"
+    study = by_name(file)
+    study = study if study.suffix == ".toml" else study.with_suffix(".toml")
+    text = quote(str(study) if study.exists() else study.name)
+    return "" if file.name.endswith(MODEL) else f"; a model ends in {MODEL}: `epsmesh export {text}` makes one"
 
 
 def _serve(text: str, *, open_it: bool) -> None:

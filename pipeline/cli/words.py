@@ -111,7 +111,7 @@ def meant(file: Path) -> str:
         return ""
     known = {path.stem: path for path in (*file.parent.glob("*.toml"), *STUDIES.glob("*.toml"))}
     close = difflib.get_close_matches(file.stem, known, n=1, cutoff=0.5)
-    return f"; did you mean {known[close[0]]}?" if close else ""
+    return f"; did you mean {known[close[0]]}?" if close else "; `epsmesh new NAME` makes one"
 
 
 def read_dataset(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":

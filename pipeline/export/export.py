@@ -55,9 +55,19 @@ class Exported:
         """The share of the test touches whose error the error bar covers."""
         return float(np.mean([check.is_held for check in self.judged]))
 
+    @property
+    def tools(self) -> str:
+        """The tools that the model answers for, in words."""
+        return (
+            f"disc, sphere, sharp cone: frictionless{'; blade; bonded disc' if len(self.model.table.tensors) else ''}; "
+            f"along the normal, contact up to {self.model.largest:g} of the distance to a side, the bottom or other "
+            "tissue"
+        )
+
     def summary(self, accuracy: float) -> dict[str, float]:
         """Return the numbers of its quality; ``as_asked`` is the share of test touches within the ``accuracy``."""
         errors = np.abs([check.error for check in self.judged])
+        forces = [check.full for check in (*self.fitted, *self.judged)]
         return {
             "places": self.places,
             "coefficients": 2 * self.model.table.reciprocal.size,
@@ -67,6 +77,8 @@ class Exported:
             "as_asked": float(np.mean(errors <= accuracy)),
             "median_bar": float(np.median([check.bar for check in self.judged])),
             "table_missed": self.missed,
+            "smallest_force": min(forces),
+            "largest_force": max(forces),
         }
 
 
@@ -166,9 +178,7 @@ def write(exported: Exported, path: Path, scope: Scope, study: Path, version: st
         "title": f"Real-time model of a {body.shape}",
         "source": f"epsmesh {version}, {study.name}",
         "body": f"{body.shape}, {body.face}, {1e3 * height:g} mm high, held at {body.fixed}",
-        "tools": "disc, sphere, sharp cone: frictionless"
-        + ("; blade; bonded disc" if len(model.table.tensors) else "")
-        + f"; along the normal, contact up to {model.largest:g} of the distance to a side, the bottom or other tissue",
+        "tools": exported.tools,
         "held": f"{sum(check.is_held for check in exported.judged)} of {len(exported.judged)} judged touches",
     }
     write_model(path, model, columns(exported.fitted, exported.judged), attributes, exported.surface)

@@ -1,4 +1,4 @@
-"""What becomes of a computed record: kept, failed, or the next mesh tried, where an accuracy is asked for."""
+"""Decide on a computed record: keep it, fail it, or, with an accuracy, try the next mesh."""
 
 from dataclasses import replace
 from math import isfinite, nan
@@ -7,19 +7,19 @@ from pipeline.plan.steps import Solve
 from pipeline.run.measure import add_times
 from pipeline.run.record import Record
 
-# An error bar above this says that the force is not known: it may be more than twice the true one.
+# With a larger error bar the force is unknown: it may be more than twice the true one.
 _WORST_BAR = 1.0
 
 
 class Attempts:
-    """The records of solves, judged; remembers those with a goal that are on their way to it."""
+    """Judges records of solves; keeps the earlier attempts of solves with an accuracy."""
 
     def __init__(self) -> None:
         self._earlier: dict[str, list[Record]] = {}
         self._again: dict[str, Solve] = {}
 
     def judge(self, solve: Solve, record: Record) -> Record | None:
-        """Return the record to keep of a solve, or None if its next mesh is to be tried: see :meth:`take_again`."""
+        """Return the record to keep of a solve, or None to try its next mesh: see :meth:`take_again`."""
         record = _checked(solve, record)
         if solve.goal is None:
             return record
@@ -29,60 +29,63 @@ class Attempts:
             return None
         return _concluded(solve, record, self._earlier.pop(solve.key, []))
 
-    def goes_on(self, solve: Solve) -> bool:
-        """Tell whether the next mesh of a solve is to be tried."""
+    def has_next(self, solve: Solve) -> bool:
+        """Return whether the next mesh of a solve is to be tried."""
         return solve.key in self._again
 
     def take_again(self) -> tuple[Solve, ...]:
-        """Return the solves whose next mesh is to be tried, each once."""
+        """Return the solves whose next mesh is to be tried, and forget them."""
         again, self._again = tuple(self._again.values()), {}
         return again
 
 
 def failed(record: Record, message: str) -> Record:
-    """Return ``record`` as that of a failure."""
+    """Return ``record`` with the status of a failure."""
     return replace(record, status="failed", message=message)
 
 
 def _checked(solve: Solve, record: Record) -> Record:
-    """Return ``record``, as a failure if its force is not known.
+    """Return ``record``, as a failure if its force is unknown.
 
-    A force whose bar had no memory is one to rely on, and says so; where an accuracy is asked for, only the bar proves
-    it.
+    A force without error bar for want of memory is valid, with a message; an accuracy needs the error bar.
     """
     if record.status != "ok":
         return record
     bar = record.force_error
     if not isfinite(record.force):
-        return failed(record, f"the force came out as {record.force}")
+        return failed(record, f"the computed force is {record.force}")
     if not isfinite(bar) and (solve.goal is not None or not record.message):
-        return failed(record, f"the error bar came out as {bar}")
+        return failed(record, f"the computed error bar is {bar}")
     if solve.goal is None and bar > _WORST_BAR:
         return failed(record, f"error bar {100 * bar:.0f} %: the mesh is too coarse for this scene; use a smaller rim")
-    return failed(record, f"the error bar came out as {bar:.2g}") if bar < 0 else _without_wide_release(record)
+    return failed(record, f"the computed error bar is {bar:.2g}") if bar < 0 else _without_wide_release(record)
 
 
 def _without_wide_release(record: Record) -> Record:
-    """Return ``record`` without the energy that a slit's front releases, if that is known by its order alone."""
+    """Return ``record`` without the energy release rate of a slit, if its error bar exceeds 100 %."""
     if not record.energy_release_error > _WORST_BAR:
         return record
-    unknown = f"energy_release is not known: error bar {100 * record.energy_release_error:.0f} %, use a finer mesh"
+    unknown = f"energy_release is unknown: error bar {100 * record.energy_release_error:.0f} %; use a finer mesh"
     message = "; ".join(filter(None, (record.message, unknown)))
     return replace(record, energy_release=nan, energy_release_error=nan, message=message)
 
 
 def _concluded(solve: Solve, last: Record, earlier: list[Record]) -> Record:
-    """Return the record of a goal after its ``last`` attempt: F_exact has the best there is, with its own bar."""
+    """Return the record of a solve with an accuracy after its ``last`` attempt.
+
+    F_exact gets its best attempt, with that one's error bar.
+    """
     assert solve.goal is not None
     known = [record for record in (*earlier, last) if record.is_ok]
     if not known:
         return last
     best = min(known, key=lambda record: record.force_error)
-    # What several meshes took together says nothing of what one takes.
+    # The time of several meshes must not enter the cost model.
     record = replace(add_times(best, [r for r in known if r is not best]), kind="")
     if best.force_error <= solve.goal:
         return record
     if solve.is_reference and best.force_error <= _WORST_BAR:
         return record
     why = last.message or "this is the finest mesh tried"
-    return failed(record, f"error bar {best.force_error:.2g}, accuracy {solve.goal:g} missed: {why}")
+    bar, goal = (f"{100 * share:.2g} %" for share in (best.force_error, solve.goal))
+    return failed(record, f"error bar {bar} exceeds the accuracy {goal}: {why}")

@@ -1,4 +1,4 @@
-"""Carry out an operator step by a reduced basis: solve where the bound is worst, until it is small everywhere."""
+"""Solve an operator step by a reduced basis: add the solution with the largest error bound until all are small."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,9 +20,10 @@ Finish = Callable[[Solve, Record], None]
 def reduced_records(
     solves: tuple[Solve, ...], problem: QuasiStaticProblem, tolerance: float, compute: Compute, finish: Finish
 ) -> None:
-    """Solve a few of ``solves`` by ``compute``, which returns None where it fails, and ``finish`` the rest; collective.
+    """Solve a few of ``solves`` by ``compute`` and ``finish`` the others by the reduced basis; collective.
 
-    What is not solved gets the cost of the solved case next above in ν, and the larger of its two neighbours' bars.
+    ``compute`` returns None if it fails. A case from the basis has the costs of the solved case next above in ν, and
+    the larger error bar of its two solved neighbours.
     """
     todo = sorted(solves, key=_ratio)
     solved: dict[float, Record] = {}
@@ -45,7 +46,7 @@ def reduced_records(
             if ends or not solved:
                 continue
             found = {solve.key: basis.evaluate(_ratio(solve)) for solve in todo}
-            # A bound below zero comes of round-off, or of a preconditioner that is not definite: it is none.
+            # A negative bound is invalid: from round-off, or from an indefinite preconditioner.
             if all(0 <= reduced.bound <= tolerance for reduced in found.values()):
                 break
         for solve in todo:
@@ -53,7 +54,7 @@ def reduced_records(
 
 
 def _source(solve: Solve, solved: dict[float, Record]) -> Record:
-    """Return the solved record next above in ν, or below, with the larger error bar of both, unknown if one is."""
+    """Return the solved record next above in ν, or below, with the larger error bar of both, NaN if one is unknown."""
     t = _ratio(solve)
     above = [solved[min(other for other in solved if other >= t)]] if max(solved) >= t else []
     below = [solved[max(other for other in solved if other <= t)]] if min(solved) <= t else []
@@ -66,7 +67,7 @@ def _source(solve: Solve, solved: dict[float, Record]) -> Record:
 
 
 def _vector_bars(record: Record, bar: float) -> Vector:
-    """Return the bars (N) on the components of a record's force if that along its axis has the ``bar`` (N)."""
+    """Return the error bars (N) of a force's components, scaled so that the axial one is ``bar`` (N)."""
     own = record.force_error * abs(record.force)
     x, y, z = (component and component * bar / own for component in record.force_vector_error)
     return x, y, z
@@ -77,7 +78,7 @@ def _ratio(solve: Solve) -> float:
 
 
 def _record(solve: Solve, reduced: Reduced, source: Record, problem: QuasiStaticProblem, basis: ReducedBasis) -> Record:
-    """Return the record of an evaluation, which is for μ = 1."""
+    """Return the record of an evaluation of the basis, which is for μ = 1."""
     scale, law = solve.case.scale, law_of(solve.case)
     (mu,) = law.lame_mu
     x, y, z = (mu * component for component in reduced.response.force)

@@ -1,10 +1,9 @@
-"""The cases that a process is at, in a small file beside the case store: what is left if the process is ended.
+"""A small file beside the case store with the cases that a process is computing, for the case that it is killed.
 
-Nothing in Python catches the system's out-of-memory killer, a library that ends the process, or a fault in one. The
-next run finds the file, lets the cases in it fail, and goes on with the others. It is a file, and no row of the store:
-each rank has one of its own, its lock tells whether that rank still runs, and a line is written in microseconds, since
-it need not outlive the machine. Python's own handler adds the number of each signal, even while C code computes: a
-process that was asked to end blames no case.
+Python cannot catch the out-of-memory killer, nor a crash in a library. The next run finds the file, records its cases
+as failed, and computes the others. Each rank has its own file: its lock shows whether the rank still runs, and a write
+takes microseconds because it is not synchronised to disk. Python's signal handler appends the number of each signal,
+even while C code runs: if a process was asked to end, its cases are not to blame.
 """
 
 import fcntl
@@ -19,17 +18,17 @@ from types import TracebackType
 from pipeline.run.record import Record
 from pipeline.run.store import Store
 
-KILLED = "the process ended while it computed this case: out of memory, as a rule, or a fault in a library"
-# The cases of a process that still runs are not known to have failed.
+KILLED = "the process was killed while it computed this case: usually out of memory, else a crash in a library"
+# The state of a file whose process still runs.
 _RUNNING = "running"
-# What asks a process to end.
+# Signals that ask a process to end.
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Begun:
-    """The file of this process, made when the first case begins; a context manager, that removes it at an orderly end.
+    """The file of this process: made at its first case, removed at an orderly end; a context manager.
 
-    Without a ``store`` nothing is written. A file that cannot be written stops nobody.
+    Without a ``store`` nothing is written. If the file cannot be written, the run continues without it.
     """
 
     def __init__(self, store: Path | None = None):
@@ -44,7 +43,7 @@ class Begun:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._file >= 0:
-            with suppress(ValueError):  # only the main thread hears of signals
+            with suppress(ValueError):  # only the main thread receives signals
                 signal.set_wakeup_fd(self._before)
             os.close(self._file)
             self._file = -1
@@ -52,7 +51,7 @@ class Begun:
                 self._path.unlink(missing_ok=True)
 
     def name(self, keys: Collection[str], why: str = KILLED) -> None:
-        """Write which cases are begun, instead of the last ones, and ``why`` they failed if nothing else is written."""
+        """Write the cases that start now in place of the last ones, and ``why`` they failed if the process ends."""
         self._is_blamed = why != KILLED
         with suppress(OSError):
             if self._file < 0:
@@ -72,9 +71,9 @@ class Begun:
 
 
 def fail_begun(store: Store, keys: Collection[str]) -> dict[str, Record]:
-    """Return by key the failures of those of ``keys`` with which a process was ended, and put them on record.
+    """Return the failures, by key, of cases among ``keys`` during which a process was killed, and store them.
 
-    A force that is on record stays there. Files of processes that still run, and of other studies, are left alone.
+    Stored forces stay. Files of running processes, and of other studies, are not touched.
 
     Raises:
         StoreError: if the store cannot be written.
@@ -99,15 +98,15 @@ def _stem(store: Path) -> str:
 
 
 def _read(path: Path) -> tuple[set[str], str]:
-    """Return the cases in a file, and why they failed: "" if none is to blame, ``_RUNNING`` if it is not known yet."""
+    """Return the cases in a file and why they failed: "" if they did not, ``_RUNNING`` if the process still runs."""
     with path.open("rb") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             return set(), _RUNNING
-        told, _, signals = file.read().partition(b"\n")
+        text, _, signals = file.read().partition(b"\n")
     try:
-        content = json.loads(told)
+        content = json.loads(text)
         keys, why = set(content["keys"]), str(content["why"])
     except (ValueError, TypeError, KeyError):
         return set(), ""

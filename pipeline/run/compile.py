@@ -1,4 +1,4 @@
-"""Compile every form that solves need, once, before any rank waits for one."""
+"""Compile all forms of a run's solves in advance, on one rank."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from pipeline.stages import stage
 
 @dataclass(frozen=True, order=True)
 class _Forms:
-    """What tells the forms of a solve from others."""
+    """Identifies the forms of a solve."""
 
     element: str
     degree: int = 0
@@ -29,15 +29,15 @@ class _Forms:
     of_slit: bool = False
 
 
-# What the regular part of a Green's function takes, whatever the elements of the case.
+# The forms of a Green's function, which do not depend on a case's elements.
 _REGULAR = _Forms("regular")
-# What this process has seen to.
+# The forms that this process has compiled.
 _compiled: set[_Forms] = set()
 
 
 @stage("compiler")
 def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
-    """Compile what ``solves`` need and the cache does not have; collective.
+    """Compile the forms of ``solves`` that the cache does not have; collective.
 
     Raises:
         CompilerError: on every rank, if no C compiler works here.

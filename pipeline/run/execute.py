@@ -1,4 +1,4 @@
-"""Carry out a plan on a communicator, and hand over the record of each case as soon as it exists."""
+"""Run a plan on a communicator, and return the record of each case as soon as it exists."""
 
 from collections.abc import Callable, Mapping
 
@@ -32,20 +32,19 @@ def execute(
     cache: MeshCache | None = None,
     begun: Begun | None = None,
 ) -> int:
-    """Carry out ``plan``; collective. ``keep`` is called on rank 0 with each record, as soon as it arrives there.
+    """Run ``plan``; collective. ``keep`` is called on rank 0 with each record, as soon as it arrives there.
 
-    ``known`` are rank 0's records of what the plan takes from the store; meshes are kept in ``cache``, and the cases
-    under way are told to ``begun``, on each rank. Returns the
-    number of cases that failed, the same on every rank: each has a record with its message, and the rest went on.
+    ``known`` are rank 0's stored records of the plan; ``cache`` caches meshes; ``begun`` notes the cases under way, on
+    each rank. Returns the number of failed cases, the same on every rank; each has a record with its message.
     """
     keep_imports()
     desk = _Desk(plan, keep if comm.rank == 0 else None, progress, comm.bcast(dict(known or {})))
 
     def make(group: MPI.Comm, post: Keep) -> StepRunner:
-        told = begun or Begun()
-        return StepRunner(plan, group, keep=post, progress=progress, begun=told, cache=cache, ranks=comm.size)
+        notes = begun or Begun()
+        return StepRunner(plan, group, keep=post, progress=progress, begun=notes, cache=cache, ranks=comm.size)
 
-    # A rank is one thread: OpenBLAS's own would wait for work by spinning, and take the other ranks' cores.
+    # One BLAS thread per rank: idle threads of OpenBLAS spin, and would take the other ranks' cores.
     with threadpool_limits(limits=1, user_api="blas"):
         for wave in waves(plan, plan.solves):
             todo = tuple(solve for solve in wave if not desk.skips(solve))
@@ -59,14 +58,14 @@ def execute(
 
 
 def compute(plan: Plan, comm: MPI.Comm) -> dict[str, Record]:
-    """Carry out ``plan`` without a store and return its records by key, on every rank; collective."""
+    """Run ``plan`` without a store and return its records by key, on every rank; collective."""
     records: dict[str, Record] = {}
     execute(plan, comm, lambda record: records.__setitem__(record.key, record), Progress())
     return comm.bcast(records)
 
 
 class _Desk:
-    """Where the records of a run come in: all of them on rank 0, those of earlier waves on every rank."""
+    """Collects the records of a run: all on rank 0, those of earlier waves on every rank."""
 
     def __init__(self, plan: Plan, keep: Keep | None, progress: Progress, known: dict[str, Record]):
         self._plan, self._keep, self._progress = plan, keep, progress
@@ -74,14 +73,14 @@ class _Desk:
         self.records = known
 
     def take(self, record: Record) -> None:
-        """Take in a record; on rank 0 it is kept, and counted."""
+        """Add a record; on rank 0, also keep and count it."""
         self.records[record.key] = record
         if self._keep is not None:
             self._keep(record)
             self._progress.done(self._solves[record.key].label, record.message if record.status == "failed" else "")
 
     def skips(self, solve: Solve) -> bool:
-        """Tell whether a solve need not be run, and record why not; the same on every rank."""
+        """Return whether a solve is skipped, and record the reason; the same on every rank."""
         reason = reason_to_skip(self._plan, solve, self.records.get)
         if reason:
             self.take(Record(solve.key, SKIPPED, reason, provenance=provenance(ranks=1)))
@@ -89,6 +88,6 @@ class _Desk:
 
     @property
     def failed(self) -> int:
-        """How many cases of the study failed."""
+        """The number of failed cases of the study."""
         states = {key: record.status for key, record in self.records.items()}
         return sum(len(solve.serves) for key, solve in self._solves.items() if states.get(key, "failed") == "failed")

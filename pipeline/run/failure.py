@@ -1,4 +1,4 @@
-"""Failures of cases: whatever is raised while one is computed fails that case, and the run goes on, on all ranks."""
+"""Failures of cases: any exception in a case's computation fails that case, and the run continues on all ranks."""
 
 import time
 import traceback
@@ -19,32 +19,32 @@ from pipeline.solve import SolveError
 
 T = TypeVar("T")
 
-# Seconds that a rank waits with a failure of its own for the others, which may be in a call that needs all ranks. They
-# may as well be about to come: at an assembly or a set-up of their own, which on large meshes takes that long. To wait
-# in vain costs a run that has ended anyway a minute; not to wait costs one that could go on all its cases.
+# Seconds that a failed rank waits for the others to agree on the failure. They may be blocked in a collective call that
+# needs this rank; or they may only be slow, in an assembly or set-up of a large mesh. In the first case waiting delays
+# a lost run by a minute; in the second, not waiting would lose all its cases.
 PATIENCE = 60.0
 _PAUSE = 2e-3
 _EXPECTED = (CaseFailure, MeshError, SolveError)
-# Want of memory, above all, as libraries tell it.
+# Exceptions of libraries, mostly for want of memory.
 _OF_LIBRARIES = (MemoryError, RuntimeError, ArithmeticError, np.linalg.LinAlgError, OSError)
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Why something could not be computed; all ranks agree on it."""
+    """Why a computation failed; the same on all ranks."""
 
     message: str
 
 
 class AloneError(RuntimeError):
-    """One rank failed while the others are in a call that needs all: the run cannot go on."""
+    """One rank failed while the others are in a collective call: the run cannot continue."""
 
 
 class Attempt:
-    """Computes on the ranks of a communicator, and agrees on failures; ``free`` it in the end, collectively."""
+    """Computes on the ranks of a communicator, which agree on failures; call ``free`` at the end, collectively."""
 
     def __init__(self, comm: MPI.Comm):
-        """Collective. What is agreed on is told apart from messages of what is computed."""
+        """Collective. A communicator of its own separates agreement from the computation's messages."""
         self._comm = comm.Dup() if comm.size > 1 else comm
         self._count = 0
 
@@ -54,11 +54,11 @@ class Attempt:
             self._comm.Free()
 
     def __call__(self, compute: Callable[[], T]) -> T | Failure:
-        """Return what ``compute`` returns, or why it failed, on any rank; collective.
+        """Return the result of ``compute``, or why it failed on any rank; collective.
 
         Raises:
-            StoreError: if records cannot be kept: that is no case's failure.
-            AloneError: on the rank that failed, if the others cannot be told.
+            StoreError: if the store cannot be written: this is not a failure of the case.
+            AloneError: on the rank that failed, if the others do not answer.
         """
         self._count += 1
         count, found, message = self._count, None, ""
@@ -77,22 +77,22 @@ class Attempt:
     def _agreed(self, message: str, count: int) -> str:
         """Return the message of the first rank that has one, "" if none has; collective."""
         comm = self._comm
-        # The largest of all: whether one failed, and whether all are at the same attempt.
+        # A maximum over all ranks: which one failed, and whether all are at the same attempt.
         mine, largest = np.array([comm.size - comm.rank if message else 0, count, -count]), np.zeros(3, np.int64)
         request, start = comm.Iallreduce(mine, largest, MPI.MAX), time.monotonic()
         if not message:
             request.Wait()
         while not request.Test():
             if time.monotonic() - start > PATIENCE:
-                raise AloneError(f"{message}; the other ranks wait in a call that needs this one")
+                raise AloneError(f"{message}; the other ranks wait in a collective call for this one")
             time.sleep(_PAUSE)
         if largest[1] != -largest[2]:
-            raise AloneError(message or "another rank has failed, and is elsewhere")
+            raise AloneError(message or "another rank failed, and is at another step")
         return str(comm.bcast(message, comm.size - int(largest[0]))) if largest[0] else ""
 
 
 def describe(error: Exception) -> str:
-    """Return what to say of an error: where it was raised, too, if nobody had foreseen it."""
+    """Return the message of an error; for an unexpected one also where it was raised."""
     if isinstance(error, _EXPECTED):
         return str(error)
     if isinstance(error, _OF_LIBRARIES):

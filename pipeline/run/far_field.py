@@ -1,4 +1,4 @@
-"""What closes the half ball of a case: a point force's field on a half-space, or on the body itself."""
+"""The far field of a half-ball case: that of a point force on a half-space, or on the body itself."""
 
 import time
 from collections.abc import Iterable
@@ -19,13 +19,13 @@ from pipeline.study.closure import FarRegion, room
 from pipeline.study.sweep import Case
 
 _Key = tuple[Body, Place, float, FarRegion | None]
-# Regular parts by body, place, Poisson's ratio and the region of their mesh, with the seconds that each took: some
-# kilobytes each. Nothing in them is the tool's: all tools at one place share one, and all ε.
+# Regular parts of Green's functions with the seconds of their solves, by body, place, Poisson's ratio and the region of
+# their mesh; some kilobytes each. They do not depend on the tool or ε.
 _known: dict[_Key, tuple[Smooth, float]] = {}
 
 
 def far_field_of(case: Case) -> PointForce | BodyField:
-    """Return the far field of a closed case; every rank finds it for itself.
+    """Return the far field of a half-ball case; every rank computes it.
 
     Raises:
         MeshError: if the body cannot be meshed.
@@ -41,7 +41,7 @@ def far_field_of(case: Case) -> PointForce | BodyField:
 
 
 def far_field_seconds(case: Case) -> float:
-    """Return what the far field of a closed case took to find, nothing where it is a closed form."""
+    """Return the seconds to solve for a half-ball case's far field; 0 for a closed form."""
     if not case.has_own_far_field:
         return 0.0
     _, seconds = _known[_key(case)]
@@ -49,7 +49,7 @@ def far_field_seconds(case: Case) -> float:
 
 
 def share_far_fields(cases: Iterable[Case]) -> None:
-    """Find the far fields of ``cases`` that share a mesh, by one factorisation for each body and Poisson's ratio.
+    """Compute the far fields of ``cases`` that share a mesh: one factorisation for each body and Poisson's ratio.
 
     Raises:
         MeshError: if the body cannot be meshed.
@@ -76,7 +76,7 @@ def _mesh_of(case: Case) -> BodyMesh:
 
 @stage("far field")
 def _find(mesh: BodyMesh, cases: list[Case]) -> None:
-    """Find the regular parts of ``cases``, each for a unit of a point force with the largest half ball there."""
+    """Compute the regular parts of ``cases``, each for a unit point force with the largest half ball at its place."""
     start = time.perf_counter()
     ratio = cases[0].material.poisson
     forces = [PointForce(ratio, case.frame.point, room(case.body, case.probe)) for case in cases]
@@ -86,7 +86,7 @@ def _find(mesh: BodyMesh, cases: list[Case]) -> None:
         _known[_key(case)] = smooth, seconds
 
 
-# One of each: what is computed for a far field is kept by it.
+# One object for each far field, because it caches its values.
 _field = cache(BodyField)
 
 

@@ -1,8 +1,8 @@
-"""Share the steps of a phase between groups of ranks: each takes the next one when it is free.
+"""Distribute the steps of a phase over groups of ranks: a free group takes the next step.
 
-Which step is next is a counter that lives on the first rank and that any rank can fetch and raise without its help.
-Where MPI has no such one-sided communication between machines, the steps are dealt out in turn, costliest first.
-Records travel to the first rank, which alone writes to the store; it takes them in between its own solves.
+The next step is a counter on the first rank, which any rank fetches and raises by one-sided communication. If MPI has
+none between machines, steps are distributed in turn, most expensive first. Records are sent to the first rank, which
+alone writes to the store; it receives them between its own solves.
 """
 
 import time
@@ -18,18 +18,18 @@ from pipeline.plan.schedule import Phase
 from pipeline.plan.steps import MeshStep
 from pipeline.run.record import Record
 
-# Seconds between two looks of a rank that has nothing else to do: it leaves its core to those that have.
+# Seconds between two polls of an idle rank, so that it leaves its core to others.
 _PATIENCE = 2e-3
 
 
 class Runner(Protocol):
-    """What carries out steps on a communicator."""
+    """Runs steps on a communicator."""
 
     def run(self, step: MeshStep) -> None:
-        """Carry out a step; collective."""
+        """Run a step; collective."""
 
     def free(self) -> None:
-        """Free what belongs to the communicator; collective."""
+        """Free the communicators; collective."""
 
 
 def run_phase(
@@ -38,9 +38,9 @@ def run_phase(
     make: Callable[[MPI.Comm, Callable[[Record], None]], Runner],
     keep: Callable[[Record], None],
 ) -> None:
-    """Carry out a phase; collective. ``make`` returns a runner on a communicator, that posts records to a function.
+    """Run a phase; collective. ``make`` returns a runner for a communicator and a function that receives its records.
 
-    ``keep`` is called on rank 0 with every record, from whatever group it comes.
+    ``keep`` is called on rank 0 with every record of every group.
     """
     if phase.size >= comm.size:
         runner = make(comm, keep)
@@ -60,9 +60,9 @@ def run_phase(
 
 
 class Counter:
-    """Hands out 0, 1, 2, …, each number to one rank; a context manager, collective to enter and to leave.
+    """Returns 0, 1, 2, …, each number to one rank; a context manager, collective to enter and to leave.
 
-    ``number`` of ``count`` is who asks, for turns where there is no one-sided communication.
+    ``number`` of ``count`` is this group, for turns without one-sided communication.
     """
 
     def __init__(self, comm: MPI.Comm, number: int, count: int):
@@ -103,7 +103,7 @@ class Counter:
 
 
 class Mailbox:
-    """Takes records to rank 0; a context manager, collective to leave: all that was posted has then arrived."""
+    """Sends records to rank 0; a context manager, collective to leave: all posted records have then arrived."""
 
     def __init__(self, comm: MPI.Comm, keep: Callable[[Record], None]):
         self._keep = keep
@@ -117,7 +117,7 @@ class Mailbox:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is not None:  # the run ends: what has arrived is kept, nobody waits for the rest
+        if kind is not None:  # the run ends: keep what has arrived, do not wait for more
             with suppress(MPI.Exception):
                 self.look()
             return
@@ -132,7 +132,7 @@ class Mailbox:
         self._comm.Free()
 
     def post(self, record: Record) -> None:
-        """Send a record on its way, or keep it if this is rank 0."""
+        """Send a record without waiting; on rank 0, keep it."""
         if self._comm.rank == 0:
             self._keep(record)
         else:
@@ -140,7 +140,7 @@ class Mailbox:
         self.look()
 
     def look(self) -> None:
-        """Keep, on rank 0, what has arrived; elsewhere forget what has been delivered."""
+        """On rank 0, keep arrived records; elsewhere, drop delivered requests."""
         if self._comm.rank != 0:
             self._sent = [request for request in self._sent if not request.Test()]
             return

@@ -1,4 +1,4 @@
-"""The loads of a case as solvers take them: in newtons, on the mesh that is turned as it is solved."""
+"""The loads of a case for the solver: in newtons, on the mesh turned so that the probe presses along -z."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ from pipeline.study.loads import FREE, Cap, Traction
 from pipeline.study.sweep import Case
 
 _Test = Callable[[FloatArray, FloatArray], BoolArray]
-# A cap is what faces within this cosine of the way that the surface does at its centre.
+# A facet belongs to a cap if the cosine between its normal and that at the cap's centre exceeds this.
 _SAME_WAY = 0.5
 
 
@@ -43,9 +43,9 @@ def _surface_load(case: Case, traction: Traction) -> SurfaceLoad:
 
 
 def _on_face(surfaces: dict[str, tuple[Surface, ...]], name: str, frame: Frame) -> _Test:
-    """Return what tells whether facets are on the face ``name``: whether that is the nearest of all ``surfaces``.
+    """Return a test of facets: whether the face ``name`` is the nearest of all ``surfaces``.
 
-    Corners of a facet beside an edge may all lie on another face, but then its middle does not.
+    All corners of a facet beside an edge may be on another face; its middle is then not.
     """
 
     def on_face(corners: FloatArray, _: FloatArray) -> BoolArray:
@@ -60,7 +60,7 @@ def _on_face(surfaces: dict[str, tuple[Surface, ...]], name: str, frame: Frame) 
 
 
 def _farthest(surface: Surface, points: FloatArray) -> FloatArray:
-    """Return the largest distance (m) of four points of each facet."""
+    """Return the largest distance (m) of each facet's four points from a surface."""
     return np.asarray(np.abs(surface.distance(points)).reshape(-1, 4).max(axis=1))
 
 

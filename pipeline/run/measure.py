@@ -1,4 +1,4 @@
-"""From solutions to records: the force along the probe's axis, its error bar, and what it cost."""
+"""From solutions to records: the force along the probe's axis, its error bar, its costs."""
 
 from dataclasses import replace
 from math import hypot, isnan, nan
@@ -21,7 +21,7 @@ from pipeline.solve.solution import Solution
 from pipeline.study.sweep import Case
 
 _ROUNDING = 1e-9
-# Contact is no longer where the mesh is graded to if it begins farther from the axis, in units of its half width.
+# The mesh is graded to the axis. If first contact is farther away, in units of the half width, it is not graded to it.
 _BESIDE = 0.1
 BARS = (
     "force_error",
@@ -36,10 +36,10 @@ TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
 
 
 def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Record:
-    """Return the record of a solution, on the part of the body that was modelled.
+    """Return the record of a solution, which is on the modelled part of the body.
 
-    Where an accuracy is asked for, F is what the elements of one degree more, and the rest of the sequence, make of
-    it; otherwise it is that of the elements that the study declares. A meridian's is its best as it is.
+    With an accuracy, F is extrapolated with the elements of one degree more; without one, F is that of the study's
+    elements. A meridian's F is already its best.
     """
     case = solve.case
     kind, planned_cells, poisson = features(solve)
@@ -47,7 +47,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         solution = solution.extrapolated(
             case.mesh.degree, case.element, graded=is_graded_to_contact(case), elsewhere=not case.is_plain
         )
-    # It was solved with the probe pressing along -z; the record is in the coordinates of the body.
+    # The solution is in the frame where the probe presses along -z; the record is in the body's coordinates.
     turn, force, bar = case.frame.turn, solution.reaction[2], solution.reaction_bars[2]
     return Record(
         key=solve.key,
@@ -83,7 +83,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
 
 
 def _of_contact(contact: Contact | None) -> dict[str, Any]:
-    """Return what a record holds of contact that was found, nothing where it was prescribed."""
+    """Return the fields of a record for found contact, none for a prescribed footprint."""
     if contact is None:
         return {}
     bars = {"contact_area_error": contact.bar, "contact_radius_error": contact.bar / 2}
@@ -91,7 +91,7 @@ def _of_contact(contact: Contact | None) -> dict[str, Any]:
 
 
 def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:
-    """Return what a record holds of loads, nothing where there are none."""
+    """Return the fields of a record for loads, none without loads."""
     loaded, contact = solution.load_response, solution.contact
     if contact and not isnan(contact.sag):  # loads bend the surface, and the depth counts from the first touch
         none = (0.0, 0.0, 0.0)
@@ -105,16 +105,16 @@ def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:
         "load_force_error": solution.load_force_bar,
         "load_force_vector": turned_back(case.frame.turn, _known_of(case, force)),
         "load_energy": loaded.energy,
-        # Where the probe bears no force along its axis: held at a depth d it bears k d + load_force.
+        # At depth d the axial force is k d + load_force; at the sag it is zero.
         "sag": -force[2] / loaded.stiffness_along(axis),
     }
 
 
 def _known_of(case: Case, force: Vector) -> Vector:
-    """Return a ``force`` (N) on the probe, not a number where it is not known and no symmetry makes it nought.
+    """Return a ``force`` (N) on the probe, with NaN for components that are neither computed nor zero by symmetry.
 
-    A far field of the force along the axis tells that alone. Along a blade on which tissue slides, what pushes on its
-    two ends is not looked at.
+    The far field of an axial force gives no lateral force. Along a frictionless blade in a slit, the forces on its two
+    ends are not computed.
     """
     x, y, z = force
     if case.is_closed and case.probe.contact == "bonded":
@@ -126,11 +126,11 @@ def _known_of(case: Case, force: Vector) -> Vector:
 
 
 def is_graded_to_contact(case: Case) -> bool:
-    """Tell whether the mesh of ``case`` is graded to where contact ends, or is expected to."""
+    """Return whether the mesh of ``case`` is graded to the expected edge of contact."""
     rim = case.mesh.rim_size(case.probe.half_width) / half_width_of(case)
-    # The coarsest recipe is that of the limit itself, in the same units: no rounding may put it beyond.
+    # The coarsest recipe equals the limit of `is_graded`: rounding must not exceed it.
     rim *= 1 - _ROUNDING if isinstance(case.probe, Indenter) else 1.0
-    if case.probe.is_unilateral:  # small elements are round the axis: contact is to be there
+    if case.probe.is_unilateral:  # small elements surround the axis, so contact must be there
         *beside, _ = first_touch(case.body, case.probe, case.frame)
         if hypot(*beside) > _BESIDE * half_width_of(case):
             return False
@@ -138,7 +138,7 @@ def is_graded_to_contact(case: Case) -> bool:
 
 
 def _front_length(case: Case) -> float:
-    """Return the length (m) of the front of the slit that the probe stands in."""
+    """Return the length (m) of the front of the probe's slit."""
     slit = case.probe.slit
     assert slit is not None
     if not slit.is_open:
@@ -149,7 +149,7 @@ def _front_length(case: Case) -> float:
 
 
 def turned_back(turn: FloatArray | None, vector: Vector) -> Vector:
-    """Return a vector of the turned mesh in the body's coordinates: the rows of ``turn`` are the axes it was put on."""
+    """Return a vector of the turned mesh in the body's coordinates; the rows of ``turn`` are the mesh's axes."""
     if turn is None:
         return vector
     x, y, z = map(float, np.array(vector) @ turn)
@@ -157,16 +157,16 @@ def turned_back(turn: FloatArray | None, vector: Vector) -> Vector:
 
 
 def _vector_bars(solution: Solution, turn: FloatArray | None) -> Vector:
-    """Return the bars (N) on the components of the force; what symmetry makes zero is known to be.
+    """Return the error bars (N) of the force's components; 0 for components that are zero by symmetry.
 
-    Turned, those of a component are the sum of what all that it is made of may be off by.
+    In turned coordinates, the bar of a component is the sum over its contributions.
     """
     x, y, z = (0.0 if f == 0 else bar for f, bar in zip(solution.reaction, solution.reaction_bars, strict=True))
     return turned_back(None if turn is None else np.abs(turn), (x, y, z))
 
 
 def _rows(matrix: FloatArray | None, turn: FloatArray | None, *, bars: bool = False) -> tuple[tuple[float, ...], ...]:
-    """Return a matrix (6, 6) of forces and torques for all motions, or the bars on it, in the body's coordinates."""
+    """Return a stiffness matrix (6, 6), or its error bars, in the body's coordinates."""
     if matrix is None:
         return ()
     if turn is not None:
@@ -176,7 +176,7 @@ def _rows(matrix: FloatArray | None, turn: FloatArray | None, *, bars: bool = Fa
 
 
 def add_times(record: Record, earlier: list[Record]) -> Record:
-    """Return ``record`` with all the time that its goal took: error bars are part of the work, and earlier tries."""
+    """Return ``record`` with the total time for its accuracy: with error bars and earlier attempts."""
     sums = {name: sum(getattr(r, name) for r in [*earlier, record]) for name in TIMES}
     sums["time_solve"] += sum(r.time_error for r in [*earlier, record])
     return replace(record, **sums, time_error=0.0)

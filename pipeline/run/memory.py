@@ -1,4 +1,4 @@
-"""Peak memory of a stretch of work, how much there is, and what is given back."""
+"""Memory: the peak of a computation, the available amount, and its return to the system."""
 
 import ctypes
 import gc
@@ -14,25 +14,25 @@ from pipeline.stages import stage
 
 _C = ctypes.CDLL(None)
 _kept: list[bool] = []
-# Collections take no more than one part in so many of the time, where nothing is lost by waiting.
+# Garbage collections take at most one part in so many of the time, if waiting does no harm.
 _RARELY = 50
 _next: list[float] = [0.0]  # time (s) of the next one
 
 
 def keep_imports() -> None:
-    """Take what is loaded by now out of the reach of the garbage collector: each collection walks through the rest."""
+    """Exclude all loaded objects from garbage collection, which would otherwise visit them each time."""
     if not _kept:
         gc.collect()
         gc.freeze()
-        _kept.append(True)  # to count what is frozen takes as long as a collection
+        _kept.append(True)  # gc.get_freeze_count() takes as long as a collection
 
 
 @stage("garbage")
 def give_back(comm: MPI.Comm) -> None:
-    """Free what nobody refers to, and return it to the system, where the C library can; collective.
+    """Collect garbage and return its memory to the system, if the C library can; collective.
 
-    A collection walks through all that Python holds, the records of a long run among it. So small meshes wait for one
-    another on one rank; on several all free their communicators at once.
+    A collection visits all Python objects, also the records of a long run. On one rank it is therefore rare, and frees
+    several small meshes at once. On several ranks it is done each time, so that all free their communicators together.
     """
     start = time.perf_counter()
     if comm.size == 1 and start < _next[0]:
@@ -45,11 +45,11 @@ def give_back(comm: MPI.Comm) -> None:
 
 
 class PeakMemory:
-    """The most memory that all ranks together have held since this object was made."""
+    """The peak memory of all ranks since this object was made."""
 
     def __init__(self, comm: MPI.Comm):
         self._comm = comm
-        # Linux: 5 sets the peak back to what the process holds now.
+        # Linux: writing 5 resets the peak to the present memory.
         with suppress(OSError):
             Path("/proc/self/clear_refs").write_text("5")
 
@@ -59,7 +59,7 @@ class PeakMemory:
 
 
 class FreeMemory:
-    """What the ranks together may still take."""
+    """The memory that all ranks together may still allocate."""
 
     def __init__(self, comm: MPI.Comm):
         """Collective."""
@@ -69,9 +69,9 @@ class FreeMemory:
         machine.Free()
 
     def available(self) -> float:
-        """Return it in bytes, the same on every rank; collective.
+        """Return the available bytes, the same on every rank; collective.
 
-        What the machines have free, or, if less, what containers, Slurm's grant or the limits of the processes leave.
+        The least of: free memory of the machines, limits of containers, Slurm's grant, limits of the processes.
         """
         free = machine_room() if self._is_first else 0.0
         return float(min(self._comm.allreduce(free), self._comm.allreduce(process_room())))

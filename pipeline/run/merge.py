@@ -1,6 +1,6 @@
-"""Stores brought together in one: nothing is lost, and neither their order nor a second time makes a difference.
+"""Merge stores into one. The result depends neither on their order nor on repetition, and no force is lost.
 
-Of two records of one case the one with a force is kept; of two such, or of two failures, the one stored last.
+Of two records of a case the one with a force is kept; of two such, or of two failures, the one stored last.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from pipeline.run.store import Row, Store, StoreError
 
 @dataclass(frozen=True)
 class Source:
-    """What came of one store: its ``records``, those ``taken`` from it, and what is wrong with it."""
+    """One merged store: its number of records, how many were taken, and its problems."""
 
     path: Path
     records: int = 0
@@ -23,13 +23,12 @@ class Source:
 
 
 def merge(paths: Sequence[Path], store: Store) -> tuple[Source, ...]:
-    """Take into ``store`` what is new or better in the stores at ``paths``, all or nothing.
+    """Copy into ``store`` the new or better records of the stores at ``paths``, all or none.
 
-    The files at ``paths`` are read only. One that is damaged is left out; of one that holds records that cannot be
-    read, the others are taken.
+    The stores at ``paths`` are not changed. Damaged ones are left out, and so are records that cannot be read.
 
     Raises:
-        StoreError: if ``store`` cannot be read or written; it is then as it was.
+        StoreError: if ``store`` cannot be read or written; it is then unchanged.
     """
     sources = []
     with store.transaction():
@@ -51,12 +50,12 @@ def merge(paths: Sequence[Path], store: Store) -> tuple[Source, ...]:
 
 
 def _worth(row: Row) -> tuple[int, float, str]:
-    """Return what decides between two rows of one key; the text decides between clocks that agree."""
+    """Return the sort key between two rows of one case; for equal times the text decides."""
     return _state(row), row[2], row[1]
 
 
 def _state(row: Row) -> int:
-    """Return 1 for a record with a force, 0 for a failure, -1 for what cannot be read."""
+    """Return 1 for a record with a force, 0 for a failure, -1 for an unreadable one."""
     try:
         record = Record.from_json(row[1])
     except ValueError:

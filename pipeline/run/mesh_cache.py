@@ -1,4 +1,4 @@
-"""Meshes kept on disk, by what they depend on: a bounded folder, the least recently used go first."""
+"""A cache of meshes on disk, keyed by their inputs; its size is bounded, and the least recently used go first."""
 
 import os
 import time
@@ -18,25 +18,25 @@ from pipeline.plan.key import digest, mesh_key
 from pipeline.stages import stage
 from pipeline.study.sweep import Case
 
-# Raise by hand when the same case gives another mesh.
+# Raise by hand when the same input gives another mesh.
 MESH_VERSION = 6
 LIMIT = 2_000_000_000  # bytes
 
 
 class MeshCache:
-    """Meshes in a folder; one process of a run uses it. Two runs may share a folder: files appear whole."""
+    """Meshes in a folder, used by one process of a run. Two runs may share a folder, because files appear whole."""
 
     def __init__(self, folder: Path, limit: float = LIMIT):
         self._folder, self._limit = folder, limit
 
     def path(self, case: Case, mirrors: tuple[str, ...]) -> Path:
-        """Return the file of a case's mesh, of the part that ``mirrors`` leave."""
+        """Return the file of a case's mesh, of the part bounded by the planes ``mirrors``."""
         key = digest(f"{MESH_VERSION} {versions()['gmsh']} {mesh_key(case)} {mirrors}")
         return self._folder / f"{key}.npz"
 
     @stage("mesh cache")
     def get(self, path: Path) -> MeshArrays | None:
-        """Return the mesh in ``path``, None if there is none that can be read."""
+        """Return the mesh in ``path``, None if it is absent or unreadable."""
         content = _read(path)
         if content is None:
             return None
@@ -53,7 +53,7 @@ class MeshCache:
 
     @stage("mesh cache")
     def put(self, path: Path, mesh: MeshArrays) -> None:
-        """Keep a mesh. A full disk is no reason to end a run: it is then not kept."""
+        """Store a mesh. If the disk is full, it is not stored, and the run continues."""
         arrays: dict[str, Any] = {f"facets_{name}": value for name, value in mesh.facets.items()}
         if mesh.regions is not None:
             arrays["regions"] = mesh.regions
@@ -63,7 +63,7 @@ class MeshCache:
 
     @stage("mesh cache")
     def arrays(self, key: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Return the arrays kept under ``key``, or those that ``make`` returns, which are then kept."""
+        """Return the arrays stored under ``key``; if there are none, store and return the result of ``make``."""
         path = self._folder / f"{digest(key)}.npz"
         found = _read(path)
         if found is None:
@@ -92,7 +92,7 @@ class MeshCache:
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    """Return the arrays in a file, which is marked as used; None if there is none that can be read."""
+    """Return the arrays in a file, and mark it as used; None if it is absent or unreadable."""
     try:
         found = read_npz(path)
         _touch(path)
@@ -102,6 +102,6 @@ def _read(path: Path) -> dict[str, Any] | None:
 
 
 def _touch(path: Path) -> None:
-    """Mark a file as used now: by the fine clock, since the file system's own may tick every few milliseconds."""
+    """Mark a file as used now, by a clock finer than that of some file systems."""
     now = time.time_ns()
     os.utime(path, ns=(now, now))

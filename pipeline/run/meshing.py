@@ -1,4 +1,4 @@
-"""From a case to its distributed mesh: made on the first rank, or found in the cache."""
+"""From a case to its distributed mesh: made on the first rank, or read from the cache."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -19,9 +19,9 @@ T = TypeVar("T")
 
 @stage("meshing")
 def mesh_case(case: Case, mirrors: tuple[str, ...], comm: MPI.Comm, cache: MeshCache | None = None) -> BodyMesh:
-    """Return the mesh of a case, of the part that ``mirrors`` leave of it; collective.
+    """Return the mesh of a case, of the part bounded by the planes ``mirrors``; collective.
 
-    It is turned so that the probe presses along -z: that is how it is solved.
+    The mesh is turned so that the probe presses along -z.
 
     Raises:
         MeshError: on every rank.
@@ -31,7 +31,7 @@ def mesh_case(case: Case, mirrors: tuple[str, ...], comm: MPI.Comm, cache: MeshC
 
 
 def cached_arrays(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None) -> MeshArrays:
-    """Return the mesh of a case from the cache, charged with the time that it took, or made and put there."""
+    """Return the mesh of a case from the cache, with the time of its making, or make and cache it."""
     if cache is None:
         return mesh_arrays(case, mirrors)
     path = cache.path(case, mirrors)
@@ -45,7 +45,7 @@ def cached_arrays(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None)
 
 
 def on_first_rank(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
-    """Return what ``compute`` gives on rank 0, None elsewhere; its failure is raised on every rank."""
+    """Return the result of ``compute`` on rank 0, None elsewhere; a failure is raised on every rank."""
     result, message = None, None
     if comm.rank == 0:
         try:

@@ -1,4 +1,4 @@
-"""What came of a study: how many of its cases are in which state, what failed, and where contact is lost."""
+"""The outcome of a study: counts of its cases by state, failures, and cases without contact."""
 
 from collections.abc import Iterator, Mapping
 
@@ -13,9 +13,9 @@ LOST = "lost"
 
 
 def without_contact(case: Case) -> Record | None:
-    """Return the record of a case without contact: no force where the tool is clear of the body.
+    """Return the record of a case without contact: force 0 if the tool is clear of the body; None with contact.
 
-    Where it would stand over an edge it touches something, and its force is not known. None if it stands on the body.
+    A tool over an edge touches the body, and its force is unknown: the case is skipped.
     """
     if not (why := case.lost_contact):
         return None
@@ -40,14 +40,14 @@ def without_contact(case: Case) -> Record | None:
 
 
 def count_states(plan: Plan, records: Mapping[str, Record]) -> dict[str, int]:
-    """Return the number of a plan's cases in each state; of a shard's plan, of its own cases."""
+    """Return the number of a plan's cases in each state; for a shard, only its own cases count."""
     states = [_status(records.get(key) or without_contact(case)) for key, case in _cases(plan)]
     counts = {state: states.count(state) for state in ("ok", "skipped", "failed", "pending")}
     return counts | ({LOST: states.count(LOST)} if LOST in states else {})
 
 
 def failures(plan: Plan, records: Mapping[str, Record]) -> tuple[tuple[str, str], ...]:
-    """Return (case, message) of what failed, and of F_exact that could not be found: no case is the worse for that."""
+    """Return (case, message) of failed cases, and of failed F_exact, which fail no case."""
     failed = [
         (str(case), records[key].message)
         for key, case in _cases(plan)

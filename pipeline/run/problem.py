@@ -1,4 +1,4 @@
-"""What solves a case on its mesh, if the memory is there for it."""
+"""Set up and solve a case on its mesh, after a check of the memory."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -31,21 +31,21 @@ from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case
 
-# Unknowns up to which a direct solve is a way out where iterations do not converge.
+# Largest number of unknowns for a direct solve if iterations do not converge.
 _MOST_DIRECT = 100_000
-_FAR_FIELDS = 1_000  # that are remembered, of some kilobytes each
-# What is virtually moved round a slit's front is this near to it, in units of the distance to anything else.
+_FAR_FIELDS = 1_000  # in the cache, some kilobytes each
+# Radius of the virtual crack extension round a slit's front, in units of the distance to the nearest other surface.
 _CLEAR = 0.7
 
 
 class CaseFailure(Exception):
-    """A case cannot be computed, for a reason that all ranks have agreed on."""
+    """A case cannot be computed; the reason is the same on all ranks."""
 
 
 def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: bool = False) -> QuasiStaticProblem:
-    """Return what solves cases in the spaces of the mesh of ``case``, by the elements that suit it; collective.
+    """Return the problem on the mesh of ``case``, with its elements; collective.
 
-    ``case`` is the one that the mesh was made for: the tool is there. ``condense`` says that many depths are to come.
+    The mesh was made for ``case``, whose probe gives the tool's place. ``condense``: many depths follow.
     """
     tool = tool_of(case) if case.probe.is_unilateral else None
     degree, conditions = case.mesh.degree, conditions_of(case)
@@ -53,7 +53,7 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
 
 
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:
-    """Return the bytes that a solve of ``case`` with so many ``dofs`` takes, and its error bar."""
+    """Return the estimated bytes of a solve of ``case`` with ``dofs`` unknowns, and of its error bar."""
     degree, direct = case.mesh.degree, is_direct(case.solve.method, dofs, DIRECT_LIMIT[case.mesh.degree])
     return (
         estimate.solving_memory(dofs, degree, case.formulation, direct=direct),
@@ -62,31 +62,31 @@ def memory_of(case: Case, dofs: int) -> tuple[float, float]:
 
 
 def memory_of_basis(case: Case, dofs: int) -> float:
-    """Return the bytes that a reduced basis takes, with a solve of it; bars that have no room are left out."""
+    """Return the estimated bytes of a reduced basis with one solve; error bars without memory are left out."""
     solving, _ = memory_of(case, dofs)
     return solving + estimate.basis_memory(dofs, case.mesh.degree)
 
 
 def meridian_problem(case: Case) -> Problem:
-    """Return what solves a round ``case``, which no loads act on, on its meridian."""
+    """Return the problem of an axisymmetric ``case`` without loads, on its meridian."""
     if case.probe.is_unilateral:
         return MeridianContact(meridian_of(case), round_tool_of(case))
     return MeridianProblem(meridian_of(case), conditions_of(case))
 
 
 def conditions_of(case: Case) -> Conditions:
-    """Return what the probe of ``case`` prescribes."""
+    """Return the boundary conditions by the probe of ``case``."""
     front, tip = _fronts_of(case)
     return Conditions(bonded=case.probe.contact == "bonded", unilateral=case.probe.is_unilateral, front=front, tip=tip)
 
 
 def tool_of(case: Case) -> Tool:
-    """Return the surface of the probe of ``case``, on the mesh that is turned so that it presses along -z."""
+    """Return the surface of the probe of ``case``, for the mesh turned so that the probe presses along -z."""
     probe, frame = case.probe, case.frame.upright
 
     def height(points: FloatArray) -> FloatArray:
         local = frame.local(points)
-        # All of a flat tool's footprint is below its face, whatever rounding has made of the nodes on the edge.
+        # The whole footprint of a flat tool is below its face, despite rounding of the nodes on the edge.
         return (0.0 if probe.has_singular_edge else probe.profile(local[:, :2])) - local[:, 2]
 
     *_, first = first_touch(case.body, probe, case.frame)
@@ -94,7 +94,7 @@ def tool_of(case: Case) -> Tool:
 
 
 def _fronts_of(case: Case) -> tuple[Front | None, Front | None]:
-    """Return the front of the slit that the probe of ``case`` stands in, and the tip of a blade that slides there."""
+    """Return the front of the slit of ``case``, and the tip of a frictionless blade in it."""
     slit, frame = case.probe.slit, case.frame.upright
     if slit is None:
         return None, None
@@ -105,14 +105,14 @@ def _fronts_of(case: Case) -> tuple[Front | None, Front | None]:
 
 
 def round_tool_of(case: Case) -> RoundTool:
-    """Return the round tool of ``case`` above the body that it touches: where contact is unilateral on a meridian.
+    """Return the tool of an axisymmetric ``case`` with unilateral contact.
 
     Raises:
-        CaseFailure: if the scene is not round.
+        CaseFailure: if the scene is not axisymmetric.
     """
     probe, body = case.probe, case.body.half_plane()
     if body is None or not probe.is_round:
-        raise CaseFailure("only round scenes have a meridian")
+        raise CaseFailure("the scene is not axisymmetric")
 
     def gap(radii: FloatArray) -> FloatArray:
         return np.asarray(probe.profile(np.column_stack([radii, np.zeros_like(radii)])) + body.fall(radii))
@@ -123,9 +123,9 @@ def round_tool_of(case: Case) -> RoundTool:
 
 
 def movement_of(case: Case, meshed: Case | None = None) -> Movement:
-    """Return how the probe of ``case`` moves, and what loads act, on the mesh turned so that it presses along -z.
+    """Return the probe's movement and the loads of ``case``, on the mesh turned so that the probe presses along -z.
 
-    ``meshed`` is the case that the mesh was made for, if that is another: a half ball elsewhere on the body.
+    ``meshed`` is the case of the mesh, if it differs: a half ball at another place.
     """
     return replace(_motions_of(case, meshed or case), loads=loads_of(case))
 
@@ -136,34 +136,34 @@ def _motions_of(case: Case, meshed: Case) -> Movement:
     if case.probe.motion == "all":
         return Movement.all(travel, frame.point)
     if slit := case.probe.slit:
-        # Along flanks that it slides on, tissue does not go with the blade.
+        # Tissue slides along frictionless flanks, so only their opening is prescribed.
         pressed = Movement.along(travel) if case.probe.contact == "bonded" else Movement((), ())
         return pressed.opened(case.frame.upright.across, slit.width / 2)
     if case.is_closed:
         return Movement.along(travel).with_far(_moved(far_field_of(case), meshed.frame.point))
-    # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
+    # Across a plane of symmetry, sliding gives no axial force, and pressing gives no lateral force.
     return Movement.along(travel, apart=mirror_planes(case) != movement_planes(case))
 
 
 @lru_cache(_FAR_FIELDS)
 def _moved(far: PointForce | BodyField, centre: Place) -> FarField:
-    """Return the same for the same: what is computed for a far field is kept by it."""
+    """Return the far field at another centre; cached, because the object caches its values."""
     return far.moved(centre)
 
 
 def law_of(case: Case) -> MaterialLaw:
-    """Return what the regions of the body of ``case`` are made of."""
+    """Return the material law of the body's regions."""
     parameters = tuple(Parameters.of_moduli(tissue.young, tissue.poisson) for tissue in case.tissues)
     return MaterialLaw(parameters, case.material.law)
 
 
 def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case | None = None) -> Solution:
-    """Solve a case; where iterations do not converge and the system is small, directly. Collective.
+    """Solve a case; a small system is solved directly if iterations do not converge. Collective.
 
-    ``meshed`` is the case that the mesh was made for, if that is another: see ``movement_of``.
+    ``meshed`` is the case of the mesh, if it differs: see ``movement_of``.
 
     Raises:
-        SolveError: if that fails, too, or what is found cannot be.
+        SolveError: if this fails, too, or if the solution is impossible.
     """
     law, movement = law_of(case), movement_of(case, meshed)
     asked = Request(law, movement, case.solve.method, case.solve.energy_tolerance, estimate)
@@ -184,7 +184,7 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case 
 
 
 def check_memory(free: FreeMemory, needed: float, what: str) -> None:
-    """Refuse what needs more bytes of memory than there are; collective.
+    """Fail the case if it needs more memory (bytes) than there is; collective.
 
     Raises:
         CaseFailure: on every rank.
@@ -194,14 +194,14 @@ def check_memory(free: FreeMemory, needed: float, what: str) -> None:
 
 
 def lacks_memory(free: FreeMemory, needed: float, what: str) -> str:
-    """Return what to say if ``needed`` bytes are too much, the same on every rank; collective."""
+    """Return a message if ``needed`` bytes are too much, else ""; the same on every rank; collective."""
     available = free.available()
     if needed <= MEMORY_SHARE * available:
         return ""
-    there = f"{_gigabytes(available)} GB are available, of which {100 * MEMORY_SHARE:.0f} % may be taken"
-    return f"{what} needs about {_gigabytes(needed)} GB of memory, {there}"
+    there = f"{_gigabytes(available)} GB are available, and a case may use {100 * MEMORY_SHARE:.0f} % of them"
+    return f"{what} needs about {_gigabytes(needed)} GB of memory; {there}"
 
 
 def _gigabytes(size: float) -> str:
-    """Return bytes in GB, to a hundredth where they are few: what is needed and what is there may be close."""
+    """Return bytes in GB, to two digits if few, because needed and available memory may be close."""
     return f"{size / 1e9:.2f}" if size < 1e9 else f"{size / 1e9:,.1f}"

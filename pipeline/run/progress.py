@@ -1,4 +1,4 @@
-"""Progress on long work: one line where someone watches, a plain line now and then where output goes to a file."""
+"""Progress of a run: a bar on a terminal, occasional plain lines in a file."""
 
 import sys
 import time
@@ -8,34 +8,34 @@ from typing import Any
 from pipeline.printable import printable
 from pipeline.run.remaining import Remaining, format_seconds
 
-# In a file a line is written for each of these shares of the work, and when this many seconds went by without one.
+# In a file, a line is written after this share of the solves, and after so many seconds without one.
 _SHARE, _SILENCE = 0.05, 30.0
-# Refreshes of the line on a terminal, per second: what is solved meanwhile should not notice.
+# Refreshes of the bar per second: few, so that they cost the solver nothing.
 _REFRESH = 2
-# How a note of a mesh begins.
+# The prefix of a note on meshing.
 MESHING = "meshing: "
 
 
 class Progress:
-    """What a run tells whoever started it: nothing, to ranks other than the first, and to scripts."""
+    """Progress that prints nothing: for scripts, and for ranks other than the first."""
 
     def done(self, label: str, failed: str = "") -> None:
-        """Report that one more case is finished, or has ``failed`` with a message."""
+        """Report a finished solve, or one that ``failed`` with a message."""
 
     def note(self, text: str) -> None:
-        """Say what is being worked on."""
+        """Report the present work."""
 
 
 class Terminal(Progress):
-    """Progress for people, as a context manager: rich's bar on a terminal, else plain lines.
+    """Progress for people, as a context manager: a bar on a terminal, else plain lines.
 
-    ``remaining`` tells the time left, of the whole and of the step under way; ``verbose`` gives every case its line.
+    ``remaining`` estimates the time left, of the run and of the present step; ``verbose`` prints a line for each solve.
     """
 
     def __init__(self, total: int, remaining: Remaining | None = None, *, verbose: bool = False):
         self._total, self._count, self._start = total, 0, time.monotonic()
         self._remaining, self._verbose = remaining, verbose
-        self._told, self._told_count = self._start, 0
+        self._printed, self._printed_count = self._start, 0
         self._step: int | None = None
         self._bar: Any = None
         self._task: Any = None
@@ -49,12 +49,12 @@ class Terminal(Progress):
             from rich.text import Text
 
             class Times(ProgressColumn):
-                """Time gone and time left, as of now."""
+                """Time elapsed and time left."""
 
                 def render(column, _: Any) -> Text:
                     return Text(self._times())
 
-            # What is being worked on gives way to the numbers where the terminal is narrow.
+            # On a narrow terminal the words are cut, not the numbers.
             words = TextColumn(
                 "{task.description}", markup=False, table_column=Column(ratio=1, no_wrap=True, overflow="ellipsis")
             )
@@ -80,7 +80,7 @@ class Terminal(Progress):
             self._bar.stop()
 
     def done(self, label: str, failed: str = "") -> None:
-        """Count a case."""
+        """Count a solve, and print it if due."""
         self._count += 1
         if self._remaining is not None:
             self._remaining.done(label, counts=not failed)
@@ -91,12 +91,12 @@ class Terminal(Progress):
             self._line(f"{label}  FAILED: {failed}" if failed else label, "red" if failed else "")
 
     def note(self, text: str) -> None:
-        """Show what is being worked on."""
+        """Show the present work."""
         step = self._remaining.step_of(text.removeprefix(MESHING)) if self._remaining is not None else None
         self._step = self._step if step is None else step
         if self._bar is not None:
             self._bar.update(self._task, description=printable(text))
-        elif self._verbose or time.monotonic() - self._told > _SILENCE:
+        elif self._verbose or time.monotonic() - self._printed > _SILENCE:
             self._line(f"… {text}")
 
     def _is_worth_a_line(self) -> bool:
@@ -104,12 +104,12 @@ class Terminal(Progress):
             return True
         if self._bar is not None:
             return False
-        enough = self._count - self._told_count >= _SHARE * self._total or self._count == self._total
-        return enough or time.monotonic() - self._told > _SILENCE
+        enough = self._count - self._printed_count >= _SHARE * self._total or self._count == self._total
+        return enough or time.monotonic() - self._printed > _SILENCE
 
     def _line(self, text: str, style: str = "") -> None:
-        self._told, self._told_count = time.monotonic(), self._count
-        line = f"[{self._count}/{self._total}] {self._times()}  {printable(text)}"
+        self._printed, self._printed_count = time.monotonic(), self._count
+        line = f"[solve {self._count}/{self._total}] {self._times()}  {printable(text)}"
         if self._bar is not None:
             self._bar.console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)
         else:

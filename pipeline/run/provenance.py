@@ -1,4 +1,4 @@
-"""Where and with what a record was computed."""
+"""The origin of a record: versions, commit, host and ranks."""
 
 import platform
 import subprocess
@@ -22,7 +22,7 @@ def provenance(ranks: int) -> dict[str, str | int]:
 
 @cache
 def git_commit() -> str:
-    """Return the commit of the checkout that this process was loaded from, with ``+`` if files differ, or ''."""
+    """Return the commit of this checkout, with ``+`` if files differ; '' outside a checkout."""
     folder = Path(__file__).resolve().parents[2]
     if not (folder / ".git").exists():
         return ""

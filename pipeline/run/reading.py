@@ -1,4 +1,4 @@
-"""Case stores that are read and left as they are: no file is made, moved or changed."""
+"""Read-only access to case stores: no file is made, moved or changed."""
 
 import shutil
 import sqlite3
@@ -20,7 +20,7 @@ def open_to_read(path: Path) -> Iterator[Records]:
     """Open the store at ``path``.
 
     Raises:
-        StoreError: if there is none, or a damaged one: what mends it is named.
+        StoreError: if it is absent or damaged; the message names the command that repairs it.
     """
     try:
         with _connection(path) as database:
@@ -35,7 +35,7 @@ def open_to_read(path: Path) -> Iterator[Records]:
 
 
 def known_of(path: Path, plan: Plan) -> tuple[dict[str, Record], CostModel]:
-    """Return what the store at ``path``, if there is one, has of a plan's cases and F_exact, and what cases cost.
+    """Return the stored records of a plan's cases and F_exact, and the cost model; none without a store at ``path``.
 
     Raises:
         StoreError: as :func:`open_to_read`, or if a record cannot be read.
@@ -47,11 +47,11 @@ def known_of(path: Path, plan: Plan) -> tuple[dict[str, Record], CostModel]:
 
 
 def plan_the_rest(study: Study, path: Path, without: Collection[str] = ()) -> tuple[Plan, dict[str, Record]]:
-    """Return the plan of what the store at ``path``, if there is one, does not have, and the records that it has.
+    """Return the plan of all that is not stored at ``path``, and the stored records.
 
     Raises:
         StoreError: as :func:`known_of`.
-        ValueError: if ``without`` holds an unknown name.
+        ValueError: if ``without`` has an unknown name.
     """
     bare = make_plan(study, without=without)
     records, cost = known_of(path, bare)
@@ -60,28 +60,28 @@ def plan_the_rest(study: Study, path: Path, without: Collection[str] = ()) -> tu
 
 
 def read_rows(path: Path) -> list[Row]:
-    """Return the rows of the store at ``path``, all of whose file is sound.
+    """Return the rows of the store at ``path``, after a check of the whole file.
 
     Raises:
-        StoreError: if it is no store, or a damaged one.
+        StoreError: if it is no store, or damaged.
     """
     try:
         with open_to_read(path) as records:
             if wrong := records.unsound():
                 raise sqlite3.DatabaseError(wrong)
             return records.rows()
-    except StoreError as told:
-        raise StoreError(f"{path}: damaged, left out: {reason(told.__cause__)}") from told
+    except StoreError as error:
+        raise StoreError(f"{path}: damaged, left out: {reason(error.__cause__)}") from error
 
 
 @contextmanager
 def _connection(path: Path) -> Iterator[sqlite3.Connection]:
-    """Connect to the store at ``path``, to a copy of it, or, where it has no records, to nothing."""
+    """Connect to the store at ``path``, to a copy of it, or, if it has no records, to an empty one."""
     with TemporaryDirectory() as folder:
         try:
             database = _connect(path)
         except sqlite3.OperationalError:
-            # A run that was killed while it wrote has left a journal: what was half done is undone in a copy.
+            # A run that was killed while writing leaves a journal: its unfinished write is rolled back in a copy.
             if not _journal(path).exists():
                 raise
             shutil.copy(path, folder)
@@ -90,7 +90,7 @@ def _connection(path: Path) -> Iterator[sqlite3.Connection]:
             database = sqlite3.connect(Path(folder) / path.name, isolation_level=None)
         with closing(database):
             guard(database)
-            # A job may end between making the file and its table.
+            # A job may be killed after making the file and before making its table.
             if database.execute("SELECT 1 FROM sqlite_master WHERE name = 'records'").fetchone():
                 yield database
                 return

@@ -1,4 +1,4 @@
-"""What is kept of a case: its force, its checks, what it cost, and where it was computed."""
+"""The record of a case: its force, checks, costs and origin."""
 
 import json
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -12,10 +12,10 @@ from pipeline.plan.cost import Observation, speed_up
 from pipeline.quantities import STRESSES
 from pipeline.study.sweep import Scale
 
-# How the message of a case begins that failed for a reason that the program does not know.
+# The prefix of the message of an unexpected failure.
 UNFORESEEN = "an error of the program: "
 
-# What of a record is proportional to Young's modulus, and to which power of the depth.
+# Quantities that are proportional to Young's modulus and to this power of the depth.
 _POWERS = {
     "force": 1,
     "force_vector": 1,
@@ -31,20 +31,22 @@ _POWERS = {
 class Record:
     """The result of one case; SI units, times in seconds, memory in bytes summed over ranks.
 
-    ``young`` (Pa) and ``depth`` (m) are the :class:`Scale` of the case it was computed for. ``force_vector`` is the
-    force of the tissue on the probe; ``force`` its part against the probe's advance, and ``force_error`` the relative
-    95 % error bar on that, on which ``time_error`` seconds were spent. ``force_vector_error`` (N) are the bars on the
-    vector's components, where they are known; ``stiffness`` is that of all six rigid motions, if it was asked for, and
-    ``stiffness_error`` has the bars on its entries. ``contact_area`` (m²) and ``contact_radius`` (m) are those of
-    unilateral contact. ``largest`` has the largest values of cells clear of the probe's
-    edge, by their names in the dataset.
-    ``energy_release`` (J/m²) is the mean along a slit's front, its relative 95 % bar ``energy_release_error``.
-    Loads add ``load_force`` (N), of the bar ``load_force_error`` (N), to the force while the probe is held, in all
-    ``load_force_vector`` (N); ``load_energy`` (J) is their strain energy, ``sag`` (m) how far they take a probe that is
-    free along its axis. ``surface_deviation`` (m) is how far the mesh is from the surface in the body's file.
-    ``kind``, ``planned_cells`` and ``poisson`` are what its cost was estimated from (:mod:`pipeline.plan.cost`),
-    ``group`` the ranks that computed it. What times are worth tell ``time_spread``, that
-    of repeats relative to their median, and ``load``, the processes a core that ran or wanted to.
+    - ``young`` (Pa) and ``depth`` (m): the :class:`Scale` of the case.
+    - ``force_vector`` (N): the force of the tissue on the probe, with error bars ``force_vector_error`` (N, NaN if
+      unknown); ``force``: its part against the probe's advance, with the relative 95 % error bar ``force_error``, whose
+      computation took ``time_error`` seconds.
+    - ``stiffness``: of all six rigid motions, with the error bars ``stiffness_error``; empty without `motion = "all"`.
+    - ``contact_area`` (m²), ``contact_radius`` (m): of unilateral contact, with relative error bars.
+    - ``largest``: the largest values of cells away from the probe's edge, by their names in the dataset.
+    - ``energy_release`` (J/m²): the mean along a slit's front, with its relative 95 % error bar.
+    - ``load_force`` (N), with the error bar ``load_force_error`` (N), and ``load_force_vector`` (N): what loads add to
+      the force if the probe is held. ``load_energy`` (J): their strain energy. ``sag`` (m): their displacement of a
+      probe that is free along its axis.
+    - ``surface_deviation`` (m): distance of the mesh from the surface in the body's file.
+    - ``kind``, ``planned_cells``, ``poisson``: inputs of the cost model (:mod:`pipeline.plan.cost`).
+    - ``group``: the number of ranks that computed the case.
+    - ``time_spread``: the range of repeated times relative to their median; ``load``: running and waiting processes
+      per core.
     """
 
     key: str
@@ -93,21 +95,21 @@ class Record:
 
     @property
     def is_ok(self) -> bool:
-        """Whether there is a force to rely on."""
+        """Whether the record has a valid force."""
         return self.status == "ok" and isfinite(self.force)
 
     @property
     def max_strain(self) -> float:
-        """Largest principal strain of a cell clear of the probe's edge, by magnitude."""
+        """Largest principal strain, by magnitude, of a cell away from the probe's edge."""
         return self.largest.get("max_strain", nan)
 
     @property
     def time_total(self) -> float:
-        """Seconds that this case costs alone."""
+        """Seconds that this case takes alone."""
         return self.time_mesh + self.time_assemble + self.time_setup + self.time_solve
 
     def observation(self) -> Observation | None:
-        """Return what the case took, on one rank, or None if that is not known."""
+        """Return the times of the case on one rank, None if they are unknown."""
         if not self.is_ok or not self.kind or self.origin not in ("solved", "symmetric", "axisymmetric"):
             return None
         faster = speed_up(self.group)
@@ -121,7 +123,7 @@ class Record:
         )
 
     def scaled(self, scale: Scale) -> "Record":
-        """Return the record of a case that differs from this one's in its ``scale`` only."""
+        """Return the record of a case that differs only in its ``scale``."""
         young, depth = scale.stress, scale.length
         if (young, depth) == (self.young, self.depth) or not isfinite(self.force):
             return self
@@ -132,19 +134,19 @@ class Record:
         return replace(self, origin="scaled", young=young, depth=depth, largest=largest, **scaled)
 
     def to_json(self) -> str:
-        """Write as JSON text."""
+        """Return the record as JSON text."""
         return json.dumps(asdict(self))
 
     @staticmethod
     def from_json(text: str) -> "Record":
-        """Read what :meth:`to_json` wrote.
+        """Return the record in the text of :meth:`to_json`.
 
         Raises:
-            ValueError: if it is no record.
+            ValueError: if the text is no record.
         """
         record = _adapter().validate_json(text)
         if missing := {one.name for one in fields(Record)} - json.loads(text).keys():
-            raise ValueError(f"it lacks {', '.join(sorted(missing))}")
+            raise ValueError(f"missing: {', '.join(sorted(missing))}")
         return record
 
 

@@ -1,4 +1,4 @@
-"""How long a run will still take: the plan's estimates, corrected by what has been measured in the run so far."""
+"""Time left of a run: the plan's estimates, corrected by the times measured so far."""
 
 import time
 from collections import defaultdict
@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pipeline.plan.plan import Plan
 
-# The estimates count for as much as this share of the whole, measured.
+# Weight of the estimates, as a share of the whole run's time.
 _TRUST = 0.005
-# Neighbours in a study are alike: with each solve that is measured, those before it count this much less.
+# Neighbouring solves are similar: each new one reduces the weight of earlier ones by this factor.
 _MEMORY = 0.95
-# What is overdue is not finished: this share of what was expected is still to come.
+# An overdue solve still has this share of its expected time left.
 _LEAST = 0.05
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What a solve is expected to take: seconds, the kind of work it is, and the number of its step."""
+    """The expected seconds of a solve, its kind of work, and the number of its step."""
 
     seconds: float
     kind: str
@@ -27,7 +27,7 @@ class Expected:
 
 
 def expectations(plan: "Plan") -> dict[str, Expected]:
-    """Return what every solve of ``plan`` should take, by label; the time of a mesh is shared by its solves."""
+    """Return the expected times of all solves of ``plan``, by label; solves on a mesh share its time."""
     found = {}
     for number, step in enumerate(plan.meshes):
         estimate = plan.cost.step(step)
@@ -38,10 +38,10 @@ def expectations(plan: "Plan") -> dict[str, Expected]:
 
 
 class Remaining:
-    """Time left of a run whose solves end one after the other, on however many ranks.
+    """Time left of a run, from the times at which its solves finish, on any number of ranks.
 
-    Each kind of work has a factor on its estimates: what was measured over what was expected, drawn towards the
-    factor of the whole run, and that towards 1, while little has been measured. ``clock`` returns seconds.
+    The estimates of each kind of work are multiplied by the ratio of measured to expected time. While few times are
+    measured, this ratio is drawn towards that of the whole run, and that one towards 1. ``clock`` returns seconds.
     """
 
     def __init__(self, expected: Mapping[str, Expected], clock: Callable[[], float] = time.monotonic):
@@ -49,7 +49,7 @@ class Remaining:
         self._trust = max(_TRUST * sum(e.seconds for e in expected.values()), 1e-6)
         self._measured: dict[str, float] = {}
         self._estimated: dict[str, float] = {}
-        # Estimated seconds that are still to come by kind, of the whole (None) and of each step.
+        # Estimated seconds left by kind, of the whole run (None) and of each step.
         self._to_come: dict[int | None, dict[str, float]] = {None: defaultdict(float)}
         for e in expected.values():
             for step in (None, e.step):
@@ -58,7 +58,7 @@ class Remaining:
         self._last = clock()
 
     def done(self, label: str, *, counts: bool = True) -> None:
-        """Take note that a solve is finished; one that failed ``counts`` for nothing in the factors."""
+        """Note a finished solve; with ``counts`` its time corrects the estimates (a failed one's should not)."""
         now = self._clock()
         if label in self._pending:
             self._pending.remove(label)
@@ -75,7 +75,7 @@ class Remaining:
         return self._expected[label].step if label in self._expected else None
 
     def seconds(self, step: int | None = None) -> float:
-        """Return the seconds that are left of the whole run, or of a step."""
+        """Return the seconds left of the whole run, or of a step."""
         if not self._pending:
             return 0.0
         total = sum(self._factor(kind) * max(seconds, 0.0) for kind, seconds in self._to_come[step].items())
@@ -88,7 +88,7 @@ class Remaining:
 
 
 def format_seconds(value: float) -> str:
-    """Write a time as people say it."""
+    """Return a time for people, such as ``2.5 s`` or ``1 h 05 min``."""
     if value < 9.95:
         return f"{value:.1f} s"
     if value < 119.5:

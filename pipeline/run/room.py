@@ -1,4 +1,4 @@
-"""What the machine has left: memory, by the tightest of all limits that hold for this process, and cores."""
+"""Free memory of the machine, by the tightest limit for this process, and its load."""
 
 import os
 import resource
@@ -9,28 +9,28 @@ from pathlib import Path
 
 import psutil
 
-# A case may take this share of the memory that is free when it begins.
+# A case may use this share of the memory that is free at its start.
 MEMORY_SHARE = 0.9
-# A limit of cgroup v1 above this is none.
+# In cgroup v1, a larger number means no limit.
 _NO_LIMIT = 2**60
 
 
 def machine_load() -> float:
-    """Return the processes a core that ran, or wanted to, over the last minute; not a number where nobody counts."""
+    """Return the running and waiting processes per core, over the last minute; NaN if unknown."""
     with suppress(OSError):
         return os.getloadavg()[0] / (os.cpu_count() or 1)
     return nan
 
 
 def machine_room() -> float:
-    """Return the bytes that all processes on this machine together may still take, by the tightest of all limits."""
+    """Return the bytes that all processes on this machine together may still allocate, by the tightest limit."""
     return min(float(psutil.virtual_memory().available), container_room(), granted_room())
 
 
 def container_room(table: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
-    """Return the bytes that this process's control groups leave, infinity where none has a limit.
+    """Return the bytes that this process's control groups leave, infinity without limits.
 
-    The limit of a group holds for all below it, too: the tightest one counts. Memory that only caches files is free.
+    A group's limit applies to all groups below it, so the tightest counts. Memory of the file cache counts as free.
     """
     return min(_rooms(table, root), default=inf)
 
@@ -46,7 +46,7 @@ def _rooms(table: Path, root: Path) -> Iterator[float]:
             else:
                 continue
             group = base / path.strip("/")
-            # In a container the path is that of the machine, and what is mounted is the container's own group.
+            # In a container the path is the machine's, but the container's own group is mounted.
             for folder in (group, *group.parents):
                 if folder.is_relative_to(base):
                     yield _room_of_group(folder, *names)
@@ -65,20 +65,20 @@ def _room_of_group(folder: Path, limit_name: str, usage_name: str, cache_name: s
 
 
 def process_room() -> float:
-    """Return the bytes that this process's own limit leaves, infinity where it has none."""
+    """Return the bytes that this process's own limit leaves, infinity without a limit."""
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     return inf if limit == resource.RLIM_INFINITY else float(limit - psutil.Process().memory_info().vms)
 
 
 def granted_room() -> float:
-    """Return the bytes of this machine that Slurm grants the job, less what this process holds: more would end it."""
-    each_cpu = _told("SLURM_MEM_PER_CPU") * (_told("SLURM_CPUS_ON_NODE") or 1.0)
-    granted = 1e6 * (_told("SLURM_MEM_PER_NODE") or each_cpu)  # 0: all there is
+    """Return the bytes that Slurm grants the job on this machine, less those of this process."""
+    each_cpu = _number_of("SLURM_MEM_PER_CPU") * (_number_of("SLURM_CPUS_ON_NODE") or 1.0)
+    granted = 1e6 * (_number_of("SLURM_MEM_PER_NODE") or each_cpu)  # 0: the whole machine
     return max(0.0, granted - psutil.Process().memory_info().rss) if granted else inf
 
 
-def _told(name: str) -> float:
-    """Return a number of the environment, 0 where it tells none: who set it may not have been Slurm."""
+def _number_of(name: str) -> float:
+    """Return the number in an environment variable, 0 without one, or if it is not a finite positive number."""
     with suppress(ValueError):
         number = float(os.environ.get(name) or 0)
         return number if 0 < number < inf else 0.0

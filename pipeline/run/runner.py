@@ -1,4 +1,4 @@
-"""Carry out the steps of a plan on one communicator: mesh, operators, solves, and a record of each."""
+"""Run the steps of a plan on one communicator: mesh, operators, solves, and a record of each."""
 
 import statistics
 from collections.abc import Callable, Iterator, Sequence
@@ -49,7 +49,7 @@ Keep = Callable[[Record], None]
 
 @dataclass(frozen=True)
 class Meshed:
-    """A mesh that solves share: its spaces, the times of its making, and the memory since that was begun."""
+    """A mesh that solves share: its spaces, the times of its making, and the peak memory since its start."""
 
     spaces: Spaces
     times: Times
@@ -57,10 +57,10 @@ class Meshed:
 
 
 class StepRunner:
-    """Carries out mesh steps on one communicator; ``free`` it in the end, collectively.
+    """Runs mesh steps on one communicator; call ``free`` at the end, collectively.
 
-    ``keep`` is called on its rank 0 with each record, ``begun`` is told on each rank which cases are under way, and
-    ``ranks`` is how many the whole run has.
+    ``keep`` is called on its rank 0 with each record; ``begun`` notes the cases under way, on each rank; ``ranks`` is
+    the number of ranks of the whole run.
     """
 
     def __init__(
@@ -86,26 +86,26 @@ class StepRunner:
     def run(self, step: MeshStep) -> None:
         """Compute every case of a mesh step, and record each; collective.
 
-        Those that miss their goal are tried again at once, with the next mesh.
+        A case whose error bar exceeds its accuracy is tried again at once, with the next mesh.
         """
         todo = [step]
         while todo:
             following = todo.pop(0)
             found = self._caught(partial(self._way_of(following), following, PeakMemory(self._comm)))
             if isinstance(found, Failure):
-                self._fail([solve for solve in following.solves if not self._is_seen_to(solve)], found)
+                self._fail([solve for solve in following.solves if not self._is_settled(solve)], found)
             give_back(self._comm)
             if again := self._attempts.take_again():
                 prepare(self._comm, again)
                 todo += mesh_steps(again, shared=self._plan.shared)
 
     def free(self) -> None:
-        """Free what belongs to the communicator; collective."""
+        """Free the communicators; collective."""
         self._attempt.free()
 
-    def _is_seen_to(self, solve: Solve) -> bool:
-        """Tell whether a solve has its record, or will get it on another mesh."""
-        return solve.key in self._records or self._attempts.goes_on(solve)
+    def _is_settled(self, solve: Solve) -> bool:
+        """Return whether a solve has its record, or will get it on another mesh."""
+        return solve.key in self._records or self._attempts.has_next(solve)
 
     def _way_of(self, step: MeshStep) -> Callable[[MeshStep, PeakMemory], None]:
         if step.axisymmetric:
@@ -125,7 +125,7 @@ class StepRunner:
                 self._operate(operator, Meshed(spaces, times, memory))
 
     def _operate(self, step: OperatorStep, meshed: Meshed) -> None:
-        """Solve every material of an operator, or a few of them and the rest from these."""
+        """Solve every material of an operator, or a few of them and the others by a reduced basis."""
         self._begin(*step.solves)
         first = step.solves[0]
         condense, reuse = self._condenses(step, meshed.spaces.body), self._plan.reuse
@@ -143,14 +143,14 @@ class StepRunner:
                     self._record(solve, partial(self._solve, solve, problem, meshed))
 
     def _share_far_fields(self) -> None:
-        """Find the far fields of all places of the plan at once; if that fails, each finds its own. Collective."""
+        """Compute the far fields of all places at once; if this fails, each is computed alone. Collective."""
         plan = self._plan
         if plan.shared and not self._has_far_fields:
             self._has_far_fields = True
             self._caught(lambda: share_far_fields(solve.case for solve in plan.solves))
 
     def _reduce(self, step: OperatorStep, problem: QuasiStaticProblem, meshed: Meshed) -> None:
-        """Solve a few and finish the rest from their basis; without a basis those are left to be solved, too."""
+        """Solve a few cases and get the others from their reduced basis; if it fails, they remain to be solved."""
 
         def compute(solve: Solve) -> Record | None:
             self._record(solve, partial(self._solve, solve, problem, meshed))
@@ -163,10 +163,10 @@ class StepRunner:
         else:
             found = self._caught(lambda: reduced_records(step.solves, problem, tolerance, compute, self._finish))
         if isinstance(found, Failure):
-            self._progress.note(f"no reduced basis, every case is solved: {found.message}")
+            self._progress.note(f"no reduced basis, each case is solved: {found.message}")
 
     def _on_meridians(self, step: MeshStep, memory: PeakMemory) -> None:
-        """Solve round scenes in two dimensions, on the first rank, each on a mesh of its own."""
+        """Solve axisymmetric scenes in two dimensions, on the first rank, each on its own mesh."""
         for solve in step.solves:
             self._record(solve, partial(self._solve_meridian, solve, memory))
 
@@ -175,9 +175,9 @@ class StepRunner:
             self._record(solve, partial(self._repeated, solve, memory))
 
     def _repeated(self, solve: Solve, memory: PeakMemory) -> Record:
-        """Compute a case afresh several times; its times are the medians. The error bar comes after them.
+        """Compute a case from scratch several times; its times are the medians. The error bar follows, untimed.
 
-        Where an accuracy is asked for, the bar is part of the work.
+        With an accuracy, the error bar is part of the timed work.
         """
         has_goal = solve.goal is not None
         records = [self._afresh(solve, memory, has_bar=has_goal) for _ in range(solve.case.solve.repeats)]
@@ -185,12 +185,13 @@ class StepRunner:
         record = replace(records[-1], **medians, time_spread=_spread([r.time_total for r in records]))
         if has_goal:
             return record
-        told = self._afresh(replace(solve, mirrors=model_planes(solve.case)), memory)
-        seconds = told.time_total + told.time_error
-        return replace(record, **{name: getattr(told, name) for name in BARS}, time_error=seconds, message=told.message)
+        other = self._afresh(replace(solve, mirrors=model_planes(solve.case)), memory)
+        seconds = other.time_total + other.time_error
+        bars = {name: getattr(other, name) for name in BARS}
+        return replace(record, **bars, time_error=seconds, message=other.message)
 
     def _afresh(self, solve: Solve, memory: PeakMemory, *, has_bar: bool = True) -> Record:
-        """Compute one case, mesh and all; collective."""
+        """Compute one case from scratch, with its mesh; collective."""
         with recorded() as times:
             mesh = self._mesh(solve)
         with Spaces(mesh) as spaces, problem_of(spaces, solve.meshed_case) as problem:
@@ -200,10 +201,10 @@ class StepRunner:
         return record
 
     def _solve(self, solve: Solve, problem: QuasiStaticProblem, meshed: Meshed, *, has_bar: bool = True) -> Record:
-        """Return the record of a solve, with its error bar if there is memory for that; collective.
+        """Return the record of a solve, with its error bar if the memory is enough; collective.
 
         Raises:
-            CaseFailure: if there is none for the solve, or for the bar that alone proves an accuracy.
+            CaseFailure: if there is too little memory for the solve, or for the error bar that an accuracy needs.
         """
         needed, with_bar = memory_of(solve.case, problem.dofs)
         check_memory(self._free, needed, "solving")
@@ -222,14 +223,14 @@ class StepRunner:
         return self._stamp(self._comm.bcast(record), memory)
 
     def _mesh(self, solve: Solve) -> BodyMesh:
-        """Return the distributed mesh of a solve; collective. What is timed is made."""
+        """Return the distributed mesh of a solve; collective. Timing studies do not use the cache."""
         case = solve.meshed_case
         self._progress.note(f"{MESHING}{solve.label}")
         check_memory(self._free, estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
         return mesh_case(case, solve.mirrors, self._comm, None if case.solve.timing else self._cache)
 
     def _condenses(self, step: OperatorStep, mesh: BodyMesh) -> bool:
-        """Tell whether the surface is condensed for many depths: of a small body, on one rank; collective."""
+        """Return whether many depths are solved by condensation: of a small body, on one rank; collective."""
         size = estimate.dofs(mesh.cells, step.case.mesh.degree)
         needed = estimate.solving_memory(size, step.case.mesh.degree, direct=True)
         is_small = self._comm.size == 1 and size <= MOST_DOFS
@@ -241,7 +242,7 @@ class StepRunner:
         return replace(record, memory=memory.peak(), load=machine_load(), group=self._comm.size, provenance=where)
 
     def _record(self, solve: Solve, compute: Callable[[], Record]) -> None:
-        """Compute and keep a record; if that fails, keep a record of the failure."""
+        """Compute and keep a record, or a record of the failure."""
         self._progress.note(solve.label)
         self._begin(solve)
         found = self._caught(compute)
@@ -251,7 +252,7 @@ class StepRunner:
             self._finish(solve, found)
 
     def _begin(self, *solves: Solve) -> None:
-        self._keys = [solve.key for solve in solves if not self._is_seen_to(solve)]
+        self._keys = [solve.key for solve in solves if not self._is_settled(solve)]
         self._begun.name(self._keys)
 
     def _fail(self, solves: Sequence[Solve], failure: Failure) -> None:
@@ -259,7 +260,7 @@ class StepRunner:
             self._finish(solve, Record(solve.key, "failed", failure.message, provenance=self._provenance))
 
     def _finish(self, solve: Solve, record: Record) -> None:
-        """Keep a record, unless another mesh is to be tried."""
+        """Keep a record, unless another mesh follows."""
         judged = self._attempts.judge(solve, record)
         if judged is not None:
             self._records[judged.key] = judged
@@ -267,9 +268,9 @@ class StepRunner:
                 self._keep(judged)
 
     def _caught(self, compute: Callable[[], T]) -> T | Failure:
-        """Return what ``compute`` returns, or why it failed, whatever it was; collective.
+        """Return the result of ``compute``, or why it failed; collective.
 
-        Where the others cannot be told of it, the run ends, and the next one knows which cases failed, and why.
+        If the other ranks do not answer, the run ends, and the next run reads which cases failed, and why.
         """
         try:
             return self._attempt(compute)
@@ -279,14 +280,14 @@ class StepRunner:
 
 
 def _spread(seconds: list[float]) -> float:
-    """Return how far times are apart, relative to their median; not a number of one."""
+    """Return the range of times relative to their median; NaN for one."""
     return (max(seconds) - min(seconds)) / statistics.median(seconds) if len(seconds) > 1 else nan
 
 
 def _in_order(step: OperatorStep, *, condensed: bool) -> Iterator[Solve]:
-    """Yield the solves of an operator, by material and depth where contact is found, or displacements are large.
+    """Yield the solves of an operator; if contact is found or displacements are large, by material and depth.
 
-    On a ``condensed`` surface a depth costs less than its error bar. Those come first of which others take theirs.
+    With condensation a depth costs less than its error bar, so some depths use the bars of others, which come first.
     """
     if not step.case.is_followed:
         yield from step.solves
@@ -298,7 +299,7 @@ def _in_order(step: OperatorStep, *, condensed: bool) -> Iterator[Solve]:
 
 
 def _with_own_bars(sweep: tuple[Solve, ...]) -> tuple[Solve, ...]:
-    """Return the least and the largest depth, and in between as few as leave none alone with its bar."""
+    """Return the depths with their own error bars: the least, the largest, and the fewest needed in between."""
     chosen = [sweep[0]]
     for this, following in zip(sweep, (*sweep[1:], None), strict=True):
         if following is None or following.case.probe.depth > NEAR * chosen[-1].case.probe.depth:

@@ -1,4 +1,4 @@
-"""An early stop along ε: once F stays near F_exact, larger ε are not run."""
+"""Early stop along ε: once F stays close to F_exact, larger ε are skipped."""
 
 from collections.abc import Callable, Collection, Mapping
 from math import inf
@@ -12,12 +12,12 @@ from pipeline.run.record import Record
 from pipeline.study.sweep import Case
 
 SKIPPED = "skipped"
-# F "stays" near F_exact if it is at this many values of ε in a row.
+# F stays close to F_exact if it is close at this many values of ε in a row.
 _IN_A_ROW = 2
 
 
 def waves(plan: Plan, todo: Collection[Solve]) -> list[tuple[Solve, ...]]:
-    """Return the solves in the order in which they must be known: all at once, or F_exact first and then by ε."""
+    """Return the solves in groups, each of which needs the earlier ones: one group, or F_exact first and then by ε."""
     if plan.study.planning.stop_near_exact is None:
         return [tuple(todo)]
     exact = tuple(solve for solve in todo if solve.is_reference)
@@ -27,9 +27,9 @@ def waves(plan: Plan, todo: Collection[Solve]) -> list[tuple[Solve, ...]]:
 
 
 def reason_to_skip(plan: Plan, solve: Solve, find: Callable[[str], Record | None]) -> str:
-    """Return why a solve need not be run: what smaller ε of all cases that it serves, and F_exact, are found to give.
+    """Return why a solve is skipped, by F_exact and the smaller ε of all its cases; "" if it is needed.
 
-    One of full order serves every outside, and is run for the one that needs it.
+    The full order belongs to every `outside`, and is solved if one of them needs it.
     """
     limit = plan.study.planning.stop_near_exact
     if limit is None or solve.is_reference or not plan.reference_keys:
@@ -47,17 +47,17 @@ def _reason(case: Case, row: list[tuple[float, str, str]], limit: float, find: C
         if record is None or exact is None or not (record.is_ok and exact.is_ok):
             return ""
         ratio = record.scaled(case.scale).force / exact.scaled(case.scale).force
-        # What F_exact itself may be wrong by counts: near to a doubtful one is not near.
+        # The error of F_exact itself counts, too.
         near.append((abs(ratio - 1) + exact.force_error <= limit, other))
     near.sort(key=lambda pair: pair[1])
     last = [is_near for is_near, _ in near[-_IN_A_ROW:]]
     if len(last) < _IN_A_ROW or not all(last):
         return ""
-    return f"F is within {100 * limit:g} % of F_exact up to ε = {write('epsilon', near[-1][1])}: larger ε are not run"
+    return f"F is within {100 * limit:g} % of F_exact up to ε = {write('epsilon', near[-1][1])}: larger ε are skipped"
 
 
 def skipped(plan: Plan, records: Mapping[str, Record]) -> dict[str, Record]:
-    """Return, by key, what is to be known of the solves that need not be run, given the ``records`` of others."""
+    """Return, by key, the records of skipped solves, given the ``records`` of others."""
     known = dict(records)
     for solve in (solve for wave in waves(plan, plan.solves) for solve in wave if solve.key not in records):
         if reason := reason_to_skip(plan, solve, known.get):
@@ -66,7 +66,7 @@ def skipped(plan: Plan, records: Mapping[str, Record]) -> dict[str, Record]:
 
 
 def _rows(plan: Plan, solve: Solve) -> list[list[tuple[float, str, str]]]:
-    """Return, for all that the cases of a solve have but ε, this and the keys of the cases of smaller ε."""
+    """Return, for each case of a solve, the smaller ε with the keys of those cases and of their F_exact."""
     axes = plan.study.axes
     position = next((i for i, axis in enumerate(axes) if axis.path == "mesh.epsilon"), None)
     if position is None:

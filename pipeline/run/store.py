@@ -1,4 +1,4 @@
-"""The case store: every record on disk, in one SQLite file, the moment it exists."""
+"""The case store: an SQLite file to which every record is written at once."""
 
 import os
 import re
@@ -19,21 +19,21 @@ from pipeline.stages import stage
 
 _COLUMNS = "records (key TEXT PRIMARY KEY, record TEXT NOT NULL, stored REAL NOT NULL)"
 SCHEMA = f"CREATE TABLE IF NOT EXISTS {_COLUMNS}"
-# What has another type than its column is damaged, and is read all the same, to be told or removed.
+# A value of another type than its column's is damaged; it is read as text, so that it can be reported or removed.
 _KEY, _TEXT = "coalesce(CAST(key AS TEXT), '')", "coalesce(CAST(record AS TEXT), '')"
 _STORED = "coalesce(CAST(stored AS REAL), 0.0)"
-# As SQLite writes it into the file, and how it begins what else is no program.
+# The table's declaration as SQLite stores it, and the only allowed kinds of declarations.
 _RECORDS, _PLAIN = f"CREATE TABLE {_COLUMNS}", re.compile(r"CREATE (TABLE|(UNIQUE )?INDEX) ", re.IGNORECASE)
-# Two runs may share a store: each write takes milliseconds, so half a minute means that something hangs.
+# Seconds to wait for another run's write, which takes milliseconds: after so long, something hangs.
 PATIENCE = 30.0
-# Records that the cost model is fitted to: the newest.
+# The cost model is fitted to so many of the newest records.
 _RECENT = 500
 
-# The longest text of a record (bytes): ten times that of a hundred motions' stiffness.
+# Largest text of a record (bytes), with a generous margin.
 _LONGEST = 16_000_000
 _LONGEST_REASON = 200  # letters
 
-Row = tuple[str, str, float]  # key, record as text, seconds since 1970 at which it was stored
+Row = tuple[str, str, float]  # key, record as text, time of storage in seconds since 1970
 
 
 class StoreError(Exception):
@@ -41,12 +41,12 @@ class StoreError(Exception):
 
 
 class DamagedStoreError(StoreError):
-    """The file of a case store is damaged as a whole."""
+    """The whole file of a case store is damaged."""
 
 
 @dataclass(frozen=True)
 class Doomed:
-    """A record that is to be removed, and why; ``size`` is its length in bytes."""
+    """A record to remove, and why; ``size`` is its length in bytes."""
 
     key: str
     why: str
@@ -54,20 +54,20 @@ class Doomed:
 
 
 class Records:
-    """What a case store holds, to be read: see :func:`pipeline.run.reading.open_to_read`."""
+    """Read access to a case store: see :func:`pipeline.run.reading.open_to_read`."""
 
     def __init__(self, path: Path, database: sqlite3.Connection):
         self.path, self._database = path, database
 
     def rows(self) -> list[Row]:
-        """Return what is on disk as it is, in the order of the keys."""
+        """Return all rows, unchecked, in the order of their keys."""
         return self._database.execute(f"SELECT {_KEY}, {_TEXT}, {_STORED} FROM records ORDER BY key").fetchall()
 
     def get(self, keys: Iterable[str]) -> dict[str, Record]:
-        """Return the records on disk among ``keys``.
+        """Return the stored records of ``keys``.
 
         Raises:
-            StoreError: if a record cannot be read, or is another one's.
+            StoreError: if a record cannot be read, or belongs to another key.
         """
         found = {}
         for key in keys:
@@ -82,11 +82,11 @@ class Records:
         return {key: record for key, record in found.items() if record is not None}
 
     def records(self) -> Iterator[Record]:
-        """Yield every record that can be read."""
+        """Yield every readable record."""
         return (record for _, text, _ in self.rows() if (record := _readable(text)) is not None)
 
     def cost_model(self) -> CostModel:
-        """Return the cost model that fits the latest records: those that can be read."""
+        """Return the cost model fitted to the latest readable records."""
         latest, seen = "SELECT record FROM records ORDER BY stored DESC LIMIT ?", []
         with suppress(sqlite3.Error):
             for (text,) in self._database.execute(latest, (_RECENT,)):
@@ -94,12 +94,12 @@ class Records:
         return fit(observation for observation in seen if observation is not None)
 
     def unsound(self) -> str:
-        """Return the first thing that is wrong with the file's pages, on one line; "" if all are sound."""
+        """Return the first error in the file's pages, on one line; "" if there is none."""
         (state,) = self._database.execute("PRAGMA integrity_check(1)").fetchone()
         return "" if state == "ok" else "; ".join(state.splitlines())
 
     def problems(self) -> Iterator[str]:
-        """Yield what is wrong with the file or with its records."""
+        """Yield the errors of the file and of its records."""
         if wrong := self.unsound():
             yield f"the file: {wrong}"
         for key, text, _ in self.rows():
@@ -107,17 +107,17 @@ class Records:
             if fault := _fault(key, record):
                 yield f"record {printable(key)}: {fault}"
             elif record and record.status == "ok" and not (isfinite(record.force) and record.force > 0):
-                yield f"record {printable(key)}: is ok, and its force {record.force}"
+                yield f"record {printable(key)}: its status is ok, but its force {record.force}"
 
     def doomed(self, *, older_than: float | None = None, failed: bool = False) -> list[Doomed]:
-        """Return records stored ``older_than`` seconds ago or before, failed ones, and what is no record of its key."""
+        """Return the records to remove: unreadable, at least ``older_than`` seconds old, or (with ``failed``) failed."""
         found = []
         for key, text, stored in self.rows():
             record = _readable(text)
             why = "cannot be read" if _fault(key, record) else ""
             if failed and record and not record.is_ok:
                 why = why or "failed"
-            # A clock that has gone back leaves records of a time to come.
+            # After a clock was set back, records may have a future time.
             if older_than is not None and max(time.time() - stored, 0.0) >= older_than:
                 why = why or "old"
             if why:
@@ -130,10 +130,10 @@ class Records:
 
 
 class Store(Records):
-    """Records by key. One process of a run opens it; a record is on disk, whole, when ``put`` returns."""
+    """Records by key. One process of a run opens it; when ``put`` returns, the record is on disk."""
 
     def __init__(self, path: Path):
-        """Open the store at ``path``, making it if need be; a damaged one is moved aside, never overwritten.
+        """Open the store at ``path``, or make it; a damaged one is renamed, never overwritten.
 
         Raises:
             StoreError: if the file cannot be made or opened.
@@ -147,7 +147,7 @@ class Store(Records):
         except sqlite3.DatabaseError as error:
             aside = _move_aside(path)
             self.notice = (
-                f"the case store {path} is damaged ({reason(error)}); it was moved to {aside} and a new one begun"
+                f"the case store {path} is damaged ({reason(error)}); it was renamed to {aside}, and a new one made"
             )
             super().__init__(path, _open(path))
         except OSError as error:
@@ -155,10 +155,10 @@ class Store(Records):
 
     @stage("store")
     def put(self, record: Record) -> None:
-        """Write one record, atomically, in place of an earlier one of the same key.
+        """Write one record, atomically; it replaces an earlier one of the same key.
 
         Raises:
-            StoreError: if it cannot be written: the disk is full, or another run holds the file.
+            StoreError: if it cannot be written: the disk is full, or another run locks the file.
         """
         row = (record.key, record.to_json(), time.time())
         try:
@@ -168,7 +168,7 @@ class Store(Records):
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """Do several writes as one: all of them or, after an exception, none.
+        """Combine several writes: all are done or, after an exception, none.
 
         Raises:
             StoreError: if the file cannot be read or written.
@@ -185,11 +185,11 @@ class Store(Records):
             raise StoreError(f"the case store {self.path} cannot be read or written: {reason(error)}") from error
 
     def put_rows(self, rows: Iterable[Row]) -> None:
-        """Write rows of another store, times and all, in place of earlier ones of the same keys."""
+        """Write rows of another store with their times; they replace earlier ones of the same keys."""
         self._database.executemany("INSERT OR REPLACE INTO records VALUES (?, ?, ?)", rows)
 
     def prune(self, *, older_than: float | None = None, failed: bool = False) -> int:
-        """Remove what is :meth:`doomed`, and return how many records that were.
+        """Remove the :meth:`doomed` records, and return their number.
 
         Raises:
             StoreError: if the file cannot be written.
@@ -198,25 +198,25 @@ class Store(Records):
             gone = self.doomed(older_than=older_than, failed=failed)
             keys = {one.key for one in gone}
             rows = self._database.execute(f"SELECT rowid, {_KEY} FROM records").fetchall()
-            # Not by the key: one that is no text is not found by how it is written.
+            # By row number: a key that is no text is not found by its text.
             numbers = [(number,) for number, key in rows if key in keys]
             self._database.executemany("DELETE FROM records WHERE rowid = ?", numbers)
         if gone:
-            with suppress(sqlite3.Error):  # it takes a second file's room, and saves no more than that
+            with suppress(sqlite3.Error):  # it needs space for a copy of the file, and only saves space
                 self._database.execute("VACUUM")
         return len(gone)
 
 
 def guard(database: sqlite3.Connection) -> None:
-    """Let a file that a stranger made be data only.
+    """Allow only data in a file of unknown origin.
 
-    What it declares is held against what may be, not against what may not: SQLite takes the same words in many ways.
+    Its declarations are compared with the allowed ones, because SQLite accepts many spellings of forbidden ones.
 
     Raises:
-        sqlite3.DatabaseError: if it holds views, triggers or tables that are programs, or if its records are not plain
-            columns (those that are computed would fill the memory): a case store has none.
+        sqlite3.DatabaseError: if it has views, triggers, virtual tables, or a table of records with computed columns
+            (which could fill the memory).
     """
-    # JSON with a byte that is no UTF-8 is none either: one record cannot be read, and the others can.
+    # A byte that is not UTF-8 makes one record unreadable, not the others.
     database.text_factory = lambda data: data.decode(errors="backslashreplace")
     database.execute("PRAGMA trusted_schema = OFF")
     database.execute("PRAGMA cell_size_check = ON")
@@ -242,17 +242,17 @@ def _open(path: Path) -> sqlite3.Connection:
 
 
 def _move_aside(path: Path) -> Path:
-    """Give a damaged store a name of its own."""
+    """Rename a damaged store, and return its new path."""
     return path.rename(f"{path}.damaged-{time.strftime('%Y%m%d-%H%M%S')}-{os.urandom(2).hex()}")
 
 
 def damaged(path: Path, error: Exception) -> str:
-    """Return what to say of a store that cannot be read."""
-    return f"the case store {path} is damaged ({reason(error)}); {_mend(path)} moves it aside and begins a new one"
+    """Return the message for a damaged store."""
+    return f"the case store {path} is damaged ({reason(error)}); {_mend(path)} renames it and makes a new one"
 
 
 def reason(error: BaseException | None) -> str:
-    """Return what is wrong with a store on one short line: names in a damaged file may be of any length."""
+    """Return an error of a store on one short line, because names in a damaged file may be long."""
     return shorten(printable(str(error)), _LONGEST_REASON, placeholder=" …")
 
 
@@ -261,7 +261,7 @@ def _mend(path: Path) -> str:
 
 
 def _readable(text: str) -> Record | None:
-    """Return the record that ``text`` is, None if it is none."""
+    """Return the record in ``text``, None if it is no record."""
     try:
         return Record.from_json(text)
     except ValueError:
@@ -269,7 +269,7 @@ def _readable(text: str) -> Record | None:
 
 
 def _fault(key: str, record: Record | None) -> str:
-    """Return what is wrong with what is stored under ``key``, if anything is."""
+    """Return the error of the record under ``key``, "" if there is none."""
     if record is None:
         return "cannot be read"
-    return "" if record.key == key else f"is that of {record.key}"
+    return "" if record.key == key else f"belongs to {record.key}"

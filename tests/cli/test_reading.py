@@ -41,13 +41,13 @@ def test_a_damaged_store_is_named_and_left_where_it_is(epsmesh, small, tmp_path,
     done = epsmesh(*(small if word == "FILE" else word for word in words), "--store", store)
     assert done.exit_code == 2
     assert f"the case store {store} is damaged" in done.stderr
-    assert f"`epsmesh status --prune --yes --store {store}` moves it aside" in done.stderr
+    assert f"`epsmesh status --prune --yes --store {store}` renames it" in done.stderr
     preview = epsmesh("status", "--prune", "--store", store)
     assert "the whole store is damaged" in preview.stdout
     assert contents(tmp_path) == before
     mended = epsmesh("status", "--prune", "--store", store, "--yes")
     assert mended.exit_code == 0
-    assert "it was moved to" in mended.stderr
+    assert "it was renamed to" in mended.stderr
     assert epsmesh(*(small if word == "FILE" else word for word in words), "--store", store).exit_code == 0
 
 

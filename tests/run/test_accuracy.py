@@ -63,7 +63,7 @@ def test_accuracy_that_is_missed_is_a_failed_case():
     )
     (record,) = records.values()
     assert record.status == "failed"
-    assert "accuracy 0.001 missed" in record.message
+    assert "exceeds the accuracy 0.1 %" in record.message
     assert record.force_error > 0.001
 
 

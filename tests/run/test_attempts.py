@@ -51,7 +51,7 @@ def judged(solve, *records: Record) -> Record:
 @pytest.mark.parametrize("solve", [plain(), asked(), asked(exact=True)])
 def test_a_force_that_is_no_number_is_a_failure(solve, force):
     found = judged(solve, record(1e-4, force=force))
-    assert (found.status, found.message) == ("failed", f"the force came out as {force}")
+    assert (found.status, found.message) == ("failed", f"the computed force is {force}")
 
 
 def test_an_energy_released_that_is_known_by_its_order_alone_is_left_out():
@@ -69,7 +69,7 @@ def test_an_energy_released_that_is_known_by_its_order_alone_is_left_out():
 def test_a_bar_that_is_no_number_is_a_failure_and_no_reason_for_a_finer_mesh(solve, bar):
     found = judged(solve, record(bar))
     assert found.status == "failed"
-    assert "the error bar came out as" in found.message
+    assert "the computed error bar is" in found.message
 
 
 def test_a_force_whose_bar_had_no_memory_says_so():
@@ -107,7 +107,7 @@ def test_an_accuracy_that_is_missed_for_another_reason_says_both():
     lost = Record("", "failed", "no memory left")
     found = judged(asked(), record(0.02), lost)
     assert found.status == "failed"
-    assert "error bar 0.02, accuracy 0.003 missed" in found.message
+    assert "error bar 2 % exceeds the accuracy 0.3 %" in found.message
     assert "no memory left" in found.message
     assert judged(asked(), lost).message == "no memory left"
 

@@ -68,7 +68,7 @@ def test_the_cases_of_a_process_that_was_killed_have_failed_but_forces_on_record
     assert fail_begun(store, {"c"}) == {}  # done by then
     failed = fail_begun(store, {"a", "b", "c"})
     assert sorted(failed) == ["a", "b"]
-    assert "the process ended while it computed this case" in failed["b"].message
+    assert "the process was killed while it computed this case" in failed["b"].message
     found = store.get({"a", "b"})
     assert (found["a"].is_ok, found["b"].status) == (True, "failed")
     assert fail_begun(store, {"b"}) == {}
@@ -129,7 +129,7 @@ def test_a_case_that_ends_its_process_fails_in_the_next_run_alone(epsmesh, tmp_p
     following = epsmesh(*words)
     assert following.exit_code == 1, following.stderr
     assert "the process of an earlier run ended: the case that it was at has failed" in following.stderr
-    assert "2 ok, 1 failed (the process ended while it computed this case" in following.stdout
+    assert "2 ok, 1 failed (the process was killed while it computed this case" in following.stdout
     data = load(tmp_path / "small.nc").squeeze()
     assert list(data["status"].values) == ["failed", "ok", "ok"]
     assert np.isfinite(data["force"].values).tolist() == [False, True, True]

@@ -81,7 +81,7 @@ def test_failed_cases_are_recorded_and_the_rest_goes_on():
     """Elements of a nanometre's thousandth fit into no machine: refused, not made."""
     records = solve(WORLD, mesh={"rim": ["1e-9 mm", "1 mm"]})
     assert records[0,].status == "failed"
-    assert re.search(r"needs about .* GB of memory, .* GB are available, of which 90 %", records[0,].message)
+    assert re.search(r"needs about .* GB of memory; .* GB are available, and a case may use 90 %", records[0,].message)
     assert records[1,].status == "ok"
 
 

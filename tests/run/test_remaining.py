@@ -72,7 +72,7 @@ def test_a_log_gets_a_line_now_and_then_and_every_failure(capsys):
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) <= 22
     assert sum("FAILED: it went wrong" in line for line in lines) == 1
-    assert lines[-1].startswith("[1000/1000]")
+    assert lines[-1].startswith("[solve 1000/1000]")
     with Terminal(100, verbose=True) as progress:
         for i in range(100):
             progress.done(f"case {i}")

@@ -55,7 +55,7 @@ def test_a_store_that_is_read_is_left_alone(tmp_path):
     store.close()
     assert set(before) == {file.name for file in tmp_path.iterdir()}
     path.write_bytes(b"this is no database" * 100)
-    with pytest.raises(StoreError, match=r"is damaged \(.*\); `epsmesh status --prune .*` moves it aside"):
+    with pytest.raises(StoreError, match=r"is damaged \(.*\); `epsmesh status --prune .*` renames it"):
         open_to_read(path).__enter__()
     with pytest.raises(StoreError, match="cannot be read"):
         open_to_read(tmp_path / "absent.sqlite").__enter__()
@@ -117,7 +117,7 @@ def test_prune_and_problems(tmp_path):
         StoreError, match=r"record torn cannot be read; `epsmesh status --prune --yes --store .*` removes it"
     ):
         store.get(["good", "torn"])
-    with pytest.raises(StoreError, match="record moved is that of good"):
+    with pytest.raises(StoreError, match="record moved belongs to good"):
         store.get(["moved"])
     assert store.prune(failed=True) == 3
     assert {record.key for record in store.records()} == {"good", "nonsense"}
