@@ -129,10 +129,9 @@ def _print_result(exported: "Exported", wanted: float, path: Path) -> None:
     """Print what the model is for, and how good it is."""
     if exported.unseen:
         warning(f"{path} has no deforming surface: {exported.unseen}")
-    found = exported.summary(wanted) | {"file": str(path)}
-    checked = len(exported.fitted) + len(exported.judged)
+    found, checked = exported.summary(wanted), len(exported.fitted) + len(exported.judged)
     say(
-        found,
+        found | {"file": str(path)},
         repr(exported.model),
         f"tools: {exported.tools}",
         f"wrote {path}: {counted(int(found['places']), 'place')} solved, {found['coefficients']} coefficients",

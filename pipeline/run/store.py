@@ -110,7 +110,7 @@ class Records:
                 yield f"record {printable(key)}: its status is ok, but its force {record.force}"
 
     def doomed(self, *, older_than: float | None = None, failed: bool = False) -> list[Doomed]:
-        """Return the records to remove: unreadable, at least ``older_than`` seconds old, or (with ``failed``) failed."""
+        """Return the records to remove: unreadable, ``older_than`` seconds old or more, with ``failed`` failed ones."""
         found = []
         for key, text, stored in self.rows():
             record = _readable(text)

@@ -1,4 +1,4 @@
-"""Is F right: against closed forms, published tables, manufactured solutions, and the program's other paths."""
+"""Verification of F: closed forms, published tables, manufactured solutions, and other ways through the program."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -10,8 +10,8 @@ if TYPE_CHECKING:
 
 
 def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
-    """Yield every comparison as it is made, the same on every rank; ``quick`` leaves a few of each kind; collective."""
-    from pipeline.solve.compiled import compiling  # noqa: PLC0415 (the folder's face loads no solver)
+    """Yield the comparisons one by one, the same on every rank; ``quick`` yields a few of each kind; collective."""
+    from pipeline.solve.compiled import compiling  # noqa: PLC0415 (importing this package loads no solver)
     from pipeline.verify.bodies import body_rows  # noqa: PLC0415
     from pipeline.verify.closure import closure_rows  # noqa: PLC0415
     from pipeline.verify.compliance import compliance_rows  # noqa: PLC0415

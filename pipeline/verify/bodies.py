@@ -1,4 +1,4 @@
-"""Bodies of other shapes: round ones on the meridian and in the limit of a half-space, and the same body from files."""
+"""Bodies of other shapes: ellipsoids against the meridian and the half-space, and bodies from files."""
 
 import os
 import sys
@@ -17,14 +17,14 @@ from pipeline.verify.row import Row
 from pipeline.verify.sections import Section, box, disc, mm, tissue
 from pipeline.verify.star import directions, star_file
 
-# Semi-axes (mm), and the height below which they are held, and half as many facets as a file of it has.
+# Semi-axes (mm) of a round and a general ellipsoid; height below which they are fixed; number of points of a file.
 _ROUND, _AXES, _BELOW, _POINTS = (60.0, 60.0, 45.0), (60.0, 45.0, 30.0), -10.0, 7000
-_BALL, _CURVED = 1e6, 1e-5  # a ball of so many radii of the disc, and what its curvature leaves of F
+_BALL, _CURVED = 1e6, 1e-5  # radius of a ball in radii of the disc; relative effect of its curvature on F
 _BOX = (60.0, 60.0, 20.0)
 
 
 def body_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows of ellipsoids and of bodies from files, as they are solved; ``quick`` leaves a few; collective."""
+    """Yield the rows of ellipsoids and of bodies from files; ``quick`` yields a few; collective."""
     yield from _balls(comm, quick)
     yield from _ellipsoids(comm, quick)
     if not quick:
@@ -32,7 +32,7 @@ def body_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
 
 
 def _balls(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """A ball that is so large that its surface is plane."""
+    """A ball so large that its surface is plane near the disc."""
     for contact in ("frictionless",) if quick else ("frictionless", "bonded"):
         force, source = known.half_space_disc(10e3, 0.3, 1e-3, 1e-5, contact)
         scene = _scene(_ellipsoid((_BALL,) * 3, 0.0), disc(1, contact=contact))
@@ -40,14 +40,14 @@ def _balls(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
 
 
 def _ellipsoids(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """Ellipsoids of revolution in three dimensions against the same in two, which is the reference."""
+    """Ellipsoids of revolution in three dimensions; the reference is the same scene in two."""
     for contact, nu in (("bonded", 0.3),) if quick else (("bonded", 0.3), ("frictionless", 0.3), ("frictionless", 0.5)):
         scene = _scene(_ellipsoid(_ROUND), disc(8, contact=contact), nu)
         yield against_meridian(comm, f"ellipsoid 4:4:3, a = 8 mm, {contact}, ν = {nu:g}", scene)
 
 
 def _files(comm: MPI.Comm) -> Iterator[Row]:
-    """Bodies from files against the same ones declared: the file's bar adds to that of the reference."""
+    """Bodies from files; the reference is the same body declared in the study."""
     with TemporaryDirectory(prefix="epsmesh-bodies-") as own:
         folder = Path(comm.bcast(own))
         if comm.rank == 0:
@@ -80,7 +80,7 @@ def _draw_box(path: Path) -> None:
 
 @contextmanager
 def _mute() -> Iterator[None]:
-    """Keep what the CAD kernel prints of a STEP file, past Python and gmsh, from the table of rows."""
+    """Discard what the CAD kernel prints to standard output, past Python and gmsh."""
     sys.stdout.flush()
     kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     try:

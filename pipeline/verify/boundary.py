@@ -1,7 +1,7 @@
-"""A frictionless rectangular punch on a half-space by boundary elements, in a page: nothing in common with the rest.
+"""A frictionless rectangular punch on a half-space by boundary elements, independent of all other code.
 
-The pressure is constant on each of n × n rectangles of a quarter of the footprint, which shrink towards its edge; the
-surface sinks under each as A. E. H. Love has it (Phil. Trans. R. Soc. A 228, 377, 1929), and all centres by the same.
+The pressure is constant on each of n × n rectangles of a quarter of the footprint, which are smaller towards its edge.
+The displacement by each rectangle is A. E. H. Love's (Phil. Trans. R. Soc. A 228, 377, 1929); all centres sink equally.
 """
 
 import numpy as np
@@ -12,8 +12,8 @@ from pipeline.arrays import FloatArray
 def rectangle_stiffness(ratio: float, divisions: tuple[int, int] = (16, 32)) -> tuple[float, float]:
     """Return c = F / (E* W d) of a frictionless rectangle of length L = ``ratio`` W, and the relative error of c.
 
-    ``divisions`` are two numbers of elements along each half side, one twice the other: the error falls like n⁻²,
-    and what the step from one to the other changes is taken as the error of what both extrapolate to.
+    ``divisions`` are two numbers of elements along each half side, one twice the other. The error falls like n⁻², so
+    both are extrapolated; the error of the result is the size of that step.
     """
     coarse, fine = (_stiffness(ratio, n) for n in divisions)
     step = (fine - coarse) / 3
@@ -21,7 +21,7 @@ def rectangle_stiffness(ratio: float, divisions: tuple[int, int] = (16, 32)) -> 
 
 
 def _stiffness(ratio: float, n: int) -> float:
-    # Chebyshev points: sides of size n⁻² at the edge, where the pressure grows like the inverse root of the distance.
+    # Chebyshev points: elements of size n⁻² at the edge, where the pressure is singular (inverse root of the distance).
     edges = np.sin(np.linspace(0.0, np.pi / 2, n + 1))
     x, y = ratio / 2 * edges, edges / 2
     x0, y0 = (a.reshape(-1) for a in np.meshgrid(x[:-1], y[:-1]))
@@ -37,7 +37,7 @@ def _stiffness(ratio: float, n: int) -> float:
 
 
 def _love(xa: FloatArray, xb: FloatArray, ya: FloatArray, yb: FloatArray) -> FloatArray:
-    """Sinking × E* of a point at (xa, ya) from one corner and (xb, yb) from the opposite of a unit of pressure."""
+    """Displacement × E* by unit pressure on a rectangle, at (xa, ya) from one corner, (xb, yb) from the opposite."""
 
     def term(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
         return a * (np.arcsinh(b / np.abs(a)) - np.arcsinh(c / np.abs(a)))

@@ -1,4 +1,4 @@
-"""Half balls closed by a far field, against what is known of the force on what they were cut out of."""
+"""Half balls with a far field, against the known force on the whole body."""
 
 from collections.abc import Iterator
 
@@ -11,15 +11,15 @@ from pipeline.verify import known
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section, box, cylinder, disc, mesh, study
 
-# At ε = 8a the far field of a point force leaves out less than this of F, and the mesh of the regular part adds less:
-# as measured on converged meshes. Off the middle of a body a bonded disc also pulls sideways.
+# Relative errors at ε = 8a, measured on converged meshes: of a point force as the far field; of the Green's function's
+# mesh; away from the middle, of the lateral force of a bonded disc, which the far field leaves out.
 LEFT_OUT, OF_BODY, OFF_MIDDLE = 2e-4, 5e-4, 1e-3
 _HALF_SPACE = (("bonded", 0.3), ("bonded", 0.5), ("frictionless", 0.3), ("frictionless", 0.45))
 _BODY = (("bonded", 0.45), ("frictionless", 0.3))
 
 
 def closure_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows, as they are solved; ``quick`` leaves one of each kind; collective."""
+    """Yield the rows; ``quick`` yields one of each kind; collective."""
     for contact, nu in _HALF_SPACE[: 1 if quick else None]:
         truth = (*known.half_space_disc(10e3, nu, 1e-3, 1e-5, contact), LEFT_OUT)
         scene = study(nu, cylinder(40, 40), disc(1, contact=contact), _closed("halfspace"))
@@ -44,7 +44,7 @@ def _closed(outside: str, radius: float = 1.0) -> Section:
 
 
 def _row(comm: MPI.Comm, name: str, truth: tuple[float, str, float], scene: Section) -> Row:
-    """Return the row of a scene whose force is known: force (N), who found it, its relative error; collective."""
+    """Return the row of a scene with a known force: force (N), source, relative error; collective."""
     reference, source, bar = truth
     (record,) = compute(make_plan(parse(scene)), comm).values()
     return Row(name, "3D, closed", reference, source, record.force, record.force_error, bar, record.message)

@@ -1,4 +1,4 @@
-"""What a rigid base adds to the compliance of a tool on a layer: the same for every small tool, and known."""
+"""The compliance that a rigid base adds for a tool on a layer: known, and the same for every small tool."""
 
 from collections.abc import Iterator
 from math import inf
@@ -12,8 +12,8 @@ from pipeline.verify.row import Row
 from pipeline.verify.sections import cylinder, disc, tissue
 
 _YOUNG, _DEPTH, _RADIUS = 10e3, 1e-5, 1e-3
-# What is left out of c, in powers of a/h: the fourth where tissue slides, whose second is known; the second where it
-# sticks at ν = ½. (At smaller ν it is the first: what sticks to a half-space then pulls at it sideways.)
+# Order of the terms left out of c, in a/h: fourth for frictionless contact, whose second is known; second for bonded
+# contact at ν = ½. (At smaller ν it is first: bonded contact then has lateral tractions.)
 _FOURTH, _SECOND = 1.0, 1.0
 _CASES = (
     ("frictionless", 0.3, 0.05),
@@ -26,14 +26,14 @@ _PUBLISHED = 0.2  # a/h, the smallest in the table
 
 
 def compliance_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows, as they are solved; ``quick`` leaves two; collective."""
+    """Yield the rows; ``quick`` yields two; collective."""
     yield _published()
     for contact, nu, ratio in _CASES[1:2] if quick else _CASES:
         yield _of_disc(comm, contact, nu, ratio)
 
 
 def _published() -> Row:
-    """Hold the smallest disc of the published table against c of the layer."""
+    """Compare the smallest disc of the published table with c of the layer."""
     thickness, a = 1.0, _PUBLISHED
     kappa, whole = known.LAYER[_PUBLISHED], (1 - 0.3**2) / (2 * a)
     reference = whole * (1 / kappa - 1)
@@ -44,7 +44,7 @@ def _published() -> Row:
 
 
 def _of_disc(comm: MPI.Comm, contact: str, nu: float, ratio: float) -> Row:
-    """Hold E d / F of a disc, less that on a half-space, against c of the layer."""
+    """Compare E d / F of a disc, minus that on a half-space, with c of the layer."""
     thickness = _RADIUS / ratio
     c, g = added_compliance(Solid(_YOUNG, nu), thickness, Solid(inf, nu))
     slides = contact == "frictionless"

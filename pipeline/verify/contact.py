@@ -1,4 +1,4 @@
-"""Contact whose area is found, where force, depth and radius are known: half-spaces, finite bodies, thin layers."""
+"""Found contact with known force, depth and radius: half-spaces, finite bodies, thin layers."""
 
 from collections.abc import Iterator
 from math import radians
@@ -19,14 +19,14 @@ from pipeline.verify.sections import Section
 
 _YOUNG, _POISSON = 10e3, 0.3
 _ACCURACY = {"2D": "0.1 %", "3D": "0.3 %"}
-# A body this many times the radius of contact is a half-space but for a few 1e-5 of F.
+# A body so many times as large as the contact radius is a half-space, up to a few 1e-5 of F.
 _FAR = 20_000
-# By this much F of the depth is above Hertz's on a cylinder whose radius and height are 200 radii of contact: found
-# with elements of degree 5 by hand, before there was this program's solver.
+# F at a given depth exceeds Hertz's by this share, on a cylinder with radius and height of 200 contact radii: computed
+# with elements of degree 5, independent of this program.
 _FINITE, _FINITE_ERROR = 3.97e-3, 3e-5
 _BALL, _ANGLE = 50.0, 60.0  # mm, degrees
 _LAYERS = (3.0, 1.0, 1 / 3)  # thickness over the radius of contact
-# Tools on a body of six radii of contact, in three dimensions.
+# Tools on a body of six contact radii, in three dimensions.
 _SMALL = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm", "fixed": "bottom"}
 _TOOLS: dict[str, Section] = {
     "sphere": {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"},
@@ -35,13 +35,13 @@ _TOOLS: dict[str, Section] = {
 }
 _SKIN = {"name": "skin", "thickness": "0.6 mm", "young": "40 kPa", "poisson": 0.3}
 _SIZES = {"epsilon": "full", "fine": "2 mm", "coarse": "2 mm", "rim": "0.3 mm", "growth": 0.5, "degree": 2}
-# What the solver leaves of the difference between contact that is found and the same, prescribed.
+# Relative difference of F between found contact and the same footprint prescribed, by the solver's tolerance.
 _SAME = 1e-7
 _LAYER_SOURCE = "integral equation (N. N. Lebedev, Ya. S. Ufliand 1958)"
 
 
 def contact_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows of unilateral contact, as they are solved; ``quick`` leaves a layer; collective."""
+    """Yield the rows of unilateral contact; ``quick`` yields a layer; collective."""
     if not quick:
         yield from _half_space(comm)
         yield from _finite(comm)
@@ -51,7 +51,7 @@ def contact_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
 
 
 def _half_space(comm: MPI.Comm) -> Iterator[Row]:
-    """F of the depth, and of the radius found, of tools of about 1 mm of contact."""
+    """F at a given depth, and at the computed radius, for contacts of about 1 mm."""
     ball, cone = Rounded(0.0, _BALL * 1e-3), Rounded(radians(_ANGLE))
     shallow, deep = 1e-6 / ball.tip, 1e-3
     force_of_ball = _of_contact(ball, ball.contact_radius(shallow))
@@ -77,7 +77,7 @@ def _of_contact(section: Rounded, radius: float) -> float:
 
 
 def _finite(comm: MPI.Comm) -> Iterator[Row]:
-    """A body of 200 radii of contact is not a half-space: its surface sinks less."""
+    """A body of 200 contact radii, whose force exceeds a half-space's."""
     ball = Rounded(0.0, 1.0)
     depth = 1e-6 / ball.tip
     record = _solved(comm, "2D", _cylinder(200, 200), {"shape": "sphere", "radius": f"{1e3 * ball.tip} mm"}, depth)
@@ -86,7 +86,7 @@ def _finite(comm: MPI.Comm) -> Iterator[Row]:
 
 
 def _flat(comm: MPI.Comm) -> Iterator[Row]:
-    """Nothing lifts off a flat disc on a flat top: F is that of the known footprint."""
+    """Contact below a flat disc on a flat top is complete: F is that of the prescribed footprint."""
     tool = {"shape": "disc", "radius": "3 mm"}
     for nu in (0.3, 0.5):
         for path in _ACCURACY:

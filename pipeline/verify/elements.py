@@ -1,4 +1,4 @@
-"""The elements by themselves: patch test, and convergence to a manufactured solution at the rates of theory."""
+"""The elements alone: patch test, and convergence rates for a manufactured solution."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,17 +25,17 @@ from pipeline.study.load import parse
 from pipeline.verify.row import Row
 
 _ROUND_OFF = 1e-10
-# Meshes of 2 and 4 cubes a side are coarse for a rate: it is to lie within 15 % of the theory's.
+# Meshes of 2 and 4 cubes a side are coarse for a rate, so it may differ by 15 % from theory.
 _RATE_ERROR = 0.15
 _CUBES = {1: (8, 16), 2: (4, 8), 3: (2, 4)}
 _MIXED_CUBES = {2: (4, 8), 3: (2, 4)}
 
-_STRAIN = "uniform strain is in every space"
-_THEORY = "energy norm falls like h^p"
+_STRAIN = "uniform strain is exact in every space"
+_THEORY = "error in the energy norm falls like h^p"
 
 
 def element_rows() -> Iterator[Row]:
-    """Yield the rows of the patch test and of the manufactured solutions: seconds, all of them."""
+    """Yield the rows of the patch test and of the manufactured solutions: a few seconds in total."""
     for degree in (1, 2, 3):
         yield Row("patch test", f"degree {degree}", 0.0, _STRAIN, _patch(degree, mixed=False), _ROUND_OFF)
     for degree in (2, 3):
@@ -53,8 +53,9 @@ def _rate(path: str, degree: int, errors: list[float]) -> Row:
 
 
 def _patch(degree: int, *, mixed: bool) -> float:
-    """Largest nodal force inside a body in uniform strain, over the largest on its surface: a mesh with curved,
-    quarter-point elements at the probe's edge.
+    """Return the largest nodal force inside a body in uniform strain, over the largest on its surface.
+
+    The mesh has curved quarter-point elements at the probe's edge.
     """
     study = parse(
         {
@@ -86,7 +87,7 @@ def _patch(degree: int, *, mixed: bool) -> float:
 
 @dataclass(frozen=True)
 class _Exact:
-    """A smooth displacement, divergence-free so that it serves for ν = ½, and the load that it takes for μ = 1."""
+    """A smooth displacement, divergence-free for ν = ½, and its load for μ = 1."""
 
     displacement: Any
     load: Any
@@ -102,9 +103,9 @@ def _exact(mesh: Any, lame_lambda: float) -> _Exact:
 
 
 def _manufactured(degree: int, cubes: int, *, poisson: float, mixed: bool) -> float:
-    """Energy-norm error on a cube of ``cubes``³ × 6 tetrahedra, all of its surface being prescribed, μ = 1.
+    """Return the error in the energy norm on a cube of ``cubes``³ × 6 tetrahedra with a prescribed surface, μ = 1.
 
-    The mixed element solves for ν = ½, where K₀ has λ₀ = 1 and the solution no dilation.
+    The mixed element solves for ν = ½, with λ₀ = 1 in K₀, and a solution without dilation.
     """
     mesh = dolfinx.mesh.create_unit_cube(MPI.COMM_SELF, cubes, cubes, cubes)
     lame_lambda = 1.0 if mixed else 2 * poisson / (1 - 2 * poisson)

@@ -1,4 +1,4 @@
-"""Scenes of one material whose force is known, solved by the program's own run in two dimensions and in three."""
+"""Scenes of one material with a known force, in two and in three dimensions."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,22 +13,22 @@ from pipeline.verify.layered import SOURCE, Solid, layered_disc
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section, blade, cylinder, disc, ellipse, tissue
 
-# A body this many times the probe's size is a half-space but for a few 1e-5 of F.
+# A body so many times as large as the probe is a half-space, up to a few 1e-5 of F.
 FAR = 20_000
 _RECTANGLE = "boundary elements (A. E. H. Love 1929)"
 
 _ELLIPSES = (1.5, 3, 8)  # first semi-axis over second
-# Not along the axes: nothing is symmetric.
+# Not along the axes, so that the scene has no symmetry.
 _OBLIQUE = [2.0, 1.0, 0.0]
-# Above this the two paths are held against each other: _incompressible.
+# Above this ν the two paths are compared with each other: _incompressible.
 _MOST_COMPRESSIBLE = 0.49
 _NEAR_HALF = (0.49, 0.499, 0.4999, 0.5)
-# What a side twelve thicknesses away leaves of a disc on a layer on a rigid base, as measured.
+# Relative effect of a side twelve thicknesses away on a disc on a layer on a rigid base, measured.
 _SIDE = 1e-7
 
 
 def scene_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows of all scenes, as they are solved; ``quick`` leaves a few of each kind; collective."""
+    """Yield the rows of all scenes; ``quick`` yields a few of each kind; collective."""
     for compare in (_half_space, _rectangles, _ellipses, _cylinders, _layers, _incompressible):
         yield from compare(comm, quick)
 
@@ -58,7 +58,7 @@ def _rectangles(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
 
 
 def _ellipses(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """Along the axes, and across them."""
+    """Ellipses along the axes, and oblique ones."""
     for ratio in (3,) if quick else _ELLIPSES:
         force, source = known.half_space_ellipse(10e3, 0.3, (ratio * 1e-3, 1e-3), 1e-5)
         for name, direction in (("", [1.0, 0.0, 0.0]), (", oblique", _OBLIQUE)):
@@ -83,7 +83,7 @@ def _cylinders(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
 
 
 def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """One layer on a rigid base, as published and as an integral equation has it."""
+    """One layer on a rigid base; references are a published table and an integral equation."""
     a = 1.0
     for ratio in (0.4,) if quick else known.LAYER:
         thickness = a / ratio
@@ -99,7 +99,7 @@ def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
 
 
 def _incompressible(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """Both paths near and at ν = ½, against each other: two dimensions are the reference."""
+    """Both paths near and at ν = ½; two dimensions are the reference."""
     for nu in (0.5,) if quick else _NEAR_HALF:
         for contact in ("bonded", "frictionless"):
             yield against_meridian(

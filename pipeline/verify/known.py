@@ -1,7 +1,6 @@
-"""Forces that are known, each with its source: closed forms, published tables, and values converged beforehand.
+"""Known forces with their sources: closed forms, published tables, and values converged beforehand.
 
-What compares forces with the truth asks here: ``epsmesh verify``, the benchmarks, the tests. SI units, unless a name
-says otherwise.
+``epsmesh verify``, the benchmarks and the tests use them. SI units, unless a name says otherwise.
 """
 
 from collections.abc import Callable
@@ -12,8 +11,8 @@ from scipy.special import ellipk
 
 from pipeline.arrays import FloatArray
 
-# F / (E d) in mm, by contact and Poisson's ratio, of the cylinder R = H = 50 mm that is held at its bottom, under a
-# disc of 3 mm: axisymmetric, Taylor–Hood elements of degree 4 graded to 1e-5 of the radius at the rim.
+# F / (E d) in mm, by contact and Poisson's ratio: cylinder R = H = 50 mm, fixed at its bottom, disc of 3 mm.
+# Axisymmetric Taylor–Hood elements of degree 4, graded to 1e-5 of the radius at the rim.
 CYLINDER = {
     ("bonded", 0.3): 7.126315,
     ("bonded", 0.45): 7.943726,
@@ -38,8 +37,8 @@ LAYER_SOURCE = "W. C. Hayes et al., J. Biomech. 5, 541 (1972)"
 # c = F / (E* W d) of a frictionless rectangle of length L and width W on a half-space, by L / W: published.
 RECTANGLE = {1: 1.1523, 2: 1.671, 4: 2.543, 8: 4.036}
 
-# F / F_max, by Poisson's ratio, of a disc of 2 mm bonded to tissue of 20 mm (radius 34 mm, base held), of which only
-# the column r < 10 mm is kept, its cut face free: axisymmetric, converged.
+# F / F_max, by Poisson's ratio: disc of 2 mm bonded to tissue 20 mm thick (radius 34 mm, fixed base); F is that of the
+# column r < 10 mm with a free cut face. Axisymmetric, converged.
 FREE_COLUMN = {0.30: 0.900, 0.40: 0.882, 0.45: 0.870, 0.49: 0.857}
 
 # F / (E d) in mm, with its relative error, on a box of 60 × 60 × 20 mm, bonded: a disc of 2 mm at (10, 5) mm, ν = 0.45,
@@ -57,7 +56,7 @@ GALIN = "L. A. Galin, Contact Problems (1961)"
 
 
 def half_space_disc(young: float, poisson: float, radius: float, depth: float, contact: str) -> tuple[float, str]:
-    """Return F of a disc on a half-space, and who found it.
+    """Return F of a disc on a half-space, and the source.
 
     Frictionless 2 E a d / (1 - ν²); bonded 4 μ a d ln(3 - 4ν) / (1 - 2ν), whose limit for ν = ½ is 8 μ a d.
     """
@@ -68,10 +67,10 @@ def half_space_disc(young: float, poisson: float, radius: float, depth: float, c
 
 
 def in_cylinder(force: float, young: float, poisson: float, size: float, depth: float) -> float:
-    """Return what the ``force`` (N) of a frictionless tool on a half-space is on a cylinder R = H = ``size`` (m).
+    """Return F (N) on a cylinder R = H = ``size`` (m) of a frictionless tool with this ``force`` (N) on a half-space.
 
-    Compliances add: what a distant support takes from d / F is c / (E R), the same for every tool that is small beside
-    R, and ``CYLINDER`` has c, good to a few (a/R)². E and ν are those far from the tool, ν one of the table's.
+    Compliances add: a distant support changes d / F by c / (E R), the same for every tool that is small compared with
+    R; c follows from ``CYLINDER``, up to a few (a/R)². E and ν are those far from the tool; ν must be in the table.
     """
     radius, far = 3.0, 50.0  # mm, of the table
     c = far * (1 / CYLINDER["frictionless", poisson] - (1 - poisson**2) / (2 * radius))
@@ -79,7 +78,7 @@ def in_cylinder(force: float, young: float, poisson: float, size: float, depth: 
 
 
 def half_space_ellipse(young: float, poisson: float, axes: tuple[float, float], depth: float) -> tuple[float, str]:
-    """Return F of a frictionless flat ellipse with these semi-axes on a half-space, and who found it.
+    """Return F of a frictionless flat ellipse with these semi-axes on a half-space, and the source.
 
     π E* a d / K(e) with the longer semi-axis a and e² = 1 - b²/a²; a circle's K = π/2 gives 2 E* a d.
     """
@@ -88,7 +87,7 @@ def half_space_ellipse(young: float, poisson: float, axes: tuple[float, float], 
 
 
 def half_space_ball(young: float, poisson: float, radius: float, depth: float) -> float:
-    """Return F of a frictionless paraboloid, as a ball is where it touches little, on a half-space: 4/3 E* √R d^1.5.
+    """Return F of a frictionless paraboloid on a half-space, 4/3 E* √R d^1.5: a ball at small depth.
 
     H. Hertz, J. reine angew. Math. 92, 156 (1882).
     """
@@ -101,7 +100,7 @@ def half_space_cone(young: float, poisson: float, angle: float, depth: float) ->
 
 
 def half_space_contact(young: float, poisson: float, slope: Callable[[FloatArray], FloatArray], radius: float) -> float:
-    """Return F of a frictionless round tool, f' its ``slope``, that touches a ``radius`` a of a half-space (Sneddon).
+    """Return F of a frictionless round tool with ``slope`` f' and contact ``radius`` a on a half-space (Sneddon).
 
     2 E* ∫ f'(r) r² / (a² - r²)^½ dr for 0 < r < a.
     """

@@ -1,4 +1,4 @@
-"""Neo-Hookean bodies, against linear elasticity where depths are small, and the half plane's elements where not."""
+"""Neo-Hookean bodies, against linear elasticity at small depths, and axisymmetric elements at larger ones."""
 
 from collections.abc import Iterator
 
@@ -8,16 +8,16 @@ from pipeline.verify.compare import solve
 from pipeline.verify.row import Row
 from pipeline.verify.sections import cylinder, disc, mesh, study
 
-# F over that of linear elasticity, cylinder R = H = 20 a / 3, ν = 0.3: piecewise linear elements of the half plane,
-# each of one volume, down to 0.002 a at the edge; what elements of a fifth of the size changed bounds the error.
+# F over F of linear elasticity, cylinder R = H = 20 a / 3, ν = 0.3: axisymmetric linear elements with constant volume
+# change, down to 0.002 a at the edge. Elements of a fifth of that size give the error.
 _RATIO = {0.1: 0.988, 0.2: 0.976}
 _RATIO_BAR = 1.5e-3
-# F / F_linear - 1 is of the order of the depth over the radius.
+# Depth over radius, which is the order of F / F_linear - 1.
 _SMALL = 1e-3
 
 
 def large_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows, as they are solved; ``quick`` leaves out the deepest; collective."""
+    """Yield the rows; ``quick`` leaves out the deepest; collective."""
     sizes = mesh(rim=0.6, growth=0.6, fine=3)
     linear, nonlinear = (_scene(law, _SMALL) for law in ("linear", "neo-hookean"))
     reference, _, message = solve(comm, "3D", linear, sizes)

@@ -1,12 +1,11 @@
-"""A frictionless sharp wedge on a strip of tissue that is bonded to a rigid base, in plane strain, by an integral
-equation of its own.
+"""A frictionless sharp wedge on a strip bonded to a rigid base, in plane strain, by an integral equation.
 
 With the line load's transform P(ξ) = ∫ φ(t) J₀(ξ t) dt for 0 < t < b, the pressure is (1/π) ∫ φ(t) (t² - y²)^-½ dt for
-|y| < t < b, and the surface sinks by (2 / π E*) ∫ P(ξ) L(ξ h) / ξ cos(ξ y) dξ. Its slope is that of the wedge, m:
+|y| < t < b, and the surface displacement (2 / π E*) ∫ P(ξ) L(ξ h) / ξ cos(ξ y) dξ. Its slope is that of the wedge, m:
 
     φ(x) - ∫ φ(t) x ∫ (1 - L(ξ h)) ξ J₀(ξ x) J₀(ξ t) dξ dt = E* m.
 
-The pressure falls to nought at b whatever φ is, and the load is ∫ φ dt. On a half-plane φ = E* m, where the pressure is
+The pressure is zero at b for every φ, and the load is ∫ φ dt. On a half-plane φ = E* m, where the pressure is
 E* m / π arcosh(b / |y|) (K. L. Johnson, Contact Mechanics, 5.2). L is that of :mod:`pipeline.verify.layer_contact`.
 """
 
@@ -22,12 +21,12 @@ _ACROSS, _WAVES = 64, 400
 
 
 def layer_wedge(slope: float, half_width: float, thickness: float, poisson: float) -> tuple[float, float]:
-    """Return the depth (m), and F / E* for each length (m), at which a wedge of that ``slope`` touches as far as that.
+    """Return depth (m) and F / E* per length (m) of a wedge with this ``slope`` for a contact ``half_width`` (m).
 
-    ``half_width`` and ``thickness`` are in m.
+    ``thickness`` is in m.
     """
     nodes, weights = np.polynomial.legendre.leggauss(_ACROSS)
-    # Denser at the edge of the wedge, where the depth has a logarithm to be integrated.
+    # Denser points at the edge of the wedge, where the depth's integrand is logarithmic.
     root = (nodes + 1) / 2
     t, w = half_width * root**2, half_width * root * weights
     waves, strength = np.polynomial.legendre.leggauss(_WAVES)
@@ -36,6 +35,6 @@ def layer_wedge(slope: float, half_width: float, thickness: float, poisson: floa
     bessel = j0(np.outer(t, s / thickness))
     kernel = t[:, None] * ((bessel * ((1 - share) * s * ds / thickness**2)) @ bessel.T)
     phi = np.linalg.solve(np.eye(_ACROSS) - kernel * w, np.full(_ACROSS, slope))
-    # ∫ J₀(ξ t) (1 - exp(-ξ h)) / ξ dξ = arsinh(h / t); what L differs by from that falls like exp(-ξ h).
+    # ∫ J₀(ξ t) (1 - exp(-ξ h)) / ξ dξ = arsinh(h / t); the remainder of L falls like exp(-ξ h).
     sunk = np.arcsinh(thickness / t) + bessel @ ((share - 1 + np.exp(-s)) / s * ds)
     return float(2 / pi * (phi * w) @ sunk), float(phi @ w)

@@ -1,7 +1,7 @@
-"""A frictionless flat disc on a layer that is bonded to a half-space, or to a rigid base: by an integral equation.
+"""A frictionless flat disc on a layer bonded to a half-space, or to a rigid base, by an integral equation.
 
-It has nothing in common with the rest of the program. Hankel transforms take the two solids to ordinary differential
-equations in depth (D. M. Burmister, J. Appl. Phys. 16, 89, 1945): pressure p J₀(kr) on the surface sinks it by
+The code is independent of the rest of the program. Hankel transforms reduce both solids to ordinary differential
+equations in depth (D. M. Burmister, J. Appl. Phys. 16, 89, 1945): a pressure p J₀(kr) displaces the surface by
 
     (1 - ν) / (μ k) H(kh) p J₀(kr),
 
@@ -57,10 +57,10 @@ def layered_disc(layer: Solid, thickness: float, base: Solid, radius: float, dep
 
 
 def added_compliance(layer: Solid, thickness: float, base: Solid) -> tuple[float, float]:
-    """Return what the base adds to E d / F of a small tool on a half-space of the layer: c (1/m) and g (1/m³).
+    """Return the compliance that the base adds to a small tool's on a half-space of the layer: c (1/m), g (1/m³).
 
-    A point force sinks itself by c / E more than on the half-space, and two at s and s' from one point sink each other
-    by (c + g (s² + s'²)/2) / E in the mean over directions: the wave's J₀ to its second order.
+    The displacement by a point force is larger by c / E at the force. For points at distances s and s' from a centre it
+    is larger by (c + g (s² + s'²)/2) / E, in the mean over directions: J₀ of the waves to second order.
     """
     k, weight = _gauss(_LAST, ceil(_LAST))
     beyond = weight * (surface_compliance(layer, base, k) - 1)
@@ -69,9 +69,9 @@ def added_compliance(layer: Solid, thickness: float, base: Solid) -> tuple[float
 
 
 def surface_compliance(layer: Solid, base: Solid, k: FloatArray) -> FloatArray:
-    """Return H of waves ``k`` (n,) in units of 1 / h: how far they sink, relative to a half-space of the layer."""
+    """Return H of waves ``k`` (n,), in units of 1 / h: their displacement, relative to a half-space of the layer."""
     nothing = np.zeros_like(k)
-    # The layer's four fields are those of its upper face and, mirrored, of its lower one; the base has two.
+    # The layer has four fields: two decay from its upper face, two, mirrored, from its lower one. The base has two.
     top = np.concatenate([_fields(layer, nothing), _MIRROR @ _fields(layer, k)], axis=2)
     bottom = np.concatenate([_fields(layer, k), _MIRROR @ _fields(layer, nothing)], axis=2)
     softer = np.array([layer.shear / base.shear] * 2 + [1.0] * 2)
@@ -85,15 +85,15 @@ def surface_compliance(layer: Solid, base: Solid, k: FloatArray) -> FloatArray:
     return sunk
 
 
-# What of a field changes its sign if the depth does.
+# Signs of a field's components under reflection of the depth.
 _MIRROR = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def _fields(solid: Solid, depth: FloatArray) -> FloatArray:
-    """Return the two fields of a solid that fade with ``depth`` (n,), in units of 1 / k, from a face: (n, 4, 2).
+    """Return the two fields of a solid that decay with ``depth`` (n,), in units of 1 / k, from a face: (n, 4, 2).
 
-    Each is u_r, u_z, σ_rz, σ_zz, the stresses in units of 2 μ k: the gradient of exp(-kz) J₀(kr), and the field that
-    P. F. Papkovich's potential of that along z adds.
+    Each is u_r, u_z, σ_rz, σ_zz, with stresses in units of 2 μ k: the gradient of exp(-kz) J₀(kr), and the field of
+    the Papkovich potential exp(-kz) J₀(kr) along z.
     """
     nu, one = solid.poisson, np.ones_like(depth)
     gradient = np.stack([one, one, -one, -one], axis=1)
@@ -102,7 +102,7 @@ def _fields(solid: Solid, depth: FloatArray) -> FloatArray:
 
 
 def _gauss(end: float, panels: int) -> tuple[FloatArray, FloatArray]:
-    """Return points and weights of Gauss' quadrature from 0 to ``end``, on so many panels of one length."""
+    """Return points and weights of Gauss quadrature from 0 to ``end``, on ``panels`` panels of equal length."""
     points, weights = np.polynomial.legendre.leggauss(_POINTS)
     half = end / panels / 2
     centres = half * (2 * np.arange(panels) + 1)

@@ -1,4 +1,4 @@
-"""Loads against closed forms: own weight, tension, pressure in what does not yield, and a load beside a disc."""
+"""Loads against closed forms: weight, tension, pressure on incompressible tissue, and a load beside a disc."""
 
 from collections.abc import Iterator
 from math import asin, pi
@@ -26,14 +26,14 @@ _YOUNG, _SIZE, _DENSITY, _GRAVITY, _STRESS = 10e3, (40e-3, 30e-3, 20e-3), 1060.0
 _HEAVY = {"density": f"{_DENSITY:g} kg/m^3"}
 _DOWN = {"gravity": ["0 m/s^2", "0 m/s^2", f"-{_GRAVITY} m/s^2"]}
 _PRESSED = {"traction": [{"on": "free", "pressure": f"{_STRESS:g} Pa"}]}
-# Of polynomials on straight cells, and of the area of a footprint that is drawn round, or projected.
+# Relative errors: of polynomials on straight cells; of the area of a round or projected footprint.
 _EXACT, _AREA = 1e-8, 1e-3
-# Of the disc's radius: how far away the cap is, and its radius.
+# Distance and radius of the cap, in units of the disc's radius.
 _AWAY, _CAP = 5.0, 2.0
 
 
 def load_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows of loads, as they are solved; ``quick`` leaves a few; collective."""
+    """Yield the rows of loads; ``quick`` yields a few; collective."""
     yield from _columns(comm)
     yield from _pressures(comm, quick)
     if not quick:
@@ -42,7 +42,7 @@ def load_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
 
 
 def _columns(comm: MPI.Comm) -> Iterator[Row]:
-    """A box of ν = 0 that stands on its bottom, with no probe: twice its energy is the work of the loads."""
+    """A box with ν = 0, fixed at its bottom, without probe: twice its energy is the work of the loads."""
     x, y, height = _SIZE
     weight = (_DENSITY * _GRAVITY) ** 2 * x * y * height**3 / (3 * _YOUNG)
     tension = _STRESS**2 * x * y * height / _YOUNG
@@ -53,7 +53,7 @@ def _columns(comm: MPI.Comm) -> Iterator[Row]:
 
 
 def _work_without_probe(comm: MPI.Comm, load: Section) -> float:
-    """Return the work (J) of loads on the box, of which a probe, on a side of it, touches nothing; collective."""
+    """Return the work (J) of loads on the box; the probe is at a side and without effect; collective."""
     probe = disc(2) | {"at": [mm(20), "0 mm", mm(-10)]}
     straight = mesh(rim=4, fine=8, degree=1) | {"model": "3d"}
     x, y, z = (1e3 * length for length in _SIZE)
@@ -77,9 +77,9 @@ def _work_without_probe(comm: MPI.Comm, load: Section) -> float:
 
 
 def _pressures(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """Where nothing can yield, pressure on what is free is borne by the probe over its own area.
+    """In an incompressible body, pressure on the free surface gives the probe the same pressure over its area.
 
-    Without bond a curved footprint bears none of what is across the axis, and tissue yields there.
+    A frictionless curved footprint is left out: it has no lateral traction, so the tissue moves.
     """
     round_ = {"shape": "ellipsoid", "axes": [mm(20), mm(18), mm(15)], "fixed": {"below": mm(-4)}}
     for name, body, contacts in (
@@ -94,7 +94,7 @@ def _pressures(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
 
 
 def _incompressible_weight(comm: MPI.Comm) -> Row:
-    """What does not yield, in a container, bears its weight by a pressure that is none at the top."""
+    """An incompressible body in a container has hydrostatic pressure, zero at the top."""
     record = _solve(comm, box(40, 30, 20, fixed="bottom+sides"), 0.5, disc(3), _DOWN)
     share = record.load_force / (_DENSITY * _GRAVITY * float(np.prod(_SIZE)))
     return Row(
@@ -103,9 +103,10 @@ def _incompressible_weight(comm: MPI.Comm) -> Row:
 
 
 def _beside_a_disc(comm: MPI.Comm) -> Row:
-    """A pressure on a cap beside a frictionless disc on a half-space, by reciprocity: that disc's own surface is known.
+    """A pressure on a cap beside a frictionless disc on a half-space, by reciprocity.
 
-    Around a disc pushed in by d the surface sinks by 2/π d asin(a/r) (I. N. Sneddon, Int. J. Eng. Sci. 3, 47, 1965).
+    Around a disc at depth d, the surface displacement is 2/π d asin(a/r) (I. N. Sneddon, Int. J. Eng. Sci. 3, 47,
+    1965).
     """
     cap = {"around": [mm(_AWAY), "0 mm", "0 mm"], "radius": mm(_CAP)}
     load = {"traction": [{"on": cap, "pressure": f"{_STRESS:g} Pa"}]}
@@ -140,6 +141,6 @@ def _solve(comm: MPI.Comm, body: Section, nu: float, probe: Section, load: Secti
 
 
 def _row(name: str, reference: float, source: str, record: Record, reference_bar: float) -> Row:
-    """Return the row of the force that loads add."""
+    """Return the row of ``load_force``."""
     bar = record.load_force_error / abs(record.load_force)
     return Row(f"{name}: load_force", "3D", reference, source, record.load_force, bar, reference_bar, record.message)

@@ -1,4 +1,4 @@
-"""Places of a path, each held against the force on it that was found elsewhere."""
+"""Places of a path, compared with known forces at these places."""
 
 from collections.abc import Iterator
 
@@ -14,13 +14,13 @@ from pipeline.verify.row import Row
 from pipeline.verify.sections import Section, box, cylinder, disc, mesh, mm, study
 
 _YOUNG, _DEPTH, _UNIT = 10e3, 1e-5, 1e-3
-# The last of them is the place that NGSolve solved, or its image.
+# The last place is NGSolve's, or its image.
 _TO_KNOWN = ((-5.0, 0.0), (3.0, 4.0), (10.0, 5.0))
 _IMAGES = ((10.0, -5.0), (-10.0, 5.0))
 
 
 def path_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows, as they are solved; ``quick`` leaves one; collective."""
+    """Yield the rows; ``quick`` yields one; collective."""
     yield _images(comm)
     if not quick:
         yield from _on_one_mesh(comm)
@@ -28,14 +28,14 @@ def path_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
 
 
 def _images(comm: MPI.Comm) -> Row:
-    """The second place of two that are each other's image, on a box."""
+    """The second of two places on a box that are images of each other."""
     sizes = mesh(rim=0.2, growth=0.4, fine=3, coarse=9, epsilon=8)
     *_, record = _records(comm, _scene(0.45, _IMAGES, sizes))
     return _row("path, image of a place, box 60 × 60 × 20 mm, a = 2 mm, bonded, ν = 0.45", record, _truth(0.0))
 
 
 def _on_one_mesh(comm: MPI.Comm) -> Iterator[Row]:
-    """The last of places that share the mesh of a half ball, and the middle of a body that is round."""
+    """The last of several places with one half-ball mesh, and the middle of a round body."""
     sizes = {**mesh(rim=0.1, growth=0.4, fine=4, epsilon=13), "outside": "green"}
     *_, record = _records(comm, _scene(0.45, _TO_KNOWN, sizes))
     name = "path, half balls on one mesh, box 60 × 60 × 20 mm, a = 2 mm, bonded, ν = 0.45"
@@ -48,7 +48,7 @@ def _on_one_mesh(comm: MPI.Comm) -> Iterator[Row]:
 
 
 def _on_a_half_space(comm: MPI.Comm) -> Row:
-    """A place off the middle of what is as good as a half-space, cut out and closed by one."""
+    """A place away from the middle, as a half ball with a half-space's far field."""
     probe = _along(disc(1, contact="frictionless"), ((0.0, 0.0), (20.0, 9.0)))
     sizes = {**mesh(rim=0.05, growth=0.4, fine=2, epsilon=8), "outside": "halfspace"}
     *_, record = _records(comm, study(0.3, cylinder(60, 60), probe, sizes))
@@ -78,7 +78,7 @@ def _records(comm: MPI.Comm, scene: Section) -> list[Record]:
 
 
 def _row(name: str, record: Record, truth: tuple[float, str, float]) -> Row:
-    """Return the row of a force whose stiffness F / (E d) is known, in mm."""
+    """Return the row of a force with a known F / (E d), in mm."""
     stiffness, source, bar = truth
     reference = stiffness * _YOUNG * _DEPTH * _UNIT
     return Row(name, "3D", reference, source, record.force, record.force_error, bar, record.message)

@@ -1,4 +1,4 @@
-"""Bodies of several materials whose force is known: in a limit, of one material, or by another way to it."""
+"""Bodies of several materials with known forces: limits, equal materials, or another method."""
 
 from collections.abc import Iterator, Sequence
 from math import pi
@@ -16,21 +16,21 @@ from pipeline.verify.sections import Section, cylinder, disc, layers, tissue
 _Stack = Sequence[tuple[float, float, float]]
 _STACK = ((1.0, 60.0, 0.3), (2.0, 5.0, 0.4), (1.0, 20.0, 0.2))
 _INCOMPRESSIBLE_SKIN = ((1.0, 60.0, 0.49), (9.0, 5.0, 0.3))
-# Radii of a wide punch in units of the stack's height; what is left of the edge's part of F then is below 0.2 %.
+# Radii of a wide punch in units of the stack's height; after extrapolation the edge's part of F is below 0.2 %.
 _WIDE, _LEFT = (2.5, 5.0, 10.0), 0.002
 _DEPTH = 1e-5
-# A layer, and what is far below it: in units of the disc's radius, kPa and 1.
+# A layer, and the tissue below: thickness in units of the disc's radius, kPa, ν.
 _HALF_SPACES = {
     "stiff on soft, h = a": ((1.0, 100.0, 0.3), (10.0, 0.3)),
     "soft on stiff, h = a": ((1.0, 1.0, 0.3), (10.0, 0.3)),
     "skin on fat, h = a / 2": ((0.5, 60.0, 0.48), (2.0, 0.49)),
 }
-# What is left of F where the size of a body FAR wide is allowed for, as measured.
+# Relative error of the correction for the finite size of a body FAR wide, measured.
 _SIZE = 1e-6
 
 
 def region_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows of layers and inclusions, as they are solved; ``quick`` leaves a few of each kind; collective."""
+    """Yield the rows of layers and inclusions; ``quick`` yields a few of each kind; collective."""
     for compare in (_half_spaces, _springs, _meridians, _layered, _of_one_material):
         yield from compare(comm, quick)
 
@@ -52,7 +52,7 @@ def _half_spaces(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
 
 
 def _springs(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """Under a punch much wider than the layers are thick, each of them is a spring of its oedometric modulus."""
+    """Under a punch much wider than their thickness, layers are springs in series, with their oedometric moduli."""
     height = sum(thickness for thickness, _, _ in _STACK)
     compliance = sum(1e-3 * h / (1e3 * young * (1 - nu) / ((1 + nu) * (1 - 2 * nu))) for h, young, nu in _STACK)
     for contact in ("frictionless",) if quick else ("frictionless", "bonded"):
@@ -62,7 +62,7 @@ def _springs(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
             scene = {"body": _layers(a + 5 * height, _STACK), "probe": disc(a, contact=contact)}
             force, _, message = solve(comm, "2D", scene)
             ratios.append(force * compliance / (pi * (1e-3 * a) ** 2 * _DEPTH))
-        # The edge adds a share that falls like height / a, and its square: extrapolated to none.
+        # The edge's share of F has terms in height / a and its square: both are extrapolated to zero.
         first, second, third = ratios
         yield Row(
             f"wide punch on three layers, {contact}",
@@ -77,7 +77,7 @@ def _springs(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
 
 
 def _meridians(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """Cylinders that layers fill in three dimensions against the same in two, which is the reference."""
+    """Cylinders filled by layers, in three dimensions; the reference is the same scene in two."""
     for name, stack in (("three layers", _STACK), ("ν = 0.49 above 0.3", _INCOMPRESSIBLE_SKIN)):
         for contact in ("frictionless",) if quick else ("frictionless", "bonded"):
             scene = {"body": _layers(12.0, stack), "probe": disc(2.0, contact=contact)}
@@ -85,7 +85,7 @@ def _meridians(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
 
 
 def _layered(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """Layers on tissue, both paths against each other: two dimensions are the reference."""
+    """Layers on tissue, in three dimensions; the reference is the same scene in two."""
     soft, bone, skin, fat = (2.0, 1.0, 0.3), (4.0, 1000.0, 0.3), (1.0, 60.0, 0.48), (3.0, 2.0, 0.49)
     kinds = {"soft on firm": [soft], "soft on bone": [soft, bone], "skin and fat": [skin, fat]}
     for name, stack in [*kinds.items()][: 1 if quick else None]:
@@ -96,7 +96,7 @@ def _layered(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
 
 
 def _of_one_material(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """Pieces that are as stiff as what is round them are not felt."""
+    """Layers and inclusions of the surrounding tissue change nothing."""
     for nu in (0.3,) if quick else (0.3, 0.49):
         same: Section = {"material": tissue(nu), "probe": disc(2.0)}
         ball = {"name": "ball", "at": ["1 mm", "0 mm", "-5 mm"], "radius": "3 mm", **tissue(nu)}
@@ -107,5 +107,5 @@ def _of_one_material(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
 
 
 def _layers(radius: float, stack: _Stack) -> Section:
-    """Return a cylinder that layers fill."""
+    """Return a cylinder filled by layers."""
     return cylinder(radius, sum(thickness for thickness, _, _ in stack)) | {"layer": layers(stack)}

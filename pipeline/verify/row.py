@@ -1,11 +1,11 @@
-"""One comparison of a force, or of another number, with what it should be."""
+"""One comparison of a force, or of another number, with its reference."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Row:
-    """``value`` is to agree with ``reference`` to a relative error of ``bar``, the value's, plus ``reference_bar``."""
+    """A ``value`` and its ``reference``, which must agree within the sum of their relative error bars."""
 
     scene: str
     path: str  # how the value was computed
@@ -23,5 +23,5 @@ class Row:
 
     @property
     def is_right(self) -> bool:
-        """Whether the value agrees; what is not a number does not."""
+        """Whether value and reference agree; NaN does not."""
         return abs(self.error) <= self.bar + self.reference_bar

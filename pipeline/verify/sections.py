@@ -1,4 +1,4 @@
-"""Sections of a study, as a study file would hold them; lengths in millimetres."""
+"""Sections of study files as dictionaries; lengths in millimetres."""
 
 from collections.abc import Iterable
 from math import inf
@@ -8,12 +8,12 @@ Section = dict[str, Any]
 
 
 def mm(length: float) -> str:
-    """Write a length."""
+    """Return a length (mm) as text."""
     return f"{length:.12g} mm"
 
 
 def cylinder(radius: float = 20, height: float = 20, fixed: str | float = "bottom") -> Section:
-    """Return a cylinder; a number for ``fixed`` is the level below which it is held."""
+    """Return a cylinder; a number for ``fixed`` is the level (mm) below which it is fixed."""
     held = fixed if isinstance(fixed, str) else {"below": mm(fixed)}
     return {"shape": "cylinder", "radius": mm(radius), "height": mm(height), "fixed": held}
 
@@ -24,7 +24,7 @@ def box(x: float = 60, y: float = 60, z: float = 20, fixed: str = "bottom") -> S
 
 
 def disc(radius: float = 2, depth: float = 0.01, contact: str = "bonded", at: float = 0.0) -> Section:
-    """Return a disc, ``at`` off the axis."""
+    """Return a disc at x = ``at``."""
     probe = {"shape": "disc", "radius": mm(radius), "depth": mm(depth), "contact": contact}
     return probe | ({"at": [mm(at), "0 mm"]} if at else {})
 
@@ -45,7 +45,7 @@ def tissue(nu: float, young: float = 10.0) -> Section:
 
 
 def layers(stack: Iterable[tuple[float, float, float]]) -> list[Section]:
-    """Return layers, top to bottom, of so much thickness, Young's modulus (kPa) and Poisson's ratio."""
+    """Return layers from top to bottom, from tuples of thickness, Young's modulus (kPa) and Poisson's ratio."""
     return [
         {"name": f"layer{number}", "thickness": mm(thickness), **tissue(nu, young)}
         for number, (thickness, young, nu) in enumerate(stack)

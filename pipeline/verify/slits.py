@@ -1,4 +1,4 @@
-"""What the front of a slit releases: in a strip, where it is known, and against the change of the strain energy."""
+"""Energy release rate of a slit: in a strip, where it is known, and against the change of the strain energy."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -27,7 +27,7 @@ Section = dict[str, Any]
 
 _QUARTER = ("x", "y")
 _YOUNG = 10e3
-# Half height and width of the strip, and by how much each of its edges is moved, in m.
+# Half height and width of the strip, and the displacement of each of its edges, in m.
 _HALF, _WIDTH, _MOVED = 5e-3, 4e-3, 1e-4
 _STRIP: dict[str, Section] = {
     "body": {"shape": "box", "size": ["4 mm", "10 mm", "30 mm"]},
@@ -43,13 +43,13 @@ _STRIP: dict[str, Section] = {
     },
     "mesh": {"epsilon": "full", "fine": "2.5 mm", "coarse": "2.5 mm", "rim": "0.5 mm", "growth": 0.7, "degree": 2},
 }
-# How far (mm) the front of a slit goes up and down for the change of the energy; what is left then of the reference's
-# error, since what is released is not linear, and since three meshes are not one.
+# Step (mm) of the slit's front for the finite difference of the energy; relative error of that difference, by its
+# second order and by the three different meshes.
 _STEP, _LEFT = 0.1, 0.01
 
 
 def slit_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows of slits, as they are solved; ``quick`` leaves a few of each kind; collective."""
+    """Yield the rows of slits; ``quick`` yields one; collective."""
     for degree in (2,) if quick else (2, 3):
         value, bar = strip(comm, degree)
         yield Row(
@@ -67,9 +67,9 @@ def slit_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
 
 
 def strip(comm: MPI.Comm, degree: int) -> tuple[float, float]:
-    """Return what a long crack in a strip releases (J/m²) whose edges are moved apart, and the bar; collective.
+    """Return the energy release rate (J/m²) of a long crack in a strip, and its error bar; collective.
 
-    The faces of a slit are all free here, and the sides of the box across it are what is moved.
+    The crack's faces are free, and the two sides of the box parallel to it are moved apart.
     """
     case = parse(_STRIP | {"mesh": _STRIP["mesh"] | {"degree": degree}}).case(())
 
@@ -92,7 +92,7 @@ def strip(comm: MPI.Comm, degree: int) -> tuple[float, float]:
 
 
 def _change_of_energy(comm: MPI.Comm, nu: float) -> Row:
-    """Fronts a little deeper and less deep below the same blade tell what is released between."""
+    """The energy release rate against the difference of the energy for two depths of the front, with the same blade."""
     records = [_blade(comm, nu, "bonded", 4 + step, 1 + step, "0.3 %") for step in (-_STEP, 0.0, _STEP)]
     before, here, after = records
     slope = (before.energy - after.energy) / (2e-3 * _STEP * 20e-3)
@@ -109,7 +109,7 @@ def _change_of_energy(comm: MPI.Comm, nu: float) -> Row:
 
 
 def _pushed_on(comm: MPI.Comm, nu: float) -> Row:
-    """Blades that tissue slides along, a little deeper and less deep above the same front, tell what pushing takes."""
+    """The force of a frictionless blade against the difference of the energy for two of its depths, with one front."""
     records = [_blade(comm, nu, "frictionless", 4.0, 1 + step, "1 %") for step in (-_STEP, 0.0, _STEP)]
     deeper, here, less_deep = records
     slope = (deeper.energy - less_deep.energy) / (2e-3 * _STEP)
@@ -126,7 +126,7 @@ def _pushed_on(comm: MPI.Comm, nu: float) -> Row:
 
 
 def _blade(comm: MPI.Comm, nu: float, contact: str, incision: float, ahead: float, accuracy: str) -> Record:
-    """Solve an open slit, of which ``incision`` and ``ahead`` are in mm."""
+    """Return the record of an open slit; ``incision`` and ``ahead`` are in mm."""
     scene: dict[str, Section] = {
         "body": {"shape": "box", "size": ["20 mm", "20 mm", "12 mm"], "fixed": "bottom"},
         "material": {"young": "10 kPa", "poisson": nu},

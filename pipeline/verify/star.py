@@ -1,4 +1,4 @@
-"""Closed surfaces of triangles that are seen whole from the origin, as files have them."""
+"""STL files of star-shaped surfaces about the origin."""
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -10,7 +10,7 @@ _GOLDEN = np.pi * (3 - 5**0.5)
 
 
 def directions(count: int) -> FloatArray:
-    """Return ``count`` unit vectors (count, 3), about equally far apart: a spiral from pole to pole."""
+    """Return ``count`` unit vectors (count, 3) with about equal distances: a spiral from pole to pole."""
     number = np.arange(count) + 0.5
     height, angle = 1 - 2 * number / count, _GOLDEN * number
     ring = np.sqrt(1 - height**2)

@@ -1,4 +1,4 @@
-"""A wedge that is as long as its body, between planes along which tissue slides: contact in plane strain."""
+"""A wedge as long as its body, between two planes of symmetry: contact in plane strain."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -20,15 +20,15 @@ from pipeline.verify.layer_wedge import layer_wedge
 from pipeline.verify.row import Row
 
 _YOUNG, _ANGLE = 10e3, 80.0
-# Half the width of contact and the strip's length along the wedge (m); the strip's half width, in thicknesses beyond
-# contact, where nothing is left of what the wedge does.
+# Half the width of contact and the strip's length along the wedge (m); distance of the strip's sides from the contact,
+# in thicknesses, at which the wedge has no effect.
 _HALF, _LENGTH, _BESIDE = 1e-3, 1.25e-3, 8.0
 _SOURCE = "integral equation of plane strain"
 _QUARTER = ("x", "y")
 
 
 def wedge_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the forces per length of wedges on strips, as they are solved; ``quick`` leaves one; collective."""
+    """Yield the forces per length of wedges on strips; ``quick`` yields one; collective."""
     scenes = [(3.0, 0.3)] if quick else [(thick, nu) for thick in (3.0, 1.0, 0.5) for nu in (0.0, 0.3, 0.5)]
     for thick, nu in scenes:
         reference, value, bar = strip(comm, thick, nu)
@@ -37,9 +37,9 @@ def wedge_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
 
 
 def strip(comm: MPI.Comm, thick: float, poisson: float) -> tuple[float, float, float]:
-    """Return F for each length (N/m) of a wedge on a strip ``thick`` half widths of contact thick; collective.
+    """Return F per length (N/m) of a wedge on a strip ``thick`` half widths of contact thick; collective.
 
-    That of the integral equation first, then that of elements in three dimensions and its bar.
+    The values are the integral equation's, the elements' in three dimensions, and the error bar of the latter.
     """
     depth, share = layer_wedge(1 / tan(radians(_ANGLE)), _HALF, thick * _HALF, poisson)
     case = _case(thick, depth, poisson)
@@ -50,7 +50,7 @@ def strip(comm: MPI.Comm, thick: float, poisson: float) -> tuple[float, float, f
 
 
 def _case(thick: float, depth: float, poisson: float) -> Case:
-    """Return a case whose wedge ends with its body, which a study file may not ask for."""
+    """Return a case whose wedge is as long as its body, which study files do not allow."""
     width = 2e3 * _HALF * (2 + _BESIDE * thick)
     case = parse(
         {
@@ -81,7 +81,7 @@ def _case(thick: float, depth: float, poisson: float) -> Case:
 
 
 def _held_apart(arrays: MeshArrays) -> MeshArrays:
-    """Return the quarter with its end made a plane of symmetry, too."""
+    """Return the quarter mesh with its end as another plane of symmetry."""
     free, plane = arrays.facets[FREE], MIRROR["x"]
     at_end = np.isclose(arrays.points[free][..., 0], _LENGTH / 2, rtol=1e-6).all(axis=1)
     facets = {FREE: free[~at_end], plane: np.vstack([arrays.facets[plane], free[at_end]])}
