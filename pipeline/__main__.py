@@ -5,31 +5,39 @@ import signal
 import sys
 from typing import Any, NoReturn
 
-INTERRUPTED = 130
+BAD_INPUT, INTERRUPTED = 2, 130
 _LAST_STANDARD = 2  # number of standard error
 
 
 def main() -> None:
-    """Run the command ``epsmesh``; Ctrl-C ends it quietly, even while it loads or is on its way out."""
+    """Run the command ``epsmesh``; Ctrl-C ends it without traceback, even while it loads or exits."""
     _open_standard_streams()
-    listens = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else it is ignored: nohup, or `&`
+    listens = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else ignored: nohup, or `&`
     if listens:
         signal.signal(signal.SIGINT, _leave)
-    from pipeline.cli import main as run  # noqa: PLC0415 (what takes time to load)
 
     try:
+        from pipeline.cli import main as run  # noqa: PLC0415 (takes time to load)
+
         if listens:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         run()
+    except ModuleNotFoundError as missing:
+        from pipeline.libraries import sentence_on  # noqa: PLC0415
+
+        if not (sentence := sentence_on(missing)):
+            raise
+        print(sentence, file=sys.stderr)
+        sys.exit(BAD_INPUT)
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, _leave)
         sys.exit(INTERRUPTED)
 
 
 def _open_standard_streams() -> None:
-    """Open what was closed (``>&-``) on nothing: else the next file takes its number, and what libraries print.
+    """Connect closed standard streams (``>&-``) to the null device, before another file gets their numbers.
 
-    Python has None for such a stream, which most of what writes or flushes does not expect.
+    For a closed stream Python has None, which most code that writes or flushes does not expect.
     """
     while (number := os.open(os.devnull, os.O_RDWR)) <= _LAST_STANDARD:
         os.set_inheritable(number, True)
@@ -40,7 +48,7 @@ def _open_standard_streams() -> None:
 
 
 def _leave(*_: Any) -> NoReturn:
-    """End at once: nothing is begun, or all is done; an exception may come out of an import as another one."""
+    """Exit at once: imports may turn a KeyboardInterrupt into another exception, and no work is under way."""
     os._exit(INTERRUPTED)
 
 

@@ -21,13 +21,6 @@ Exit status: 0 done, 1 some cases failed, 2 wrong input, 130 interrupted."""
 
 # The shell sets this variable when it completes a word.
 _COMPLETING = "_EPSMESH_COMPLETE"
-# Libraries that may be missing, and how to install them.
-_FENICS = "on Debian `make setup` installs it, elsewhere `conda env create -f environment.yml`"
-_ORGANS = "`pip install 'epsmesh[organs]'` installs it (on Debian: `make setup`)"
-_REMEDIES = {
-    **dict.fromkeys(("dolfinx", "ufl", "basix", "ffcx", "petsc4py", "mpi4py", "gmsh"), _FENICS),
-    **dict.fromkeys(("igl", "nibabel", "nrrd"), _ORGANS),
-}
 
 app = typer.Typer(
     cls=Commands,
@@ -86,12 +79,6 @@ def main() -> None:
         make_patient()
     try:
         app(prog_name="epsmesh")
-    except ModuleNotFoundError as missing:
-        library = (missing.name or "").partition(".")[0]
-        if library not in _REMEDIES:
-            raise
-        error(f"the library {library} is missing: {_REMEDIES[library]}")
-        sys.exit(BAD_INPUT)
     finally:
         if why := what_was_not_written():
             error(f"standard output: {why}")

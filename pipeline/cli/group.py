@@ -22,6 +22,7 @@ from pipeline.cli.faults import (
 )
 from pipeline.files import NOT_UTF8, is_utf8
 from pipeline.launcher import is_first_rank, is_interrupt, is_launched
+from pipeline.libraries import sentence_on
 from pipeline.printable import printable
 
 # Errors of a disk that cannot be written to; some appear only at the end.
@@ -67,6 +68,10 @@ class Commands(TyperGroup):
         """Run the command; print as JSON any error that ends it, and raise it again."""
         try:
             return super().invoke(ctx)
+        except ModuleNotFoundError as wrong:
+            if sentence := sentence_on(wrong):
+                fail(sentence)
+            raise
         except OSError as wrong:
             if wrong.errno in _UNWRITABLE:
                 fail(of_unwritten(wrong))

@@ -105,7 +105,7 @@ def test_tables_of_tensors_know_their_images(shape):
     ("sections", "word"),
     [
         ({"probe": BLADE}, "bonded"),
-        ({"body": DOME, "probe": BALL}, "frictionless disc"),
+        ({"body": DOME, "probe": BALL}, 'needs shape = "disc" and contact = "frictionless"'),
         ({"body": DOME, "probe": DISC | {"axis": [0.1, 0.0, -1.0]}}, "axis"),
         ({"body": DOME, "material": SOFT | {"young": ["10 kPa", "20 kPa"]}}, "several"),
         ({"body": BOX | {"inclusion": [TUMOUR]}, "material": SOFT | {"young": ["10 kPa", "20 kPa"]}}, "several"),
@@ -114,9 +114,9 @@ def test_tables_of_tensors_know_their_images(shape):
             "material.poisson too",
         ),
         ({"body": CYLINDER | {"inclusion": [TUMOUR | {"at": ["3 mm", "0 mm", "-10 mm"]}]}}, "off its axis"),
-        ({"body": CYLINDER | {"layer": [SKIN | {"thickness": "1 mm"}]}}, "so near"),
+        ({"body": CYLINDER | {"layer": [SKIN | {"thickness": "1 mm"}]}}, "at least 2 mm, a twentieth of the"),
         ({"body": CYLINDER | {"inclusion": [TUMOUR | {"poisson": 0.5}]}}, "0.5"),
-        ({"body": CYLINDER | {"fixed": "bottom+sides"}}, "support"),
+        ({"body": CYLINDER | {"fixed": "bottom+sides"}}, 'body.fixed must be "bottom"'),
         ({"material": SOFT | {"poisson": 0.5}}, "0.5"),
         (
             {

