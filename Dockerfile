@@ -1,4 +1,5 @@
-# docker build -t epsmesh . && docker run --rm -it -v "$PWD/results:/epsmesh/results" epsmesh
+# Use: docker build -t epsmesh . && docker run --rm -it -v "$PWD/results:/epsmesh/results" epsmesh
+# `make docker-steps` runs the RUN lines in a root of Debian 12, without Docker.
 FROM debian:12
 WORKDIR /epsmesh
 COPY . .

@@ -1,4 +1,4 @@
-"""Print what pip must leave as Debian has it, a constraint a line: what binds to one MPI or one numpy.
+"""Print pip constraints for libraries that must stay at Debian's version: those that bind to MPI or numpy.
 
 Run by Debian's Python: `/usr/bin/python3 scripts/constraints.py`.
 """

@@ -1,5 +1,5 @@
 #!/bin/bash
-# Run a command under mpirun with the output of the first rank only; another rank's is shown if it fails.
+# Run a command under mpirun, and print the output of the first rank only; another rank's if it fails.
 if [[ ${OMPI_COMM_WORLD_RANK:-0} == 0 ]]; then
     exec "$@"
 fi

@@ -1,5 +1,5 @@
 #!/bin/bash
-# Make .venv-peers, the programs that `make peers` compares this one with. They come from PyPI, and bring their own numpy.
+# Make .venv-peers with the programs for `make peers`. They come from PyPI, with their own numpy.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,11 +1,11 @@
 #!/bin/bash
-# Install what is missing: Debian packages, then a venv that sees them, then this project in it.
-# Idempotent, and done in a fraction of a second when nothing is missing.
-# Debian packages named on the command line are installed too, where that is possible without asking.
+# Install Debian packages, a venv that sees them, and this project in the venv.
+# Idempotent; takes a fraction of a second if nothing is missing.
+# Debian packages named on the command line are optional: they are installed if that needs no password.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-# What binds to MPI's or numpy's ABI comes from Debian; only pure Python comes from PyPI.
+# Libraries that bind to the ABI of MPI or numpy come from Debian; only pure Python comes from PyPI.
 packages=(
     python3-dolfinx python3-gmsh python3-mpi4py python3-petsc4py python3-numpy python3-scipy
     python3-xarray python3-netcdf4 python3-matplotlib python3-venv python3-dev
@@ -13,7 +13,7 @@ packages=(
 )
 python=/usr/bin/python3
 venv=.venv
-# EXTRAS=view adds what draws pictures of a case. A venv that has it keeps it.
+# EXTRAS=view adds PyVista, for pictures of a case. A venv that has it keeps it.
 extras=dev,docs,images,repair
 if [[ ${EXTRAS:-} == view ]] || compgen -G "$venv/lib/python*/site-packages/pyvista" >/dev/null; then
     extras=dev,docs,images,repair,view
@@ -27,14 +27,14 @@ fail() { echo "setup: $*" >&2; exit 1; }
 # ---- Debian packages ----------------------------------------------------------------------------------
 missing() {
     local installed
-    # dpkg-query fails when any of them is unknown; what it prints of the others still counts.
+    # dpkg-query fails if any of them is unknown, but still prints the others.
     installed=$(dpkg-query -W -f '${db:Status-Abbrev}${Package}\n' "$@" 2>/dev/null | sed -n 's/^ii *//p') || true
     for package in "$@"; do
         grep -qx -- "$package" <<<"$installed" || echo "$package"
     done
 }
 
-command -v dpkg-query >/dev/null || fail "this needs Debian 12 or 13: its packages hold dolfinx, PETSc and gmsh"
+command -v dpkg-query >/dev/null || fail "this is no Debian: use 'conda env create -f environment.yml', or the Dockerfile"
 mapfile -t wanted < <(missing "${packages[@]}" "$@")
 mapfile -t needed < <(missing "${packages[@]}")
 if ((${#wanted[@]})); then
@@ -44,10 +44,10 @@ if ((${#wanted[@]})); then
     elif command -v sudo >/dev/null && { sudo -n true 2>/dev/null || [[ -t 0 ]]; }; then
         as_root=(sudo)
     elif ((!${#needed[@]})); then
-        echo "setup: without root, going on without ${wanted[*]}" >&2
+        echo "setup: without root, these optional packages are not installed: ${wanted[*]}" >&2
         wanted=()
     else
-        fail "Debian packages are missing and this is neither root nor sudo. Ask an administrator to run:
+        fail "Debian packages are missing, and installing them needs root or sudo. Ask an administrator to run:
     apt-get update && $install"
     fi
 fi
@@ -63,8 +63,8 @@ if ((${#wanted[@]})); then
 fi
 
 # ---- venv ---------------------------------------------------------------------------------------------
-# The stamp says for which project file, interpreter and folder the venv was last made complete; the other mark stands
-# in it while it is being changed. Where a setup was killed no package can be relied on: pip takes half of one for all.
+# The stamp records the project file, interpreter and folder of the last complete setup. The other mark exists while the
+# venv is being changed: after a killed setup the venv is made anew, because pip takes half a package for a whole one.
 state=$({ cat pyproject.toml scripts/setup.sh scripts/constraints.py; readlink -f "$python"; pwd; echo "$extras"; } | sha256sum)
 unfinished=$venv/.epsmesh-unfinished
 [[ -f $stamp && $(<"$stamp") == "$state" && -x $venv/bin/epsmesh && ! -e $unfinished ]] && exit 0
@@ -80,7 +80,7 @@ touch "$unfinished"
 echo "setup: installing the project and its Python packages into $venv"
 constraints=$venv/constraints.txt
 "$python" scripts/constraints.py >"$constraints"
-install() { # what $1 says and the rest asks for; pip that fails takes back what it did, pip that is killed does not
+install() { # $1: a name for messages; the rest: pip's arguments. A failed pip rolls back, a killed one does not.
     local status=0
     # A pip configured for --user would install beside the venv.
     PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input "${@:2}" || status=$?
@@ -89,8 +89,8 @@ install() { # what $1 says and the rest asks for; pip that fails takes back what
     fail "pip could not install $1"
 }
 install "the project" -c "$constraints" -e ".[$extras]"
-# The remesher of surfaces, mmgs, comes as a program within this package, whose Python part nothing imports: what that
-# asks for (a newer numpy than Debian 12's) is not installed.
+# This package contains the program mmgs, the remesher of surfaces. Its Python part is not used, so its dependencies (a
+# newer numpy than Debian 12's) are not installed.
 install "$mmg" --no-deps "$mmg"
 
 # ---- check --------------------------------------------------------------------------------------------

@@ -1,14 +1,14 @@
 #!/bin/bash
-# Run `make test` on Debian 13, in a root made by mmdebstrap and kept in .cache/ for the next time.
-#   PYTEST_ARGS=…      only these tests
-#   GOALS=…            these targets of make instead
-#   DEBIAN_SUITE=…     this Debian instead: sid
-#   DEBIAN13_ROOT=DIR  the root's folder, for checkouts that share one
-#   STEPS=Dockerfile   the RUN steps of this file and a small study instead
+# Run `make test` on Debian 13, in a chroot made by mmdebstrap, which stays in .cache/ for the next run.
+#   PYTEST_ARGS=…      run only these tests
+#   GOALS=…            run these targets of make instead of `test`
+#   DEBIAN_SUITE=…     use this Debian instead of 13: bookworm, sid
+#   DEBIAN13_ROOT=DIR  folder of the chroot, for checkouts that share one
+#   STEPS=Dockerfile   run the RUN lines of this file, and a small study, instead of make's targets
 set -euo pipefail
 cd "$(dirname "$0")/.."
 ((EUID == 0)) || { echo "test-debian13: needs root: a Debian 13 root is made, mounted and entered" >&2; exit 1; }
-# In a mount namespace of its own, what is mounted below goes with the last process, however that ends.
+# In its own mount namespace, the mounts below end with the last process.
 [[ ${1:-} == --inside ]] || exec unshare --mount --propagation private "$PWD/scripts/test-debian13.sh" --inside
 
 suite=${DEBIAN_SUITE:-trixie} goals=${GOALS:-test}
@@ -22,28 +22,28 @@ if [[ ! -f $root/.complete ]]; then
     rm -rf "$root"
     mkdir -p "$root"
     echo "test-debian13: making a root of Debian $suite in ${root#"$PWD"/} (some minutes, 3 GB)"
-    # This machine's way to its package mirrors (proxies, certificates) holds inside as well.
-    # A mirror may be older than its own promise to be fresh.
+    # A mirror's index may be past its validity date.
     mmdebstrap --aptopt='Acquire::Check-Valid-Until "false"' --variant=minbase \
         --include=ca-certificates,make,git,bash "$suite" "$root"
     touch "$root/.complete"
 fi
+# The chroot uses this machine's proxies, certificates and package mirrors.
 for file in /etc/resolv.conf /etc/pip.conf; do
     [[ -f $file ]] && cp -L "$file" "$root$file"
 done
 { grep -ls '^ *Acquire::' /etc/apt/apt.conf /etc/apt/apt.conf.d/* || true; } | xargs -r cp -t "$root/etc/apt/apt.conf.d/"
 cp /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/ca-certificates.crt" 2>/dev/null || true
 
-# A copy of the files as they are, without what git ignores; the venv of an earlier run stays.
+# Copy the checkout without ignored files; the venv of an earlier run stays.
 mkdir -p "$root/src/epsmesh"
 find "$root/src/epsmesh" -mindepth 1 -maxdepth 1 ! -name .venv -exec rm -rf {} +
 git ls-files -co --exclude-standard -z | tar --null --ignore-failed-read -T - -cf - | tar -xf - -C "$root/src/epsmesh"
 
 mount -t proc proc "$root/proc"
-mount -t sysfs -o ro sysfs "$root/sys" # where Open MPI counts the cores
+mount -t sysfs -o ro sysfs "$root/sys" # Open MPI counts the cores there
 mount --bind /dev "$root/dev"
 mount -t tmpfs tmpfs "$root/dev/shm"
-mount -t devpts -o ptmxmode=0666,mode=0620,gid=5 devpts "$root/dev/pts" # terminals, for the tests of what a person sees
+mount -t devpts -o ptmxmode=0666,mode=0620,gid=5 devpts "$root/dev/pts" # terminals, for tests of the progress bar
 environment=(PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/src LANG=C.UTF-8)
 for name in http_proxy https_proxy no_proxy HTTP_PROXY HTTPS_PROXY NO_PROXY PIP_INDEX_URL PIP_CERT PIP_FIND_LINKS PIP_EXTRA_INDEX_URL PYTEST_ADDOPTS; do
     [[ -n ${!name:-} ]] && environment+=("$name=${!name}")
