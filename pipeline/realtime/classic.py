@@ -1,4 +1,4 @@
-"""Numbers out of a netCDF classic file with 64-bit offsets ("CDF-2"), every length held against what there is."""
+"""Read numbers from a netCDF classic file with 64-bit offsets ("CDF-2"); every length is checked against the file."""
 
 import struct
 from collections.abc import Mapping
@@ -11,12 +11,12 @@ _MAGIC = b"CDF\x02"
 _DIMENSION, _VARIABLE, _ATTRIBUTE, _DOUBLE = 10, 11, 12, 6
 _BYTES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 4, 6: 8}
 _TYPES = {3: ">i2", 4: ">i4", 5: ">f4", 6: ">f8"}
-# No model has as many.
+# Limits, beyond those of any model.
 _MOST, _MOST_RANK, _MOST_NAME = 256, 4, 256
 
 
 class ModelError(ValueError):
-    """A file that is no model, or not a whole one."""
+    """A file that is no model, or an incomplete one."""
 
 
 def read_doubles(data: bytes) -> dict[str, NDArray[np.float64]]:
@@ -29,7 +29,7 @@ def read_doubles(data: bytes) -> dict[str, NDArray[np.float64]]:
 
 
 def read_numbers(data: bytes) -> dict[str, NDArray[np.float64]]:
-    """Return the variables of numbers of any kind, as doubles; else as ``read_doubles`` does.
+    """Return the variables of any numeric type, as doubles; otherwise like ``read_doubles``.
 
     Raises:
         ModelError: as ``read_doubles``.
@@ -40,10 +40,12 @@ def read_numbers(data: bytes) -> dict[str, NDArray[np.float64]]:
 def check_shapes(
     found: Mapping[str, NDArray[np.float64]], shapes: Mapping[str, int | tuple[int, ...]], yet: str = ""
 ) -> None:
-    """See that there is each variable of ``shapes``, of that rank or shape, and finite; ``yet`` tells of what is not.
+    """Check that each variable of ``shapes`` exists, has that rank or shape, and is finite.
+
+    ``yet`` completes the sentence on an absent one.
 
     Raises:
-        ModelError: if not.
+        ModelError: if a check fails.
     """
     for name, shape in shapes.items():
         values = found.get(name)
@@ -76,7 +78,7 @@ def _read(data: bytes, kinds: tuple[int, ...]) -> dict[str, NDArray[np.float64]]
             found[name] = reader.numbers(_TYPES[kind], begin, shape)
             taken += found[name].size * _BYTES[kind]
         if taken > len(data):  # each a copy: a small file would fill the memory
-            raise ModelError("parts of the file overlap")
+            raise ModelError("parts of the file overlap: it is damaged")
     return found
 
 
@@ -99,11 +101,11 @@ class _Reader:
 
     def count(self, most: int = _MOST) -> int:
         if (found := self.number()) > most:
-            raise ModelError(f"the file counts {found} of what a model has at most {most} of")
+            raise ModelError(f"the file's header has a length of {found}, and a model's is at most {most}")
         return found
 
     def listed(self, tag: int) -> int:
-        """Return how many follow of what ``tag`` says, or none if the list is absent."""
+        """Return the length of the list with this ``tag`` that follows, 0 if it is absent."""
         found, count = self.number(), self.count()
         if found != tag and (found or count):
             raise ModelError("the file's header is damaged")

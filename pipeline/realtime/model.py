@@ -1,4 +1,4 @@
-"""A model file as an object that is asked for forces: refuses with a status and a sentence, and never extrapolates."""
+"""A model that answers queries of forces; outside its range it refuses with a status, and never extrapolates."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,12 +18,12 @@ from pipeline.realtime.several import TOUCHING, Pressing, TooLargeError, pressed
 from pipeline.realtime.table import Table
 from pipeline.realtime.touch import Touch, refused
 
-# How far the regular part of a bonded tool may be off, in units of (1 - 2ν) a/room².
+# Error of a bonded tool's regular part, in units of (1 - 2ν) a/room².
 _STICKS = 0.1
 
 
 class _Asked(NamedTuple):
-    """A query that makes sense: tool, place and depth (m), the face there, the way (m) to a side, E (Pa) and ν."""
+    """A valid query: tool, place and depth (m), the face there, the distance (m) to a side, E (Pa) and ν."""
 
     tool: Tool
     x: float
@@ -37,13 +37,15 @@ class _Asked(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A body's face: ``origin`` (3,) and ``axes`` (3, 3), rows x, y and the outward normal; sizes in m, E in Pa.
+    """A real-time model of a body's face. Sizes are in m, E in Pa.
 
-    ``sides`` are the half extents of the face, ``thickness`` the way to the support, or to where the tissue changes;
-    ``largest`` is the largest radius of contact in units of the way to the nearest side or there, ``bar`` the shares of
-    c, of h's part, of what is beyond it, and of F, that count as error. ``face`` tells the height of what is not flat.
-    A query may be ``off`` the face by so much (m), and its axis by the angle ``aligned`` (rad) off the normal.
-    ``bend_error`` (1/m) is how far the face's mean curvature may be off. Without ``pairs`` it knows one tool at a time.
+    - ``origin`` (3,), ``axes`` (3, 3): the middle of the face, and rows x, y and outward normal.
+    - ``sides``: half extents of the face; ``thickness``: depth of the support, or of other tissue.
+    - ``largest``: largest contact radius, in units of the distance to the nearest side or of the thickness.
+    - ``bar``: errors of c, of h's part, of higher orders, and of F.
+    - ``face``: height and curvature of a curved face; ``bend_error`` (1/m): error of its mean curvature.
+    - ``off`` (m), ``aligned`` (rad): tolerances of a query, distance from the face and angle to the normal.
+    - ``pairs``: interaction of several tools; without it, the model answers for one tool at a time.
     """
 
     table: Table
@@ -69,17 +71,17 @@ class Model:
         return f"Model of {region}, {tissue}{f' ({low:.3g} to {high:.3g})' if high > low else ''}"
 
     def query(self, tool: str, **asked: Any) -> Touch:
-        """Return what a ``tool`` feels: ``asked`` as :class:`pipeline.realtime.query.Query` has it.
+        """Return the force on a ``tool``; ``asked`` are the fields of :class:`pipeline.realtime.query.Query`.
 
-        Raises nothing where the model has no answer: see ``status``.
+        A refused query raises no error: see ``status``.
 
         Raises:
-            TypeError: if a query has no such keyword, or lacks its place or its depth.
+            TypeError: if a keyword is unknown, or place or depth is missing.
         """
         return self.answer(Query(tool, **asked))
 
     def answer(self, query: Query) -> Touch:
-        """Return what the tool of a ``query`` feels."""
+        """Return the answer of a ``query``."""
         asked = self._asked(query)
         if isinstance(asked, str):
             return refused(asked)
@@ -98,10 +100,10 @@ class Model:
     def query_all(
         self, tools: Sequence[Mapping[str, Any]], *, young: float | None = None, poisson: float | None = None
     ) -> list[Touch]:
-        """Return what each of ``tools`` feels, each as the keywords of a query but E and ν, while all of them press.
+        """Return the force on each of ``tools`` while all press at once; each is the keywords of a query, without E and ν.
 
-        Forces are those of one energy of all places and depths, and a ``stiffness`` is that of one tool while the
-        others are held. Where one tool has no answer the others' status is "others". Raises nothing: see ``status``.
+        The forces derive from one energy of all places and depths. ``stiffness`` is for one tool at fixed depths of the
+        others. If one tool has no answer, the status of the others is "others". Refused queries raise no error.
         """
         if len(tools) <= 1:
             return [self.query(**tool, young=young, poisson=poisson) for tool in tools]
@@ -122,10 +124,10 @@ class Model:
         return [refused(found.get(number, "others")) for number in range(len(tools))]
 
     def _several(self, asked: Sequence[_Asked], pairs: Pairs) -> list[Touch] | dict[int, str]:
-        """Return what tools feel together, or the statuses of those that refuse, by number.
+        """Return the forces on all tools, or the statuses of refused ones, by number.
 
         Raises:
-            TooLargeError: if a contact is; ArithmeticError: if the model's numbers make no sense.
+            TooLargeError: if a contact is too large; ArithmeticError: if the model's numbers are inconsistent.
         """
         places = [self._place(each) for each in asked]
         tools = [
@@ -154,7 +156,7 @@ class Model:
         return dict.fromkeys(broken, "damaged") if broken else found
 
     def _asked(self, query: Query) -> _Asked | str:
-        """Return a query that makes sense, or the status of one that the model does not answer."""
+        """Return a valid query, or the status of a refused one."""
         modulus = self.young if query.young is None else float(query.young)
         ratio = self.poisson if query.poisson is None else float(query.poisson)
         shape = self.shape(query)
@@ -171,14 +173,14 @@ class Model:
         return _Asked(shape, x, y, query.depth, spot, self.room(x, y), modulus, ratio)
 
     def shape(self, query: Query) -> Tool | str:
-        """Return the tool of a query, or the status of one that is none, or that the model has no tables for."""
+        """Return the tool of a query, or the status if it is invalid, or needs tables that the model lacks."""
         return query.shape(self.axes, has_tensors=len(self.table.tensors) > 0)
 
     def _place(self, asked: _Asked) -> Place:
-        """Return what is known of a query's place.
+        """Return the values of the table at a query's place.
 
         Raises:
-            ArithmeticError: if the table is not that of a body.
+            ArithmeticError: if the table is inconsistent.
         """
         place = self.table.at(asked.x, asked.y, asked.poisson, whole=asked.tool.asks_all)
         if self.face.is_flat:
@@ -186,7 +188,7 @@ class Model:
         return replace(place, bend=asked.spot.bend, slope_bend=asked.spot.slope_bend)
 
     def _touch(self, asked: _Asked, found: Contact, error: float) -> Touch:
-        """Return a contact in the body's coordinates, or that the numbers make no sense."""
+        """Return a contact in the body's coordinates, or the status of inconsistent numbers."""
         modulus = asked.young
         (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = self._frame
         out_x, out_y, out_z = (modulus * part for part in asked.spot.force(found, asked.depth))
@@ -204,7 +206,7 @@ class Model:
         return Touch("ok", force, error, modulus * found.stiffness, found.radius)
 
     def _error(self, asked: _Asked, place: Place, found: Contact, depth: float) -> float:
-        """Return the relative bar of a contact at a ``depth`` (m)."""
+        """Return the relative error bar of a contact at a ``depth`` (m)."""
         error = found.stiffness * self._uncertain(place, asked.room, found, sticks=asked.tool.sticks) + self.bar[3]
         if asked.tool.grows:
             # ∂F/∂κ is half the slope of ∫ p r² with the depth, which both grow by powers of the depth, n and 3 n + 1.
@@ -237,7 +239,7 @@ class Model:
         return xx * x + xy * y + xz * z, yx * x + yy * y + yz * z, zx * x + zy * y + zz * z
 
     def _misfit(self, off: float, depth: float, ratio: float, axis: Sequence[float] | None, spot: Spot) -> str:
-        """Return the status of a query that the model does not answer, or nothing."""
+        """Return the status of a query outside the model's range, "" if it is inside."""
         low, high = self.table.poisson
         if axis is not None:
             pointed = np.asarray(axis, dtype=float)
@@ -252,10 +254,10 @@ class Model:
         return "deep" if depth >= self.thickness else ""
 
     def _uncertain(self, place: Place, room: float, contact: Contact, *, sticks: bool = False) -> float:
-        """Return how far c may be off (1/m), what is left out of it included."""
+        """Return the error of c (1/m), with that of neglected orders."""
         of_c, of_h, beyond, _ = self.bar
         share = (contact.radius / room) ** 4
         bent = abs(place.h) + (2 * hypot(*place.shape.bent) if place.shape else 0.0)
-        # Tissue that sticks is pulled inwards or outwards as well, more the more its volume changes.
+        # Bonded contact has radial tractions, which grow with compressibility.
         pulled = _STICKS * (1 - 2 * place.poisson) * contact.radius / room if sticks else 0.0
         return (of_c + beyond * share + pulled) / room + of_h * bent * contact.mean_square

@@ -1,4 +1,4 @@
-"""What every tool meets and makes: a place of a body, a contact there, and what is to be known of a tool."""
+"""The interface of tools: a place of a body, a contact there, and the base class of tools."""
 
 from dataclasses import dataclass
 from math import inf, nan
@@ -17,10 +17,10 @@ MOMENTS = {"disc": 2 / 3, "sphere": 2 / 5, "cone": 1 / 3}
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What tools take that are not round, or stick: see ``pipeline.realtime.table``.
+    """Values for blades and bonded tools: see ``pipeline.realtime.table``.
 
-    ``bent`` holds A₁ and A_xy (1/m³), ``bent_slopes`` (2, 2) theirs; ``lean`` (2,) is ∇c (1/m²) and ``hessian`` (2, 2)
-    its slope, both 0 where the lean of the face is in h; ``regular`` (3, 3) is R (1/m).
+    ``bent`` are A₁ and A_xy (1/m³), ``bent_slopes`` (2, 2) their gradients; ``lean`` (2,) is ∇c (1/m²) and ``hessian``
+    (2, 2) its gradient, both 0 if h includes the tilt of the face; ``regular`` (3, 3) is R (1/m).
     """
 
     bent: Pair
@@ -32,9 +32,9 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """c (1/m), h (1/m³) and g² (1/m⁴) of a body with E = 1 at a place, their slopes along x and y, and E*.
+    """c (1/m), h (1/m³) and g² (1/m⁴) of a body with E = 1 at a place, their gradients, and E*.
 
-    ``bend`` (1/m) is the mean curvature of the face, positive where it is a dome, with its slope.
+    ``bend`` (1/m) is the mean curvature of the face, positive on a dome, with its gradient.
     """
 
     c: float
@@ -52,7 +52,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Contact:
-    """Force (N/Pa) against the tool, force aside on it, dF/dd (N/m/Pa), radius of contact (m) and ∫ p r² / F (m²)."""
+    """Force (N/Pa) on the tool, lateral force, dF/dd (N/m/Pa), contact radius (m), ∫ p r² / F (m²)."""
 
     force: float
     aside: Pair
@@ -62,9 +62,9 @@ class Contact:
 
 
 class Tool:
-    """What presses on a face: ``kind`` tells how its pressure goes, and ``sticks`` whether tissue does to it.
+    """A tool on a face: ``kind`` is its kind of pressure, ``sticks`` whether contact is bonded.
 
-    One that ``grows`` touches with more of itself the deeper it is; one that ``asks_all`` takes all tables of a place.
+    ``grows``: the contact grows with the depth; ``asks_all``: the tool needs all tables of a place.
     """
 
     kind: ClassVar[str] = "disc"
@@ -74,13 +74,13 @@ class Tool:
     asks_all: ClassVar[bool] = False
 
     def press(self, depth: float, place: Place, most: float) -> Contact | None:
-        """Return the contact at a ``depth`` (m), or nothing if its radius is more than ``most`` (m)."""
+        """Return the contact at a ``depth`` (m), None if its radius exceeds ``most`` (m)."""
         raise NotImplementedError
 
     def moment(self, force: float, plane: float) -> tuple[float, float]:
-        """Return the mean of r² (m²) under a ``force`` (N/Pa) on a half-space of E* ``plane`` for E = 1.
+        """Return the mean of r² (m²) under a ``force`` (N/Pa) on a half-space, and its exponent in the force.
 
-        With it comes which power of the force that is.
+        ``plane`` is E* for E = 1.
         """
         raise NotImplementedError
 
@@ -90,18 +90,18 @@ class Tool:
         return 0.5 * np.eye(2)
 
     def spread_of(self, radius: float) -> Array:
-        """Return the second moment ((xx, xy), (xy, yy)) in m², for a force of one, of a contact of a ``radius`` (m)."""
+        """Return the second moment ((xx, xy), (xy, yy)) in m², for a unit force, of a contact ``radius`` (m)."""
         return 0.5 * MOMENTS[self.kind] * radius**2 * np.eye(2)
 
     def discs(self, radius: float) -> tuple[float, Array]:
-        """Return the radius (m) and the centres (k, 2) of the equal parts that a contact's pressure is seen as."""
+        """Return radius (m) and centres (k, 2) of equal discs that represent a contact's pressure for display."""
         return radius, np.zeros((1, 2))
 
     @property
     def outline(self) -> tuple[Pair, Pair]:
-        """Half extents (m) along an edge and across, of which a round tool has none, and the edge's direction."""
+        """Half extents (m) along an edge and across, 0 for a round tool, and the edge's direction."""
         return (inf, inf), (1.0, 0.0)
 
     def lifted(self, away: Array) -> Array:
-        """Return by how much (m) more than its lowest point it moves what lies below it up, of points (n, 3)."""
+        """Return the height (m) of the tool's surface above its lowest point, minus that of points (n, 3) below it."""
         return np.zeros(len(away))

@@ -1,4 +1,4 @@
-"""What a model is asked: a tool, a place, a depth, and the tissue where it is not the study's."""
+"""A query of a model: tool, place, depth, and tissue if it is not the study's."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from pipeline.realtime.place import Tool
 
 # The smallest tool (m).
 _SMALLEST = 1e-6
-# What may be said of the contact of a tool.
+# The allowed contacts of each tool.
 _CONTACTS = {
     "disc": ("frictionless", "bonded"),
     "blade": ("frictionless",),
@@ -26,10 +26,11 @@ _CONTACTS = {
 class Query:
     """A ``tool`` with its sizes, pressed in by ``depth`` (m) along the inward normal ``at`` x, y, z (m).
 
-    ``radius`` (m) is that of a disc, a sphere, or the end of a cone of a half ``angle`` (rad) to its axis; a blade has
-    a ``length`` and a ``width`` (m) and lies ``along`` a direction, or the face's x. ``axis`` is the inward normal, if
-    it is given. Without ``young`` (Pa) or ``poisson`` those of the study count. ``contact`` is "frictionless" (a disc,
-    a blade) or "unilateral" (a sphere, a cone), or of a disc "bonded": such a one sticks where it is.
+    - ``radius`` (m): of a disc, a sphere, or the end of a cone; ``angle`` (rad): a cone's half angle to its axis.
+    - ``length``, ``width`` (m): of a blade; ``along``: the direction of its edge, by default the face's x.
+    - ``axis``: the tool's direction; if given, it must be the inward normal.
+    - ``young`` (Pa), ``poisson``: by default the study's.
+    - ``contact``: "frictionless" for disc and blade, "unilateral" for sphere and cone, or "bonded" for a disc.
     """
 
     tool: str
@@ -46,9 +47,9 @@ class Query:
     contact: str | None = None
 
     def shape(self, axes: NDArray[np.float64], *, has_tensors: bool) -> Tool | str:
-        """Return the tool on a face with ``axes`` (3, 3), or the status of one that is none.
+        """Return the tool on a face with ``axes`` (3, 3), or the status of an invalid one.
 
-        Blades, and discs that stick, are none if the model ``has_tensors`` not: the tables that they need.
+        Blades and bonded discs need tables that some models lack: ``has_tensors``.
         """
         if self.tool not in _CONTACTS or self.contact not in (None, *_CONTACTS[self.tool]):
             return "tool"
@@ -69,7 +70,7 @@ class Query:
         return ball(self.radius) if self.tool == "sphere" else cone(self.angle, self.radius)
 
     def _turn(self, axes: NDArray[np.float64]) -> float | None:
-        """Return the angle (rad) of a blade to the face's x; None if it lies along no direction of the face."""
+        """Return the angle (rad) of a blade to the face's x; None if its direction is not in the face."""
         if self.along is None:
             return 0.0
         given = np.asarray(self.along, dtype=float)

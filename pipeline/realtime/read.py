@@ -1,4 +1,4 @@
-"""A model out of a file: every number held against what a model's can be."""
+"""Read a model file; every number is checked."""
 
 from math import prod
 from pathlib import Path
@@ -13,9 +13,9 @@ from pipeline.realtime.pairs import read_pairs
 from pipeline.realtime.table import TENSORS, Table
 
 FORMAT = 2.0
-# Coefficients along one direction, and in all: the C side holds as many.
+# Largest number of coefficients along one direction, and in total; the same as in C.
 MOST, MOST_IN_ALL = 64, 4096
-# Numbers of a file that are the model's as they are.
+# Numbers of a file that are fields of a model.
 _NUMBERS = ("thickness", "young", "poisson", "largest", "off", "aligned")
 
 
@@ -23,16 +23,16 @@ def load(path: str | Path) -> Model:
     """Return the model at ``path``.
 
     Raises:
-        ModelError: if it is no model, or of another version, or damaged; OSError if it cannot be read.
+        ModelError: if it is no model, of another version, or damaged; OSError if it cannot be read.
     """
     return model_of(Path(path).read_bytes())
 
 
 def model_of(data: bytes) -> Model:
-    """Return the model that the bytes of a file hold.
+    """Return the model in the bytes of a file.
 
     Raises:
-        ModelError: if they are no model, or of another version, or damaged.
+        ModelError: if they are no model, of another version, or damaged.
     """
     found = read_doubles(data)
     shapes: dict[str, int | tuple[int, ...]]
@@ -41,7 +41,9 @@ def model_of(data: bytes) -> Model:
     shapes |= {name: rank for name, rank in (("tensors", 4), ("bend_error", ())) if name in found}
     shapes |= dict.fromkeys(("format", "is_round", "c_ref", "leans", *_NUMBERS), ())
     if "format" in found and found["format"].shape == () and found["format"] != FORMAT:
-        raise ModelError(f"the file has format {float(found['format']):g}, and this program reads {FORMAT:g}")
+        raise ModelError(
+            f"the file has format {float(found['format']):g}, and this program reads {FORMAT:g}: export it again"
+        )
     check_shapes(found, shapes)
     _check(found)
     reach, sides, ratios, bar = (found[name].tolist() for name in ("reach", "sides", "poisson_range", "bar"))
@@ -73,7 +75,7 @@ def model_of(data: bytes) -> Model:
 
 
 def numbers_of(model: Model) -> dict[str, NDArray[np.float64]]:
-    """Return the numbers of a model as a file has them, by name; without what it knows of several tools."""
+    """Return the numbers of a model's file, by name, without those for several tools."""
     table, face = model.table, model.face
     found = {name: getattr(model, name) for name in (*_NUMBERS, "bend_error", "sides", "origin", "axes", "bar")}
     found |= {name: getattr(table, name) for name in ("reciprocal", "curvature", "c_ref", "reach", "even", "leans")}
@@ -83,7 +85,7 @@ def numbers_of(model: Model) -> dict[str, NDArray[np.float64]]:
 
 
 def _check(found: dict[str, NDArray[np.float64]]) -> None:
-    """Hold the numbers of a file against what a model's can be."""
+    """Check that the numbers of a file are valid for a model."""
     shape, axes, (low, high) = found["reciprocal"].shape, found["axes"], found["poisson_range"]
     reach, sides = found["reach"], found["sides"]
     flags, face, tensors = found["even"], found["height"].shape, found.get("tensors")
@@ -104,9 +106,9 @@ def _check(found: dict[str, NDArray[np.float64]]) -> None:
         "young": bool(found["young"] > 0),
         "largest": bool(0 < found["largest"] <= 1),
         "bar": bool((found["bar"] >= 0).all()),
-        # A curved face that does not say how well it is known is of a time when it was known badly.
+        # Files of earlier versions lack it, and are too inaccurate for a curved face.
         "bend_error": bool(found["bend_error"] >= 0) if "bend_error" in found else not found["bend"].any(),
     }
     for name, is_right in fits.items():
         if not is_right:
-            raise ModelError(f"{name} is not that of a model")
+            raise ModelError(f"{name} has an invalid value: the file is damaged")

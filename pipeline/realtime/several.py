@@ -1,10 +1,11 @@
-"""Several tools at once on a flat face, E = 1: forces that know of each other.
+"""Several tools at once on a flat face, E = 1, with their interaction.
 
     U(F) = Σ U_i(F_i) + Σ_{i<j} F_i F_j (G + m_i w_i + m_j w_j)(x_i, x_j),    d_i = ∂U/∂F_i,    aside on i: ∂U/∂x_i
 
-Each tool feels its own model (``pipeline.realtime.contact``) at the depth that the others leave it. G is what a force
-at one place sinks another (``pipeline.realtime.pairs``); m is the second moment of a contact on a half-space, which
-depends on its force alone, and m w = ½ M:∇∇G what that makes of a half-space's G, M the tensor of the moment.
+Each tool follows its own model (``pipeline.realtime.contact``), at its depth minus the displacement by the others. G is
+the displacement of one place by a unit force at another (``pipeline.realtime.pairs``). m is the second moment of a
+contact on a half-space, which depends on its force only; M is its tensor, and m w = ½ M:∇∇G its effect on a
+half-space's G.
 """
 
 from collections.abc import Sequence
@@ -17,24 +18,24 @@ import numpy as np
 from pipeline.realtime.pairs import Influence
 from pipeline.realtime.place import Array, Contact, Pair, Place, Tool
 
-# A depth (m) below which nothing touches.
+# At smaller depths (m) there is no contact.
 TOUCHING = 1e-12
-# How far apart the middles of two contacts are at least, in units of both radii.
+# Least distance of two contacts' middles, in units of the sum of their radii.
 NEAR = 2.0
-# Steps of Newton's method; one of so little, relative to the largest force, leaves its square.
+# Newton steps; after a relative step below _NEXT, one more reaches rounding.
 _STEPS, _NEXT = 40, 1e-8
 _NOTHING = Contact(0.0, (0.0, 0.0), 0.0, 0.0, 0.0)
 
 
 class TooLargeError(Exception):
-    """The contact of a tool is too large for its place: which one, by its ``number``."""
+    """The contact of tool ``number`` is too large for its place."""
 
     def __init__(self, number: int):
         self.number = number
 
 
 class Pressing(NamedTuple):
-    """A tool with the ``depth`` (m) that it has by itself, its place, and the largest radius (m) of its contact."""
+    """A tool with its ``depth`` (m), its place, and its largest contact radius (m)."""
 
     tool: Tool
     place: Place
@@ -43,25 +44,25 @@ class Pressing(NamedTuple):
     room: float
 
     def press(self, depth: float) -> Contact | None:
-        """Return the contact at a depth (m), or nothing if it is too large.
+        """Return the contact at a depth (m), None if it is too large.
 
         Raises:
-            ArithmeticError: if the depth is no number.
+            ArithmeticError: if the depth is not finite.
         """
         if not abs(depth) < inf:
             raise ArithmeticError("a depth is not finite")
         return self.tool.press(depth, self.place, self.most) if depth > TOUCHING else _NOTHING
 
     def moment(self, force: float) -> tuple[float, float]:
-        """Return the mean of r² (m²) under a ``force`` (N/Pa) on a half-space, and which power of the force it is."""
+        """Return the mean of r² (m²) under a ``force`` (N/Pa) on a half-space, and its exponent in the force."""
         return self.tool.moment(max(force, 0.0), self.place.plane)
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """All ``contacts`` at the ``depths`` (n,), in m, that are left to each, and their ``moments`` (n,), in m².
+    """All ``contacts`` in equilibrium, their own ``depths`` (n,), in m, and their ``moments`` (n,), in m².
 
-    ``asides`` (n, 2), in N/Pa, are the forces aside; ``inverse`` (n, n) is ∂F/∂F of what each would have alone.
+    ``asides`` (n, 2), in N/Pa, are the lateral forces; ``inverse`` (n, n) is ∂F/∂F_alone.
     """
 
     contacts: list[Contact]
@@ -77,15 +78,15 @@ class Settled:
 
     @property
     def stiffnesses(self) -> Array:
-        """dF/dd (n,), N/m/Pa, of each tool while the others are held at their depths."""
+        """dF/dd (n,), N/m/Pa, of each tool at fixed depths of the others."""
         return np.diag(self.inverse) * [contact.stiffness for contact in self.contacts]
 
 
 def pressed(tools: Sequence[Pressing], depths: Sequence[float]) -> list[Contact]:
-    """Return what each tool feels by itself.
+    """Return the contact of each tool by itself.
 
     Raises:
-        TooLargeError: if a contact is; ArithmeticError: if a depth is no number, or a table not that of a body.
+        TooLargeError: if a contact is too large; ArithmeticError: if a depth is not finite, or a table inconsistent.
     """
     found = []
     for number, (tool, depth) in enumerate(zip(tools, depths, strict=True)):
@@ -97,19 +98,19 @@ def pressed(tools: Sequence[Pressing], depths: Sequence[float]) -> list[Contact]
 
 
 def too_near(contacts: Sequence[Contact], apart: Array) -> list[int]:
-    """Return the numbers of contacts that are nearer to another one, ``apart`` (n, n) in m, than a model is for."""
+    """Return the numbers of contacts that are too close to another one; ``apart`` (n, n) are distances in m."""
     radii = np.array([contact.radius for contact in contacts])
     both = np.logical_and.outer(radii > 0, radii > 0)
     return np.flatnonzero((both & (apart < NEAR * np.add.outer(radii, radii))).any(axis=1)).tolist()
 
 
 def settle(tools: Sequence[Pressing], alone: Sequence[Contact], between: Influence) -> Settled:
-    """Return what tools feel together, from what each feels ``alone``: Newton's method.
+    """Return the equilibrium of all tools by Newton's method, from each contact ``alone``.
 
-    A tool that the others take the face from has no force; one that they lift the face to has one.
+    Other tools may move the face away from a tool, which then has no force, or up to one above the face.
 
     Raises:
-        TooLargeError: if a contact is; ArithmeticError: if the numbers are not those of a body.
+        TooLargeError: if a contact is too large; ArithmeticError: if the numbers are inconsistent.
     """
     given, forces = np.array([tool.depth for tool in tools]), np.array([contact.force for contact in alone])
     bent, slope_bent = _bent(tools, between)
@@ -133,11 +134,11 @@ def settle(tools: Sequence[Pressing], alone: Sequence[Contact], between: Influen
             break
         forces = forces - step
         is_last = bool(np.abs(step).max() <= _NEXT * np.abs(forces).max())
-    raise ArithmeticError("the tools come to no rest")
+    raise ArithmeticError("no equilibrium of the tools found")
 
 
 def _bent(tools: Sequence[Pressing], between: Influence) -> tuple[Array, Array]:
-    """Return w_i (n, n), in 1/m³, of a tool i at the place of j, and its slope (n, n, 2) with x_i."""
+    """Return w_i (n, n), in 1/m³, of a tool i at the place of j, and its gradient (n, n, 2) with respect to x_i."""
     away, near = between.away / between.apart[..., None], between.near / between.apart**2
     tensors = np.array([tool.tool.tensor for tool in tools])
     along = np.einsum("iab,ijb->ija", tensors, away)
@@ -149,7 +150,7 @@ def _bent(tools: Sequence[Pressing], between: Influence) -> tuple[Array, Array]:
 def _asides(
     tools: Sequence[Pressing], contacts: Sequence[Contact], means: Array, between: Influence, slope_bent: Array
 ) -> list[Pair]:
-    """Return the forces aside; what the others add to that on a disc that sticks is in its bar."""
+    """Return the lateral forces; for a bonded disc the others' effect is part of its error bar instead."""
     forces = np.array([contact.force for contact in contacts])
     moments = means * forces
     more = forces[:, None] * np.einsum("j,ija->ia", forces, between.slopes)

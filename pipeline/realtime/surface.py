@@ -1,7 +1,7 @@
-"""What is seen of a touch: the displacement of a body's whole surface, 60 times a second; numpy alone.
+"""The displacement of a body's whole surface for a touch, 60 times a second; numpy only.
 
-Near the tool it is that of a half-space (``pipeline.realtime.near``); what else the body is, sides, support, its own
-curvature, adds the regular part R of its Green's function, which the file keeps as a few modes of the surface.
+It is that of a half-space (``pipeline.realtime.near``) plus the regular part R of the body's Green's function, which
+the file contains as a few modes of the surface: the effect of sides, support and curvature.
 """
 
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ from pipeline.realtime.table import middle_of, polynomials
 from pipeline.realtime.touch import Touch
 
 Array = NDArray[np.float64]
-# What is nearer to the face than this, in units of the thickness, lies on it.
+# A vertex is on the face if its distance, in units of the thickness, is at most this.
 _ON_FACE = 1e-6
-# Of the face or the thickness: no vertex is so far away.
+# No vertex is farther away than this, in units of the face or the thickness.
 _FAR = 1e3
 _POINT: Array = np.zeros((2, 2))
 PARTS = {"points": 2, "triangles": 2, "modes": 3, "amounts": 4, "error": 0}
@@ -34,7 +34,7 @@ class SurfaceTable:
     """Vertices ``points`` (n, 3) in m from the face's middle, along its axes, and outward ``triangles`` (m, 3).
 
     ``modes`` (n, 3, rank), whole numbers, times ``amounts`` (rank, ν, y, x), Chebyshev coefficients over ``poisson``
-    and ``reach``, are R in m/N for E = 1. ``error`` is the most that R × room was off at places held out.
+    and ``reach``, are R in m/N for E = 1. ``error`` is the largest error of R × room at held-out places.
     """
 
     points: NDArray[np.float32]
@@ -52,7 +52,7 @@ class SurfaceTable:
         return flat.astype(np.float64).reshape(-1, 3)
 
     def amounts_at(self, x: float, y: float, poisson: float, spread: Array = _POINT) -> Array:
-        """Return how much there is of each mode (rank,), for a force as ``far`` takes it."""
+        """Return the amount of each mode (rank,), for a force as in ``far``."""
         middle = middle_of(self.poisson, poisson)
         (a, b), (rank, counts, rows, columns) = self.reach, self.amounts.shape
         along, across = polynomials(x / a, columns), polynomials(y / b, rows)
@@ -65,7 +65,7 @@ class SurfaceTable:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A model with its visible surface: ``points`` (n, 3) in m, in the body's coordinates, and ``triangles`` (m, 3)."""
+    """A model with its deforming surface: ``points`` (n, 3) in m, in the body's coordinates, and ``triangles`` (m, 3)."""
 
     model: Model
     table: SurfaceTable
@@ -98,7 +98,7 @@ class Surface:
         moved = foot.field(away, ratio, _ON_FACE * model.thickness) @ turn
         moved += table.far(x, y, ratio, foot.spread)
         moved *= force
-        # What the tool covers goes with it.
+        # The surface below the tool follows it.
         below = foot.within(away)
         more = foot.tool.lifted(away[below]) - query.depth - moved[below] @ turn[2]
         moved[below] += more[:, None] * turn[2]
@@ -108,19 +108,19 @@ class Surface:
 
 
 def load_surface(path: str | Path) -> Surface:
-    """Return the model at ``path`` with its visible surface.
+    """Return the model at ``path`` with its deforming surface.
 
     Raises:
-        ModelError: if it is no model, or damaged, or has no surface; OSError if it cannot be read.
+        ModelError: if it is no model, is damaged, or has no surface; OSError if it cannot be read.
     """
     return surface_of(Path(path).read_bytes())
 
 
 def surface_of(data: bytes) -> Surface:
-    """Return the model that the bytes of a file hold, with its visible surface.
+    """Return the model in the bytes of a file, with its deforming surface.
 
     Raises:
-        ModelError: if they are no model, or damaged, or if it has no surface.
+        ModelError: if they are no model, are damaged, or have no surface.
     """
     model, found = model_of(data), read_numbers(data)
     parts = {}
@@ -129,17 +129,17 @@ def surface_of(data: bytes) -> Surface:
         if values is None:
             raise ModelError("the model has no surface: export it again, without --no-surface")
         if values.ndim != rank or not np.isfinite(values).all():
-            raise ModelError(f"surface_{name} is not that of a model")
+            raise ModelError(f"surface_{name} has an invalid shape or value: the file is damaged")
         parts[name] = values
     points, triangles, modes, amounts = (parts[name] for name in ("points", "triangles", "modes", "amounts"))
     count, rank = len(points), len(amounts)
     fits = points.shape[1] == 3 and triangles.shape[1] == 3 and modes.shape == (count, 3, rank)
     if not fits or min(map(min, (points.shape, amounts.shape))) < 1 or float(parts["error"]) < 0:
-        raise ModelError("the surface's lengths contradict each other")
+        raise ModelError("the surface's arrays have inconsistent lengths: the file is damaged")
     if np.abs(points).max() > _FAR * max(*model.sides, model.thickness):
-        raise ModelError("the surface's points are not those of the model's body")
+        raise ModelError("the surface's points do not belong to the model's body: the file is damaged")
     if triangles.min(initial=0) < 0 or triangles.max(initial=0) >= count:
-        raise ModelError("a triangle of the surface has a vertex that there is not")
+        raise ModelError("a triangle of the surface has an absent vertex: the file is damaged")
     table = SurfaceTable(
         points.astype(np.float32),
         triangles.astype(np.int32),

@@ -1,16 +1,16 @@
-"""c and h of a body at any place of its region, with slopes, from Chebyshev tables over (ν, v, u).
+"""c and h of a body at any place of its region, with gradients, from Chebyshev tables over (ν, v, u).
 
-Tabulated are t = 1/(c + c_ref), which stays smooth where c grows towards an edge, and q = h t³, a pure number. Where a
-body is its own mirror image u and v are even in x and y, 2(x/X)² - 1 and 2(y/Y)² - 1, else x/X and y/Y; of a round body
-there is u = 2(x² + y²)/X² - 1 alone.
+The tables are t = 1/(c + c_ref), which is smooth where c grows towards an edge, and q = h t³, dimensionless. In a
+direction in which the body is symmetric, u and v are 2(x/X)² - 1 and 2(y/Y)² - 1, else x/X and y/Y. A round body has
+only u = 2(x² + y²)/X² - 1.
 
-What tools take that are not round, or stick, are seven more, each t³ times the first two and t times the rest of
+Blades and bonded tools need seven more tables: t³ times the first two, and t times the others, of
 
-    A₁ = (A_xx - A_yy)/2, A_xy, R_xz, R_yz, (R_xx + R_yy)/2, (R_xx - R_yy)/2, R_xy,
+    A₁ = (A_xx - A_yy)/2, A_xy, R_xz, R_yz, (R_xx + R_yy)/2, (R_xx - R_yy)/2, R_xy.
 
-R the regular part of the Green's function at the place itself, A the second derivatives of R_zz with the place alone
-(h = A_xx + A_yy), but for what mirror images make of them: with ξ = x/X and η = y/Y the factors 1, 2ξη, ξ, η, 1, 1,
-2ξη, for a round body ξ² - η², 2ξη, ξ, η, 1, ξ² - η², 2ξη. Where there is no image, 1 is in the place of ξ or η.
+R is the regular part of the Green's function at the force, A the second derivatives of R_zz with respect to the field
+point (h = A_xx + A_yy). Each table is divided by the factor that symmetry implies. With ξ = x/X and η = y/Y the factors
+are 1, 2ξη, ξ, η, 1, 1, 2ξη; for a round body ξ² - η², 2ξη, ξ, η, 1, ξ² - η², 2ξη; without symmetry, 1 replaces ξ or η.
 """
 
 from dataclasses import dataclass, field
@@ -20,10 +20,10 @@ import numpy as np
 
 from pipeline.realtime.place import Array, Pair, Place, Shape, Square
 
-# A value, its slope, and its second derivatives xx, xy, yy.
+# A value, its gradient, and its second derivatives xx, xy, yy.
 Local = tuple[float, Pair, tuple[float, float, float]]
 TENSORS = 7
-# Derivatives along v and u, of which value and slope are made, and of the first of some tables how that bends.
+# Orders of derivatives along v and u: for value and gradient; for the first table, also for second derivatives.
 _SLOPES, _BENDS = ((0, 0), (0, 1), (1, 0)), ((0, 2), (1, 1), (2, 0))
 _NONE: Pair = (0.0, 0.0)
 
@@ -32,7 +32,7 @@ _NONE: Pair = (0.0, 0.0)
 class Table:
     """Coefficients (ν, v, u) of ``reciprocal`` t (m) and of ``curvature`` q; half extents X, Y (m) of the region.
 
-    ``tensors`` (7, ν, v, u) may be empty. ``leans`` tells that the tilt of the face is not in h yet, but to be added.
+    ``tensors`` (7, ν, v, u) may be empty. ``leans``: h does not include the tilt of the face, which is added.
     """
 
     reciprocal: Array
@@ -46,24 +46,24 @@ class Table:
     tensors: Array = field(default_factory=lambda: np.zeros((0, 1, 1, 1)))
 
     def holds(self, x: float, y: float) -> bool:
-        """Tell whether a place (m) is in the region."""
+        """Return whether a place (m) is in the region."""
         if self.is_round:
             return bool(x**2 + y**2 <= self.reach[0] ** 2)
         return abs(x) <= self.reach[0] and abs(y) <= self.reach[1]
 
     def prepare(self) -> None:
-        """Make what all queries share: some milliseconds, which the first one would wait for."""
+        """Compute in advance the arrays of all queries, so that the first one does not take milliseconds more."""
         _ = self._round
         if len(self.tensors):
             _ = self._all
 
     def at(self, x: float, y: float, poisson: float, *, whole: bool = False) -> Place:
-        """Return what is known of a place (m) in the region, for a Poisson's ratio in the range.
+        """Return the values at a place (m) in the region, for a Poisson's ratio in the range.
 
-        ``whole`` asks for what tools take that are not round, or stick, too.
+        ``whole`` includes those for blades and bonded tools.
 
         Raises:
-            ArithmeticError: if the table is not that of a body.
+            ArithmeticError: if the table is inconsistent.
         """
         middle = middle_of(self.poisson, poisson)
         (t, slope_t, of_t), (q, slope_q, _), *others = self.local(self._all if whole else self._round, x, y, middle)
@@ -95,9 +95,9 @@ class Table:
         return derived(np.concatenate([[self.reciprocal], [self.curvature], self.tensors]))
 
     def local(self, tables: Array, x: float, y: float, middle: float = 0.0) -> list[Local]:
-        """Return of each of ``tables``, as ``derived`` gives them, what it is at a place (m); ν is from -1 to 1.
+        """Return the values of ``tables``, as ``derived`` gives them, at a place (m); ν is scaled to -1 … 1.
 
-        Second derivatives are those of the first table, and 0 of the others.
+        Second derivatives are for the first table only, 0 for the others.
         """
         a, b = self.reach
         if self.is_round:
@@ -113,7 +113,7 @@ class Table:
         return [self._along(found[3:6], found[:3], x, y), *own]
 
     def _along(self, slopes: list[float], bends: list[float], x: float, y: float) -> Local:
-        """Return a value, its slope, and its second derivatives xx, xy, yy, from those along u and v."""
+        """Return a value, its gradient, and its second derivatives xx, xy, yy, from those along u and v."""
         (f, fu, fv), (fuu, fuv, fvv) = slopes, bends
         a, b = self.reach
         bend = 4 / a**2
@@ -125,7 +125,7 @@ class Table:
         return f, (fu * ux, fv * vy), (fuu * ux**2 + fu * uxx, fuv * ux * vy, fvv * vy**2 + fv * vyy)
 
     def _shape(self, others: list[Local], at: Pair, t: float, slope_t: Pair, lean: Pair, hessian: Square) -> Shape:
-        """Return what tools take that are not round, from the tables but the first two."""
+        """Return the values for blades and bonded tools, from the tables after the first two."""
         (a, b), cube = self.reach, t**3
         known = factors((at[0] / a, at[1] / b), self.reach, self.even, self.is_round)
         apart, twist, xz, yz, mean, half, xy = (
@@ -148,7 +148,7 @@ class Table:
 def derived(tables: Array) -> Array:
     """Return the coefficients of derivatives of ``tables`` (n, ν, v, u) along v and u (3 + 3 n, ν, v, u).
 
-    First stand uu, uv and vv of the first table, then of each table itself, along u and along v.
+    The order is uu, uv and vv of the first table, then for each table its value, u and v derivative.
     """
     orders = [(tables[0], order) for order in _BENDS] + [(table, order) for table in tables for order in _SLOPES]
     found = np.zeros((len(orders), *tables.shape[1:]))
@@ -162,7 +162,7 @@ def derived(tables: Array) -> Array:
 def factors(
     at: tuple[float, float], reach: tuple[float, float], even: tuple[bool, bool], is_round: bool
 ) -> list[tuple[float, Pair]]:
-    """Return what each of the seven tables is times, with its slope (1/m), at ξ and η."""
+    """Return the factor of each of the seven tables, with its gradient (1/m), at ξ and η."""
     (xi, of_x), (eta, of_y) = (
         (share, 1 / size) if is_even else (1.0, 0.0) for share, size, is_even in zip(at, reach, even, strict=True)
     )
@@ -173,7 +173,7 @@ def factors(
 
 
 def middle_of(poissons: Pair, poisson: float) -> float:
-    """Return where in a range a Poisson's ratio is: -1 at its lower end, 1 at its upper one, 0 where there is none."""
+    """Return a Poisson's ratio scaled to its range: -1 at the lower end, 1 at the upper one; 0 for an empty range."""
     low, high = poissons
     return 0.0 if high == low else (2 * poisson - low - high) / (high - low)
 

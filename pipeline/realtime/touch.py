@@ -1,4 +1,4 @@
-"""What a query found: a force with its bar, or a status and a sentence."""
+"""The answer of a query: a force with its error bar, or a status and a sentence."""
 
 from dataclasses import dataclass
 from math import nan
@@ -10,28 +10,28 @@ SENTENCES = {
     "ok": "",
     "lost": "The tool does not touch.",
     "outside": "The place is outside the model's region: move the tool into it; `print(model)` tells its size.",
-    "large": "The tool, or its contact, is too large for a place so near to a side or the bottom.",
-    "deep": "The depth is more than the model was made for.",
-    "tool": "The model knows no such tool, or it lacks a size: disc(radius), sphere(radius), cone(radius, angle), "
+    "large": "The tool, or its contact, is too large here: a side, the bottom or other tissue is too near.",
+    "deep": "The depth exceeds the model's range.",
+    "tool": "The model has no such tool, or a size is missing: disc(radius), sphere(radius), cone(radius, angle), "
     "blade(length, width).",
-    "input": "A number of the query is not finite, or not positive where it must be.",
+    "input": "A number of the query is not finite, or must be positive.",
     "poisson": "Poisson's ratio is outside the model's range.",
     "tilted": "The tool must press along the face's inward normal.",
     "off": "The place is not on the face.",
-    "damaged": "The model's numbers make no sense here: export it again.",
-    "near": "Two tools are too near to each other: their middles must be twice as far apart as both contacts measure.",
-    "others": "Another tool has no answer, and without its force there is none here.",
-    "alone": "The model answers for one tool at a time: its face is curved, or it was exported by an earlier version.",
+    "damaged": "The model's numbers are inconsistent here: export it again.",
+    "near": "Two tools are too close: the distance of their middles must be twice the sum of both contact radii.",
+    "others": "There is no answer for another tool, on whose force this one depends.",
+    "alone": "The model answers for one tool at a time: its face is curved, or an earlier version exported it.",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """What a query found; all numbers are NaN unless ``status`` is "ok" or "lost", and ``message`` says why.
+    """The answer of a query; all numbers are NaN unless ``status`` is "ok" or "lost", and ``message`` says why.
 
-    ``force`` (3,), in N, is what the tissue does to the tool, in the body's coordinates; ``force_error`` is relative,
-    of its length along the normal, and holds for the force aside on a bonded disc, too; ``stiffness`` (N/m) is dF/dd at
-    fixed place; ``contact_radius`` is in m.
+    ``force`` (3,), in N, is the force of the tissue on the tool, in the body's coordinates. ``force_error`` is relative
+    to its normal component; it also covers the lateral force on a bonded disc. ``stiffness`` (N/m) is dF/dd at a fixed
+    place; ``contact_radius`` is in m.
     """
 
     status: str
@@ -49,12 +49,12 @@ class Touch:
 
     @property
     def message(self) -> str:
-        """A sentence on the status, or nothing if it is "ok"."""
+        """A sentence on the status, "" if it is "ok"."""
         return SENTENCES[self.status]
 
 
 def refused(status: str) -> Touch:
-    """Return what there is of a query without an answer: NaN, or of a tool that does not touch 0."""
+    """Return the answer of a refused query: NaN, or 0 if the tool does not touch."""
     if status == "lost":
         return Touch(status, np.zeros(3), 0.0, 0.0, 0.0)
     return Touch(status, np.full(3, nan))

@@ -89,6 +89,6 @@ def test_a_library_that_is_missing_is_named_with_what_installs_it(small, tmp_pat
         check=False,
     )
     assert done.returncode == 2, done.stderr
-    assert "the library gmsh is missing" in done.stderr
+    assert "the Python library gmsh is missing" in done.stderr
     assert "make setup" in done.stderr and "environment.yml" in done.stderr
     assert "Traceback" not in done.stderr
