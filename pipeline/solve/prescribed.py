@@ -18,7 +18,7 @@ from pipeline.solve.balance import MOST_ROUNDS, check_balance, rest, sums
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.elements.base import Column, Elements, Equilibrium, Products, Solver, close_far
 from pipeline.solve.elements.displacement import DisplacementElements
-from pipeline.solve.load_steps import LoadSteps, LoadPath
+from pipeline.solve.load_steps import LoadPath, LoadSteps
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import LoadResponse, Response, load_response_of, reaction

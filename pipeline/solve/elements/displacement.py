@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve.compiled import vector
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate, Fields, Solver, level_of
+from pipeline.solve.elements.base import Column, Elements, Fields, HierarchicalEstimate, Solver, level_of
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import DIRECT_LIMIT
 from pipeline.solve.linear_solver import Level, LinearSolver

@@ -21,7 +21,7 @@ from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate, Fields, Solver
+from pipeline.solve.elements.base import Column, Elements, Fields, HierarchicalEstimate, Solver
 from pipeline.solve.elements.pressures import Pressures
 from pipeline.solve.krylov import keep
 from pipeline.solve.linear_solver import Level
