@@ -42,18 +42,18 @@ def answer(guide: Guideline) -> str:
     if not isfinite(guide.accuracy):
         return (
             f"{_named(guide, chosen)} is the most accurate setting within {time(guide.budget)} a case: F is within "
-            f"{percent(chosen.error)} of F_exact in {_all(guide.scenes)}, error bars included."
+            f"{percent(chosen.error)} of F_exact{_all(guide.scenes)}, error bars included."
         )
     smallest = "the smallest ε" if "epsilon" in chosen.labels else "the cheapest setting"
     allowed = " and ".join([percent(guide.accuracy), *([time(guide.budget)] if isfinite(guide.budget) else [])])
     return (
-        f"{_named(guide, chosen)} is {smallest} that suffices: F is within {percent(chosen.error)} of F_exact in "
+        f"{_named(guide, chosen)} is {smallest} that suffices: F is within {percent(chosen.error)} of F_exact"
         f"{_all(guide.scenes)}, error bars included ({allowed} allowed)."
     )
 
 
 def _no_answer(guide: Guideline) -> str:
-    limits = [f"keeps F within {percent(guide.accuracy)} of F_exact in {_all(guide.scenes)}"]
+    limits = [f"keeps F within {percent(guide.accuracy)} of F_exact{_all(guide.scenes)}"]
     limits = limits if isfinite(guide.accuracy) else []
     limits += [f"takes at most {time(guide.budget)} a case"] if isfinite(guide.budget) else []
     none = f"No mesh setting {' and '.join(limits)}"
@@ -241,7 +241,7 @@ def _named(guide: Guideline, verdict: Verdict) -> str:
 
 
 def _all(count: int) -> str:
-    return {1: "the one scene", 2: "both scenes"}.get(count, f"all {count} scenes")
+    return {1: "", 2: " in both scenes"}.get(count, f" in all {count} scenes")
 
 
 def _short(guide: Guideline, verdict: Verdict | None) -> str:

@@ -21,8 +21,8 @@ _MM = 1e3
 _GROUPS = {PROBE: 1, FIXED: 2, CUT: 3}
 # Strains are shown over this range below the largest, which the singular edge of the probe has.
 _STRAINS = 1e-3
-# Below this (m) displacements are read in µm.
-SMALL = 1e-4
+# Below this (m) a scale of lengths is read in µm, as in scene.js.
+_SMALL = 1e-4
 # The largest displacement, in its units.
 _HALF = 32767
 # Bits of a coordinate along Morton's curve.
@@ -69,6 +69,11 @@ def shift_unit(fields: Fields) -> float:
     return 1.0 if fields.displacement is None else float(np.abs(fields.displacement).max()) / _HALF
 
 
+def unit_of_length(largest: float) -> tuple[str, float]:
+    """Return the unit in which lengths up to ``largest`` (m) are read, and its factor."""
+    return ("µm", 1e6) if largest < _SMALL else ("mm", _MM)
+
+
 def colours_of(fields: Fields) -> list[dict[str, Any]]:
     """Return what can colour the body, each with its scale or its labels."""
     names, sizes = list(fields.region_names), _MM * fields.sizes
@@ -77,7 +82,7 @@ def colours_of(fields: Fields) -> list[dict[str, Any]]:
     if fields.displacement is None or fields.strain is None:
         return [regions, size]
     largest, worst = float(fields.magnitude.max()), 100 * float(fields.strain.max())
-    unit, factor = ("µm", 1e6) if largest < SMALL else ("mm", _MM)
+    unit, factor = unit_of_length(largest)
     strain = _scale("largest principal strain", "%", _STRAINS * worst, worst, YLORRD, array="strains")
     return [regions, _scale("displacement", unit, 0.0, factor * largest, YLGNBU), strain, size]
 

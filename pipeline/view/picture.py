@@ -18,7 +18,7 @@ from pipeline.report.figures.style import DEFAULTS, save
 from pipeline.shapes.indenter import Indenter
 from pipeline.view.drawing import MM, Colouring, Drawing
 from pipeline.view.fields import Fields
-from pipeline.view.numbers import SMALL
+from pipeline.view.numbers import unit_of_length
 from pipeline.view.palette import FOOTPRINT, HELD, INK, TOOL, region_colours
 
 # Inches, at 200 dots each: 1200 × 720 pixels.
@@ -42,7 +42,7 @@ def draw_mesh(fields: Fields, path: Path, title: str) -> Path:
     else:
         colouring = Colouring(fields.regions, region_colours(len(names)), (-0.5, len(names) - 0.5), names=names)
     words = f"{len(fields.cells):,} elements" + (", fine everywhere" if fields.epsilon == inf else "")
-    return _compose(fields, Drawing(fields, colouring), colouring, "element size (mm)", (title, words), path)
+    return _compose(fields, Drawing(fields, colouring), colouring, "element size, mm", (title, words), path)
 
 
 def draw_deformed(fields: Fields, path: Path, title: str) -> tuple[Path, float]:
@@ -54,11 +54,11 @@ def draw_deformed(fields: Fields, path: Path, title: str) -> tuple[Path, float]:
     factor = fields.drawn_factor
     moved = fields.magnitude
     largest = float(moved.max())
-    unit, scale = ("µm", 1e6) if largest < SMALL else ("mm", MM)
+    unit, scale = unit_of_length(largest)
     colouring = Colouring(scale * moved, "YlGnBu", (0.0, scale * largest))
     words = "true to scale" if factor == 1 else f"displacement drawn {factor:,.0f} × as large"
     body = Drawing(fields, colouring, factor)
-    return _compose(fields, body, colouring, f"displacement ({unit})", (title, words), path), factor
+    return _compose(fields, body, colouring, f"displacement, {unit}", (title, words), path), factor
 
 
 def _compose(
@@ -115,11 +115,11 @@ def _add_scale(figure: Figure, colouring: Colouring, quantity: str) -> None:
 
 
 def _lines(fields: Fields) -> list[Artist]:
-    edge = "contact is looked for" if isinstance(fields.case.probe, Indenter) else "edge of the probe"
+    edge = "where contact may be" if isinstance(fields.case.probe, Indenter) else "edge of the probe"
     lines: list[Artist] = [
         Line2D([], [], color=FOOTPRINT, linewidth=1.6, label=edge),
         Patch(color=TOOL, alpha=0.5, label="probe"),
-        Patch(color=HELD, alpha=0.6, label="held"),
+        Patch(color=HELD, alpha=0.6, label="fixed"),
     ]
     if fields.epsilon < inf:
         lines.insert(0, Line2D([], [], color=INK, linewidth=1.6, label=f"ε = {MM * fields.epsilon:g} mm"))

@@ -109,7 +109,7 @@ def _one(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     ax = figure.subplots()
     ax.errorbar([0], [value], [np.nan_to_num(bar)], capsize=3, linestyle="none", **look(0))
     ax.set_xticks([0], [f"{value:.4g} {unit} ± {100 * share:.2g} %"])
-    ax.set_ylim(bottom=min(0.0, 1.1 * value))
+    ax.set_ylim(min(0.0, 1.2 * value), max(0.0, 1.2 * value))
     ax.set_ylabel(heading(dataset["force"]))
     finish(figure, title, "The force of the one case, with its 95 % error bar.", warning)
     return figure

@@ -12,6 +12,7 @@ import xarray as xr
 
 from pipeline.files import write_whole
 from pipeline.pages import hash_of, joined, render_page
+from pipeline.printable import counted
 from pipeline.report.figures import choose, figure
 from pipeline.report.figures.style import STYLE, stack
 from pipeline.report.guide import guide_if_any
@@ -75,6 +76,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         guide=guide,
         answer=guide.sentence if guide else summary(dataset),
         table=table,
+        many_cases=counted(len(table.order), "case"),
         main=next((name for name in _MAIN if name in names), "force"),
         first_rows=FIRST_ROWS,
         struck=struck(dataset),

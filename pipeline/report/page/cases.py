@@ -85,6 +85,11 @@ class Table:
         return json_in_page({"columns": columns, "order": self.order, "rows": FIRST_ROWS})
 
     @property
+    def is_swept(self) -> bool:
+        """Whether there is something to draw curves against."""
+        return any(column.is_axis and len(column.words or ()) > 1 for column in self.columns)
+
+    @property
     def filters(self) -> list[Column]:
         """The columns by whose words cases can be chosen."""
         return [column for column in self.columns if column.is_filter]

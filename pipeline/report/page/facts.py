@@ -66,9 +66,14 @@ def summary(dataset: xr.Dataset) -> str:
     known = int(np.isfinite(force).sum())
     if not known:
         return "No case has a force."
+    if size == 1:
+        bar = float(relative(dataset, "force_error").squeeze())
+        return (
+            f"F = {write('force', float(f'{force.item():.4g}'))}{f' ± {100 * bar:.2g} %' if np.isfinite(bar) else ''}."
+        )
     lowest, highest = (write("force", float(f"{value:.4g}")) for value in (np.nanmin(force), np.nanmax(force)))
     many = f"{known} of {size} cases have a force, from {lowest} to {highest}"
-    return f"F = {lowest}." if size == 1 else f"{many}." if known > 1 else f"One of {size} cases has a force, {lowest}."
+    return f"{many}." if known > 1 else f"One of {size} cases has a force, {lowest}."
 
 
 def by_status(dataset: xr.Dataset, status: str) -> list[dict[str, Any]]:

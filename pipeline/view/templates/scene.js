@@ -4,6 +4,8 @@
 const KINDS = { f4: Float32Array, i4: Int32Array, i2: Int16Array, u1: Uint8Array };
 const textOf = (id) => document.getElementById(id).textContent;
 const field = (name) => document.querySelector(`[name=${name}]`);
+// A length in mm, in the unit in which it is read.
+const length = (mm) => (Math.abs(mm) < 0.1 && mm ? `${short(1000 * mm)} µm` : `${short(mm)} mm`);
 const short = (value, digits = 3) => String(Number(value.toPrecision(digits)));
 
 async function inflate(id) {
@@ -265,12 +267,12 @@ class Stage {
         return `<line x2="${x}" y2="${y}"/><text x="${1.28 * x}" y="${1.28 * y}">${"xyz"[i]}</text>`;
       })
       .join("");
-    const length = 100 * this.scale();
-    const power = 10 ** Math.floor(Math.log10(length));
-    const round = power * [5, 2, 1].find((step) => step * power <= length);
+    const longest = 100 * this.scale();
+    const power = 10 ** Math.floor(Math.log10(longest));
+    const round = power * [5, 2, 1].find((step) => step * power <= longest);
     const bar = document.getElementById("bar");
     bar.style.width = `${round / this.scale()}px`;
-    bar.firstElementChild.textContent = round < 0.1 ? `${short(1000 * round)} µm` : `${short(round)} mm`;
+    bar.firstElementChild.textContent = length(round);
   }
 }
 

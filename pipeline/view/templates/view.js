@@ -32,7 +32,7 @@ class Page {
     document.getElementById("deformed").hidden = !told.factor;
     Object.assign(field("deformation"), { max: told.factor, value: told.start });
     field("ring").parentElement.hidden = !told.epsilon;
-    document.querySelector(".ring + span").textContent = `ε = ${short(told.epsilon || 0)} mm`;
+    document.querySelector(".ring + span").textContent = `ε = ${length(told.epsilon || 0)}`;
     for (const name of ["footprint", "held", "probe"]) document.querySelector(`i.${name}`).style.background = told.ink[name];
   }
   // All corners of the box round the body.
@@ -75,7 +75,7 @@ class Page {
     const { normal, stage } = this;
     const offset = field("offset").valueAsNumber;
     document.getElementById("place").hidden = !normal;
-    document.querySelector("#place output").textContent = `${offset.toFixed(2)} mm`;
+    document.querySelector("#place output").textContent = length(offset);
     stage.section.visible = Boolean(normal);
     // What of the surface lies in the plane gives way to the section.
     stage.uniforms.plane.value = normal ? [...normal, offset - 1e-5 * this.told.radius] : [0, 0, 0, 1];
