@@ -39,12 +39,13 @@ PAPER = (10.0, 0.8)
 
 def guideline(data: xr.Dataset) -> Figure:
     """F/F_max of free columns, by tissue and by tool, and the paper's claim."""
-    drawn, axes = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+    drawn, axes = plt.subplots(1, 2, figsize=(8.4, 4.2), layout="constrained")
     for ax, by in zip(axes, ("body", "probe"), strict=True):
         data.epsmesh.plot_ratio(ax, by=by, outside="free")
         ax.plot(*PAPER, "*", markersize=13, color="#d81b60", zorder=5)
-        ax.annotate("paper: 80 %", PAPER, (8, -10), textcoords="offset points", color="#d81b60", fontsize=8)
+        ax.annotate("paper: 80 %", PAPER, (8, -10), textcoords="offset points", color="#d81b60", fontsize=9)
         ax.set_ylim(0, 1.05)
+        ax.legend(fontsize=9, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
     return drawn
 
 
@@ -52,7 +53,7 @@ def one_number(data: xr.Dataset) -> Figure:
     """c of every tool over that of the smallest disc that slides, against the mean square distance of F, over ε²."""
     found = data.epsmesh.compliance("full")["compliance"].sel(outside="free")
     square = sinking(data).assign_coords(data.coords)["square"].sel(outside="free")
-    drawn, axes = plt.subplots(1, 2, figsize=(9, 3.2), sharey=True, layout="constrained")
+    drawn, axes = plt.subplots(1, 2, figsize=(8.4, 3.4), sharey=True, layout="constrained")
     for ax, nu in zip(axes, data["poisson"].values, strict=True):
         for epsilon, colour in zip((5e-3, 7e-3, 10e-3), COLOURS, strict=False):
             c, m = (part.sel(poisson=nu, epsilon=epsilon) for part in (found, square))
@@ -70,18 +71,18 @@ def one_number(data: xr.Dataset) -> Figure:
                 )
             ax.plot([], [], "-", color=colour, label=f"ε = {1e3 * epsilon:g} mm")
         ax.set_title(f"ν = {nu:g}", fontsize=9)
-        ax.set_xlabel("m²/ε²")
+        ax.set_xlabel("mean square distance of the load over ε², m²/ε²")
     for marker, kind in MARKS.items():
         axes[1].plot([], [], marker, color="black", fillstyle="none" if kind == "sticks" else "full", label=kind)
-    axes[0].set_ylabel("c beyond that of the disc of 0.5 mm (%)")
-    axes[0].legend(handles=axes[0].get_legend_handles_labels()[0], fontsize=8)
-    axes[1].legend(handles=axes[1].get_legend_handles_labels()[0][-len(MARKS) :], fontsize=8)
+    axes[0].set_ylabel("compliance c beyond that of\nthe smallest disc, %")
+    axes[0].legend(handles=axes[0].get_legend_handles_labels()[0], fontsize=9)
+    axes[1].legend(handles=axes[1].get_legend_handles_labels()[0][-len(MARKS) :], fontsize=9)
     return drawn
 
 
 def closure(data: xr.Dataset) -> Figure:
     """F/F_max of what may be beyond ε, of three scenes."""
-    drawn, axes = plt.subplots(1, 3, figsize=(9.5, 3.2), sharey=True, layout="constrained")
+    drawn, axes = plt.subplots(1, 3, figsize=(8.6, 3.4), sharey=True, layout="constrained")
     scenes = (("needle 1 mm", "10 mm thick"), ("trocar 3 mm", "10 mm thick"), ("blade 6 mm", "30 mm thick"))
     for ax, (probe, body) in zip(axes, scenes, strict=True):
         data.epsmesh.plot_ratio(ax, probe=probe, body=body)

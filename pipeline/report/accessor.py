@@ -13,7 +13,7 @@ from pipeline.report.guide import Guide, guide
 from pipeline.report.locate import Located, locate
 from pipeline.report.pareto import front, is_by_chance
 from pipeline.report.values import relative, with_words
-from pipeline.report.words import choices, formula
+from pipeline.report.words import choices, heading
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -151,8 +151,8 @@ class Accessor:
         _draw(ax, data, [d for d in others if d not in scene], scene)
         if variable == "force_ratio":
             ax.axhline(1.0, color="black", linewidth=0.7)
-        ax.set_xlabel("ε, mm")
-        ax.set_ylabel(formula(variable) if variable in ("force_ratio", "force_exact_ratio") else variable)
+        ax.set_xlabel(heading(data["epsilon"]))
+        ax.set_ylabel(heading(data))
         if ax.get_legend_handles_labels()[1]:
             ax.legend(fontsize=9)
         return ax

@@ -46,7 +46,7 @@ class Located:
             ax = plt.figure(figsize=(5, 3.4), layout="constrained").subplots()
         if (drawn := draw_excess(ax, self.excess, self.bar, self.point)) is not None:
             ax.get_figure().colorbar(drawn, ax=ax, label="excess of F, %")
-            ax.legend(fontsize=9, loc="upper left")
+            ax.legend(fontsize=9, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=2, facecolor="#9aa0a6")
         return ax
 
     def __str__(self) -> str:

@@ -69,12 +69,6 @@ def heading(array: xr.DataArray) -> str:
     return f"{text}, {unit}" if unit else text
 
 
-def formula(name: str) -> str:
-    """Return the symbol of a variable as a formula, with its indices set low."""
-    low = re.sub(r"_(\w+)", r"_{\1}", quantities.symbol(name))
-    return f"${low}$"
-
-
 def at_most(error: xr.DataArray) -> str:
     """Write the largest of relative errors, `` (at most 0.08 %)``; '' where none is known."""
     largest = float(error.max())

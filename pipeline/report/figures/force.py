@@ -44,7 +44,7 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     more = f"Not shown: against {', '.join(map(symbol, dims[_MOST_PANELS:]))}." if dims[_MOST_PANELS:] else ""
     figure.set_figheight(figure.get_figheight() + _LINE * max(map(_legend_lines, axes[0])))
     part = dict.fromkeys(words for column in left_out for words in column)
-    tells = "The force against each quantity that the study varies; bars are 95 % error bars."
+    tells = "The force against each quantity that the study varies; bars are 95\N{NO-BREAK SPACE}% error bars."
     notes = (tells, band, f"Shown: {', '.join(part)}." if part else "", more)
     finish(figure, title, " ".join(filter(None, notes)), warning, legend=False)
     return figure
@@ -111,7 +111,7 @@ def _one(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     ax.set_xticks([0], [f"{value:.4g} {unit} ± {100 * share:.2g} %"])
     ax.set_ylim(min(0.0, 1.2 * value), max(0.0, 1.2 * value))
     ax.set_ylabel(heading(dataset["force"]))
-    finish(figure, title, "The force of the one case, with its 95 % error bar.", warning)
+    finish(figure, title, "The force of the one case, with its 95\N{NO-BREAK SPACE}% error bar.", warning)
     return figure
 
 

@@ -40,7 +40,7 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             ax.set_xlabel(heading(dataset["x"]) if row == 1 else "")
             ax.set_ylabel(heading(dataset["y"]) if column == 0 else "")
         figure.colorbar(drawn, ax=axes[row].tolist(), label=label)
-    tells = "The force at each place, seen from above, and below it its 95 % error bar."
+    tells = "The force at each place, seen from above, and below it its 95\N{NO-BREAK SPACE}% error bar."
     finish(figure, title, " ".join(filter(None, (tells, facets.note))), warning)
     return figure
 
