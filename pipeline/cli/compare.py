@@ -1,4 +1,4 @@
-"""The command that holds the results of two runs against each other."""
+"""The command that compares the results of two runs."""
 
 import typer
 
@@ -11,12 +11,11 @@ _HOWTO = "docs/howto/compare.md"
 
 
 def compare(a: Dataset, b: Dataset, output: Found = DEFAULT_OUTPUT, as_json: Json = False) -> None:
-    """Say whether the forces of two datasets agree within their error bars, case by case, and which took longer.
+    """Compare the forces of two datasets case by case, within their error bars, and the times.
 
-    Cases are matched by the values of the study's keys, and not by their names: other meshes, machines, or versions may
-    have computed them. Two studies of different scenes are not compared.
+    Cases are matched by the values of the study's keys. Meshes, machines and versions may differ; scenes may not.
 
-    Exit status 1 if some do not agree, or if one cannot tell.
+    Exit status 1 if forces differ by more than their error bars, or no case can be compared.
 
     Example: epsmesh compare results/figure3.nc elsewhere/figure3.nc
 

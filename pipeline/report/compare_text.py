@@ -18,34 +18,36 @@ _MOST = 20
 def verdict(found: Comparison) -> str:
     """Return the verdict in a sentence."""
     if found.agrees:
-        return f"agree within bars: {counted(len(found.pairs), 'value')} of {counted(found.compared, 'case')}"
-    return f"do not agree: {len(found.apart)} of {counted(len(found.pairs), 'value')} are apart by more than their bars"
+        values = counted(len(found.pairs), "value")
+        return f"A and B agree within their error bars: {values} of {counted(found.compared, 'case')}"
+    values = counted(len(found.pairs), "value")
+    return f"A and B do not agree: {len(found.apart)} of {values} differ by more than their error bars"
 
 
 def text(found: Comparison, names: tuple[str, str], doubts: dict[str, list[str]]) -> str:
     """Return what came of it for people: ``names`` are those of A and B, ``doubts`` what makes their times doubtful."""
-    lines = [f"{letter}: {name}" for letter, name in zip("AB", names, strict=True)]
+    lines = [verdict(found), *(f"{letter}: {name}" for letter, name in zip("AB", names, strict=True))]
     lines += [f"  {key} differs: {one} in A, {other} in B" for key, one, other in found.settings]
     lines.append(
         f"{counted(found.cases, 'case')} in both, {len(found.only_a)} in A only, {len(found.only_b)} in B only"
     )
     if found.again_a or found.again_b:
         lines.append(
-            f"  {found.again_a} of A, {found.again_b} of B are others again: the full order is one, whatever is outside"
+            f"  counted once: {found.again_a} of A and {found.again_b} of B; full order is the same for every outside"
         )
     lines += _listed([f"  not compared: {case}: {why}" for case, why in found.not_compared])
     if found.apart:
         lines += _apart(found)
     if largest := max((pair for pair in found.pairs if pair.state == "agree"), key=_size, default=None):
         lines.append(
-            f"largest difference of those that agree: {percent(largest.difference)} (bars {percent(largest.bars)}), "
+            f"largest difference within the bars: {percent(largest.difference)} (bars {percent(largest.bars)}), "
             f"{largest.quantity}, {largest.case}"
         )
     if found.times:
         middle, least, most = found.times
         lines.append(f"times in B over those in A: {middle:.2g} × (median), {least:.2g} to {most:.2g} ×")
     lines += [f"  times of {letter}: {doubt}" for letter, sentences in doubts.items() for doubt in sentences]
-    return "\n".join([*lines, verdict(found)])
+    return "\n".join(lines)
 
 
 def to_dict(found: Comparison, names: tuple[str, str], doubts: dict[str, list[str]]) -> dict[str, Any]:

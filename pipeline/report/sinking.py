@@ -25,12 +25,12 @@ def why_not(case: Case) -> str:
     if getattr(case.material, "law", "linear") != "linear":
         return "F is not proportional to E d where elasticity is not linear"
     if probe.slit:
-        return "a blade that holds the faces of a slit apart does not sink from a surface"
+        return "the blade opens a slit, and does not press on a surface"
     if probe.force_exponent is None:
-        return f"F of a {'rounded ' if getattr(probe, 'tip', 0) else ''}{probe.shape} goes with no one power of depth"
+        return f"F of a {'rounded ' if getattr(probe, 'tip', 0) else ''}{probe.shape} is not a power of the depth"
     aside = [t - probe.depth * a for t, a in zip(case.travel, case.frame.axis, strict=True)]
     if any(aside) and not any(_is_along(aside, PLANES[plane]) for plane in mirror_planes(case)):
-        return "the blade is drawn along, too, and no mirror plane keeps that from changing F"
+        return "the blade also moves sideways, which changes F where no mirror plane excludes it"
     return ""
 
 
@@ -57,7 +57,7 @@ class Sinking:
     def of(case: Case | None) -> "Sinking":
         """Return that of a case's scene; of none, why it is not known."""
         if case is None:
-            return Sinking(nan, why_not="the study's text does not tell which scene this is")
+            return Sinking(nan, why_not="the study's text does not identify the scene")
         scale, why = case.material.young * case.probe.depth, why_not(case)
         if why:
             return Sinking(scale, why_not=why)

@@ -115,11 +115,11 @@ def test_the_command(tmp_path):
         write(dataset(ratio=lambda case, factor=factor: factor * ratio(case)), tmp_path / f"{name}.nc")
     agree, apart = (epsmesh("compare", tmp_path / "a.nc", tmp_path / f"{name}.nc") for name in "bc")
     assert (agree.exit_code, apart.exit_code) == (0, 1)
-    assert agree.stdout.splitlines()[-1] == "agree within bars: 28 values of 28 cases"
-    assert "largest difference of those that agree: 0.4 % (bars 0.8 %)" in agree.stdout
+    assert agree.stdout.splitlines()[0] == "A and B agree within their error bars: 28 values of 28 cases"
+    assert "largest difference within the bars: 0.4 % (bars 0.8 %)" in agree.stdout
     assert "times in B over those in A: 1 × (median)" in agree.stdout
     assert "50 %" in apart.stdout
-    assert apart.stdout.splitlines()[-1].startswith("do not agree: 28 of 28 values")
+    assert apart.stdout.splitlines()[0].startswith("A and B do not agree: 28 of 28 values")
     told = json.loads(epsmesh("compare", tmp_path / "a.nc", tmp_path / "c.nc", "--json").stdout)
     assert (told["agree"], told["cases"], len(told["values"])) == (False, 28, 28)
     assert told["values"][0]["difference"] == pytest.approx(0.5)

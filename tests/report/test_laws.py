@@ -194,7 +194,7 @@ def test_scenes_in_which_compliances_do_not_add_have_none_and_say_why():
     cut = {"shape": "blade", "length": "6 mm", "width": "1 mm", "depth": "0.1 mm", "slice": "0.1 mm"}
     slit = cut | {"slice": "0 mm", "incision": "3 mm"}
     assert not any(why_not(of(probe)) for probe in (ball, cone, cut))
-    assert "wedge goes with no one power" in why_not(of(wedge))
+    assert "wedge is not a power" in why_not(of(wedge))
     assert "rounded cone" in why_not(of(cone | {"tip": "0.1 mm"}))
     assert "slit" in why_not(of(slit))
     assert "no mirror plane" in why_not(of(cut | {"at": ["3 mm", "0 mm"]}))
@@ -214,7 +214,7 @@ def test_part_of_a_dataset_and_another_text():
     data = discs()
     part = data.sel(outside="free", epsilon=6e-3, height=20e-3).epsmesh.compliance()
     np.testing.assert_allclose(part["compliance"], 90.0)
-    with pytest.raises(DatasetError, match="does not tell which scene"):
+    with pytest.raises(DatasetError, match="does not identify the scene"):
         data.assign_attrs(study="").epsmesh.compliance()
     assert "needs a study of several tools" in guide(data.isel(probe_radius=[0]), "5%").text(verbose=True)
 
