@@ -29,10 +29,10 @@ def view(
     meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = DEFAULT_MESHES,
     as_json: Json = False,
 ) -> None:
-    """Show one case: its mesh by element size, cut open, and the body as the probe deforms it.
+    """Draw the mesh of one case, cut open, and the deformed body.
 
-    Writes <study>_<number>_mesh.png and <study>_<number>_deformed.png where PyVista is installed; otherwise
-    <study>_<number>.html, a page on which the body is turned round and cut open. --export says what to write instead.
+    With PyVista it writes the pictures <study>_<number>_mesh.png and <study>_<number>_deformed.png. Without, it writes
+    the page <study>_<number>.html, on which the body can be turned and cut. --export chooses what is written.
 
     Example: epsmesh view studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=coarse"
 

@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from pipeline.files import FIGURE_FORMATS
+from pipeline.printable import counted
 from pipeline.report.compliance import tool_dimension
 from pipeline.report.figures.compliance import compliance
 from pipeline.report.figures.error import error, error_facets
@@ -17,8 +18,8 @@ from pipeline.report.figures.facets import Facets, is_meshed, rest, swept
 from pipeline.report.figures.force import force, nothing
 from pipeline.report.figures.map import force_map
 from pipeline.report.figures.ratio import ratio, ratio_facets
-from pipeline.report.figures.style import STYLE, save
-from pipeline.report.table import study_of
+from pipeline.report.figures.style import STYLE, add_note, save
+from pipeline.report.table import study_of, warnings_of
 from pipeline.report.words import is_numeric
 from pipeline.study.vocabulary import FIGURES
 
@@ -114,7 +115,10 @@ def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
     """Draw the figure of one ``kind``, with the study's title or without."""
     title = _plain(str(dataset.attrs.get("title", ""))) if titled else ""
     with mpl.rc_context(STYLE):
-        return _DRAWN[kind](_with_short_names(dataset), title, _missing(dataset))
+        drawn = _DRAWN[kind](_with_short_names(dataset), title, _missing(dataset))
+        if titled and (warnings := warnings_of(dataset)):
+            add_note(drawn, f"{counted(len(warnings), 'warning')} about the model: see the report.")
+    return drawn
 
 
 def _rest(dataset: xr.Dataset, kind: str) -> list[tuple[str, xr.Dataset]]:

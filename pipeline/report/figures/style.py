@@ -73,6 +73,13 @@ def finish(figure: Figure, title: str, caption: str = "", warning: str = "", *, 
     figure.align_ylabels()
 
 
+def add_note(figure: Figure, note: str) -> None:
+    """Add a sentence to the caption."""
+    figure.set_label(f"{figure.get_label()} {note}".strip())
+    words = textwrap.fill(str(figure.get_label()), int(_LETTERS * figure.get_figwidth()))
+    figure.supxlabel(words, x=0.01, ha="left", fontsize=SIZE)
+
+
 def write_legend(figure: Figure, above: Axes | None = None) -> None:
     """Name the curves of all panels, to the right of the upper right one, or in the empty axes ``above`` them."""
     known = [ax.get_legend_handles_labels() for ax in figure.axes]
