@@ -1,4 +1,4 @@
-"""What does not go together, and why: one table of features, read by the study, the plan, the export and the docs.
+"""Features that exclude each other, and why: one table, read by the study, the plan, the export and the docs.
 
 A scene has a set of features. ``REFUSALS`` holds the pairs that a study is refused for; ``OBSTACLES`` the features for
 which a shorter way of computing (a reduction, a real-time model) is not taken. Pairs in neither table are computed.
@@ -29,7 +29,7 @@ _ALIGNED = 1e-9
 
 
 class Scene(Protocol):
-    """The sections that features are told from: a case has all of them."""
+    """The sections on which features depend: a case has all of them."""
 
     @property
     def body(self) -> Body: ...  # noqa: D102
@@ -45,7 +45,7 @@ class Scene(Protocol):
 
 @dataclass(frozen=True)
 class Feature:
-    """The ``key`` at which a study says it, whether a scene has it, and how its value is written.
+    """A feature: the ``key`` of a study that sets it, whether a scene has it, and how its value is written.
 
     ``also`` are the parts of a scene that tell, besides the section of the key.
     """
@@ -57,18 +57,18 @@ class Feature:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The parts of a scene that tell whether it has it."""
+        """The sections of a scene on which the feature depends."""
         return self.key.partition(".")[0], *self.also
 
     def value(self, scene: Scene) -> Any:
-        """Return what a study says at the key, as a message quotes it; None where that would say nothing."""
+        """Return the value of the key, as a message quotes it; None if no value is worth quoting."""
         section, _, key = self.key.partition(".")
         return self.write(getattr(getattr(scene, section), key, None))
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """Two features that do not go together: the reason, and what to write instead, are told at the first one's key."""
+    """Two features that exclude each other. The message has the key of the first."""
 
     first: str
     second: str
@@ -140,23 +140,23 @@ FEATURES: dict[str, Feature] = {
 }
 
 _COARSE = 'use outside = "coarse" here'
-_ONE_MATERIAL = f"the far field is that of one material, without layers or inclusions: {_COARSE}"
-_PRESSES = f"the far field is that of a probe that presses, and neither slides nor turns nor cuts: {_COARSE}"
-_HOLDS = 'a probe that tissue slides along holds it in one direction only: use contact = "bonded"'
-_LINEAR = "is for linear elasticity, not for a law of large displacements"
+_ONE_MATERIAL = f"the far field is known for one material, without layers or inclusions: {_COARSE}"
+_PRESSES = f"the far field is known for a tool that presses, and neither slides nor turns nor cuts: {_COARSE}"
+_HOLDS = 'a tool along which tissue slides has no stiffness sideways: use contact = "bonded"'
+_LINEAR = "needs linear elasticity: omit it with a law of large displacements"
 _OF_LAW = "with a law of large displacements"
 
 REFUSALS: tuple[Refusal, ...] = (
     # What the shapes have no keys for: the schema refuses it.
-    Refusal("layers", "curved body", "layers lie below the flat top of a box or a cylinder"),
-    Refusal("tool that is not flat", "frictionless contact", "how much of it touches is found, not prescribed"),
+    Refusal("layers", "curved body", "layers need the flat top of a box or a cylinder"),
+    Refusal("tool that is not flat", "frictionless contact", "the area in contact is computed, not prescribed"),
     # A half ball that a far field closes.
-    Refusal("half ball", "accuracy", "has an error of its own, which is not that of the mesh: leave accuracy out"),
-    Refusal("degree 1", "half ball", "is too low for a half ball, which straight elements cut: use 2 or 3"),
+    Refusal("half ball", "accuracy", "has an error besides that of the mesh: omit accuracy"),
+    Refusal("degree 1", "half ball", "is too low for a half ball, since elements are straight: use 2 or 3"),
     Refusal(
         "half ball",
         "no flat top",
-        f"the far field is that of a probe that presses straight down on the top of a box or a cylinder: {_COARSE}",
+        f"the far field is known for a tool that presses straight down on the top of a box or a cylinder: {_COARSE}",
     ),
     Refusal("half ball", "layers", _ONE_MATERIAL),
     Refusal("half ball", "inclusion", _ONE_MATERIAL),
@@ -166,42 +166,42 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         "ν > 0.49",
         "own far field",
-        f'is too near to 0.5 for outside = "green": at most {MOST_OF_GREEN}; "halfspace" takes all',
+        f'is too near to 0.5 for outside = "green": must be at most {MOST_OF_GREEN}; "halfspace" allows all values',
     ),
     # A column that is kept of the body.
     Refusal(
         "kept column",
         "body of triangles",
-        f"a column is cut out of bodies that are drawn and of CAD files, and not out of triangles: {_COARSE}",
+        f"a column is cut out of boxes, cylinders, ellipsoids and CAD files, not out of triangles: {_COARSE}",
     ),
-    Refusal("fixed column", "open slit", 'is what an open slit would run into: use ends = "blade"'),
+    Refusal("fixed column", "open slit", 'would stop the open slit at the side of the column: use ends = "blade"'),
     Refusal(
         "cut free",
         "held at its sides alone",
-        "the column round the probe does not touch the fixed sides and would float: "
+        "the column around the tool does not touch the fixed sides, and would float: "
         'use `outside = "coarse"` or "fixed", or fix the bottom',
     ),
     Refusal(
-        "open slit", "held at its sides", 'the slit would go through the sides, which are held: use ends = "blade"'
+        "open slit", "held at its sides", 'the slit would cut through the sides, which are fixed: use ends = "blade"'
     ),
     # Degrees of elements.
     Refusal(
         "degree 1",
         "found contact",
-        "is too low where contact is found: its edge falls between straight elements; use 2 or 3",
+        "is too low for unilateral contact, whose edge is between straight elements: use 2 or 3",
     ),
-    Refusal("degree 1", "inclusion", "is too low for inclusions, which straight elements cut: use 2 or 3"),
-    Refusal("degree 1", "curved or inclined surface", "is too low for a curved surface, or a tilted probe: use 2 or 3"),
-    Refusal("degree 1", "slit", "is too low for a slit, whose front needs quarter points: use 2 or 3"),
+    Refusal("degree 1", "inclusion", "is too low for inclusions, since elements are straight: use 2 or 3"),
+    Refusal("degree 1", "curved or inclined surface", "is too low for a curved surface, or a tilted tool: use 2 or 3"),
+    Refusal("degree 1", "slit", "is too low for a slit, whose front needs quarter-point elements: use 2 or 3"),
     Refusal("mixed elements", "degree 1", "there is no stable mixed element of degree 1: use 2 or 3"),
     # Tools and how they touch.
     Refusal("six motions", "found contact", _HOLDS),
     Refusal("six motions", "frictionless contact", _HOLDS),
-    Refusal("six motions", "slit", "a blade in a slit is pressed and drawn only: leave it out"),
+    Refusal("six motions", "slit", "a blade in a slit only presses and slides: omit it"),
     Refusal(
         "found contact",
         "slice",
-        'tissue does not lift off a blade that slides along: use contact = "bonded"',
+        'unilateral contact has no friction, and so no slice: use contact = "bonded"',
     ),
     Refusal(
         "found contact",
@@ -211,91 +211,90 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         "slice",
         "frictionless contact",
-        'a frictionless blade slides along without force: use contact = "bonded"',
+        'a frictionless blade slides without force: use contact = "bonded"',
     ),
-    Refusal("slit", "no flat top", "a slit goes straight down from the flat top of a box or a cylinder only"),
+    Refusal("slit", "no flat top", "a slit needs the flat top of a box or a cylinder, and goes straight down"),
     Refusal(
         "oblique slit",
         "frictionless contact",
-        "tissue slides along a blade in a slit that lies along x or y only: turn the body, or use contact = 'bonded'",
+        "a frictionless slit must be along x or y: turn the body, or use contact = 'bonded'",
     ),
     Refusal(
         "range of depths",
         "accuracy",
-        "is for meshes with sizes of your own: where an accuracy is asked for, each depth has one that is chosen for "
-        "it; leave one of the two out",
+        "needs given element sizes: with `accuracy`, each depth has a mesh of its own. Omit one of the two",
     ),
     # Loads.
     Refusal(
         "part of the body",
         "loads",
-        'loads act on the whole body, and a part of it would carry others: use outside = "coarse"',
+        'loads act on the whole body, so no part of it may be cut away: use outside = "coarse"',
     ),
-    Refusal("large strains", "loads", 'loads are computed with law = "linear" only: leave [load] out'),
+    Refusal("large strains", "loads", 'loads need law = "linear": omit [load]'),
     # Large strains.
     Refusal(
         "ν < 0.2 or > 0.45",
         "large strains",
-        f"must be {Material.OF_LARGE[0]} to {Material.OF_LARGE[1]} {_OF_LAW}: below, tissue gives way at the probe's "
-        "edge, and elements of displacements alone lock above",
+        f"must be {Material.OF_LARGE[0]} to {Material.OF_LARGE[1]} {_OF_LAW}. Below, F depends on the elements "
+        "at the tool's edge; above, displacement elements lock",
     ),
-    Refusal("large strains", "layers", "takes bodies of one material: no layers, no inclusions"),
-    Refusal("large strains", "inclusion", "takes bodies of one material: no layers, no inclusions"),
-    Refusal("found contact", "large strains", f'must be "bonded" {_OF_LAW}: where a tool touches is not found there'),
+    Refusal("large strains", "layers", "needs a body of one material: omit layers and inclusions"),
+    Refusal("large strains", "inclusion", "needs a body of one material: omit layers and inclusions"),
+    Refusal("found contact", "large strains", f'must be "bonded" {_OF_LAW}: unilateral contact is not computed'),
     Refusal("frictionless contact", "large strains", f'must be "bonded" {_OF_LAW}'),
-    Refusal("six motions", "large strains", f'must be "press" {_OF_LAW}: one stiffness says nothing then'),
+    Refusal("six motions", "large strains", f'must be "press" {_OF_LAW}: there is no single stiffness'),
     Refusal("slit", "large strains", _LINEAR),
-    Refusal("slice", "large strains", f"must be 0 mm {_OF_LAW}: the blade is pressed in only"),
+    Refusal("slice", "large strains", f"must be 0 mm {_OF_LAW}: the blade only presses"),
     Refusal("mixed elements", "large strains", f'must be "auto" or "displacement" {_OF_LAW}'),
-    Refusal("accuracy", "large strains", f"{_LINEAR}: give sizes"),
+    Refusal("accuracy", "large strains", f"{_LINEAR}, and give sizes"),
     Refusal("half ball", "large strains", f'must be "coarse", "free" or "fixed" {_OF_LAW}'),
 )
 
-_PRESSED_ONLY = "a model is of tools that press straight down, and neither slide nor turn nor cut"
+_PRESSED_ONLY = "a real-time model is of tools that press straight down, and neither slide nor turn nor cut"
 # Of each way that may be shorter, the features with which it is not taken, each with the reason.
 OBSTACLES: dict[str, dict[str, str]] = {
     "meridian": {
-        "large strains": "there are no elements for large strains on the meridian",
-        "six motions": "most of the six motions are not the same all round",
-        "half ball": "a half ball is closed in three dimensions",
+        "large strains": "large strains are computed in three dimensions",
+        "six motions": "most of the six motions are not axisymmetric",
+        "half ball": "a half ball is coupled to its far field in three dimensions",
         "loads": "loads are computed in three dimensions",
     },
     # Taken if no case of the study is in the way: what is compared is computed alike.
     "meridian of a comparison": {
-        "large strains": "what large strains are compared with is solved in three dimensions, too",
-        "half ball": "what a half ball is compared with is solved in three dimensions, too",
+        "large strains": "both sides of a comparison with large strains are solved in three dimensions",
+        "half ball": "both sides of a comparison with a half ball are solved in three dimensions",
     },
     "reduced basis": {
-        "layers": "a body of several materials has more parameters than one",
-        "inclusion": "a body of several materials has more parameters than one",
+        "layers": "a body of several materials has more than one parameter",
+        "inclusion": "a body of several materials has more than one parameter",
         "found contact": "the area of contact changes with Poisson's ratio",
         "half ball": "the far field changes with Poisson's ratio",
-        "large strains": "large displacements are not sums of others",
-        "slit": "in a slit more is asked for than the work",
-        "loads": "loads do work of their own",
+        "large strains": "the problem is nonlinear",
+        "slit": "a slit needs more results than the work",
+        "loads": "loads do work, too",
     },
     "scaling": {
-        "loads": "loads do not grow with the modulus and the depth",
+        "loads": "loads are not proportional to the modulus and the depth",
     },
     "images": {
-        "six motions": "a stiffness of all motions is no image of another",
-        "loads": "loads tell one side from the other",
+        "six motions": "the stiffness of all motions is not symmetric",
+        "loads": "loads break the symmetry",
     },
     "equivalent places": {
-        "inclusion": "an inclusion is at another distance",
-        "loads": "loads act on all of the body",
-        "own far field": "a body's own far field knows the place",
+        "inclusion": "the distance to the inclusion differs",
+        "loads": "loads act on the whole body",
+        "own far field": "the Green's function of the body depends on the place",
     },
     "proportional depths": {
-        "loads": "loads do not grow with the depth",
-        "large strains": "large strains are not in proportion to the depth",
+        "loads": "loads are not proportional to the depth",
+        "large strains": "large strains are not proportional to the depth",
     },
     "F_exact": {
-        "large strains": "at large displacements, what elements converge to is known to their bars only",
+        "large strains": "at large displacements, the converged force is known only to the error bars of meshes",
     },
     "real-time model": {
-        "loads": "[load]: gravity and tractions have no real-time model yet",
-        "large strains": "material.law: large displacements have no real-time model: F is in proportion to nothing",
+        "loads": "[load]: gravity and tractions have no real-time model",
+        "large strains": "material.law: large displacements have no real-time model",
         "slit": f"probe.incision: {_PRESSED_ONLY}",
         "six motions": f'probe.motion = "all": {_PRESSED_ONLY}',
         "slice": f"probe.slice: {_PRESSED_ONLY}",
@@ -309,14 +308,14 @@ def features_of(scene: Scene) -> frozenset[str]:
 
 
 def obstacle(way: str, scene: Scene) -> str:
-    """Return why a shorter way of computing is not taken for a scene; "" if none of its features is in the way."""
+    """Return why a scene excludes a shorter way of computing; "" if it does not."""
     return next((reason for name, reason in OBSTACLES[way].items() if FEATURES[name].holds(scene)), "")
 
 
 def check_features(
     sections: Mapping[str, Sequence[Section]], placed: Sequence[tuple[Body, Probe]], problems: Problems
 ) -> None:
-    """Report every pair of features that do not go together; ``placed`` are the bodies and probes that fit together."""
+    """Report every pair of features that exclude each other; ``placed`` are the bodies and probes that fit together."""
 
     @cache
     def occurs(name: str) -> bool:
@@ -336,7 +335,7 @@ def check_features(
 def _scenes(
     parts: Sequence[str], sections: Mapping[str, Sequence[Section]], placed: Sequence[tuple[Body, Probe]]
 ) -> Iterator[Scene]:
-    """Yield what there is of these parts: of bodies with probes, those that fit together."""
+    """Yield the combinations of these sections; of bodies and probes, those that fit together."""
     is_placed = {*_PLACE} <= {*parts}
     names = [name for name in _PARTS if name in parts and not (is_placed and name in _PLACE)]
     others: list[Sequence[Any]] = [sections[name] for name in names]

@@ -1,4 +1,4 @@
-"""Do loads fit the body that they act on, and is there anything in a scene that is not computed with them?"""
+"""Physical sense of loads: whether they fit the body and the probe."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -28,7 +28,7 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     materials = cast(Sequence[Material], sections["material"])
     for axis in axes:
         if axis.section == "load" and axis.piece and not axis.owner:
-            problems.error(axis.path, None, "its sweep needs a name: give its table one")
+            problems.error(axis.path, None, "is swept: give its table a `name`")
     if not acting:
         return
     if any(any(load.gravity) for load in acting):
@@ -51,7 +51,7 @@ def _makes_sense(load: Load, problems: Problems) -> bool:
             problems.error(
                 f"load.traction[{number}]",
                 None,
-                "needs a pressure (against the outward normal) or a traction (a vector), and not both",
+                "needs either `pressure` (against the outward normal) or `traction` (a vector)",
             )
             sane = False
     return sane
@@ -59,15 +59,15 @@ def _makes_sense(load: Load, problems: Problems) -> bool:
 
 def _check_densities(body: Body, material: Material, problems: Problems) -> None:
     if not body.is_filled and material.density is None:
-        problems.error("material.density", None, 'is required by gravity: density = "1060 kg/m^3"')
+        problems.error("material.density", None, 'is required for gravity: density = "1060 kg/m^3"')
     if body.is_filled:
         for number, region in enumerate(body.regions, start=1):
             if region.density is None and material.density is None:
-                problems.error(f"body: {region.name}", None, f"region {number} has no density, which gravity requires")
+                problems.error(f"body: {region.name}", None, f"region {number} needs a density for gravity")
 
 
 def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -> bool:
-    """Report a part of the boundary that there is not, and tell whether there is one."""
+    """Report a part of the boundary that does not exist, and return whether it does."""
     on, names = traction.on, sorted(body.surfaces())
     if isinstance(on, Cap):
         found = [in_mm(c) for c in on.around]
@@ -80,13 +80,13 @@ def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -
             problems.error(
                 key,
                 found,
-                f"lies {in_mm(off)} off the body's surface: at most half the cap's radius, "
-                f"{in_mm(_FARTHEST_OFF * on.radius)}, is taken for a place on it",
+                f"is {in_mm(off)} off the surface of the body: must be at most half the radius of the cap, "
+                f"{in_mm(_FARTHEST_OFF * on.radius)}",
             )
             return False
         return True
     if on != FREE and isinstance(body, FromFile) and body.HAS_NAMES:
-        problems.error(key, on, 'faces of a CAD file carry no tractions by name: use a cap round a point, or "free"')
+        problems.error(key, on, 'faces of a CAD file have no tractions by name: use a cap around a point, or "free"')
         return False
     if on != FREE and on not in names:
         problems.error(key, on, f"the {body.shape} has no such face; {nearest(on, [*names, FREE])}")
@@ -94,13 +94,13 @@ def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -
     support = body.support
     held = support.names if isinstance(support, Faces) else (support.face,) if isinstance(support, NamedFace) else ()
     if on in held:
-        problems.error(key, on, "is held: what acts there goes into the support")
+        problems.error(key, on, "is fixed: a traction there acts on the support alone")
         return False
     return True
 
 
 def _check_beside(body: Body, probe: Probe, cap: Cap, key: str, problems: Problems) -> None:
-    """Report a cap that may reach under the probe, which covers it there."""
+    """Report a cap that may reach under the probe."""
     try:
         gap = dist(probe.frame_on(body).point, cap.around) - cap.radius - probe.circumradius
     except PlaceError:
@@ -109,6 +109,6 @@ def _check_beside(body: Body, probe: Probe, cap: Cap, key: str, problems: Proble
         problems.error(
             key,
             [in_mm(c) for c in cap.around],
-            f"the cap reaches within {in_mm(-gap)} of what the probe may cover, "
-            f"up to {in_mm(probe.circumradius)} from its axis: move it away, or make it smaller",
+            f"the cap overlaps the tool by {in_mm(-gap)}; the tool reaches {in_mm(probe.circumradius)} from its axis: "
+            "move the cap, or make it smaller",
         )

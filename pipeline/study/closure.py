@@ -1,4 +1,4 @@
-"""Where a half ball, closed by the far field of a point force, can be cut out of a body."""
+"""Whether a half ball, coupled to the far field of a point force, fits into a body."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ class FarRegion(NamedTuple):
 
 
 def check_ball(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
-    """Refuse a half ball that does not lie within the body, or does not hold the footprint."""
+    """Report a half ball that is not inside the body, or does not contain the footprint."""
     frame = probe.frame_on(body)
     if not mesh.is_closed or mesh.epsilon >= body.farthest(frame) or not is_level(body, frame):
         return
@@ -29,13 +29,13 @@ def check_ball(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None
         problems.error(
             "mesh.epsilon",
             in_mm(mesh.epsilon),
-            f"a half ball must lie inside the body: below {in_mm(most)}, or past all of it, which is the full order",
+            f'a half ball must be inside the body: must be below {in_mm(most)}, or "full"',
         )
     elif mesh.epsilon <= probe.circumradius:
         problems.error(
             "mesh.epsilon",
             in_mm(mesh.epsilon),
-            f"a half ball must hold the footprint: above the probe's radius {in_mm(probe.circumradius)}",
+            f"a half ball must contain the contact: must be above the tool's radius {in_mm(probe.circumradius)}",
         )
 
 

@@ -1,8 +1,8 @@
-"""Which page of the documentation tells how it is done: what refusals point to."""
+"""Pages of the documentation, by key: messages about errors name them."""
 
 import re
 
-# The first that a key begins with counts. Keys of tables in arrays have numbers, which are left out.
+# The first entry with which a key begins is used. Numbers of tables in arrays are removed.
 _PAGES = {
     "body.layer": "howto/layers",
     "body.inclusion": "howto/layers",
@@ -26,14 +26,14 @@ _PAGES = {
     "figure": "report",
     "mesh.accuracy": "accuracy",
 }
-# What all keys are, with what each takes.
+# The page about all keys.
 _ALL = "howto/own-study"
 # No page helps to find a file.
 _NONE = ("file",)
 
 
 def page_of(key: str) -> str:
-    """Return the page, as a path in the project's folder, that tells how a ``key`` of a study file is used."""
+    """Return the page about a ``key`` of a study file, as a path in the project's folder."""
     plain = re.sub(r"\[\d*\]", "", key.partition(":")[0]).strip("[]")
     if plain in _NONE:
         return ""
@@ -42,5 +42,5 @@ def page_of(key: str) -> str:
 
 
 def pages() -> tuple[str, ...]:
-    """Return all pages that refusals point to."""
+    """Return all pages that messages name."""
     return tuple(dict.fromkeys(f"docs/{page}.md" for page in (*_PAGES.values(), _ALL)))

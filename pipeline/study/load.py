@@ -1,4 +1,4 @@
-"""Read a study file: TOML to checked sections and axes, or every problem at once."""
+"""Read a study file: TOML to checked sections and axes, or all problems at once."""
 
 import difflib
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ def load(path: str | Path) -> Study:
 
 
 def load_mapping(study: Mapping[str, Any], name: str, folder: str | Path = ".") -> Study:
-    """Read the study that stands in a dictionary, as the file ``name``.toml in ``folder`` with its text would be.
+    """Read a study from a dictionary, as from a file ``name``.toml with that content in ``folder``.
 
     Raises:
         StudyError: with every problem of it.
@@ -46,7 +46,7 @@ def load_mapping(study: Mapping[str, Any], name: str, folder: str | Path = ".") 
 
 
 def load_text(text: str, file: str) -> Study:
-    """Read the text of a study, such as a dataset carries, as it stood in ``file``, beside which bodies' files lie.
+    """Read the text of a study, such as that in a dataset. Files of bodies are relative to the folder of ``file``.
 
     Raises:
         StudyError: with every problem of it.
@@ -71,7 +71,9 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
     cases = prod(map(len, axes))
     if not problems.errors and cases > MOST_CASES:
         sweeps = " × ".join(f"{len(axis)} {axis.name}" for axis in axes)
-        problems.error("study", None, f"has {cases} cases ({sweeps}): at most {MOST_CASES}; make several of it")
+        problems.error(
+            "study", None, f"has {cases} cases ({sweeps}): at most {MOST_CASES}; split it into several studies"
+        )
     if all(problem.key != "study" for problem in problems.errors):
         _check_together(sections, tuple(axes), problems)
     if problems.errors:
@@ -84,8 +86,8 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
 def _check_together(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
     """Check what must fit together.
 
-    A section that holds an error is left out, so that those of the others are told at once. Only now does a section
-    that the file leaves out get what stands for it.
+    A section with an error is omitted, so that errors of the others are reported at once. Sections that the file omits
+    get their defaults only here.
     """
     check_regions(problems.sound(sections), axes, problems)
     if not problems.errors:
@@ -96,7 +98,7 @@ def _check_together(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, 
 
 
 def _names_of(raw: dict[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Return the names of the tables of each section that is an array of them, "" where one has none."""
+    """Return the names of the tables of each section that is an array; "" for a table without a name."""
     return {
         section: tuple(str(table.get("name", "")) if isinstance(table, dict) else "" for table in tables)
         for section, tables in raw.items()
@@ -105,7 +107,7 @@ def _names_of(raw: dict[str, Any]) -> dict[str, tuple[str, ...]]:
 
 
 def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Return the study with the files that bodies name found from the ``folder`` of the study."""
+    """Return the study with paths of bodies' files that begin with the ``folder`` of the study."""
 
     def found(value: Any) -> Any:
         if isinstance(value, list):
@@ -142,8 +144,8 @@ def _check_top(raw: dict[str, Any], problems: Problems) -> None:
 
 
 def _meant(key: str) -> str:
-    """Return what may have been meant by an unknown section: one of them, or the piece of one."""
+    """Return a suggestion for an unknown section: a section, or an array of tables within one."""
     pieces = {piece: section for section, inner in NESTED.items() for piece in inner}
     if close := difflib.get_close_matches(key, pieces, n=1, cutoff=0.6):
-        return f"pieces of a section stand in it: write [[{pieces[close[0]]}.{close[0]}]]"
+        return f"it is part of another section: write [[{pieces[close[0]]}.{close[0]}]]"
     return nearest(key, [*SECTIONS, "title"])

@@ -18,7 +18,7 @@ _COORDINATES = 3
 
 
 class Cap(BaseModel):
-    """What of the boundary lies within a ball and faces the way that it does at the centre."""
+    """A cap: the part of the boundary within a ball whose normal is on the same side as at the centre."""
 
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
     around: tuple[Coordinate, Coordinate, Coordinate]
@@ -31,7 +31,7 @@ def _on(value: Any) -> Any:
         if set(value) != {"around", "radius"} or not isinstance(around, tuple) or len(around) != _COORDINATES:
             raise PydanticCustomError(
                 "not_supported",
-                'a cap has a centre and a radius: {around = ["10 mm", "0 mm", "0 mm"], radius = "4 mm"}',
+                'a cap has the keys around and radius: {around = ["10 mm", "0 mm", "0 mm"], radius = "4 mm"}',
             )
         return Cap(**value)
     if not isinstance(value, str):
@@ -42,7 +42,7 @@ def _on(value: Any) -> Any:
 
 
 class Traction(Section):
-    """A force for each area of part of the boundary: a vector, or a pressure against the outward normal."""
+    """A traction on part of the boundary: a vector, or a pressure against the outward normal."""
 
     name: Annotated[
         str,
@@ -80,12 +80,12 @@ class Traction(Section):
 
     @property
     def acts(self) -> bool:
-        """Whether it is not nought."""
+        """Whether it is not zero."""
         return bool(self.pressure) or any(self.traction or ())
 
 
 class Load(Section):
-    """What acts on the body besides the probe."""
+    """Loads on the body besides the probe."""
 
     gravity: Annotated[
         tuple[Acceleration, Acceleration, Acceleration],

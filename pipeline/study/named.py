@@ -1,4 +1,4 @@
-"""Studies by their names: what a name may be, and those that come with the program."""
+"""Names of studies, and the studies that come with the program."""
 
 from pathlib import Path
 
@@ -11,13 +11,13 @@ SHORT = ("pad", "layers", "organ", "tumour", "needle", "cut")
 # The JSON schema of study files, for editors.
 SCHEMA = EXAMPLES / "study.schema.json"
 
-# What a name may be, in words. Files are called after it, with a few letters more: theirs have 255 bytes at most.
-NAME = "letters, digits, - and _, at most 200 bytes: results are called after it"
+# Allowed names, in words. Results have the name, with a few letters more, and at most 255 bytes.
+NAME = "letters, digits, - and _, at most 200 bytes, since results have that name, too"
 _LONGEST = 200
 
 
 def is_name(name: object) -> bool:
-    """Tell whether a study may be called so: results are called after it."""
+    """Return whether a study may have this name. Results have it, too."""
     if not isinstance(name, str) or len(name.encode(errors="replace")) > _LONGEST:
         return False
     return name == name.strip() and name.replace("-", "").replace("_", "").replace(".", "").isalnum()

@@ -1,4 +1,4 @@
-"""``[probe.path]``: the places along which a probe moves, and the numbers that the dataset calls them by."""
+"""``[probe.path]``: the places along which a probe moves, and their coordinates in the dataset."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from pipeline.shapes.section import Section, Words, in_mm
 from pipeline.study.problems import Problems, allowed, nearest, tuples
 from pipeline.units import Coordinate, Length, canonical
 
-# Digits behind the point of a metre: what is less is rounding of sines and of shares of a line.
+# Decimal places of a coordinate in metres: beyond, there is rounding only.
 _DIGITS = 12
-_MOST = 20_000  # places; more is a slip of the pen
+_MOST = 20_000  # places
 
 Point = tuple[float, ...]
 
@@ -28,7 +28,7 @@ def _two_or_three(point: Point) -> Point:
 
 def _several(points: Any) -> Any:
     if not isinstance(points, tuple) or len(points) < 2:
-        raise PydanticCustomError("not_supported", "must be a list of two places at least; for one, use `at`")
+        raise PydanticCustomError("not_supported", "must be a list of at least two places; for one place, use `at`")
     return points
 
 
@@ -64,11 +64,11 @@ class Range(_Table):
     steps: Steps
 
 
-_OF_RASTER = "must be a list of two lengths at least, or a table of from, to and steps"
+_OF_RASTER = "must be a list of at least two lengths, or a range {from, to, steps}"
 
 
 def _kind(value: Any) -> str | None:
-    """Return which form coordinates have; None where it is neither."""
+    """Return the form of coordinates; None if it is neither."""
     is_table, is_list = isinstance(value, dict | Range), isinstance(value, tuple) and len(value) > 1
     return "table" if is_table else "list" if is_list else None
 
@@ -155,7 +155,7 @@ class Way:
 
     @property
     def texts(self) -> list[list[str]]:
-        """The places as they would stand in a study file."""
+        """The places as a study file would list them."""
         return [[f"{c!r} m" for c in place] for place in self.places]
 
 
@@ -169,7 +169,7 @@ def read_path(raw: Any, where: str, problems: Problems) -> Way | None:
         return None
     before, forms = len(problems.errors), [key for key in raw if key in _FORMS]
     if len(forms) != 1:
-        found = f"has {' and '.join(forms)}" if forms else "has no place"
+        found = f"has {' and '.join(forms)}" if forms else "has no places"
         problems.error(where, None, f"{found}: give one of {', '.join(_FORMS)}")
     try:
         path = Path.model_validate({key: tuples(value) for key, value in raw.items()})
@@ -241,10 +241,10 @@ def _way_of(path: Path, form: str) -> Way:
 
 
 def _check(way: Way, raw: Any, where: str, problems: Problems) -> None:
-    """Report places that are given twice, lists that do not rise, and points of unlike numbers of coordinates."""
+    """Report places that are given twice, lists that do not rise, and places with different numbers of coordinates."""
     ends = [raw[key] for key in ("from", "to")] if "from" in raw else []
     if len({len(place) for place in way.places}) > 1 or len({len(end) for end in ends}) > 1:
-        problems.error(where, raw, "all places must have two coordinates, or all three")
+        problems.error(where, raw, "must have two coordinates at all places, or three at all places")
         return
     for name, values in way.axes:
         if name != "path" and any(b <= a for a, b in pairwise(values)):
@@ -255,7 +255,7 @@ def _check(way: Way, raw: Any, where: str, problems: Problems) -> None:
     seen: set[Point] = set()
     for place in way.places:
         if place in seen:
-            problems.error(where, [in_mm(c) for c in place], "stands more than once on the path")
+            problems.error(where, [in_mm(c) for c in place], "is on the path more than once")
             return
         seen.add(place)
 

@@ -1,4 +1,4 @@
-"""Where a tool can stand: what is wrong with a place, and whether it is clear of the body altogether."""
+"""Places of a tool: whether it can touch the body there, and whether it is clear of the body."""
 
 from functools import lru_cache
 from math import dist, inf
@@ -22,7 +22,7 @@ _FARTHEST_OFF = 0.1
 
 
 def place_error(body: Body, probe: Probe) -> PlaceError | None:
-    """Return why the probe cannot touch the body where it is told to; None if it can."""
+    """Return why the probe cannot touch the body at its place; None if it can."""
     # Probes are equal whether their direction is the default or was given.
     return _place_error(body, probe, "direction" in probe.model_fields_set)
 
@@ -44,7 +44,7 @@ def _place_error(body: Body, probe: Probe, is_directed: bool) -> PlaceError | No
 
 @lru_cache(_MANY)
 def is_clear(body: Body, probe: Probe) -> bool:
-    """Tell whether all of a tool passes a body by, without touching it: False, too, where that is not known.
+    """Return whether the tool certainly does not touch the body.
 
     A place is then farther from the body than all that the tool touches with is wide, and than it is pushed in.
     """
@@ -59,39 +59,41 @@ def is_clear(body: Body, probe: Probe) -> bool:
 
 
 def _check_directions(probe: Probe, frame: Frame) -> None:
-    """Refuse a given direction that says nothing: left out, it is y where the probe advances along x."""
+    """Report a given direction that is parallel to the axis. The default is y if the probe advances along x."""
     if frame.is_replaced(probe.lies_along):
         frame.refuse_direction()
 
 
 def _check_fit(body: Body, probe: Probe, frame: Frame) -> None:
     if probe.gap(body, frame) <= _TOUCHING * body.extent:
-        raise PlaceError(f"{_footprint(probe)} must lie inside the body's top ({body.face}), not on or over its edge")
+        raise PlaceError(
+            f"{_footprint(probe)} must be inside the top face of the body ({body.face}), not on or over its edge"
+        )
 
 
 def _footprint(probe: Probe) -> str:
-    """Return what must lie on one face, in words."""
+    """Return the name of the part of the tool that must be on one face."""
     if isinstance(probe, Indenter):
-        return f"all that the {probe.shape} may touch, up to {in_mm(probe.circumradius)} from its axis,"
+        return f"the largest contact area of the {probe.shape}, up to {in_mm(probe.circumradius)} from its axis,"
     if probe.slit and not probe.slit.is_open:
         return "the slit"
     return f"the footprint of the {probe.shape}, up to {in_mm(probe.circumradius)} from its axis,"
 
 
 def _check_contact(body: Body, probe: Probe, frame: Frame) -> None:
-    """Check a place where the face is not level, not plane, or the probe not at right angles to it."""
+    """Check a place on a face that is curved or inclined, or to which the probe is not normal."""
     if len(probe.at) == 3 and (off := dist(probe.at, frame.point)) > _FARTHEST_OFF * body.extent:
         raise PlaceError(
-            f"lies {in_mm(off)} off the body's surface: at most {_FARTHEST_OFF:.0%} of its extent, "
-            f"{in_mm(_FARTHEST_OFF * body.extent)}, is taken for a place on it"
+            f"is {in_mm(off)} off the surface of the body: must be at most {_FARTHEST_OFF:.0%} of its size, "
+            f"{in_mm(_FARTHEST_OFF * body.extent)}"
         )
     check_contact(body, probe, frame)
     if probe.is_unilateral:
         check_first_touch(body, probe, frame)
     if edge_gap(body, probe, frame) <= _TOUCHING * body.extent:
-        raise PlaceError(f"{_footprint(probe)} must lie inside one face, not on or over its edge")
+        raise PlaceError(f"{_footprint(probe)} must be inside one face, not on or over its edge")
     if held_gap(body, probe, frame) <= _TOUCHING * body.extent:
-        raise PlaceError(f"{_footprint(probe)} must not reach what is held of the body")
+        raise PlaceError(f"{_footprint(probe)} must not reach the support of the body")
 
 
 @lru_cache(_MANY)

@@ -1,4 +1,4 @@
-"""Problems of a study file: collected all at once, each with file, key, what was found and what is allowed."""
+"""Problems of a study file: collected all at once, each with file, key, value, and what is allowed."""
 
 import difflib
 import json
@@ -29,7 +29,7 @@ _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?\s?(%|mm\b)?")
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong (or, as a warning, doubtful) in a study file.
+    """A problem of a study file: an error or, as a warning, a doubtful value.
 
     ``tables`` are those of arrays that it is about, by section and name: none where it is about all of them.
     """
@@ -46,14 +46,14 @@ class Problem:
 
     @property
     def value(self) -> Any:
-        """What was found, as plain data."""
+        """The value in the file, as plain data."""
         if isinstance(self.found, _Raw):
             return json.loads(self.found)
         return str(self.found) if isinstance(self.found, str) else self.found
 
     @property
     def howto(self) -> str:
-        """The page of the documentation that tells how it is done; "" where none does."""
+        """The page of the documentation about the key; "" if there is none."""
         return page_of(self.key)
 
 
@@ -105,7 +105,7 @@ class Problems:
         self._add(self.errors, self._problem(key, found, allowed))
 
     def unknown(self, key: str, found: Any, allowed: str) -> None:
-        """Add the error of a key that is not read: what it stands in can be held against the rest without it."""
+        """Add the error of an unknown key. The rest of its section is still checked against the others."""
         self.error(key, found, allowed)
         self._unread.add(key)
 
@@ -114,7 +114,7 @@ class Problems:
         self._add(self.warnings, self._problem(key, found, allowed))
 
     def told_once(self) -> Iterator[str]:
-        """Yield the warnings; of those of a sweep, which differ in numbers only, the first one for all."""
+        """Yield the warnings. Those of a sweep, which differ in numbers only, are one."""
         groups: dict[tuple[str, str, tuple[tuple[str, str], ...]], list[Problem]] = {}
         for problem in self.named(self.warnings):
             groups.setdefault((problem.key, _NUMBER.sub("#", problem.allowed), problem.tables), []).append(problem)
@@ -128,7 +128,7 @@ class Problems:
             yield f"{first}; so for {printable(listed)}" if listed else str(first)
 
     def named(self, problems: Iterable[Problem]) -> list[Problem]:
-        """Return ``problems`` without the names of tables where they are about all of an array."""
+        """Return ``problems``, without names of tables if they are about all tables of an array."""
         found = []
         for problem in problems:
             sections = [section for section, _ in problem.tables]
@@ -137,7 +137,7 @@ class Problems:
         return found
 
     def sound(self, sections: dict[str, tuple[Section, ...]]) -> dict[str, tuple[Section, ...]]:
-        """Return ``sections`` without those that hold an error: what goes with them cannot be told yet.
+        """Return ``sections`` without those that have an error, which cannot be checked against others.
 
         Of an array of tables, the others are left.
         """
@@ -176,7 +176,7 @@ class Problems:
             self.error(f"{where}.{key}".rstrip("."), found, allowed({**item, "loc": place}, model))
 
     def _add(self, problems: list[Problem], problem: Problem) -> None:
-        """Add a problem; if it is there already, of other tables, it is of these, too."""
+        """Add a problem. If it is known for other tables, these are added to it."""
         same = (problems is self.errors, problem.key, problem.found, problem.allowed)
         place = self._places.setdefault(same, len(problems))
         if place == len(problems):
@@ -203,7 +203,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def closest(name: str, known: Iterable[str]) -> str:
-    """Return the known name that was probably meant: one much like ``name``, or one that begins with it; "" if none."""
+    """Return the known name that is similar to ``name``, or begins with it; "" if there is none."""
     known = list(known)
     begun = [other for other in known if other.startswith(name)] if len(name) > 1 else []
     return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=_ALIKE) or begun), "")
@@ -246,7 +246,7 @@ def allowed(item: Any, model: type[BaseModel]) -> str:
 
 
 def _list_of(model: type[BaseModel], key: str) -> str:
-    """Say what a list holds, by the type of a key: a tuple, or a choice of things that one is among; and an example."""
+    """Return what a list must have, by the type of its key, and an example."""
     annotation: Any = model.model_fields[key].annotation
     parts = (annotation, *getattr(annotation, "__args__", ()))
     items: tuple[Any, ...] = next((part.__args__ for part in parts if getattr(part, "__origin__", None) is tuple), ())
@@ -261,7 +261,7 @@ def _section_of(key: str) -> tuple[str, int]:
 
 
 class _Raw(str):
-    """A value already written as it stands in the file."""
+    """A value as the file writes it."""
 
 
 def _hashable(value: Any) -> Any:

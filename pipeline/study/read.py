@@ -1,4 +1,4 @@
-"""The text of a study file, and what of TOML it holds, within what any study needs."""
+"""The text of a study file, and its TOML, within the limits of any study."""
 
 import re
 import tomllib
@@ -51,7 +51,7 @@ def toml_of(text: str, file: str) -> dict[str, Any]:
     _check_size(len(text), file)
     try:
         if _LONG_KEY.search(text):
-            raise _refused(file, "TOML", f"is nested more than {_DEEPEST} levels deep: no study is")
+            raise _refused(file, "TOML", f"is nested more than {_DEEPEST} levels deep: this is no study")
         raw = tomllib.loads(text)
     except RecursionError:
         raise _refused(file, "TOML syntax", "is nested too deeply") from None
@@ -63,13 +63,13 @@ def toml_of(text: str, file: str) -> dict[str, Any]:
             raise _refused(file, "TOML", "has an integer of more than 64 bits: write 1e30 for a large number")
         layer = list(_inside(layer))
     if layer:
-        raise _refused(file, "TOML", f"is nested more than {_DEEPEST} levels deep: no study is")
+        raise _refused(file, "TOML", f"is nested more than {_DEEPEST} levels deep: this is no study")
     return raw
 
 
 def _check_size(size: int, file: str) -> None:
     if size > _MOST_BYTES:
-        raise _refused(file, "file", f"is larger than {_MOST_BYTES / 1e6:g} MB: no study is")
+        raise _refused(file, "file", f"is larger than {_MOST_BYTES / 1e6:g} MB: this is no study")
 
 
 def _refused(file: str, what: str, why: str) -> StudyError:
@@ -77,13 +77,13 @@ def _refused(file: str, what: str, why: str) -> StudyError:
 
 
 def check_text(key: str, text: str, problems: Problems) -> None:
-    """Report a text that would be shown, and cannot be as it is: it has lines, controls, or turns the writing round."""
+    """Report a text that is not safe to print: one with several lines, control characters, or a reversed direction."""
     if any(unicodedata.category(letter) in _CONTROLS or letter in _TURNS for letter in text):
         problems.error(key, text, "must be one line of text without control characters")
 
 
 def _inside(layer: list[Any]) -> Iterator[Any]:
-    """Yield what the tables and lists of a layer hold."""
+    """Yield the values in the tables and lists of a layer."""
     for outer in layer:
         if isinstance(outer, dict | list):
             yield from outer.values() if isinstance(outer, dict) else outer

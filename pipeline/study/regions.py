@@ -124,7 +124,7 @@ def _check_inclusions(body: Body, problems: Problems) -> None:
             problems.error(
                 key,
                 found,
-                f"{inclusion.name} must be inside the {body.shape}, at least {in_mm(gap)} (a tenth of its smallest "
+                f"{inclusion.name} must be inside the body, at least {in_mm(gap)} (a tenth of its smallest "
                 f"semi-axis) below the surface; "
                 + (f"it is {in_mm(room)} below it" if room > 0 else f"it reaches {in_mm(-room)} out of the body")
                 + f". {_tissue_at(body, inclusion.at)}",

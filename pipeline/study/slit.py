@@ -1,4 +1,4 @@
-"""Whether a slit that a blade stands in fits into the body: within it, clear of the support and of other materials."""
+"""Whether the slit of a blade fits into the body: inside it, clear of the support and of other materials."""
 
 from math import inf, isfinite
 
@@ -21,7 +21,7 @@ _POINTS, _ROUNDS = 21, 8
 
 
 def check_slit(body: Body, probe: Probe, problems: Problems) -> bool:
-    """Report a slit that the body has no room for, and tell whether there is none, or one that fits."""
+    """Report a slit for which the body has no room, and return whether there is none, or one that fits."""
     slit, before = probe.slit, len(problems.errors)
     if slit is None:
         return True
@@ -39,7 +39,7 @@ def check_slit(body: Body, probe: Probe, problems: Problems) -> bool:
 
 
 def check_slit_in(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
-    """Report a mesh that a slit does not fit into."""
+    """Report a column into which the slit does not fit."""
     slit = probe.slit
     if slit is None:
         return
@@ -50,20 +50,20 @@ def check_slit_in(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> N
         problems.error(
             "mesh.epsilon",
             in_mm(mesh.epsilon),
-            f"keeps a column that the slit reaches out of: must be above {in_mm(slit.on_surface)}, or use "
+            f"is too small: the slit reaches out of the column. Must be above {in_mm(slit.on_surface)}, or use "
             'outside = "coarse"',
         )
 
 
 def _check_tip(body: Body, slit: Slit, problems: Problems) -> None:
-    """Report a blade that tissue slides along where what its tip moves in does not allow for it."""
+    """Report a frictionless blade whose tip is too near to the surface or the end of a layer."""
     least = _LEAST_ROOM * slit.ahead
     if slit.tip > 0 and (room := slit.room_at_tip(body)) < least:
         problems.error(
             "probe.incision",
             in_mm(slit.depth),
-            f"puts the blade's tip {in_mm(room)} from the surface or where a layer ends: tissue that slides along it "
-            f"needs {in_mm(least)}, a quarter of how far the slit runs ahead",
+            f"leaves {in_mm(room)} between the blade's tip and the surface or the end of a layer: frictionless contact "
+            f"needs {in_mm(least)}, a quarter of `ahead`",
         )
 
 
@@ -73,7 +73,7 @@ def _check_depth(body: Body, slit: Slit, problems: Problems) -> None:
         problems.error(
             "probe.incision",
             in_mm(slit.depth),
-            f"goes through the whole body: must be below its height {in_mm(high - low)}",
+            f"cuts through the whole body: must be below its height {in_mm(high - low)}",
         )
 
 
@@ -84,7 +84,7 @@ def _check_support(body: Body, slit: Slit, problems: Problems) -> None:
             problems.error(
                 "probe.incision",
                 in_mm(slit.depth),
-                f"goes through what is held of the body: must be below {in_mm(high - level)}",
+                f"cuts through the support of the body: must be below {in_mm(high - level)}",
             )
 
 
@@ -94,21 +94,21 @@ def _check_room(body: Body, slit: Slit, problems: Problems) -> None:
         problems.error(
             "probe.incision",
             in_mm(slit.depth),
-            f"puts the slit's front {in_mm(room)} from where a layer ends, or from the bottom or what is held: at "
-            f"least {in_mm(least)}, a quarter of how far it runs ahead of the blade, must be left",
+            f"leaves {in_mm(room)} between the front of the slit and the end of a layer, the bottom or the support: "
+            f"must leave at least {in_mm(least)}, a quarter of `ahead`",
         )
 
 
 def _check_inclusions(body: Body, slit: Slit, frame: Frame, problems: Problems) -> None:
-    """Report inclusions that a slit cuts, or that are nearer to it than it runs ahead of the blade."""
+    """Report inclusions that the slit cuts, or that are nearer to it than `ahead`."""
     half = slit.reach if isfinite(slit.reach) else body.extent
     for number, inclusion in enumerate(body.inclusion, start=1):
         if (room := _distance(slit, half, frame, inclusion.surface)) < slit.ahead:
             problems.error(
                 f"body.inclusion[{number}].at",
                 [in_mm(x) for x in inclusion.at],
-                f"{inclusion.name} must keep {in_mm(slit.ahead)} (how far the slit runs ahead of the blade) from the "
-                f"slit; it is {f'{in_mm(room)} from it' if room > 0 else 'cut by it'}",
+                f"{inclusion.name} must be at least {in_mm(slit.ahead)} (`ahead`) from the slit; "
+                + (f"the distance is {in_mm(room)}" if room > 0 else "the slit cuts it"),
             )
 
 

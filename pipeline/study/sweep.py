@@ -116,7 +116,7 @@ class Case:
         if not any(axis.off == "lost" for axis in self.axes):
             return ""
         error = place_error(self.body, self.probe)
-        return "" if error is None else CLEAR if is_clear(self.body, self.probe) else f"the tool cannot stand: {error}"
+        return "" if error is None else CLEAR if is_clear(self.body, self.probe) else f"the tool does not fit: {error}"
 
     @property
     def travel(self) -> Vector:

@@ -1,4 +1,4 @@
-"""What of a section is swept: lists of values, where they stand, and the axes that they become."""
+"""Sweeps of a section: lists of values, their places in the file, and the axes that they become."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -10,12 +10,12 @@ from pipeline.shapes.section import Section
 from pipeline.study.problems import Problems, nested_model
 from pipeline.study.sweep import Axis
 
-# Where a value stands within a section: keys, and numbers in arrays of tables, from 0.
+# Place of a value within a section: keys, and numbers in arrays of tables, from 0.
 Place = tuple[str | int, ...]
 
 
 def sweeps(model: type[BaseModel], raw: dict[str, Any], where: Place = ()) -> Iterator[tuple[Place, list[Any]]]:
-    """Yield place and values of every sweep of a section, those of the pieces in its own arrays of tables, too."""
+    """Yield place and values of every sweep of a section, and of the arrays of tables within it."""
     for key, value in raw.items():
         inner = nested_model(model, key)
         if inner is not None:
@@ -27,7 +27,7 @@ def sweeps(model: type[BaseModel], raw: dict[str, Any], where: Place = ()) -> It
 
 
 def placed(raw: Any, values: Iterable[tuple[Place, Any]]) -> Any:
-    """Return ``raw`` with each value put where it belongs."""
+    """Return ``raw`` with each value at its place."""
     for (key, *rest), value in values:
         inner = placed(raw[key], [(tuple(rest), value)]) if rest else value
         raw = raw.copy()
@@ -47,7 +47,7 @@ def _is_sweep(model: type[BaseModel], key: str, value: Any) -> bool:
 
 
 def axis_of(section: str, place: Place, raw: list[Any], parsed: list[Section], problems: Problems) -> Axis:
-    """Return the axis of a sweep: its values as they were given, its unit, and the table it stands in."""
+    """Return the axis of a sweep: its values as given, its unit, and the table that it is in."""
     *outer, key = place
     owners = [_at(item, outer) for item in parsed]
     values = [getattr(owner, str(key)) for owner in owners]
@@ -61,7 +61,7 @@ def axis_of(section: str, place: Place, raw: list[Any], parsed: list[Section], p
         labels = values
     for label, count in Counter(labels).items():
         if count > 1:
-            problems.error(f"{section}.{written(place)}", raw[labels.index(label)], "stands more than once in the list")
+            problems.error(f"{section}.{written(place)}", raw[labels.index(label)], "is in the list more than once")
     if unit == "" and all(isinstance(label, float | int) for label in labels):
         unit = "1"
     if not outer:
@@ -75,14 +75,14 @@ def _labelled(table: dict[str, Any]) -> str:
 
 
 def _at(section: Any, place: list[str | int]) -> Any:
-    """Return what stands at a place within a section."""
+    """Return the value at a place within a section."""
     for step in place:
         section = section[step] if isinstance(step, int) else getattr(section, step)
     return section
 
 
 def _unit_of(model: type[BaseModel], key: str) -> str:
-    """Return the unit of a number that may be left out."""
+    """Return the unit of an optional number."""
     parts = getattr(model.model_fields[key].annotation, "__args__", ())
     extras = [getattr(m, "json_schema_extra", None) for part in parts for m in getattr(part, "__metadata__", ())]
     return next((str(extra["unit"]) for extra in extras if isinstance(extra, dict) and "unit" in extra), "")

@@ -1,4 +1,4 @@
-"""Sections of a study file as they are read: tables, arrays of tables, and what of them is swept."""
+"""Sections of a study file: tables, arrays of tables, and their sweeps."""
 
 import itertools
 from collections import Counter
@@ -19,8 +19,7 @@ from pipeline.study.sweep import Axis
 from pipeline.study.swept import Place, axis_of, placed, sweeps, written
 from pipeline.study.vocabulary import NOT_COMPUTED
 
-# More values in a list, or more cases of a study, are a slip of the pen, or work for several studies: every case is
-# planned and reported, each in a few hundred bytes and a tenth of a millisecond.
+# Limits of a list and of a study. Each case costs a few hundred bytes and a tenth of a millisecond.
 _MOST_VALUES = 10_000
 MOST_CASES = 200_000
 
@@ -37,16 +36,16 @@ def read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
 
 
 def _walked(raw: Any, problems: Problems) -> tuple[Any, Way | None]:
-    """Return the probe's tables with the places of their path in its stead, and that path, if there is one."""
+    """Return the probe's tables with the places of the path as a sweep of `at`, and the path, if there is one."""
     tables = raw if isinstance(raw, list) else [raw]
     having = [table for table in tables if isinstance(table, dict) and "path" in table]
     if not having:
         return raw, None
     where = "probe.path" if isinstance(raw, dict) else "probe[1].path"
     if any("at" in table for table in having):
-        problems.error(where, None, "stands beside `at`: give one of both")
+        problems.error(where, None, "excludes `at`: give one of both")
     if len(having) < len(tables) or any(table["path"] != having[0]["path"] for table in having):
-        problems.error("probe.path", None, "must be the same in all [[probe]] tables: it is one sweep of all of them")
+        problems.error("probe.path", None, "must be the same in all [[probe]] tables, since it is one sweep")
     way = read_path(having[0]["path"], where, problems)
 
     def walked(table: Any) -> Any:
@@ -63,13 +62,13 @@ def _walked(raw: Any, problems: Problems) -> tuple[Any, Way | None]:
 
 
 def _axes_of(way: Way, axes: list[Axis]) -> list[Axis]:
-    """Return the axes with those of a path for that of its places."""
+    """Return the axes; those of a path replace the axis of `at`."""
     own = [Axis("probe", name, labels, "m", off=way.off) for name, labels in way.axes]
     return [new for axis in axes for new in (own if axis.key == "at" else [axis])]
 
 
 def _read_tables(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
-    """Return the axes of a section as it is written, and every combination of their values."""
+    """Return the axes of a section, and every combination of their values."""
     if isinstance(raw, list) and name not in SINGLE:
         return _read_array(name, raw, problems)
     if not isinstance(raw, dict):
@@ -82,7 +81,7 @@ def _read_tables(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
     swept = {} if name in SINGLE else dict(sweeps(model, raw))
     for place, values in swept.items():
         if not values:
-            problems.error(f"{name}.{written(place)}", values, "an empty list sweeps nothing; give at least one value")
+            problems.error(f"{name}.{written(place)}", values, "is an empty list: give at least one value")
         elif len(values) > _MOST_VALUES and place != ("at",):  # places are those of a path, which has its own limit
             problems.error(f"{name}.{written(place)}", None, f"has {len(values)} values: at most {_MOST_VALUES}")
     if not all(0 < len(values) <= _MOST_VALUES or place == ("at",) for place, values in swept.items()):
@@ -103,9 +102,9 @@ def _read_tables(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
 
 
 def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
-    """Read ``[[name]]`` tables: a sweep over the section as a whole, labelled by the tables' names.
+    """Read ``[[name]]`` tables: a sweep over the section as a whole, labelled by the names of the tables.
 
-    A list that all of them have of a key sweeps it in each of them.
+    A key with the same list in all tables is a sweep of that key in each of them.
     """
     variants: list[list[Section]] = []
     read: list[dict[str, Any]] = []
@@ -118,7 +117,7 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
             problems.error(where, table, f"must be a table: write [[{name}]]")
             continue
         _check_name(f"{where}.name", table.get("name"), problems)
-        table = _possible(name, table, problems, where)  # noqa: PLW2901 (of the rest, what is wrong is told)
+        table = _possible(name, table, problems, where)  # noqa: PLW2901 (the rest is checked)
         model = _model(name, table, problems, where)
         if model is None:
             continue
@@ -127,7 +126,7 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
                 problems.error(
                     f"{where}.{written(place)}",
                     value,
-                    "a list inside an array of tables: write one table for each value, or the same list in all tables",
+                    "is a list in one table of an array: write a table for each value, or the same list in all tables",
                 )
         try:
             combinations = itertools.product(*shared.values())
@@ -137,15 +136,15 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
         except ValidationError as error:
             problems.from_pydantic(where, error, model, table)
     if len(variants) < len(tables):
-        return [], tuple(itertools.chain.from_iterable(variants))  # what is wrong with the others is reported
+        return [], tuple(itertools.chain.from_iterable(variants))  # errors of the others are reported
     names = [first.name for first, *_ in variants]
     for label in sorted(name for name, count in Counter(names).items() if count > 1 and name):
         problems.error(
-            f"{name}.name", label, "is the name of more than one table; names label the sweep and must differ"
+            f"{name}.name", label, "is the name of several tables: names must differ, since they label the sweep"
         )
     axes = [Axis(name, "", tuple(names), "")]
     if variants and shared:
-        # What each of their values is does not depend on the table: the first one tells.
+        # The values do not depend on the table: the first one is read.
         kind, table = type(variants[0][0]), placed(read[0], ((place, given[0]) for place, given in shared.items()))
         for place, values in shared.items():
             parsed = [_validate(kind, placed(table, [(place, value)])) for value in values]
@@ -155,15 +154,15 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
 
 def _check_name(key: str, name: Any, problems: Problems) -> None:
     if not isinstance(name, str) or not name:
-        problems.error(key, name, "is required in an array of tables: it labels the sweep")
+        problems.error(key, name, "is required in an array of tables, since it labels the sweep")
     else:
         check_text(key, name, problems)
 
 
 def _is_sane(name: str, tables: list[Any], shared: dict[Place, list[Any]], problems: Problems) -> bool:
-    """Tell whether there are tables, and no more of them and their sweeps than can be gone through."""
+    """Return whether there are tables, and not too many of them or of their sweeps."""
     if not tables:
-        problems.error(name, tables, f"an empty list sweeps nothing; write [[{name}]] for each value")
+        problems.error(name, tables, f"is an empty list: write [[{name}]] for each value")
     elif len(tables) > _MOST_VALUES:
         problems.error(name, None, f"has {len(tables)} tables: at most {_MOST_VALUES}")
     elif len(tables) * prod(map(len, shared.values())) > MOST_CASES:
@@ -174,7 +173,7 @@ def _is_sane(name: str, tables: list[Any], shared: dict[Place, list[Any]], probl
 
 
 def _shared_sweeps(name: str, tables: list[Any]) -> dict[Place, list[Any]]:
-    """Return the lists of values that all of an array's tables have of a key of their own, alike."""
+    """Return the lists of values that are the same in all tables of an array."""
     found: list[dict[Place, list[Any]]] = []
     for table in tables:
         model = SECTIONS[name]
@@ -192,10 +191,10 @@ def _shared_sweeps(name: str, tables: list[Any]) -> dict[Place, list[Any]]:
 
 
 def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "") -> dict[str, Any]:
-    """Return a section without the keys that it does not have, which are reported: the rest is checked all the same."""
+    """Return a section without its unknown keys, which are reported: the rest is checked all the same."""
     models, shape = SECTIONS[name], raw.get("shape")
     if isinstance(models, Mapping) and (not isinstance(shape, str) or shape not in models):
-        return raw  # what all shapes lack is told with it
+        return raw  # keys that no shape has are reported with it
     model = models[str(shape)] if isinstance(models, Mapping) else models
     lacking = [key for key in raw if key not in model.model_fields]
     for key in lacking[:MOST_ERRORS]:
@@ -207,7 +206,7 @@ def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "
 
 
 def _lacking(name: str, model: type[Section], shape: str, key: str) -> str:
-    """Say that a section has no such key; if other shapes have it, or one like it, which do."""
+    """Return the message about an unknown key: its new name, shapes that have it, or a similar key."""
     models = SECTIONS[name]
     if new := renamed(name, key):
         return new
@@ -225,7 +224,7 @@ def _lacking(name: str, model: type[Section], shape: str, key: str) -> str:
 
 
 def _having(model: Mapping[str, type[Section]], key: str) -> str:
-    """Say which shapes have a key, "" if none has."""
+    """Return which shapes have a key, in words; "" if none has."""
     shapes = [shape for shape, kind in model.items() if key in kind.model_fields]
     if len(shapes) > 1:
         return f"{', '.join(shapes[:-1])} and {shapes[-1]} have"
@@ -233,9 +232,9 @@ def _having(model: Mapping[str, type[Section]], key: str) -> str:
 
 
 def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") -> type[Section] | None:
-    """Return the model of a section, chosen by its shape where it has one; None if it has none, and why is told.
+    """Return the model of a section, by its shape; None if the shape is wrong, which is reported.
 
-    Keys that no shape has are told all the same.
+    Keys that no shape has are reported, too.
     """
     where = where or name
     model = SECTIONS[name]
@@ -247,9 +246,11 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
     supported = ", ".join(model)
     if shape is None:
         if raw:
-            problems.error(f"{where}.shape", None, f"is required; supported are {supported}")
+            problems.error(f"{where}.shape", None, f"is required: one of {supported}")
     elif isinstance(shape, list):
-        problems.error(f"{where}.shape", shape, f"shapes are swept with an array of tables: write [[{name}]] for each")
+        problems.error(
+            f"{where}.shape", shape, f"must be one shape: for a sweep over shapes, write one [[{name}]] for each"
+        )
     else:
         problems.error(f"{where}.shape", shape, f"unknown shape; {nearest(str(shape), model)}")
     known = dict.fromkeys(key for kind in model.values() for key in kind.model_fields)
@@ -264,7 +265,7 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
 def _validate_each(
     name: str, model: type[Section], raw: dict[str, Any], swept: dict[Place, list[Any]], problems: Problems
 ) -> list[list[Section]] | None:
-    """Validate each value of each sweep once, so that an error is reported once however many cases it meets."""
+    """Validate each value of each sweep once, so that an error is reported once, not for each case."""
     before = len(problems.errors)
     first = placed(raw, ((place, values[0]) for place, values in swept.items()))
     singles: list[list[Section]] = []

@@ -1,4 +1,4 @@
-"""A study that stands in a dictionary, written as the file that it stands for.
+"""A study in a dictionary, written as a study file.
 
 A dataset carries the text of its study, and a store knows cases by their numbers: so what a program declares is written
 as TOML and read like any other study, within the same limits.
@@ -87,9 +87,7 @@ def _value(value: Any, place: str, problems: Problems) -> str:
             pairs = (f"{_key(str(k))} = {_value(v, f'{place}.{k}', problems)}" for k, v in value.items())
             return f"{{{', '.join(pairs)}}}"
     allowed = 'write text with a unit, such as "10 mm", a number, a list, or a table'
-    what = (
-        "None: leave the key out" if value is None else f"a {type(value).__name__} has no place in a study: {allowed}"
-    )
+    what = "None: leave the key out" if value is None else f"a {type(value).__name__} is no value of a study: {allowed}"
     problems.errors.append(Problem(place, None, what))
     return ""
 

@@ -1,4 +1,4 @@
-"""Names that options of the command line share with the keys of a study file."""
+"""Names that the command line and study files share."""
 
 REDUCTIONS = (
     "duplicates",
@@ -16,13 +16,13 @@ REDUCTIONS = (
     "all",
 )
 
-# Keys of features that are not computed: named as such, not taken for slips of the pen.
+# Keys of features that are not computed. A message says so, instead of suggesting a similar key.
 NOT_COMPUTED = {
-    "friction": 'friction is not computed: tissue sticks (contact = "bonded") or slides ("frictionless")',
-    "adhesion": 'adhesion is not computed: contact = "bonded" pulls as well as it presses',
-    "velocity": "forces are static: nothing depends on velocity",
-    "speed": "forces are static: nothing depends on speed",
-    "history": "forces are static: a depth has one force, whatever came before it",
+    "friction": 'friction is not computed: tissue sticks to the tool (contact = "bonded") or slides ("frictionless")',
+    "adhesion": 'adhesion is not computed; with contact = "bonded", the tool pulls as well as it presses',
+    "velocity": "velocity is not computed: forces are static",
+    "speed": "speed is not computed: forces are static",
+    "history": "forces are static: they depend on the present depth alone",
     "relaxation": "viscoelasticity is not computed: forces are static",
     "viscosity": "viscoelasticity is not computed: forces are static",
     "damping": "viscoelasticity is not computed: forces are static",
@@ -30,8 +30,8 @@ NOT_COMPUTED = {
     "yield": "plasticity is not computed: materials are elastic",
     "fibres": "anisotropy is not computed: materials are isotropic",
     "anisotropy": "anisotropy is not computed: materials are isotropic",
-    "toughness": "fracture is not computed: a slit does not grow, and energy_release tells what would drive it",
-    "insertion": "fracture is not computed: a blade stands in a slit that is there, `incision` deep",
+    "toughness": "fracture is not computed: a slit does not grow; `energy_release` in the dataset drives it",
+    "insertion": "fracture is not computed: the blade is in an open slit, `incision` deep",
     "temperature": "temperature is not computed",
 }
 

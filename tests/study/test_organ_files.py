@@ -86,5 +86,5 @@ def test_elements_fit_between_a_footprint_and_what_is_held():
         study(body=body, probe=probe, mesh={"rim": "0.5 mm"})
     (fits,) = study(body=body, probe=probe, mesh={"rim": "0.2 mm"}).cases()
     assert held_gaps(fits.body, fits.probe, fits.mesh)["body.fixed"] == pytest.approx(0.3e-3, rel=1e-3)
-    with pytest.raises(StudyError, match="must not reach what is held"):
+    with pytest.raises(StudyError, match="must not reach the support"):
         study(body=body | {"fixed": {"below": f"{1e3 * lowest + 0.3:.6f} mm"}}, probe=probe)

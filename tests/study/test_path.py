@@ -78,13 +78,13 @@ WRONG = {
     "no unit": ({"line": LINE | {"to": ["10 mm", 0]}}, ["probe.path.line.to[2] = 0", "number with a unit"]),
     "no length": ({"circle": {"centre": ["0 mm", "0 mm"], "radius": "5 kPa", "steps": 4}}, ["radius", "a length"]),
     "one coordinate": ({"points": [["0 mm", "0 mm"], ["1 mm"]]}, ["probe.path.points[2]", "2 or 3"]),
-    "unlike": ({"points": [["0 mm", "0 mm"], ["1 mm", "0 mm", "0 mm"]]}, ["two coordinates, or all three"]),
-    "one place": ({"points": [["0 mm", "0 mm"]]}, ["probe.path.points", "for one, use `at`"]),
+    "unlike": ({"points": [["0 mm", "0 mm"], ["1 mm", "0 mm", "0 mm"]]}, ["two coordinates at all places"]),
+    "one place": ({"points": [["0 mm", "0 mm"]]}, ["probe.path.points", "for one place, use `at`"]),
     "twice": ({"points": [["1 mm", "0 mm"], ["2 mm", "0 mm"], ["1 mm", "0 mm"]]}, ["1 mm", "more than once"]),
     "no length at all": ({"line": LINE | {"to": LINE["from"]}}, ["probe.path.line", "more than once"]),
     "falling": ({"raster": GRID | {"x": ["5 mm", "-5 mm"]}}, ["probe.path.raster.x", "must rise"]),
-    "a raster's list": ({"raster": GRID | {"x": "5 mm"}}, ['probe.path.raster.x = "5 mm"', "list of two lengths"]),
-    "off the body": (OFF | {"off": "refuse"}, ["probe.path", '"30 mm"', "inside the body's top", 'off = "lost"']),
+    "a raster's list": ({"raster": GRID | {"x": "5 mm"}}, ['probe.path.raster.x = "5 mm"', "list of at least two lengths"]),
+    "off the body": (OFF | {"off": "refuse"}, ["probe.path", '"30 mm"', "inside the top face", 'off = "lost"']),
     "wrong word": ({"line": LINE, "off": "void"}, ['probe.path.off = "void"', "'refuse' or 'lost'"]),
     "never on the body": ({"line": {"from": ["50 mm", "0 mm"], "to": ["60 mm", "0 mm"], "steps": 2}, "off": "lost"},
                           ["probe.path", "misses the body"]),
@@ -100,7 +100,7 @@ def test_what_is_no_path_is_refused(path, words):
 
 
 def test_a_path_stands_in_place_of_at():
-    with pytest.raises(StudyError, match="stands beside `at`"):
+    with pytest.raises(StudyError, match="excludes `at`"):
         study(probe={"at": ["0 mm", "0 mm"], "path": {"line": LINE}})
 
 
@@ -113,7 +113,7 @@ def test_where_the_tool_is_clear_of_the_body_there_is_no_force_and_over_the_edge
     assert np.isfinite(found["force"][:3]).all()
     assert np.isnan(found["force"][3])
     assert found["force"].values[4] == 0
-    assert "inside the body's top" in str(found["message"].values[3])
+    assert "inside the top face" in str(found["message"].values[3])
     assert np.isnan(found["at_x"].values[3:]).all()
     assert count_states(made, {}) == {"ok": 0, "skipped": 1, "failed": 0, "pending": 3, "lost": 1}
     assert build(made, {})["status"].values[0] == "pending"

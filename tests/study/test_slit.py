@@ -23,31 +23,31 @@ def problems(**changes):
 @pytest.mark.parametrize(
     ("key", "said", "changes"),
     [
-        ("probe.direction", "along x or y only", {"probe": {**SLIT, "contact": "frictionless",
+        ("probe.direction", "must be along x or y", {"probe": {**SLIT, "contact": "frictionless",
                                                            "direction": [1.0, 0.2, 0.0]}}),
-        ("probe.incision", "the blade's tip 0 mm from", {"probe": {**SLIT, "contact": "frictionless",
+        ("probe.incision", "leaves 0 mm between the blade's tip", {"probe": {**SLIT, "contact": "frictionless",
                                                                   "incision": "5.1 mm"}, "body": LAYERED}),
-        ("probe.slice", "slides along without force", {"probe": {**SLIT, "contact": "frictionless",
+        ("probe.slice", "slides without force", {"probe": {**SLIT, "contact": "frictionless",
                                                                 "slice": "0.1 mm"}}),
         ("probe.ahead", "leaves no part of the blade in the slit", {"probe": {**SLIT, "incision": "1 mm"}}),
         ("probe.ahead", "there is no incision", {"probe": {**BLADE, "ahead": "1 mm"}}),
         ("probe.ends", "there is no incision", {"probe": {**BLADE, "ends": "open"}}),
         ("probe.incision", "through the whole body", {"probe": {**SLIT, "incision": "20 mm"}}),
-        ("probe.incision", "through what is held", {"probe": {**SLIT, "incision": "16 mm"},
+        ("probe.incision", "through the support", {"probe": {**SLIT, "incision": "16 mm"},
                                                    "body": {**BOX, "fixed": {"below": "-15 mm"}}}),
         ("probe.incision", "at least 0.25 mm", {"probe": {**SLIT, "incision": "19.9 mm"}}),
-        ("probe.incision", "where a layer ends", {"probe": SLIT, "body": LAYERED}),
-        ("probe.at", "the slit must lie inside", {"probe": {**SLIT, "at": ["14.5 mm", "0 mm"]}}),
+        ("probe.incision", "the end of a layer", {"probe": SLIT, "body": LAYERED}),
+        ("probe.at", "the slit must be inside", {"probe": {**SLIT, "at": ["14.5 mm", "0 mm"]}}),
         ("probe.at", "the footprint of the blade", {"probe": {**SLIT, "ends": "open", "at": ["16 mm", "0 mm"]}}),
-        ("probe.ends", "the sides, which are held", {"probe": {**SLIT, "ends": "open"},
+        ("probe.ends", "the sides, which are fixed", {"probe": {**SLIT, "ends": "open"},
                                                     "body": {**BOX, "fixed": "sides"}}),
-        ("body.inclusion[1].at", "must keep 1 mm", {"probe": SLIT, "body": {**BOX, "inclusion": [TUMOUR]}}),
+        ("body.inclusion[1].at", "must be at least 1 mm", {"probe": SLIT, "body": {**BOX, "inclusion": [TUMOUR]}}),
         ("probe.incision", "flat top of a box or a cylinder", {"probe": SLIT, "body": ORGAN}),
         ("probe.incision", "flat top of a box or a cylinder", {"probe": {**SLIT, "axis": [0.1, 0.0, -1.0]}}),
         ("probe.depth", "through the slit's front below its tip", {"probe": {**SLIT, "depth": "1 mm"}}),
         ("probe.slice", "through the slit's front at its end", {"probe": {**SLIT, "slice": "1.5 mm"}}),
         ("mesh.epsilon", "the slit reaches out of", {"probe": SLIT, "mesh": {"epsilon": "5 mm", "outside": "free"}}),
-        ("mesh.outside", "an open slit would run into", {"probe": {**SLIT, "ends": "open"},
+        ("mesh.outside", "would stop the open slit", {"probe": {**SLIT, "ends": "open"},
                                                         "mesh": {"epsilon": "10 mm", "outside": "fixed"}}),
     ],
 )  # fmt: skip
@@ -64,7 +64,7 @@ def test_inclusions_of_any_size_are_seen(at, beside):
     body = {**BOX, "inclusion": [{**ball, "young": "20 kPa", "poisson": 0.4}]}
     ((key, text),) = problems(probe={**SLIT, "ends": "open", "ahead": "0.3 mm", "width": "0.3 mm"}, body=body)
     assert key == "body.inclusion[1].at"
-    assert ("it is 0.25 mm from it" if beside else "it is cut by it") in text
+    assert ("the distance is 0.25 mm" if beside else "the slit cuts it") in text
 
 
 def test_lengths_have_units():
