@@ -63,6 +63,7 @@ def study_schema() -> Schema:
     swept = {model.__name__: model for model in _swept()}
     words = swept | {model.__name__: model for model in (*chain(*sections.values()), *tables)}
     for name, definition in definitions.items():
+        definition.pop("description", None)  # a docstring, which is not for authors of studies
         properties = definition.get("properties", {})
         for key, value in properties.items():
             properties[key] = _described(_in_file(value, name in swept, key), words.get(name), key)

@@ -92,7 +92,7 @@ MISTAKES = {
     "blade outside": ({"probe": BLADE | {"length": "41 mm"}}, ["probe.at", "blade"]),
     "fine above coarse": ({"mesh": {"fine": "9 mm"}}, ['mesh.fine = "9 mm"', "at most coarse = 8 mm"]),
     "rim above fine": ({"mesh": {"rim": "6 mm"}}, ['mesh.rim = "6 mm"', "at most fine"]),
-    "direction": ({"probe": BLADE | {"direction": [0.0, 0.0, 1.0]}}, ["probe.direction", "10° aside"]),
+    "direction": ({"probe": BLADE | {"direction": [0.0, 0.0, 1.0]}}, ["probe.direction", "at least 10°"]),
     "direction of an ellipse": (
         {"probe": ELLIPSE | {"direction": [0.0, 0.0, 0.0]}}, ["probe.direction", "not all zero"],
     ),
@@ -123,16 +123,16 @@ MISTAKES = {
         {"probe": {"axis": [1, 0, -1], "at": ["16 mm", "0 mm"]}}, ["probe.at", "edge"],
     ),
     "direction along the axis": (
-        {"probe": BLADE | {"axis": [1, 0, -1], "direction": [-1, 0, 1.1]}}, ["probe.direction", "10° aside"],
+        {"probe": BLADE | {"axis": [1, 0, -1], "direction": [-1, 0, 1.1]}}, ["probe.direction", "at least 10°"],
     ),
     "direction along the normal": (
-        {"probe": BLADE | {"at": ["20 mm", "0 mm", "-9 mm"], "direction": [1, 0, 0]}}, ["probe.direction", "10° aside"],
+        {"probe": BLADE | {"at": ["20 mm", "0 mm", "-9 mm"], "direction": [1, 0, 0]}}, ["probe.direction", "at least 10°"],
     ),
     "ellipsoid with faces": ({"body": ELLIPSOID | {"fixed": "bottom"}}, ["body.fixed", "below"]),
     "ellipsoid without support": (
         {"body": {"shape": "ellipsoid", "axes": ["9 mm"] * 3}}, ["body.fixed", "is required"],
     ),
-    "place beside an ellipsoid": ({"body": ELLIPSOID, "probe": {"at": ["41 mm", "0 mm"]}}, ["probe.at", "beside"]),
+    "place beside an ellipsoid": ({"body": ELLIPSOID, "probe": {"at": ["41 mm", "0 mm"]}}, ["probe.at", "outside the body"]),
     "footprint beside an ellipsoid": (
         {"body": ELLIPSOID, "probe": {"at": ["32 mm", "0 mm"], "axis": [0, 0, -1], "radius": "9 mm"}},
         ["probe.at", "misses the body"],
@@ -204,7 +204,7 @@ def test_what_is_refused_does_not_hang_on_what_was_read_before():
     """A direction along the axis is refused where it was given; the same one, left out, is another one there."""
     on_side = BLADE | {"at": ["20 mm", "1.25 mm", "-9 mm"]}
     study(probe=on_side)
-    with pytest.raises(StudyError, match="10° aside"):
+    with pytest.raises(StudyError, match="at least 10°"):
         study(probe=on_side | {"direction": [1.0, 0.0, 0.0]})
     study(probe=on_side)
 

@@ -50,7 +50,7 @@ def test_what_was_done_to_a_file_is_a_warning(crumbs):
 def test_a_broken_file_and_a_label_that_is_not_there_are_refused_by_key(crumbs):
     with pytest.raises(StudyError, match=r"body\.file.*crumbs\.stl.*2 separate shells"):
         surface(crumbs)
-    with pytest.raises(StudyError, match=r"body\.file.*no voxel has label 5; there are 1, 2"):
+    with pytest.raises(StudyError, match=r"body\.file.*no voxel has label 5; labels are 1, 2"):
         image(label=5)
     with pytest.raises(StudyError, match=r"body\.label"):
         image(label=0)
