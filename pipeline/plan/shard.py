@@ -103,7 +103,7 @@ def _units(plan: Plan) -> list[tuple[int, list[str]]]:
 
 
 def _waiting(plan: Plan) -> Iterable[list[str]]:
-    """Return, of a study with `stop_near_exact`, the keys of cases that differ in ε only, with those of F_exact."""
+    """Return keys of cases that differ in ε only, with those of their F_exact, for `stop_near_exact`."""
     position = next((i for i, axis in enumerate(plan.study.axes) if axis.path == "mesh.epsilon"), None)
     if plan.study.planning.stop_near_exact is None or position is None or not plan.reference_keys:
         return ()

@@ -57,7 +57,8 @@ def _checked(solve: Solve, record: Record) -> Record:
     if not isfinite(bar) and (solve.goal is not None or not record.message):
         return failed(record, f"the computed error bar is {bar}")
     if solve.goal is None and bar > _WORST_BAR:
-        return failed(record, f"error bar {100 * bar:.0f} %: the mesh is too coarse for this scene; use a smaller rim")
+        why = f"error bar {100 * bar:.0f} % of F, above {100 * _WORST_BAR:.0f} %: this mesh does not show that F is right"
+        return failed(record, f"{why}; use a smaller `rim` or `fine`")
     return failed(record, f"the computed error bar is {bar:.2g}") if bar < 0 else _without_wide_release(record)
 
 

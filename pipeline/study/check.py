@@ -71,10 +71,16 @@ def _placed(
     """Return the bodies with the probes that have a place on them, and report those that have none."""
     sane = [probe for probe in probes if _has_place(probe, problems)]
     placed, fitting = [], []
+    refused: dict[tuple[str, str, str], list[Probe]] = {}
     for body, probe in itertools.product(bodies, sane):
         with problems.about(body=body, probe=probe):
-            if _check_place(body, probe, way, problems):
+            if _check_place(body, probe, way, problems, refused):
                 placed.append((body, probe))
+    for (body_name, probe_name, why), lost in refused.items():
+        places = [[in_mm(x) for x in probe.at] for probe in lost]
+        more = f"; the same for {len(places) - 1} more places, up to {', '.join(places[-1])}" if len(places) > 1 else ""
+        with problems.about(body=_named(bodies, body_name), probe=_named(probes, probe_name)):
+            problems.error(way.path if way else "probe.at", places[0], f"{why}{more}{'' if lost[0].slit else _OR_LOST}")
     _check_way(way, probes, placed, problems)
     for body, probe in placed:
         with problems.about(body=body, probe=probe):
@@ -150,14 +156,29 @@ def _has_place(probe: Probe, problems: Problems) -> bool:
     return sane
 
 
-def _check_place(body: Body, probe: Probe, way: Axis | None, problems: Problems) -> bool:
-    """Report a place at which the probe cannot touch the body, and return whether it can."""
+def _named(sections: Sequence[Section], name: str) -> Section:
+    """Return the section of that name."""
+    return next(section for section in sections if section.name == name)
+
+
+def _check_place(
+    body: Body, probe: Probe, way: Axis | None, problems: Problems, refused: dict[tuple[str, str, str], list[Probe]]
+) -> bool:
+    """Report a place at which the probe cannot touch the body, and return whether it can.
+
+    Places of a path are added to ``refused``, by body, probe and reason: they are reported together.
+    """
     error = place_error(body, probe)
-    if error is not None and not (way and way.off == "lost" and error.key == "at"):
-        found, key = getattr(probe, error.key), way.path if way and error.key == "at" else f"probe.{error.key}"
-        why = f"{error}{_OR_LOST if way and error.key == 'at' and not probe.slit else ''}"
-        problems.error(key, [in_mm(x) for x in found] if error.key == "at" else found and list(found), why)
-    return error is None
+    if error is None:
+        return True
+    found = getattr(probe, error.key)
+    if error.key != "at":
+        problems.error(f"probe.{error.key}", found and list(found), str(error))
+    elif way is None:
+        problems.error("probe.at", [in_mm(x) for x in found], str(error))
+    elif way.off != "lost":
+        refused.setdefault((body.name, probe.name, str(error)), []).append(probe)
+    return False
 
 
 def _check_way(

@@ -126,13 +126,13 @@ MISTAKES = {
         {"probe": BLADE | {"axis": [1, 0, -1], "direction": [-1, 0, 1.1]}}, ["probe.direction", "at least 10°"],
     ),
     "direction along the normal": (
-        {"probe": BLADE | {"at": ["20 mm", "0 mm", "-9 mm"], "direction": [1, 0, 0]}}, ["probe.direction", "at least 10°"],
+        {"probe": BLADE | {"at": ["20 mm", "0 mm", "-9 mm"], "direction": [1, 0, 0]}}, ["probe.direction", "10°"],
     ),
     "ellipsoid with faces": ({"body": ELLIPSOID | {"fixed": "bottom"}}, ["body.fixed", "below"]),
     "ellipsoid without support": (
         {"body": {"shape": "ellipsoid", "axes": ["9 mm"] * 3}}, ["body.fixed", "is required"],
     ),
-    "place beside an ellipsoid": ({"body": ELLIPSOID, "probe": {"at": ["41 mm", "0 mm"]}}, ["probe.at", "outside the body"]),
+    "place beside an ellipsoid": ({"body": ELLIPSOID, "probe": {"at": ["41 mm", "0 mm"]}}, ["probe.at", "outside"]),
     "footprint beside an ellipsoid": (
         {"body": ELLIPSOID, "probe": {"at": ["32 mm", "0 mm"], "axis": [0, 0, -1], "radius": "9 mm"}},
         ["probe.at", "misses the body"],

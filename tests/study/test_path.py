@@ -84,7 +84,7 @@ WRONG = {
     "no length at all": ({"line": LINE | {"to": LINE["from"]}}, ["probe.path.line", "more than once"]),
     "falling": ({"raster": GRID | {"x": ["5 mm", "-5 mm"]}}, ["probe.path.raster.x", "must rise"]),
     "a raster's list": ({"raster": GRID | {"x": "5 mm"}}, ['probe.path.raster.x = "5 mm"', "two lengths"]),
-    "off the body": (OFF | {"off": "refuse"}, ["probe.path", '"30 mm"', "inside the top face", 'off = "lost"']),
+    "off the body": (OFF | {"off": "refuse"}, ["probe.path", "30 mm", "inside the top face", 'off = "lost"']),
     "wrong word": ({"line": LINE, "off": "void"}, ['probe.path.off = "void"', "'refuse' or 'lost'"]),
     "never on the body": ({"line": {"from": ["50 mm", "0 mm"], "to": ["60 mm", "0 mm"], "steps": 2}, "off": "lost"},
                           ["probe.path", "misses the body"]),
