@@ -57,7 +57,7 @@ def _checked(solve: Solve, record: Record) -> Record:
     if not isfinite(bar) and (solve.goal is not None or not record.message):
         return failed(record, f"the computed error bar is {bar}")
     if solve.goal is None and bar > _WORST_BAR:
-        why = f"error bar {100 * bar:.0f} % of F, above {100 * _WORST_BAR:.0f} %: this mesh does not show that F is right"
+        why = f"error bar {100 * bar:.0f} % of F, above {100 * _WORST_BAR:.0f} %: F is not proved on this mesh"
         return failed(record, f"{why}; use a smaller `rim` or `fine`")
     return failed(record, f"the computed error bar is {bar:.2g}") if bar < 0 else _without_wide_release(record)
 
