@@ -149,7 +149,7 @@ def _copy_of(like: str) -> tuple[str, Path]:
 def _carried(text: str, source: Path, target: Path) -> list[Path]:
     """Copy the body's file that a study names from the folder ``source`` to where it leads from ``target``.
 
-    What is there already is left alone, and what is not to be had, the study's reader tells of.
+    An existing file is kept. A missing one is reported when the study is read.
 
     Raises:
         OSError: if it cannot be written.

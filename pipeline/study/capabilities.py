@@ -1,7 +1,7 @@
 """Features that exclude each other, and why: one table, read by the study, the plan, the export and the docs.
 
-A scene has a set of features. ``REFUSALS`` holds the pairs that a study is refused for; ``OBSTACLES`` the features for
-which a shorter way of computing (a reduction, a real-time model) is not taken. Pairs in neither table are computed.
+A scene has a set of features. ``REFUSALS`` lists pairs that are errors of a study. ``OBSTACLES`` lists, for each shorter
+way of computing (a reduction, a real-time model), the features that exclude it. All other pairs are computed.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,7 +24,7 @@ from pipeline.study.schema import Material, Mesh
 
 # Poisson's ratio beyond which displacement elements of degree 2, which find a body's own far field, lock.
 MOST_OF_GREEN = 0.49
-# A slit whose blade tissue slides along lies along x or y to this.
+# Tolerance within which a frictionless slit must be along x or y.
 _ALIGNED = 1e-9
 
 
@@ -47,7 +47,7 @@ class Scene(Protocol):
 class Feature:
     """A feature: the ``key`` of a study that sets it, whether a scene has it, and how its value is written.
 
-    ``also`` are the parts of a scene that tell, besides the section of the key.
+    ``also`` are other sections on which the feature depends.
     """
 
     key: str
@@ -125,8 +125,8 @@ FEATURES: dict[str, Feature] = {
     "curved or inclined surface": Feature("probe.axis", lambda s: not _is_flat(s), ("body",)),
     "no flat top": Feature("body.shape", lambda s: not (isinstance(s.body, Layered) and _is_level(s)), ("probe",)),
     "body of triangles": Feature("body.shape", lambda s: isinstance(s.body, FromFile) and not s.body.HAS_NAMES),
-    "held at its sides": Feature("body.fixed", lambda s: s.body.support.gap(0.0) == 0.0),
-    "held at its sides alone": Feature("body.fixed", lambda s: not s.body.support.holds_column()),
+    "fixed sides": Feature("body.fixed", lambda s: s.body.support.gap(0.0) == 0.0),
+    "fixed sides alone": Feature("body.fixed", lambda s: not s.body.support.holds_column()),
     "cut free": Feature("mesh.outside", lambda s: s.mesh.outside == "free" and isfinite(s.mesh.epsilon)),
     "kept column": Feature("mesh.outside", _is_column, _PLACE),
     "fixed column": Feature("mesh.outside", lambda s: s.mesh.outside == "fixed" and _is_column(s), _PLACE),
@@ -177,13 +177,11 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("fixed column", "open slit", 'would stop the open slit at the side of the column: use ends = "blade"'),
     Refusal(
         "cut free",
-        "held at its sides alone",
+        "fixed sides alone",
         "the column around the tool does not touch the fixed sides, and would float: "
         'use `outside = "coarse"` or "fixed", or fix the bottom',
     ),
-    Refusal(
-        "open slit", "held at its sides", 'the slit would cut through the sides, which are fixed: use ends = "blade"'
-    ),
+    Refusal("open slit", "fixed sides", 'the slit would cut through the sides, which are fixed: use ends = "blade"'),
     # Degrees of elements.
     Refusal(
         "degree 1",

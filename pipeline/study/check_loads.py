@@ -16,7 +16,7 @@ from pipeline.study.problems import Problems, nearest
 from pipeline.study.schema import Material
 from pipeline.study.sweep import Axis
 
-# A centre this far off the surface, in units of the cap's radius, is not taken for a place on it.
+# Largest distance of a centre from the surface, in units of the cap's radius.
 _FARTHEST_OFF = 0.5
 
 

@@ -38,7 +38,7 @@ def load_mapping(study: Mapping[str, Any], name: str, folder: str | Path = ".") 
     path = Path(folder) / f"{name}.toml"
     try:
         text = to_toml(study, str(path))
-        text.encode()  # a dataset holds it as UTF-8
+        text.encode()  # datasets store it as UTF-8
         return load_text(text, str(path))
     except (RecursionError, UnicodeEncodeError) as error:
         why = "is nested too deeply" if isinstance(error, RecursionError) else "has text that is not Unicode"

@@ -10,7 +10,7 @@ from pipeline.shapes.frame import Vector
 from pipeline.shapes.section import Section, Words
 from pipeline.units import Acceleration, Coordinate, Length, Stress
 
-# Of all the boundary that is neither held nor under the probe.
+# All of the boundary without support and probe.
 FREE = "free"
 # A component of a unit vector, or a coordinate in units of a cap's radius, that is smaller is none.
 _NONE = 1e-12
@@ -107,7 +107,7 @@ class Load(Section):
     def is_mirrored(self, normal: Vector) -> bool:
         """Tell whether it is its own image in the plane through the origin with that unit normal, as the body is.
 
-        A face by name is, then; a cap if its centre lies in the plane: pairs of images are not looked for.
+        This is so for a named face, and for a cap whose centre is in the plane. Pairs of caps are not considered.
         """
         if abs(_along(self.gravity, normal)) > _NONE * hypot(*self.gravity):
             return False

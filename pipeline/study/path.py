@@ -189,7 +189,7 @@ def read_path(raw: Any, where: str, problems: Problems) -> Way | None:
     return None if len(problems.errors) > before else way
 
 
-# The tables within each table, by key; those of x and y are what stands in the place of a list.
+# The tables within each table, by key; those of x and y are ranges.
 _INNER: dict[str, type[BaseModel]] = {"line": Line, "circle": Circle, "raster": Raster, "x": Range, "y": Range}
 
 

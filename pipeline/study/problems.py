@@ -21,7 +21,7 @@ _QUOTED = 200
 MOST_ERRORS = 50
 # Values of a sweep beyond these are not listed in a warning.
 _MOST_VALUES = 4
-# Names less alike than this are not taken for one another: `step` was not meant to be `raster`.
+# Similarity from which a known name is suggested: `raster` is none for `step`.
 _ALIKE = 0.65
 # A number and its unit: warnings that differ in nothing else are one.
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?\s?(%|mm\b)?")
@@ -70,7 +70,7 @@ class StudyError(Exception):
 class Problems:
     """A growing list of errors and warnings; the same one twice counts once.
 
-    ``tables`` holds the names of the tables of each section that is an array of them.
+    ``tables`` has the names of the tables of each section that is an array.
     """
 
     errors: list[Problem] = field(default_factory=list)
@@ -255,7 +255,7 @@ def _list_of(model: type[BaseModel], key: str) -> str:
 
 
 def _section_of(key: str) -> tuple[str, int]:
-    """Return the section that a key stands in, and the number of the table if that is an array of them, else 0."""
+    """Return the section of a key, and the number of the table in an array, else 0."""
     match = re.match(r"\[*(\w+)(?:\[(\d+)\])?", key)
     return (match[1], int(match[2] or 0)) if match else ("", 0)
 

@@ -23,7 +23,7 @@ GAP = 0.1
 _POINTS = 2000
 # Heights at which a message looks for tissue.
 _LEVELS = 401
-# Names of tissues that lie on one another: two of them in a sweep were probably meant as layers.
+# Names of tissues in layers: two of them in a sweep of materials were probably meant as layers.
 _LIE_ON_ONE_ANOTHER = {
     "skin",
     "epidermis",

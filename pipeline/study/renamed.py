@@ -13,7 +13,7 @@ RENAMED = {
     "plan.tolerance": "plan.reduced_basis_error",
     "solve.tolerance": "solve.energy_tolerance",
 }
-# Names that stored records use for renamed keys: a record is found again by its inputs, whatever their names are now.
+# Names of renamed keys in stored records, so that records made before are found again.
 STORED = {new.rpartition(".")[2]: old.rpartition(".")[2] for old, new in RENAMED.items()}
 
 _HEADING = re.compile(r"\s*\[+\s*([^\]#]*?)\s*\]+")

@@ -48,8 +48,8 @@ class Material(Tissue):
 
     # Keys that F is proportional to, if all of them change together.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]] = ("young",)
-    # Poisson's ratios of neo-Hookean bodies. Below the first, tissue at the probe's edge gives way, and F hangs on the
-    # elements there (docs/accuracy.md); the elements are of displacements alone, and lock above the second.
+    # Poisson's ratios of neo-Hookean bodies. Below the first, F depends on the elements at the probe's edge
+    # (docs/accuracy.md). Above the second, displacement elements lock.
     OF_LARGE: ClassVar[tuple[float, float]] = (0.2, 0.45)
 
     @property
@@ -288,5 +288,5 @@ NESTED: dict[str, dict[str, type[Section]]] = {
 }
 # Sections that say how, not what: their lists are no sweeps.
 SINGLE = ("solve", "plan", "figure")
-# Tables within a section that stand for one of its keys.
+# Tables within a section, which replace one of its keys.
 TABLES: dict[str, dict[str, type[BaseModel]]] = {"probe": {"path": Path}}

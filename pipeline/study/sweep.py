@@ -23,7 +23,7 @@ from pipeline.study.schema import Drawing, Material, Mesh, Planning, Solving, ma
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy", "axis")
 
-# A body that is held beside the probe alone is a plate up to this thickness over its reach (docs/accuracy.md).
+# Thickness over reach up to which a body without support below the probe is a plate (docs/accuracy.md).
 _PLATE = 0.1
 _PARTS = ("body", "material", "probe", "mesh", "solve", "load")
 
@@ -52,7 +52,7 @@ class Axis:
 
     @property
     def path(self) -> str:
-        """Where it stands in the study file."""
+        """Place in the study file."""
         if self.off:
             return "probe.path" if self.key == "path" else f"probe.path.raster.{self.key}"
         return ".".join(part for part in (self.section, self.piece, self.key) if part)
@@ -112,7 +112,7 @@ class Case:
 
     @property
     def lost_contact(self) -> str:
-        """Why a tool that may leave the body does not stand at this place of its path; "" if it does."""
+        """Why there is no contact at this place of a path that may leave the body; "" if there is."""
         if not any(axis.off == "lost" for axis in self.axes):
             return ""
         error = place_error(self.body, self.probe)
@@ -186,13 +186,13 @@ class Case:
 
     @property
     def is_plate(self) -> bool:
-        """Whether the body spans what holds it beside the probe, and is so thin that it bends there."""
+        """Whether the body has no support below the probe, and is so thin that it bends."""
         thickness, reach = self.body.thickness(self.frame), self.body.reach(self.frame)
         return not self.body.support.holds_column() and thickness < _PLATE * reach
 
     @property
     def is_full(self) -> bool:
-        """Whether the mesh is fine everywhere: asked for as such, or with an ε past the whole body."""
+        """Whether the mesh is fine everywhere: ε is "full", or reaches past the whole body."""
         return self.mesh.epsilon == inf or self.mesh.epsilon >= self.body.farthest(self.frame)
 
     @property

@@ -1,7 +1,7 @@
 """A study in a dictionary, written as a study file.
 
-A dataset carries the text of its study, and a store knows cases by their numbers: so what a program declares is written
-as TOML and read like any other study, within the same limits.
+A dataset contains the text of its study. So a study that a program declares is written as TOML, and read like any other
+study, within the same limits.
 """
 
 import json
@@ -93,12 +93,12 @@ def _value(value: Any, place: str, problems: Problems) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return what stands for a value of a library: lists for arrays, texts for paths."""
+    """Return a value of a library as plain data: lists for arrays, texts for paths."""
     if isinstance(value, PathLike):
         return fspath(value)
     if isinstance(value, tuple):
         return list(value)
-    # numpy's arrays and numbers, which only a program that has loaded it can hold.
+    # Arrays and numbers of numpy, without importing it.
     return value.tolist() if type(value).__module__ == "numpy" and hasattr(value, "tolist") else value
 
 
