@@ -56,12 +56,21 @@ def study_page() -> str:
     lines = [
         "# Study file",
         "",
-        "TOML. A list where one value is expected is a sweep, and a dimension of the dataset; so is an array of tables "
-        "(`[[body]]`, `[[material]]`, `[[probe]]`, `[[mesh]]`), labelled by the tables' `name`. Quantities are text, "
-        'one number and one unit (`"10 mm"`, `"12 kPa"`, `"1 %"`, `"60 deg"`): metre and pascal with their '
-        "prefixes, `bar`, `%`, `deg` and `rad`; of loads kg/m^3 and m/s^2. A decimal comma, a ±, or a sum is an error. "
-        "`title` stands before the sections. Editors that know JSON schemas complete and check keys by "
-        "{download}`study.schema.json`.",
+        "A study file is TOML: a `title`, then sections. A sweep is a dimension of the dataset. There are three kinds:",
+        "",
+        "- a list in place of one value: `poisson = [0.3, 0.45]`;",
+        '- a range: `depth = {from = "0.1 mm", to = "1 mm", steps = 10}`, also within a list: '
+        '`epsilon = [{from = "4 mm", to = "10 mm", steps = 4}, "full"]`;',
+        "- an array of tables, labelled by their `name`: `[[body]]`, `[[material]]`, `[[probe]]`, `[[mesh]]` or "
+        "`[[load]]`.",
+        "",
+        'A quantity is text, one number and one unit: `"10 mm"`, `"12 kPa"`, `"1 %"`, `"60 deg"`. Units are metre and '
+        "pascal with their prefixes, `bar`, `%`, `deg` and `rad`; for loads kg/m^3 and m/s^2. Decimal commas, ± and sums "
+        "are errors.",
+        "",
+        "Editors with the taplo language server (VS Code: Even Better TOML) complete and check keys by the JSON schema "
+        "{download}`study.schema.json`. `epsmesh new` writes it beside each study, with the line "
+        "`#:schema ./study.schema.json`.",
     ]
     for section in all_sections():
         lines += [
@@ -84,12 +93,12 @@ def features_page() -> str:
     """Return the page of what does not go together in one study, and of what is computed the long way."""
     lines = [
         "# What goes together", "",
-        "Any two features of a study go together, but for these. A study that has both is refused, at the key and with "
-        "the reason that the table has.", "",
-        *_table(("feature", "with", "told at", "reason, and what to write instead")),
+        "Features that exclude each other. A study that has both is an error; the message has the key and the reason "
+        "of this table. All other pairs are computed.", "",
+        *_table(("feature", "with", "key of the message", "reason, and what to write instead")),
     ]  # fmt: skip
     lines += [_row(r.first, r.second, f"`{FEATURES[r.first].key}`", _escaped(r.reason)) for r in REFUSALS]
-    lines += ["", "Shorter ways of computing, and real-time models, are not for all of them:", ""]
+    lines += ["", "Features that exclude a shorter way of computing, or a real-time model:", ""]
     lines += _table(("way", "not with", "reason"))
     lines += [
         _row(way, feature, _escaped(reason)) for way, found in OBSTACLES.items() for feature, reason in found.items()

@@ -1,7 +1,7 @@
 """Features that exclude each other, and why: one table, read by the study, the plan, the export and the docs.
 
-A scene has a set of features. ``REFUSALS`` lists pairs that are errors of a study. ``OBSTACLES`` lists, for each shorter
-way of computing (a reduction, a real-time model), the features that exclude it. All other pairs are computed.
+A scene has a set of features. ``REFUSALS`` lists pairs that are errors of a study. ``OBSTACLES`` lists, for each
+shorter way of computing (a reduction, a real-time model), the features that exclude it. All other pairs are computed.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
