@@ -61,8 +61,8 @@ def study_page() -> str:
         "- a list in place of one value: `poisson = [0.3, 0.45]`;",
         '- a range: `depth = {from = "0.1 mm", to = "1 mm", steps = 10}`, also within a list: '
         '`epsilon = [{from = "4 mm", to = "10 mm", steps = 4}, "full"]`;',
-        "- an array of tables, labelled by their `name`: `[[body]]`, `[[material]]`, `[[probe]]`, `[[mesh]]` or "
-        "`[[load]]`.",
+        "- an array of tables, labelled by their `name`: `[[body]]`, `[[material]]`, `[[probe]]`, `[[mesh]]` "
+        "or `[[load]]`.",
         "",
         'A quantity is text, one number and one unit: `"10 mm"`, `"12 kPa"`, `"1 %"`, `"60 deg"`. Units are metre and '
         "pascal with their prefixes, `bar`, `%`, `deg` and `rad`; for loads kg/m^3 and m/s^2. Decimal commas, ± and sums "
