@@ -65,8 +65,8 @@ def study_page() -> str:
         "or `[[load]]`.",
         "",
         'A quantity is text, one number and one unit: `"10 mm"`, `"12 kPa"`, `"1 %"`, `"60 deg"`. Units are metre and '
-        "- an array of tables, labelled by their `name`: `[[body]]`, `[[material]]`, `[[probe]]`, `[[mesh]]`, "
-        "or `[[load]]`.",
+        "pascal with their prefixes, `bar`, `%`, `deg` and `rad`; for loads kg/m^3 and m/s^2. Decimal commas, ± and "
+        "sums are errors.",
         "",
         "Editors with the taplo language server (VS Code: Even Better TOML) complete and check keys by the JSON schema "
         "{download}`study.schema.json`. `epsmesh new` writes it beside each study, with the line "
