@@ -100,7 +100,7 @@ class Model:
     def query_all(
         self, tools: Sequence[Mapping[str, Any]], *, young: float | None = None, poisson: float | None = None
     ) -> list[Touch]:
-        """Return the force on each of ``tools`` while all press at once; each is the keywords of a query, without E and ν.
+        """Return the force on each of ``tools`` while all press at once; each has the keywords of a query but E and ν.
 
         The forces derive from one energy of all places and depths. ``stiffness`` is for one tool at fixed depths of the
         others. If one tool has no answer, the status of the others is "others". Refused queries raise no error.

@@ -65,7 +65,7 @@ class SurfaceTable:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A model with its deforming surface: ``points`` (n, 3) in m, in the body's coordinates, and ``triangles`` (m, 3)."""
+    """A model with its deforming surface: ``points`` (n, 3) in m in the body's frame, and ``triangles`` (m, 3)."""
 
     model: Model
     table: SurfaceTable
