@@ -1,11 +1,11 @@
-"""How much of F is the file's: one body as surfaces of many resolutions, with noise, and as images of many voxels.
+"""Effect of a file's resolution on F: one body as surfaces of many resolutions, with noise, and as label maps.
 
     python -m benchmarks.resolution      a quarter of an hour; writes results/resolution.json, .png and a table
 
-The body is the liver-like one of scripts/make_organs.py, whose surface a formula gives: a file's own error can be told.
-Every file is solved with the same accuracy. The reference is the finest surface, whose points are on the true one; its
-chords are 0.01 mm off. A place's own normal is part of what a file says, so that on the thin lobe, which bends, each
-file is solved along the axis of the reference, too. What is solved stays in results/resolution/: a run can be resumed.
+The body is the liver-like one of scripts/make_organs.py. Its surface has a formula, so that each file's own error is
+known. Every file is solved with the same accuracy. The reference is the finest surface; its points are exact, its
+chords are 0.01 mm off. The normal at a place depends on the file: on the curved thin lobe, each file is therefore
+solved along the axis of the reference, too. Results stay in results/resolution/: a run can be resumed.
 """
 
 import json
@@ -33,13 +33,13 @@ LIVER = ORGANS["liver.stl"]
 PLACES = {"thick lobe": (-25, 0), "flank": (-75, 0, 5), "thin lobe": (60, -8)}
 BENDS = "thin lobe"
 ACCURACY, RADIUS = "2 %", 4.0  # mm
-_PROJECTIONS, _STEP = 8, 1e-3  # Newton's, and of the differences (mm)
+_PROJECTIONS, _STEP = 8, 1e-3  # Newton's iterations, and step of finite differences (mm)
 _FACETS_APART = 0.05
 
 
 @dataclass(frozen=True)
 class File:
-    """One file of the body: a surface of points ``step`` apart, or voxels of that size; all in mm."""
+    """One file of the body: a surface with points ``step`` apart, or voxels of that size; all in mm."""
 
     name: str
     kind: str  # exact, noise or image
@@ -66,7 +66,7 @@ FILES = (
 
 
 def _grid(organ: Organ, step: float, offset: tuple[float, float, float] = (0, 0, 0)) -> tuple[FloatArray, FloatArray]:
-    """Return the field on a grid round the organ, and where the grid starts (mm)."""
+    """Return the field on a grid around the organ, and the corner of the grid (mm)."""
     start = -np.array(organ.half) - (2 + np.array(offset)) * step
     counts = (2 * (np.array(organ.half) + 2 * step) / step).astype(int) + 2
     places = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1) * step + start
@@ -74,10 +74,10 @@ def _grid(organ: Organ, step: float, offset: tuple[float, float, float] = (0, 0,
 
 
 def surface(organ: Organ, step: float) -> tuple[FloatArray, IntArray]:
-    """Return a surface (mm) of points on the organ's true one, about ``step`` apart."""
+    """Return a surface (mm) with points on the organ's exact one, about ``step`` apart."""
     values, start = _grid(organ, step)
     points, facets = march((0.5 - values / (4 * step)).astype(np.float32), 0.5)
-    # The field's distances are singular in the middles of its ellipsoids: specks there are no surface.
+    # The field is singular in the centres of its ellipsoids: small shells there are not part of the surface.
     facets, _ = largest_shell(points, facets, 1.0, _FACETS_APART)
     used, facets = np.unique(facets, return_inverse=True)
     points, facets = points[used] * step + start, facets.reshape(-1, 3)
@@ -106,13 +106,13 @@ def write(file: File, organ: Organ, folder: Path) -> dict[str, Any]:
     points = points + file.noise * np.random.Generator(np.random.PCG64(1)).standard_normal(points.shape)
     if not path.exists():
         path.write_bytes(stl(points, facets))
-    # Short edges of marched cubes cross where noise is about as long as they are.
+    # Short edges of marched cubes cross if noise is about as long as they are.
     mended = {"repair": True} if file.noise else {}
     return {"shape": "surface", "file": str(path), "unit": "mm"} | mended | filtered
 
 
 def solve(body: dict[str, Any], place: str, folder: Path, axis: list[float] | None = None) -> dict[str, Any]:
-    """Return F (N), its bar, and the axis and height (m) of one place, or why there is none."""
+    """Return F (N), its bar, and the axis and height (m) of one place, or the message of a failure."""
     probe: dict[str, Any] = {"shape": "disc", "radius": f"{RADIUS} mm", "depth": "0.3 mm"}
     probe["at"] = [f"{x} mm" for x in PLACES[place]]
     raw = {
@@ -137,7 +137,7 @@ def solve(body: dict[str, Any], place: str, folder: Path, axis: list[float] | No
 
 
 def measure(folder: Path, files: tuple[File, ...] = FILES) -> dict[str, dict[str, Any]]:
-    """Return what each file gives at each place, and at the one that bends along the reference's axis, too."""
+    """Return the results of each file at each place, and at the curved one along the reference's axis, too."""
     folder.mkdir(parents=True, exist_ok=True)
     found: dict[str, dict[str, Any]] = {}
     for file in files:
@@ -152,7 +152,7 @@ def measure(folder: Path, files: tuple[File, ...] = FILES) -> dict[str, dict[str
 
 
 def relative(row: dict[str, Any], reference: dict[str, Any]) -> dict[str, tuple[float, float]]:
-    """Return what F is off that of the reference (%), and how its axis is turned (degrees), by place."""
+    """Return the deviation of F from the reference (%), and the rotation of the axis (degrees), by place."""
     result = {}
     for place, true in reference.items():
         mine = row[place]
@@ -170,7 +170,7 @@ def _line(name: str, off: dict[str, tuple[float, float]]) -> str:
 
 
 def draw(found: dict[str, dict[str, Any]], path: Path) -> Path:
-    """Draw what F of each file is off the reference, beside the error bars of the elements."""
+    """Draw the deviation of F from the reference for each file, with the error bars of the elements."""
     reference = found[REFERENCE.name]
     names = [name for name in found if name != REFERENCE.name]
     with mpl.rc_context(STYLE):
@@ -184,8 +184,8 @@ def draw(found: dict[str, dict[str, Any]], path: Path) -> Path:
         axes.axvline(0, color="black", linewidth=0.8)
         axes.set_yticks(range(len(names)), names)
         axes.invert_yaxis()
-        axes.set_xlabel("F off that of the exact surface (%)")
-        finish(figure, "What a file leaves open of F: disc of 4 mm, liver-like body")
+        axes.set_xlabel("deviation of F from the exact surface (%)")
+        finish(figure, "Effect of the file on F: disc of 4 mm, liver-like body")
         return save(figure, path)
 
 

@@ -1,7 +1,7 @@
 """Work against precision: the error of F over run time and unknowns, for every kind of element and mesh.
 
-The scene is one of which F is known to 1e-7, a disc of 3 mm on a cylinder of R = H = 50 mm, bonded. Runs are warm
-(forms compiled, libraries loaded), alone, on one core; times are medians. Wants an idle machine, and takes ten minutes.
+F of the scene is known to 1e-7: a disc of 3 mm, bonded, on a cylinder of R = H = 50 mm. Runs are warm (forms compiled,
+libraries loaded), alone, on one core; times are medians. Run it on an idle machine; it takes ten minutes.
 """
 
 import argparse
@@ -42,7 +42,7 @@ YOUNG, DEPTH = 10e3, 1e-4
 
 @dataclass(frozen=True)
 class Method:
-    """A way to a force, and the sequence of meshes on which it is tried, coarse to fine."""
+    """A method, and the sequence of its meshes, coarse to fine."""
 
     name: str
     degree: int
@@ -58,7 +58,7 @@ def _uniform(*sizes: float) -> tuple[dict[str, Any], ...]:
 
 
 def _graded(*rims: float) -> tuple[dict[str, Any], ...]:
-    """Meshes that grow by 0.4 from ``rims``, in units of the probe's radius."""
+    """Return meshes that grow by 0.4 from ``rims``, in units of the probe's radius."""
     return tuple(
         {"epsilon": "full", "fine": "25 mm", "coarse": "25 mm", "rim": f"{3 * rim:g} mm", "growth": 0.4} for rim in rims
     )
@@ -75,7 +75,7 @@ METHODS = (
     Method("P2/P1 mixed graded", 2, "mixed", _graded(0.4, 0.2, 0.1, 0.05)),
     Method("P3/P2 mixed graded", 3, "mixed", _graded(0.4, 0.2, 0.1, 0.05)),
 )
-# The driver of accuracies, in three dimensions, and what it is asked for.
+# Required accuracies, for the automatic choice of meshes in three dimensions.
 ASKED = ("2 %", "1 %", "0.3 %", "0.1 %")
 AXISYMMETRIC = (4, 5, 6)  # degrees; of lower ones the error bar is above what the solver accepts
 

@@ -1,4 +1,4 @@
-"""One moment: a run that gets a signal in a stage, and what must be true of what is left."""
+"""One moment of fault injection: a run that receives a signal in a stage, and checks of what it leaves."""
 
 import os
 import random
@@ -22,7 +22,7 @@ from pipeline.run.reading import read_rows
 from pipeline.run.store import Store, StoreError
 
 ROOT = Path(__file__).parents[2]
-# Stages of a run by what it does then; a moment is drawn from within one of them.
+# Stages of a run by phase; a moment is drawn within one of them.
 PHASES = {
     "compile": ("compiler",),
     "mesh": ("gmsh", "dolfinx mesh", "mesh cache"),
@@ -30,13 +30,13 @@ PHASES = {
     "write": ("store", "results"),
 }
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-# Who gets it: the process, or its launcher; or one of two ranks, alone.
+# Receiver of the signal: the process or its launcher, or one of two ranks.
 TARGETS = ("launcher", "rank 0", "rank 1")
 # Seconds within which all processes of a run must be gone.
 LONGEST = 30.0
-# Seconds that a run may take to its end, where it is not killed.
+# Limit (s) for a run that is not killed.
 _PATIENCE = 300.0
-# How long after a stage was seen to begin the signal comes, at most, in s.
+# Longest delay (s) of the signal after a stage was seen to begin.
 _LATEST = {"compile": 1.5, "mesh": 0.08, "solve": 0.05, "write": 0.02}
 _MARK = "EPSMESH_FAULTS"
 _MPI = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1"}
@@ -44,7 +44,7 @@ _MPI = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "O
 
 @dataclass(frozen=True)
 class Moment:
-    """A signal, to whom, in which phase, and how often that is seen to begin before (``entry``)."""
+    """A signal, its receiver, the phase, and how often that phase must begin first (``entry``)."""
 
     number: signal.Signals
     ranks: int
@@ -60,8 +60,8 @@ class Moment:
 
 @dataclass(frozen=True)
 class Left:
-    """What was seen: where the signal struck ("" if the run had ended before), the seconds until all was quiet,
-    the run's status, and what is wrong.
+    """Observations: stage of the signal ("" if the run had ended before), seconds until all processes were gone, the
+    run's status, and faults.
     """
 
     stage: str
@@ -71,7 +71,7 @@ class Left:
 
 
 def draw(number: int, seed: int) -> Moment:
-    """Return the moment of a ``number``: signals, ranks and phases in turn, the rest at random."""
+    """Return the moment of a ``number``: signals, ranks and phases cycle, the rest is random."""
     dice = random.Random(f"{seed} {number}")
     phase = [*PHASES][number % len(PHASES)]
     name = SIGNALS[number // len(PHASES) % len(SIGNALS)]
@@ -81,7 +81,7 @@ def draw(number: int, seed: int) -> Moment:
 
 
 class Scene:
-    """A folder with a study, its store and results, and a folder of compiled code, part of which is missing."""
+    """A folder with a study, its store and results, and a folder of compiled code with some code missing."""
 
     def __init__(self, folder: Path, study: str, cache: Path, missing: int, dice: random.Random):
         folder.mkdir(parents=True)
@@ -104,7 +104,7 @@ class Scene:
         return self.folder / "results" / "study.nc"
 
     def start(self, ranks: int) -> subprocess.Popen[bytes]:
-        """Start a run in a session of its own; what it says goes to a file."""
+        """Start a run in a session of its own; its output goes to a file."""
         words = [
             "run",
             str(self.file),
@@ -140,7 +140,7 @@ class Scene:
             return process.wait()
 
     def strike(self, moment: Moment) -> Left:
-        """Begin a run, send the signal, and look at what is left."""
+        """Begin a run, send the signal, and check what is left."""
         process, before = self.start(moment.ranks), dict[str, str]()
         stage = self._await(moment, process)
         if stage:
@@ -185,11 +185,11 @@ class Scene:
         return process.pid
 
     def _alive(self) -> list[psutil.Process]:
-        """Return all processes that descend from runs in this folder, whoever is their parent now."""
+        """Return all processes started by runs in this folder, whoever is their parent now."""
         return [process for process in _processes() if _mark_of(process) == str(self.folder)]
 
     def _records(self) -> dict[str, str]:
-        """Return what the store holds: what is there now may not be lost."""
+        """Return the records of the store, none of which may be lost."""
         if not self.store.exists():
             return {}
         with suppress(sqlite3.Error), closing(sqlite3.connect(f"file:{self.store}?mode=ro", uri=True)) as database:
@@ -197,7 +197,7 @@ class Scene:
         return {}
 
     def _faults(self, before: dict[str, str]) -> Iterator[str]:
-        """Yield what is wrong with store, dataset and meshes."""
+        """Yield faults of store, dataset and meshes."""
         if self.store.exists():
             contents = _contents(self.folder)
             try:
@@ -208,7 +208,7 @@ class Scene:
             if _contents(self.folder) != contents:
                 yield "reading the store changed a file"
             if any(rows.get(key) != text for key, text in before.items()):
-                yield "a record that was there is lost, or another one"
+                yield "a record of the store is lost, or has changed"
             store = Store(self.store)
             yield from store.problems()
             if store.notice:

@@ -1,4 +1,4 @@
-"""Bodies of several materials obey mechanics, by every element and on every number of ranks."""
+"""Mechanics of bodies of several materials, with every element and on several ranks."""
 
 from dataclasses import replace
 from typing import Any
@@ -37,7 +37,7 @@ def body() -> BodyMesh:
 
 
 def moduli(*pairs: tuple[float, float]) -> MaterialLaw:
-    """Return the law of regions of these Young's moduli (Pa) and Poisson's ratios."""
+    """Return the law of regions with these Young's moduli (Pa) and Poisson's ratios."""
     laws = [MaterialLaw.of_moduli(*pair) for pair in pairs]
     return MaterialLaw(sum((law.parameters for law in laws), ()))
 
@@ -87,7 +87,7 @@ def test_stiffer_pieces_take_more_force(body):
 
 @pytest.mark.parametrize("compressible", [0.0, 0.1, 0.3])
 def test_both_kinds_of_elements_agree_where_one_region_is_nearly_incompressible(compressible):
-    """Displacement elements of degree 3 are good up to ν = 0.49; mixed ones are from there on, and for the rest."""
+    """Displacement elements of degree 3 serve up to ν = 0.49; mixed ones from there on; the rest suits both."""
     body = make_mesh(rim="0.4 mm", growth=0.6)
     law = moduli((10e3, compressible), (60e3, 0.48), (20e3, compressible))
     plain = solve(body, law, degree=3, estimate=True)
@@ -112,7 +112,7 @@ def test_materials_in_turn_give_what_each_gives_alone(body):
     assert found == pytest.approx([solve(body, law, "mixed").reaction[2] for law in laws], rel=1e-9)
 
 
-def test_splitting_leaves_what_the_pressure_takes_positive():
+def test_a_split_law_has_a_positive_pressure_modulus():
     law = moduli((1e3, 0.0), (2e3, 0.2), (3e3, 0.3), (4e3, 0.5))
     split = SplitLaw.of(law)
     for number, (lame_lambda, mu) in enumerate(zip(law.lame_lambda, law.lame_mu, strict=True)):
@@ -150,7 +150,7 @@ def test_law_of_a_case_numbers_materials_like_meshes():
 
 
 def test_a_thin_layer_of_the_same_material_changes_nothing_but_the_mesh():
-    """Elements along the probe's edge follow it: their long ones made flat ones, with strains of any size in them."""
+    """Long elements along the probe's edge would make it flat, with arbitrary strains."""
     skin = {"name": "skin", "thickness": "0.15 mm", "young": "10 kPa", "poisson": 0.3}
     body = {"shape": "box", "size": ["20 mm", "20 mm", "10 mm"], "fixed": "bottom"}
     probe = {"radius": "2 mm", "depth": "0.1 mm"}

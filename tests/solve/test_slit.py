@@ -1,4 +1,4 @@
-"""A blade that stands in a slit: what the slit's front releases, against closed forms and the change of energy."""
+"""A blade in a slit: the energy release rate of the front, compared with closed forms and the change of energy."""
 
 from functools import cache
 
@@ -35,7 +35,7 @@ def run(case, mirrors=QUARTER, kind="displacement", poisson=0.3, comm=MPI.COMM_S
 
 
 def finer(solution):
-    """Return potential energy (J) and release (J/m) as elements of one degree more have them."""
+    """Return potential energy (J) and release (J/m) in elements of one degree more."""
     line, loaded = solution.front, solution.load_response
     form, decrements = (solution.stiffness, solution.decrements) if loaded is None else (loaded.form, loaded.decrements)
     energy = float(line.amounts @ (form - decrements) @ line.amounts) / 2
@@ -48,7 +48,7 @@ def quarter():
 
 
 def test_change_of_energy():
-    """A front that is deeper, below the same blade, releases what the energy loses: within 2 %."""
+    """A deeper front below the same blade releases the loss of energy: within 2 %."""
     step = 0.15e-3
     found = [
         finer(run(case_of(ends="open", incision=f"{4 + 1e3 * s} mm", ahead=f"{1 + 1e3 * s} mm"), estimate=True))
@@ -58,7 +58,7 @@ def test_change_of_energy():
     assert release == pytest.approx((before - after) / (2 * step), rel=0.02)
 
 
-# They pull the faces apart, and along the sides that the front ends in; the edge of the cap is among what is moved.
+# They pull the faces apart, and along the sides at which the front ends; the edge of the cap is in the moved region.
 LOADS = {
     "gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"],
     "traction": [
@@ -70,7 +70,7 @@ LOADS = {
 
 @pytest.mark.parametrize("kind", ["displacement", "mixed"])
 def test_change_of_energy_under_loads(kind):
-    """It releases what the potential energy of blade and loads together loses, as nodes move on with the front or tip.
+    """The release is the loss of potential energy of blade and loads, as nodes move with the front or the tip.
 
     Half of it belongs to the loads.
     """
@@ -94,8 +94,8 @@ def test_change_of_energy_under_loads(kind):
     assert here.reaction[2] + here.load_force[2] == pytest.approx(slope, rel=1e-5)
 
 
-def test_loads_that_press_a_slit_shut():
-    """A pressure on all sides closes it at its front: the case fails, and says why."""
+def test_loads_that_close_a_slit():
+    """A pressure on all sides closes it at its front: the case fails, and the message says why."""
     pressed = {"traction": [{"on": "sides", "pressure": "2 kPa"}]}
     (record,) = solve(body=BODY, probe={**SLIT_BLADE, "incision": "4 mm"}, mesh=COARSEST, load=pressed).values()
     assert record.status == "failed"
@@ -103,7 +103,7 @@ def test_loads_that_press_a_slit_shut():
 
 
 def test_a_study_of_a_slit_under_loads():
-    """What they do to a blade along which tissue slides has a bar; they open a slit, and draw the blade in."""
+    """The loads' force on a sliding blade has a bar; the loads open the slit, and pull the blade in."""
     probe = {**SLIT_BLADE, "incision": "4 mm"}
     movement = {"traction": [{"on": "sides", "pressure": "-0.3 kPa"}]}
     alone = solve(body=BODY, probe=probe, mesh=COARSEST)[()]
@@ -116,8 +116,8 @@ def test_a_study_of_a_slit_under_loads():
     assert 0 < slid.load_force_error < 0.3 * abs(slid.load_force)
 
 
-def test_strain_is_read_clear_of_the_front():
-    """Of the cells about it, and of no other."""
+def test_strain_is_taken_clear_of_the_front():
+    """Cells around it are left out, and no others."""
     case = case_of()
     mesh = mesh_case(case, QUARTER, MPI.COMM_SELF)
     front = conditions_of(case).front
@@ -129,7 +129,7 @@ def test_strain_is_read_clear_of_the_front():
     assert 0 < np.count_nonzero(whole & ~clear) < 30
 
 
-def test_what_pairs_of_motions_release_is_that_of_their_sums():
+def test_release_is_quadratic_in_the_motions():
     form = np.array([[2.0, 0.3, -0.7], [0.3, 1.0, 0.2], [-0.7, 0.2, 4.0]])
 
     class Known(Release):
@@ -144,7 +144,7 @@ def test_what_pairs_of_motions_release_is_that_of_their_sums():
 
 
 def test_flanks_that_slide():
-    """What it takes to push a blade on, with the front where it is, is what the energy gains: within the bar."""
+    """The force that drives a blade on, with a fixed front, is the gain of energy: within the bar."""
     step = 0.15e-3
     found = [
         run(case_of(contact="frictionless", ends="open", ahead=f"{1 + 1e3 * s} mm"), estimate=True)
@@ -165,7 +165,7 @@ def test_flanks_that_slide():
     ("mirrors", "place"), [(("x",), {"at": ["0 mm", "0.01 mm"]}), ((), {"direction": [1.0, 0.01, 0.0]})]
 )
 def test_doubled_nodes(mirrors, place):
-    """A slit inside the mesh, a little off the plane of symmetry or turned a little, opens as the one in it does."""
+    """A slit inside the mesh, slightly off the plane of symmetry or rotated, opens like the one in that plane."""
     inside = run(case_of(**place), mirrors, comm=MPI.COMM_WORLD)
     assert inside.release == pytest.approx(quarter().release, rel=quarter().release_bar)
     assert inside.reaction[2] == pytest.approx(quarter().reaction[2], rel=0.01)
@@ -174,7 +174,7 @@ def test_doubled_nodes(mirrors, place):
 
 
 def test_mixed_elements():
-    """Both kinds of elements agree within their bars where both serve."""
+    """Both kinds of elements agree within their bars at a ratio that both support."""
     one, other = quarter(), run(case_of(), kind="mixed", estimate=True)
     for name, bar in (("release", "release_bar"), ("energy", "bar")):
         apart = abs(getattr(one, name) - getattr(other, name)) / getattr(one, name)
@@ -183,7 +183,7 @@ def test_mixed_elements():
 
 
 def test_bar_of_release():
-    """The bars hold the truth, from elements of degree 3 on a finer mesh, and are of its order."""
+    """The bars cover the truth, from elements of degree 3 on a finer mesh, and are of the same order."""
     fine = run(case_of({"rim": "0.2 mm", "growth": 0.6, "fine": "3 mm", "degree": 3}), estimate=True)
     truth = fine.extrapolated(3, "displacement")
     found = quarter()
@@ -194,8 +194,8 @@ def test_bar_of_release():
 
 
 def test_study_of_incisions():
-    """Deeper blades take more force; F is proportional to Young's modulus, not to depth; the slit's faces slide
-    with the blade, and its front does not tell.
+    """Deeper blades have a larger force. F is proportional to Young's modulus, not to the depth. A bonded slice moves
+    the faces with the blade, and leaves the energy release at the front unchanged.
     """
     probe = {**SLIT_BLADE, "incision": ["3 mm", "4 mm"]}
     material = {"young": ["10 kPa", "20 kPa"], "poisson": 0.3}

@@ -1,4 +1,4 @@
-"""The largest strain: read clear of the probe's edge, where it would grow with every smaller element."""
+"""The largest strain, taken clear of the probe's edge, where it grows as elements shrink."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_converges_as_the_edge_is_refined():
 
 
 def test_strain_at_the_front_of_a_slit_is_left_out_of_its_own_body_only():
-    """Which cells are clear of singular edges is known of each front, on one mesh."""
+    """On one mesh, the mask of clear cells is kept for each front separately."""
     case = case_of()
     mesh = mesh_case(case, ("x", "y"), MPI.COMM_SELF)
     front, law = conditions_of(case).front, MaterialLaw.of_moduli(1.0, 0.3)
@@ -50,8 +50,8 @@ def test_strain_at_the_front_of_a_slit_is_left_out_of_its_own_body_only():
     assert with_front == again < 0.9 * without
 
 
-def test_a_value_that_is_not_known_is_not_nought(monkeypatch):
-    """A stress of displacements is not that of elements with a pressure: a function of cells can say so."""
+def test_an_unknown_value_is_nan_and_not_zero(monkeypatch):
+    """The formula of stress for displacement elements is wrong for mixed ones, where it returns NaN."""
 
     def stress(cells):
         hookes = cells.lame_lambda * cells.principal_strains.sum(axis=1)

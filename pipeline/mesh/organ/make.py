@@ -38,7 +38,6 @@ _SAME = 1e-6
 _MOST_OFF = 0.25
 # Largest change of the body's volume. Chords of elements leave out half a per cent of an organ, which curved edges
 # restore; with folds as fine as elements it is more, and F is not that of the file.
-# back; where folds are as fine as elements, it is more, and F not that of the file.
 MOST_EXCESS = 0.03
 
 Lift = Callable[[FloatArray], FloatArray]

@@ -19,7 +19,6 @@ _SAFE = 1.25
 # Number of remembered depths: in an ordered sweep the last ones are the nearest.
 _REMEMBERED = 2
 # Two depths are extrapolated to a third at most this many times their own distance away.
-# Two depths tell of a third that is at most so many times as far from them as they are from each other.
 _FARTHEST = 2.0
 
 
