@@ -1,4 +1,4 @@
-/* Counts what a rank sends, and the processor's time that it spends within MPI: to be loaded before MPI's library.
+/* Counts the messages of a rank, and its processor time within MPI; load it before MPI's library.
  *
  * Point-to-point messages are counted where they are sent, persistent ones each time that they are started.
  */
@@ -118,7 +118,7 @@ int MPI_Allreduce(const void* data, void* found, int count, MPI_Datatype type, M
   TIMED(PMPI_Allreduce(data, found, count, type, op, comm));
 }
 
-/* What waits, and takes time only. */
+/* Calls that wait: only their time counts. */
 int MPI_Wait(MPI_Request* request, MPI_Status* status) { TIMED(PMPI_Wait(request, status)); }
 int MPI_Waitall(int n, MPI_Request r[], MPI_Status s[]) { TIMED(PMPI_Waitall(n, r, s)); }
 int MPI_Waitany(int n, MPI_Request r[], int* i, MPI_Status* s) { TIMED(PMPI_Waitany(n, r, i, s)); }

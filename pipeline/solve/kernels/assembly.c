@@ -21,9 +21,9 @@ enum { MOST_PAIRS = 630 }; /* the 35 points of degree 4 */
 
 /* Fill `places`, (cells, width, width): the number of the entry that each pair of points of a cell has in a matrix.
  *
- * A cell has `width` points, `dofs`. Row r has the entries offsets[r] to before offsets[r + 1], whose columns are in
- * `columns`; likewise visits are those of the points of all cells, counted through, that are the row r. `entry` is room
- * for a number a column.
+ * A cell has `width` points, `dofs`. Row r has the entries offsets[r] to offsets[r + 1] - 1, with their `columns`. The
+ * visits of a row are, in the same way, the positions at which its point occurs among the points of all cells. `entry` is
+ * work space, one number per column.
  */
 void find_entries(int rows, int width, const int* dofs, const int* offsets, const int* columns, const int* first_visit,
                   const int* visits, int* entry, int* places)
@@ -80,7 +80,7 @@ static void stiffness(int pairs, const double* restrict S, const double K[3][3],
   }
 }
 
-/* Add nothing to rows and columns of prescribed displacements. Most cells have none. */
+/* Set rows and columns of prescribed displacements to zero. Most cells have none. */
 static void hold(int points, const int* dofs, const double* free, double B[restrict 9][MOST_PAIRS])
 {
   int held = 0;
@@ -96,7 +96,7 @@ static void hold(int points, const int* dofs, const double* free, double B[restr
           B[3 * s + r][p] *= free[3 * (size_t)dofs[i] + r] * free[3 * (size_t)dofs[j] + s];
 }
 
-/* Add the blocks of all pairs, and their transposes, where they belong. */
+/* Add the blocks of all pairs, and their transposes, to the matrix. */
 static void scatter(int points, const int* places, const double B[restrict 9][MOST_PAIRS], double* blocks)
 {
   for (int i = 0, p = 0; i < points; ++i)
@@ -117,8 +117,8 @@ static void scatter(int points, const int* places, const double B[restrict 9][MO
 /* Add the stiffness of some cells to the `blocks` of a matrix.
  *
  * corners (cells, 4, 3); dofs (cells, points); places (cells, points, points) from find_entries; S (3, 3, pairs);
- * free (dofs, 3): 1, or 0 where a displacement is prescribed; `which` are the `count` cells to add; region (cells)
- * numbers what each is made of, with its lambda and mu.
+ * free (dofs, 3): 1, or 0 where a displacement is prescribed; `which` are the `count` cells to add; region (cells) are
+ * the region numbers, with lambda and mu of each region.
  */
 void add_stiffness(int count, const int* which, int points, const double* corners, const int* dofs, const int* places,
                    const double* S, const double* free, const int* region, const double* lambda, const double* mu,
@@ -127,7 +127,7 @@ void add_stiffness(int count, const int* which, int points, const double* corner
   const int pairs = points * (points + 1) / 2, places_each = points * points;
   for (int k = 0; k < count; ++k)
   {
-    if (k + 1 < count) /* memory is far: ask for the next cell's blocks, two cache lines each, while at this one's */
+    if (k + 1 < count) /* prefetch the next cell's blocks, two cache lines each */
       for (int q = 0; q < places_each; ++q)
       {
         const double* next = blocks + 9 * (size_t)places[which[k + 1] * (size_t)places_each + q];
@@ -143,7 +143,7 @@ void add_stiffness(int count, const int* which, int points, const double* corner
   }
 }
 
-/* The same as a kernel for dolfinx, which puts matrices of cells together by itself (the interface is UFCx's).
+/* The same as a cell kernel for dolfinx, which assembles by itself (the interface is UFCx's).
  *
  * A (3 points, 3 points) of one cell, lame its lambda and mu, x the cell's nodes, corners first.
  */

@@ -1,4 +1,4 @@
-/* Products with the stiffness of curved tetrahedra, cell by cell, by quadrature: there is no matrix to read.
+/* Matrix-free products with the stiffness of curved tetrahedra, cell by cell, by quadrature.
  *
  * Cells are stored as in product.c, LANES at a time; in double precision half of them are taken at once.
  */
@@ -15,7 +15,7 @@ enum { LANES = 16, MOST_POINTS = 35 }; /* of degree 4 */
 typedef float floats __attribute__((vector_size(64)));
 typedef double doubles __attribute__((vector_size(64)));
 
-/* The mapping of gradients at each point of a quadrature, times the root of its weight's size and of how volume grows
+/* The mapping of gradients at each quadrature point, times the root of the weight's magnitude and of the volume ratio
  * there, lane by lane: maps (batches, quadrature, 3, 3, LANES). roots (batches, quadrature, LANES) are these roots, with
  * the sign of the determinant. nodes (count, width, 3) are those of the geometry, gradients (quadrature, width, 3) of its
  * functions. */
@@ -96,7 +96,7 @@ void add_curved_diagonal(int points, int quadrature, int batches, const int* res
 }
 
 /* y += A x over whole batches of cells: dofs (batches, points, LANES), maps (batches, quadrature, 3, 3, LANES), lame
- * (batches, 2, LANES); cells that fill up the last batch have maps of nought. */
+ * (batches, 2, LANES); padding cells of the last batch have zero maps. */
 #define DEFINE_PRODUCT(NAME, TYPE, VECTOR)                                                                             \
 void NAME(int points, int quadrature, int batches, const int* restrict dofs, const TYPE* restrict maps,                \
           const TYPE* restrict lame, const TYPE* restrict signs, const TYPE* restrict gradients,                       \

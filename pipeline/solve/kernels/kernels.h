@@ -1,4 +1,4 @@
-/* What Python calls: cffi reads this file, too. */
+/* Functions called from Python; cffi reads this file. */
 
 /* assembly.c: matrices of straight cells */
 void find_entries(int rows, int width, const int* dofs, const int* offsets, const int* columns, const int* first_visit,
@@ -38,7 +38,7 @@ void add_curved(int points, int quadrature, int batches, const int* dofs, const 
 void add_curved_double(int points, int quadrature, int batches, const int* dofs, const double* maps,
                        const double* lame, const double* signs, const double* gradients, const double* x, double* y);
 
-/* pressure.c: what pressures take part in */
+/* pressure.c: the blocks of mixed elements */
 void add_mass(int count, int batches, const int* pressures, const double* roots, const double* mass, const double* x,
               double* y);
 void add_curved_mass(int count, int quadrature, int batches, const int* pressures, const double* roots,

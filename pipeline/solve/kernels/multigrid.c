@@ -6,7 +6,7 @@
 
 #include "kernels.h"
 
-/* The inverses of the diagonal blocks; the number of those that have none. */
+/* Invert the diagonal blocks; return the number of singular ones. */
 int invert_diagonal(int rows, const float* blocks, float* inverse)
 {
   int singular = 0;
@@ -65,7 +65,7 @@ double dot(int count, const float* x, const float* y)
   return sum;
 }
 
-/* x += P e of points: prescribed numbers neither read nor written. */
+/* x += P e by points; prescribed numbers are neither read nor written. */
 void prolong(int rows, const int* offsets, const int* points, const float* weights, const float* coarse_free,
              const float* fine_free, const float* e, float* x)
 {

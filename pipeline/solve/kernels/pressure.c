@@ -1,8 +1,8 @@
-/* Products with what pressures take part in, cell by cell: the coupling int q div u, its transpose, the mass int p q.
+/* Matrix-free products of mixed elements, cell by cell: the coupling int q div u, its transpose, the mass int p q.
  *
- * Straight cells go by Bernstein's coefficients, curved ones by quadrature; both are stored as in product.c and curved.c,
- * LANES at a time, of which half are taken at once. Maps of gradients carry a root of the volume, roots the other one,
- * with the sign of the cell's determinant, so that what fills up the last batch adds nought.
+ * Straight cells use Bernstein coefficients, curved ones quadrature; both are stored as in product.c and curved.c, LANES
+ * at a time, of which half are processed at once. Maps of gradients contain one root of the volume, roots the other one,
+ * with the sign of the cell's determinant; padding cells add zero.
  */
 
 #include <stddef.h>
@@ -65,7 +65,7 @@ static inline void apply_mass(int count, const double* restrict mass, const doub
 
 /* y += B x: dofs (batches, points, LANES), pressures (batches, count, LANES), maps (batches, 3, 3, LANES), roots
  * (batches, 1, LANES). first and so on take values of displacements to coefficients, those of `back` coefficients to
- * values of pressures; raised as in product.c, mass (count, count) holds the degree. */
+ * values of pressures; raised as in product.c, mass (count, count) includes the degree. */
 void add_dilation(int points, int count, int batches, const int* dofs, const int* pressures, const double* maps,
                   const double* roots, const int* first, const int* column, const double* weight,
                   const int* first_back, const int* column_back, const double* weight_back, const int* raised,

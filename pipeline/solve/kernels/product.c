@@ -1,13 +1,13 @@
-/* Products with the stiffness of straight-sided tetrahedra, cell by cell: there is no matrix to read.
+/* Matrix-free products with the stiffness of straight-sided tetrahedra, cell by cell.
  *
- * In Bernstein's polynomials of degree p on barycentric coordinates a gradient takes two coefficients for each of its
- * own, of degree p - 1:
+ * In Bernstein polynomials of degree p, in barycentric coordinates, each coefficient of a gradient, of degree p - 1,
+ * depends on two coefficients:
  *
  *     d_a u = sum_b p (c[b + e_a] - c[b + e_0]) B_b,   a = 1, 2, 3.
  *
- * On a straight cell one constant matrix maps it to space, and stress is as constant a multiple of it: what is left
- * is the mass of degree p - 1. From values at points to coefficients, and back, is a sparse matrix. Cells are stored
- * LANES at a time, one in each lane of vectors; in double precision half of them are taken at once.
+ * On a straight cell one constant matrix maps the gradient to space, and another one to stress; the rest is the mass of
+ * degree p - 1. A sparse matrix converts values at points to coefficients. Cells are stored LANES at a time, one in each
+ * lane of vectors; in double precision half of them are processed at once.
  */
 
 #include <math.h>
@@ -76,9 +76,9 @@ void add_diagonal(int count, int points, const int* dofs, const double* maps, co
 }
 
 /* y += A x over whole batches of cells: dofs (batches, points, LANES), maps (batches, 3, 3, LANES), lame (batches, 2,
- * LANES); cells that fill up the last batch have maps of nought. Row i of what takes values to coefficients has the
- * entries first[i] to before first[i + 1]; first_back and so on are its transpose. raised (coefficients, 4) has the
- * places of b + e_0, ..., b + e_3; mass (coefficients, coefficients) holds p^2, too. */
+ * LANES); padding cells of the last batch have zero maps. Row i of the map from values to coefficients has the
+ * entries first[i] to first[i + 1] - 1; first_back and so on are its transpose. raised (coefficients, 4) has the
+ * positions of b + e_0, ..., b + e_3; mass (coefficients, coefficients) includes p^2. */
 #define DEFINE_PRODUCT(NAME, TYPE, VECTOR)                                                                             \
 static inline __attribute__((always_inline)) void transform(NAME)(                                                     \
     int points, const int* restrict first, const int* restrict column, const TYPE* restrict weight,                    \
