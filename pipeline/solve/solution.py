@@ -89,12 +89,12 @@ class Solution:
 
     @property
     def stiffness(self) -> FloatArray:
-        """The probe's stiffness (n, n), in the order of the loads' motions; units: see ``Response``."""
+        """The probe's stiffness (n, n), in the order of the motions; units: see ``Response``."""
         return self.response.stiffness
 
     @property
     def decrement(self) -> float:
-        """Share of the energy that one degree more takes away; not a number if that was not asked for."""
+        """Share of the energy that one degree more removes; NaN without an estimate."""
         if self.decrements is None:
             return nan
         amounts = self.response.amounts
@@ -102,7 +102,7 @@ class Solution:
 
     @property
     def bar(self) -> float:
-        """Relative 95 % error bar on the energy, hence on F along the travel; not a number if not asked for."""
+        """Relative 95 % error bar on the energy, hence on F along the travel; NaN without an estimate."""
         if self.bars is None:
             return nan
         amounts = np.abs(self.response.amounts)
