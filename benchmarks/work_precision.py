@@ -77,12 +77,12 @@ METHODS = (
 )
 # Required accuracies, for the automatic choice of meshes in three dimensions.
 ASKED = ("2 %", "1 %", "0.3 %", "0.1 %")
-AXISYMMETRIC = (4, 5, 6)  # degrees; of lower ones the error bar is above what the solver accepts
+AXISYMMETRIC = (4, 5, 6)  # degrees; the error bar of lower ones exceeds the solver's limit
 
 
 @dataclass(frozen=True)
 class Point:
-    """One run of one method: what it cost, and how far F is from the truth."""
+    """One run of one method: its cost, and the error of F."""
 
     method: str
     poisson: float
@@ -96,11 +96,11 @@ class Point:
 
 
 def measure(repeats: int, *, quick: bool = False) -> Iterator[Point]:
-    """Yield every point, coarse to fine; ``quick`` takes the two coarsest meshes of each method."""
+    """Yield every point, coarse to fine; ``quick`` uses only the two coarsest meshes of each method."""
     most = 2 if quick else None
     with threadpool_limits(limits=1, user_api="blas"):
         for nu, method in itertools.product(POISSON, METHODS):
-            if method.degree == 1 and nu > 0.45:  # locks: the program refuses it
+            if method.degree == 1 and nu > 0.45:  # locking: the program refuses it
                 continue
             for level, mesh in enumerate(method.meshes[:most]):
                 settings = {**mesh, "degree": method.degree, "element": method.element}
@@ -123,9 +123,9 @@ def _point(name: str, nu: float, level: int, mesh: dict[str, Any], without: tupl
     )
     plan = make_plan(study, without=("axisymmetric", *without))
     runs: list[Record] = []
-    for _ in range(repeats + 1):  # the first one warms up
+    for _ in range(repeats + 1):  # the first run warms up
         (record,) = compute(plan, MPI.COMM_SELF).values()
-        if not isfinite(record.force):  # an error bar above 100 % is no obstacle here
+        if not isfinite(record.force):  # error bars above 100 % are allowed here
             raise RuntimeError(f"{name}, ν = {nu:g}: {record.message}")
         runs.append(record)
     median = {n: statistics.median(getattr(r, n) for r in runs[1:]) for n in ("time_total", "time_error")}

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from pipeline.files import FIGURE_FORMATS
 from pipeline.report.figures import STYLE, save
 
-# Colour says the element, the line how the mesh is made: told apart by the colour-blind and in grey.
+# Colours by element, line styles by mesh; they can be told apart in grey and by the colour-blind.
 _COLOURS = {"P1": "#777777", "P2": "#1f5fa8", "P3": "#00204d", "P2/P1": "#c98a00", "P3/P2": "#b0413e"}
 _OTHERS = {"axisymmetric, by degree": ("#2a9d8f", "-", "D"), "accuracy asked for, 3D": ("#d81b60", "-", "*")}
 
