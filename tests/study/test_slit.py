@@ -92,8 +92,8 @@ def test_no_incision():
     assert deep.proportional_to == ()
 
 
-def test_depth_does_nothing_where_tissue_slides_along_the_blade():
-    """It says so; and each Poisson's ratio is solved: a reduced basis knows of the work only."""
+def test_depth_has_no_effect_without_bond_in_a_slit():
+    """The study warns of it. Each Poisson's ratio is solved: a reduced basis gives the work only."""
     poisson = [0.1, 0.2, 0.25, 0.3, 0.35, 0.4, 0.42]
     sliding = parse(raw(probe={**SLIT, "contact": "frictionless"}, material={"poisson": poisson}))
     assert any("no effect" in warning for warning in sliding.warnings)

@@ -178,5 +178,5 @@ def test_what_is_no_label_map_is_refused(scan: Path, tmp_path: Path):
     nrrd.write(str(tmp_path / "nowhere.nrrd"), values, {})
     with pytest.raises(SurfaceError, match="names no unit"):
         load_image(tmp_path / "nowhere.nrrd", 2)
-    with pytest.raises(SurfaceError, match="how large"):
+    with pytest.raises(SurfaceError, match="voxel size is unknown"):
         load_image(tmp_path / "nowhere.nrrd", 2, unit=1e-3)
