@@ -1,4 +1,4 @@
-/* See epsmesh.h for what is offered, pipeline/realtime/ for the formulas, in the same order and under the same names. */
+/* epsmesh.h is the interface. Formulas are in pipeline/realtime/, in the same order and under the same names. */
 #include "epsmesh.h"
 
 #include <float.h>
@@ -174,7 +174,7 @@ static int is_sound(const epsmesh_model *m) {
     return m->thickness > 0 && m->young > 0 && m->largest > 0 && m->largest <= 1;
 }
 
-/* Return whether what a file tells of two places, if it does, is that of a model. */
+/* Return whether a file's interaction of places, if it has one, is valid. */
 static int has_pairs(epsmesh_model *m, const wanted *w) {
     int i, j, n, found = 0, rank, nodes;
     for (i = 0; i < WANTED - OF_PAIRS; i++) found += w[i].rank >= 0;
@@ -254,7 +254,7 @@ epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
     m->is_flat = 1;
     for (i = 0; i < m->face_counts[0] * m->face_counts[1]; i++)
         if (m->height[i] != 0 || m->bend[i] != 0) m->is_flat = 0;
-    /* A curved face that does not say how well it is known is of a time when it was known badly. */
+    /* Files of earlier versions lack it, and are too inaccurate for a curved face. */
     if (!m->is_flat && w[OPTIONAL + 1].rank < 0) return EPSMESH_NO_MODEL;
     if (!has_pairs(m, w + OF_PAIRS)) return EPSMESH_NO_MODEL;
     m->is_loaded = is_sound(m);
@@ -327,7 +327,7 @@ static value along(const epsmesh_model *m, const double *table, const terms *p, 
     return found;
 }
 
-/* What blades and bonded tools take: the factors of the seven tables are those of pipeline/realtime/table.py. */
+/* Values for blades and bonded tools; the factors of the seven tables are those of pipeline/realtime/table.py. */
 static void shape_at(const epsmesh_model *m, const terms *s, double x, double y, double t, const double slope_t[2],
                      place *p) {
     double xi = m->even[0] ? x / m->reach[0] : 1, eta = m->even[1] ? y / m->reach[1] : 1;
@@ -412,7 +412,7 @@ static spot face_at(const epsmesh_model *m, double x, double y) {
     return f;
 }
 
-/* The force on a tool whose tip is at p - d n: its work is what the energy loses. */
+/* The force on a tool whose tip is at p - d n: its work is the decrease of the energy. */
 static void force_at(const spot *f, double push, const double aside[2], double depth, double out[3]) {
     double steep = sqrt(1 + f->slope[0] * f->slope[0] + f->slope[1] * f->slope[1]), m[2][2], det, x, y;
     int i, j;
@@ -523,7 +523,7 @@ static int press_round(const epsmesh_query *tool, const place *p, double most, c
     return 1;
 }
 
-/* A rectangle's stiffness, where it presses, and how it resists to be tilted: pipeline/realtime/blade.py */
+/* A rectangle's stiffness, second moments and tilting stiffness: pipeline/realtime/blade.py */
 static const double RECTANGLE[5][8] = {
     {1.5467288, -0.5389724, 0.154788, -0.0121522, 0.0020102, -0.0001257, 6e-06, -1.4e-06},
     {0.4134192, 0.0443058, 0.0039289, -0.0011234, -0.0003526, 1.7e-06, 2.01e-05, 4.2e-06},
@@ -591,7 +591,7 @@ static double room_at(const epsmesh_model *m, double x, double y) {
 
 static int is_positive(double x) { return isfinite(x) && x > 0; }
 
-/* Return whether the tool is one that the model knows; `edge` is the direction of a blade on the face. */
+/* Return whether the model has this tool; `edge` is the direction of a blade on the face. */
 static epsmesh_status tool_of(const epsmesh_model *m, const epsmesh_query *q, double edge[2]) {
     int i, j, is_blade = q->shape == EPSMESH_BLADE, has_angle = q->shape == EPSMESH_CONE;
     edge[0] = 1, edge[1] = 0;
@@ -650,7 +650,7 @@ static epsmesh_status misfit(const epsmesh_model *m, const epsmesh_query *q, dou
     return q->depth <= TOUCHING ? EPSMESH_LOST : EPSMESH_OK;
 }
 
-/* Move a place to the nearest one of the region, or nearly: return whether it was outside. */
+/* Move a place to about the nearest one of the region; return whether it was outside. */
 static int into_region(const epsmesh_model *m, double place[2]) {
     double r = sqrt(place[0] * place[0] + place[1] * place[1]);
     int i, was_outside = 0;
@@ -682,7 +682,7 @@ static epsmesh_status curved_foot(const epsmesh_model *m, const double tip[3], d
             return above < 0 ? EPSMESH_OK : EPSMESH_LOST;
         }
         for (i = 0; i < 2; i++) place[i] += step[i];
-        /* Steps that end at the border again and again lead out. */
+        /* If steps end at the border several times, the place is outside. */
         if (into_region(m, place) && ++cuts > 2) return EPSMESH_OUTSIDE;
     }
     return EPSMESH_DEEP;
@@ -725,7 +725,7 @@ epsmesh_query epsmesh_ask(const epsmesh_model *m) {
     return q;
 }
 
-/* A query that makes sense, with what is known of its place. */
+/* A valid query, with the values at its place. */
 typedef struct {
     double local[3], edge[2], room;
     spot f;
@@ -821,7 +821,7 @@ static void modes_at(const epsmesh_model *m, double x, double y, double f[4][EPS
     }
 }
 
-/* Return the second moment (m2) of a contact under a `force` on a half-space, and which `power` of the force it is. */
+/* Return the second moment (m2) of a contact under a `force` on a half-space, and its exponent `power` in the force. */
 static double moment(const epsmesh_query *q, double plane, double force, double *power) {
     double big = 0.5 * (q->length > q->width ? q->length : q->width), c8[3][EPSMESH_MOST], r[2] = {0, 0};
     double small = 0.5 * (q->length > q->width ? q->width : q->length);
@@ -901,7 +901,7 @@ static void influences(const epsmesh_model *m, int n, const epsmesh_query *q, co
     for (i = 0; i < n; i++) bent_at(&q[i], a[i].edge, n, i, g);
 }
 
-/* Put the inverse of `a`, which is lost, into `b`: Gauss's elimination with the largest pivots of the columns. */
+/* Put the inverse of `a` into `b`, by Gauss elimination with column pivoting; `a` is overwritten. */
 static int inverted(int n, double a[TOOLS][TOOLS], double b[TOOLS][TOOLS]) {
     int i, j, k;
     for (i = 0; i < n; i++)
@@ -926,7 +926,7 @@ static int inverted(int n, double a[TOOLS][TOOLS], double b[TOOLS][TOOLS]) {
     return 1;
 }
 
-/* Press all tools to depths: EPSMESH_LARGE, and whose contact is, or EPSMESH_DAMAGED. */
+/* Press all tools to depths; return EPSMESH_LARGE with the tool's number, or EPSMESH_DAMAGED. */
 static epsmesh_status press_all(const epsmesh_model *m, int n, const epsmesh_query *q, const asked *a,
                                 const double depth[TOOLS], contact k[TOOLS], int *whose) {
     int i;
@@ -953,7 +953,7 @@ static void asides(int n, const epsmesh_query *q, const influence *g, settled *s
         }
 }
 
-/* Newton's method from what each tool feels alone. */
+/* Newton's method, from each tool's contact alone. */
 static epsmesh_status settle_all(const epsmesh_model *m, int n, const epsmesh_query *q, const asked *a, const influence *g,
                              settled *s, int *whose) {
     int i, j, steps, is_last = 0;
@@ -1050,7 +1050,7 @@ static void doubts(const epsmesh_model *m, int n, const epsmesh_query *q, const 
     }
 }
 
-/* Say that some tools, marked in `which`, have a status, and that the others have none for that. */
+/* Give the tools marked in `which` a status, and all others EPSMESH_OTHERS. */
 static void refuse(int n, epsmesh_touch *t, const int which[TOOLS], epsmesh_status status) {
     int i;
     for (i = 0; i < n; i++) t[i] = all(which[i] ? status : EPSMESH_OTHERS, (double)NAN);

@@ -1,8 +1,7 @@
-/* Forces of tools on a body from a model file of `epsmesh export`: C99, no allocation, no locks, no input or output.
+/* Forces of tools on a body, from a model file of `epsmesh export`. C99; no allocation, no locks, no input or output.
  *
- * SI units throughout. A model is plain memory: fill it once with epsmesh_load from the bytes of the file, then any
- * number of threads may query it. The formulas are those of pipeline/realtime/contact.py and blade.py, where they are
- * derived.
+ * SI units. A model is plain memory: epsmesh_load fills it once from the bytes of the file; then any number of threads
+ * may query it. Formulas are derived in pipeline/realtime/contact.py and blade.py.
  */
 #ifndef EPSMESH_H
 #define EPSMESH_H
@@ -20,18 +19,18 @@ typedef enum {
     EPSMESH_OK,
     EPSMESH_LOST,     /* the tool does not touch: all numbers are 0 */
     EPSMESH_OUTSIDE,  /* the place is outside the model's region */
-    EPSMESH_LARGE,    /* tool or contact too large for a place so near to a side or the bottom */
-    EPSMESH_DEEP,     /* deeper than the model was made for */
-    EPSMESH_TOOL,     /* no such tool, or a size of it is missing, or the model has no tables for it */
-    EPSMESH_INPUT,    /* a number is not finite, or not positive where it must be */
+    EPSMESH_LARGE,    /* tool or contact too large here: a side, the bottom or other tissue is too near */
+    EPSMESH_DEEP,     /* the depth exceeds the model's range */
+    EPSMESH_TOOL,     /* unknown tool, or a size is missing, or the model has no tables for it */
+    EPSMESH_INPUT,    /* a number is not finite, or must be positive */
     EPSMESH_POISSON,  /* Poisson's ratio is outside the model's range */
     EPSMESH_TILTED,   /* the tool must press along the face's inward normal */
     EPSMESH_OFF,      /* the place is not on the face */
-    EPSMESH_DAMAGED,  /* the model's numbers make no sense here */
-    EPSMESH_NO_MODEL, /* the file is of another kind or version, cut short, or contradicts itself */
-    EPSMESH_NEAR,     /* the middles of two contacts are nearer to each other than twice their radii together */
-    EPSMESH_OTHERS,   /* another tool has no answer, and without its force there is none here */
-    EPSMESH_ALONE,    /* the model knows one tool at a time: its face is curved, or its file of an earlier version */
+    EPSMESH_DAMAGED,  /* the model's numbers are inconsistent here */
+    EPSMESH_NO_MODEL, /* the file is of another kind or version, cut short, or inconsistent */
+    EPSMESH_NEAR,     /* two contacts' middles are closer than twice the sum of their radii */
+    EPSMESH_OTHERS,   /* another tool, on whose force this one depends, has no answer */
+    EPSMESH_ALONE,    /* one tool at a time: the face is curved, or the file of an earlier version */
     EPSMESH_STATUSES
 } epsmesh_status;
 
@@ -50,20 +49,20 @@ typedef struct {
 
 typedef struct {
     epsmesh_shape shape;
-    double radius;         /* m: of a disc, of a ball, of a cone where it ends */
-    double angle;          /* rad: of a cone's flank to its axis; else unused */
-    double at[3];          /* m: where its axis meets the face */
-    double axis[3];        /* along which it presses; 0, 0, 0 is the inward normal */
+    double radius;         /* m: of a disc, a ball, or the end of a cone */
+    double angle;          /* rad: a cone's half angle to its axis; else unused */
+    double at[3];          /* m: where the tool's axis meets the face */
+    double axis[3];        /* direction of pressing; 0, 0, 0 is the inward normal */
     double depth;          /* m */
-    double young, poisson; /* Pa, 1; those of model->young and model->poisson unless they change */
+    double young, poisson; /* Pa, 1; by default model->young and model->poisson */
     double length, width;  /* m: of a blade's edge; else unused */
-    double along[3];       /* along which its length lies; 0, 0, 0 is the face's x */
+    double along[3];       /* direction of a blade's length; 0, 0, 0 is the face's x */
 } epsmesh_query;
 
 typedef struct {
     epsmesh_status status;
-    double force[3];       /* N: what the tissue does to the tool, in the body's coordinates */
-    double force_error;    /* relative, of its part along the normal */
+    double force[3];       /* N: force of the tissue on the tool, in the body's coordinates */
+    double force_error;    /* relative to the force along the normal */
     double stiffness;      /* N/m: dF/dd at a fixed place */
     double contact_radius; /* m */
 } epsmesh_touch;
@@ -71,24 +70,23 @@ typedef struct {
 /* Fill `model` from the `size` bytes of a file at `data`: EPSMESH_OK or EPSMESH_NO_MODEL. */
 epsmesh_status epsmesh_load(epsmesh_model *model, const void *data, size_t size);
 
-/* Find the place `at` of the face above a tool whose lowest point is at `tip` (m), and its `depth` (m) along the inward
- * normal there: EPSMESH_OK; EPSMESH_LOST if the tool is above the face, EPSMESH_OUTSIDE beside the region of a curved one,
- * EPSMESH_DEEP where the normals of several places lead to the tip, and then there is none. */
+/* Find the place `at` of the face for a tool whose lowest point is at `tip` (m), and its `depth` (m) along the inward
+ * normal there. Returns EPSMESH_OK; EPSMESH_LOST if the tool is above the face; EPSMESH_OUTSIDE beside the region of a
+ * curved face; EPSMESH_DEEP if the normals of several places meet at the tip, so that the place is not unique. */
 epsmesh_status epsmesh_foot(const epsmesh_model *model, const double tip[3], double at[3], double *depth);
 
-/* Return a query of the model's own E and nu, along the inward normal, with all else unset. */
+/* Return a query with the model's E and nu, along the inward normal; all else is unset. */
 epsmesh_query epsmesh_ask(const epsmesh_model *model);
 
 /* Answer a query; all numbers are NaN unless the status is EPSMESH_OK or EPSMESH_LOST. */
 epsmesh_touch epsmesh_touch_at(const epsmesh_model *model, const epsmesh_query *query);
 
-/* Answer `count` queries of tools that press all at once, of one E and nu: each touch is what that tool feels, its
- * stiffness that while the others are held. If one has no answer, the others have EPSMESH_OTHERS; more than
- * EPSMESH_MOST_TOOLS are EPSMESH_INPUT, as are E or nu that differ. The formulas are those of pipeline/realtime/several.py,
- * pairs.py and doubt.py. */
+/* Answer `count` queries of tools that press at the same time, with equal E and nu. The stiffness of each tool is at fixed
+ * depths of the others. If one has no answer, the others get EPSMESH_OTHERS. More than EPSMESH_MOST_TOOLS, or different E
+ * or nu, give EPSMESH_INPUT. Formulas: pipeline/realtime/several.py, pairs.py and doubt.py. */
 void epsmesh_touch_all(const epsmesh_model *model, int count, const epsmesh_query *queries, epsmesh_touch *touches);
 
-/* Return the word that Python uses for a status. */
+/* Return the name of a status in Python. */
 const char *epsmesh_word(epsmesh_status status);
 
 #ifdef __cplusplus

@@ -1,7 +1,7 @@
-/* Any convex tip on a model of epsmesh.h, as pipeline/realtime/patch.py has it: C99, no allocation, locks, input, output.
+/* Any convex tip on a model of epsmesh.h; see pipeline/realtime/patch.py. C99; no allocation, locks, input or output.
  *
- * Build epsmesh_patch.c instead of epsmesh.c, which it holds. A patch is plain memory of about 150 kB; it begins where
- * its last call ended: one for each tool and thread.
+ * Build epsmesh_patch.c instead of epsmesh.c, which it includes. A patch is plain memory of about 150 kB. Each call starts
+ * from the last one's contact, so every tool and thread needs its own patch.
  */
 #ifndef EPSMESH_PATCH_H
 #define EPSMESH_PATCH_H
@@ -14,7 +14,7 @@ extern "C" {
 
 enum { EPSMESH_SIDE = 11, EPSMESH_CELLS = EPSMESH_SIDE * EPSMESH_SIDE, EPSMESH_DEPTHS = 40, EPSMESH_TOLD = 4 };
 
-/* Return how far (m) a convex tip is above its lowest point, which is at x = y = 0 (m, along the tip's own axes). */
+/* Return the height (m) of a convex tip above its lowest point, which is at x = y = 0 (m, along the tip's axes). */
 typedef double (*epsmesh_height)(double x, double y, void *user);
 
 typedef struct {
@@ -27,10 +27,10 @@ typedef struct {
     int is_made;
 } epsmesh_patch;
 
-/* Make the patch of a tip up to a `reach` (m): EPSMESH_OK, or EPSMESH_INPUT if it is no convex tip. */
+/* Make the patch of a tip up to a `reach` (m). Returns EPSMESH_OK, or EPSMESH_INPUT if the tip is not convex. */
 epsmesh_status epsmesh_patch_make(epsmesh_patch *patch, epsmesh_height height, void *user, double reach);
 
-/* Answer a query, whose shape and sizes do not count, for the tip turned by `turn` (rad) from the face's x to its y. */
+/* Answer a query for the tip, turned by `turn` (rad) from the face's x to its y; the query's shape and sizes are unused. */
 epsmesh_touch epsmesh_patch_touch(epsmesh_patch *patch, const epsmesh_model *model, const epsmesh_query *query,
                                   double turn);
 

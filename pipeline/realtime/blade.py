@@ -1,4 +1,4 @@
-"""What a blade and a body do to each other: a flat rectangle on the regular part of ``pipeline.realtime.contact``."""
+"""Contact of a blade with a body: a flat rectangle with the regular part of ``pipeline.realtime.contact``."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,7 +22,7 @@ RECTANGLE = np.array(
         [1.7362244, 0.2238417, 0.0903649, 0.0247386, 0.0048149, 0.0006582, 5.88e-05, 3.6e-06],
     ]
 ).T
-# What is seen of it are discs so many half widths apart, and so many at least and at most.
+# For display, discs so many half widths apart, with a least and a largest number, represent the blade.
 _APART, _FEWEST, _MOST = 1.2, 4, 24
 
 
@@ -30,8 +30,8 @@ _APART, _FEWEST, _MOST = 1.2, 4, 24
 class Blade(Tool):
     """A flat rectangular punch of half ``length`` and half ``width`` (m), its edge along ``turn`` (rad) from x.
 
-    Its stiffness on a half-space, where it presses, and how it resists to be tilted are those of its proportions,
-    fitted to an integral equation (A. E. H. Love's rectangles, graded to the edges) to 1e-5.
+    Its stiffness on a half-space, second moments and tilting stiffness depend on its aspect ratio. They are fitted to
+    boundary elements (A. E. H. Love's rectangles, graded to the edges), within 1e-5.
     """
 
     is_round: ClassVar[bool] = False
@@ -43,7 +43,7 @@ class Blade(Tool):
 
     @property
     def spread(self) -> tuple[float, float]:
-        """The second moments (m²) of its pressure along the edge and across, for a force of one."""
+        """The second moments (m²) of its pressure along the edge and across, for a unit force."""
         _, along, across, *_ = _rectangle(self.width / self.length)
         return along * self.length**2, across * self.width**2
 
@@ -80,12 +80,12 @@ class Blade(Tool):
         return Contact(push, (squared * of_x, squared * of_y), 1 / soft, hypot(long, short), along + across)
 
     def moment(self, force: float, plane: float) -> tuple[float, float]:
-        """Of a flat tool it is the same under any force."""
+        """It does not depend on the force of a flat tool."""
         return sum(self.spread), 0.0
 
     @property
     def tensor(self) -> Array:
-        """That of its two moments."""
+        """From both second moments."""
         along, across = self.spread
         edge = np.array([np.cos(self.turn), np.sin(self.turn)])
         return np.asarray((across * np.eye(2) + (along - across) * np.outer(edge, edge)) / (along + across))
@@ -98,9 +98,9 @@ class Blade(Tool):
         return np.asarray(along * np.outer(edge, edge) + across * np.outer(side, side))
 
     def discs(self, radius: float) -> tuple[float, Array]:
-        """Discs along the edge, at the abscissae of a pressure that grows like 1/√ towards its ends."""
+        """Discs along the edge, at Chebyshev points: the pressure is singular (1/√) at both ends."""
         count = min(max(ceil(2 * self.length / (_APART * self.width)), _FEWEST), _MOST)
-        # Of a disc, the second moment in one direction is a third of the square of its radius.
+        # A disc's second moment in one direction is a third of its squared radius.
         reach = sqrt(2 * max(self.spread[0] - self.width**2 / 3, 0.0))
         return self.width, np.outer(reach * np.cos(pi * (np.arange(count) + 0.5) / count), self.outline[1])
 
@@ -112,13 +112,13 @@ class Blade(Tool):
 
 @lru_cache(64)
 def _rectangle(share: float) -> tuple[float, ...]:
-    """Return the five numbers of a rectangle whose ``share`` is w/l."""
+    """Return the five coefficients of a rectangle with w/l = ``share``."""
     at = 1 - 2 * log(share) / log(_SLENDER)
     return tuple((np.array(chebyshev(at, len(RECTANGLE))) @ RECTANGLE).tolist())
 
 
 def blade(length: float, width: float, turn: float) -> Blade | None:
-    """Return the blade of a ``length`` and a ``width`` (m), or nothing if it is too slender to be known."""
+    """Return the blade of a ``length`` and a ``width`` (m), None if it is more slender than the fit."""
     long, short = max(length, width) / 2, min(length, width) / 2
     if short < _SLENDER * long:
         return None

@@ -1,15 +1,15 @@
-"""What a frictionless tool and a body do to each other, from c, h and their slopes at one place: closed forms, E = 1.
+"""Frictionless contact of a tool with a body, from c, h and their gradients at one place: closed forms, E = 1.
 
-A force F, pressed on at t, sinks the face at s, both from the tool's axis, by its field on a half-space, and by
-F·(c + g·(s + t) + h (s² + t²)/4), ∇c = 2g: the regular part of the body's Green's function up to second order. Such a
-body under a round tool is the half-space under one whose profile has Fh/4·r² more (I. N. Sneddon, 1965), exactly:
+A force F at t displaces the face at s (both from the tool's axis) by its field on a half-space, plus
+F·(c + g·(s + t) + h (s² + t²)/4), ∇c = 2g: the regular part of the body's Green's function up to second order. For a
+round tool this is exactly the half-space under a tool whose profile has Fh/4·r² more (I. N. Sneddon, 1965):
 
     D(a) = a ∫ f'(r) / (a² - r²)^½ dr,    F = 2E* ∫ D_e(a) - D_e(s) ds,    D_e(s) = D(s) + F h s²/2,
     d = D_e(a) + F c + h/4·∫ p r²,    ∫ p r² = 4E* ∫ s² (D_e(a) - D_e(s)) ds.
 
-The slope g tilts the face by Fg, which moves the pressure aside by what a disc of the contact's radius would feel:
--2/3·E* a³ F² g² in the complementary energy U(F), d = ∂U/∂F. All forces are slopes of one energy: at a fixed depth
-the force aside is ∂U/∂x, and a closed path does no work.
+The gradient g tilts the face by Fg. The pressure changes as under a tilted disc of the contact's radius, which adds
+-2/3·E* a³ F² g² to the complementary energy U(F), d = ∂U/∂F. All forces derive from one energy: at a fixed depth the
+lateral force is ∂U/∂x, so a closed path does no work.
 """
 
 from dataclasses import dataclass
@@ -20,12 +20,11 @@ import numpy as np
 
 from pipeline.realtime.place import Array, Contact, Place, Tool
 
-# Steps of Newton's method, which is kept within a bracket; the radius is then exact to rounding.
-# A step of it that is this small leaves its square.
+# Newton steps, within a bracket; relative step at rounding, and the one after which one more step reaches rounding.
 _STEPS, _SAME, _NEXT = 60, 4e-16, 1e-8
-# Of terms in the series of a ball, the last is below rounding for contact up to 0.6 of its radius.
+# Number of terms in the series of a ball: the last is below rounding for contact radii up to 0.6 of its radius.
 _TERMS, _NEGLIGIBLE = 40, 1e-17
-# Of 1 - 2ν, below which a logarithm over it is its limit.
+# For smaller 1 - 2ν, a logarithm divided by it is replaced by its limit.
 _SOFT = 1e-12
 
 
@@ -49,7 +48,7 @@ class Disc(Tool):
         return Contact(force, (aside_x, aside_y), force / depth, a, 2 / 3 * a**2 - 8 / 45 * stiff * h * a**5)
 
     def moment(self, force: float, plane: float) -> tuple[float, float]:
-        """Of a flat tool it is the same under any force."""
+        """It does not depend on the force of a flat tool."""
         return 2 / 3 * self.radius**2, 0.0
 
 
@@ -66,15 +65,15 @@ class Round(Tool):
         raise NotImplementedError
 
     def first(self, depth: float) -> float:
-        """Return about what the radius of contact (m) is at a ``depth`` (m)."""
+        """Return an initial guess of the contact radius (m) at a ``depth`` (m)."""
         raise NotImplementedError
 
     def rise(self, square: Array) -> Array:
-        """Return how far (m) above its lowest point it is, at squares (m²) of the way to its axis."""
+        """Return the height (m) of the surface above its lowest point, at squared distances (m²) from the axis."""
         raise NotImplementedError
 
     def lifted(self, away: Array) -> Array:
-        """It rises from its lowest point."""
+        """The height follows from the profile."""
         square = away[:, 0] ** 2 + away[:, 1] ** 2
         return np.asarray(self.rise(square) - away[:, 2])
 
@@ -96,10 +95,10 @@ class Round(Tool):
         return _contact(a, self._at(a, place), place)
 
     def _at(self, a: float, place: Place) -> "_Pressed":
-        """Return what presses the contact to a radius ``a`` (m), its depth below 0 if h leaves no such contact."""
+        """Return the state for a contact radius ``a`` (m); its depth is negative if h allows no such contact."""
         stiff, h = place.plane, place.h
         sunk, steep, area, moment = self.profile(a)
-        # A dome is met by a tool that is as much sharper.
+        # On a dome the tool acts like a sharper one.
         sunk, steep = sunk + place.bend * a**2, steep + 2 * place.bend * a
         area, moment = area + place.bend * a**3 / 3, moment + place.bend * a**5 / 5
         own = 1 - 2 / 3 * stiff * h * a**3
@@ -118,7 +117,7 @@ class Round(Tool):
 
 
 class _Pressed(NamedTuple):
-    """Depth (m) and its slope with the radius of contact, force, ∫ p r², own·dF/da, and dd/dF."""
+    """Depth (m) and its derivative by the contact radius, force, ∫ p r², own·dF/da, and dd/dF."""
 
     depth: float
     slope: float
@@ -150,7 +149,7 @@ class Ball(Round):
     radius: float
 
     def profile(self, s: float) -> tuple[float, float, float, float]:
-        """D(s) = s artanh(s/R), by its series, which does not cancel."""
+        """D(s) = s artanh(s/R), by a series without cancellation."""
         t = (s / self.radius) ** 2
         power, sunk, steep, area, moment = t, 0.0, 0.0, 0.0, 0.0
         for odd in range(1, 2 * _TERMS, 2):
@@ -169,11 +168,11 @@ class Ball(Round):
         return sqrt(self.radius * depth)
 
     def rise(self, square: Array) -> Array:
-        """Beyond its own radius it is as high as there."""
+        """Beyond its radius the height is constant."""
         return np.asarray(self.radius - np.sqrt(np.maximum(self.radius**2 - square, 0.0)))
 
     def moment(self, force: float, plane: float) -> tuple[float, float]:
-        """That of H. Hertz's radius of contact."""
+        """By H. Hertz's contact radius."""
         return 0.4 * (0.75 * force * self.radius / plane) ** (2 / 3), 2 / 3
 
 
@@ -199,13 +198,13 @@ class Cone(Round):
         return np.asarray(self.slope * np.sqrt(square))
 
     def moment(self, force: float, plane: float) -> tuple[float, float]:
-        """That of A. E. H. Love's radius of contact."""
+        """By A. E. H. Love's contact radius."""
         return 2 / 3 * force / (pi * plane * self.slope), 1.0
 
 
 @dataclass(frozen=True)
 class Bonded(Disc):
-    """A flat round punch of ``radius`` (m) that tissue sticks to, and that does not turn."""
+    """A flat round bonded punch of ``radius`` (m), which does not rotate."""
 
     sticks: ClassVar[bool] = True
     asks_all: ClassVar[bool] = True
@@ -213,7 +212,7 @@ class Bonded(Disc):
     def press(self, depth: float, place: Place, most: float) -> Contact | None:
         """Return the contact at a ``depth`` (m), or nothing if its radius is more than ``most`` (m).
 
-        Straight down V. I. Mossakovskii's stiffness (1954), aside R. D. Mindlin's of a disc that does not lift (1949).
+        Normal stiffness by V. I. Mossakovskii (1954), lateral by R. D. Mindlin for a disc without lift-off (1949).
         """
         a, ratio = self.radius, place.poisson
         if a > most or place.shape is None:
@@ -231,7 +230,7 @@ class Bonded(Disc):
 
 
 def tangent(a: float, place: Place) -> float:
-    """Return dd/dF (Pa m/N) while the radius of contact is ``a``, but for what the tilt adds."""
+    """Return dd/dF (Pa m/N) at a contact radius ``a``, without the effect of the tilt."""
     c, h, stiff = place.c, place.h, place.plane
     return 0.5 / (stiff * a) + c + a**2 / 3 * h - 2 / 45 * stiff * h**2 * a**5
 

@@ -1,4 +1,4 @@
-"""The bars of several tools at once: what each has by itself, and what is not known of what they do to each other."""
+"""Error bars of several tools at once: those of each tool by itself, and those of their interaction."""
 
 from collections.abc import Sequence
 from math import hypot, sqrt
@@ -9,17 +9,17 @@ from pipeline.realtime.pairs import Influence, Pairs
 from pipeline.realtime.place import Array
 from pipeline.realtime.several import Pressing, Settled
 
-# Of a half-space's G, what fourth moments of two contacts make of it at most, in units of (m_i + m_j)²/D⁴: of round
-# tools, and of blades that point at each other. Blades bend R by so much more than round tools.
+# Largest effect of two contacts' fourth moments on a half-space's G, in units of (m_i + m_j)²/D⁴: for round tools,
+# and for blades that point at each other. Factor for blades on the second derivatives of R.
 _FOURTH, _FOURTH_BLADE, _BLADE = 0.5, 2.0, 2.0
 
 
 def errors(
     tools: Sequence[Pressing], settled: Settled, own: Sequence[float], pairs: Pairs, between: Influence, of_c: float
 ) -> Array:
-    """Return the relative bars (n,) of forces whose own models tell them to ``own``; c may be off by ``of_c``/room.
+    """Return the relative error bars (n,) of forces; ``own`` are those of each tool's model, ``of_c``/room those of c.
 
-    Errors of depths and of the own models go on from tool to tool as they do at worst.
+    Errors of depths and of the tools' models propagate between tools in the worst case.
     """
     forces = settled.forces
     rooms = np.sqrt([tool.room for tool in tools])
@@ -34,9 +34,9 @@ def errors(
 
 
 def _spread(tools: Sequence[Pressing], settled: Settled, between: Influence) -> Array:
-    """Return what is left out of G (n, n), in 1/m, since contacts have a size.
+    """Return the terms neglected in G (n, n), in 1/m, for the finite size of contacts.
 
-    That is what second moments make of R, what is not known of them, and the next term of a half-space's.
+    They are the second moments on R, the error of these moments, and the next order on a half-space.
     """
     means = np.array([contact.mean_square for contact in settled.contacts])
     is_blade = np.array([not tool.tool.is_round for tool in tools])
@@ -49,9 +49,9 @@ def _spread(tools: Sequence[Pressing], settled: Settled, between: Influence) -> 
 
 
 def _tilted(tools: Sequence[Pressing], settled: Settled, between: Influence) -> Array:
-    """Return how far depths (n,), in m for E = 1, are off as the face under each tool leans by the others.
+    """Return the errors of depths (n,), in m for E = 1, by the tilt of the face under each tool by the others.
 
-    The complementary energy has -2/3·E* a³ of the whole slope's square, of which the tool's own is known.
+    The complementary energy has -2/3·E* a³ times the squared slope; the model includes only the tool's own slope.
     """
     steep, forces = np.sqrt((between.slopes**2).sum(axis=-1)), settled.forces
     lean, own = steep @ forces, np.array([sqrt(tool.place.tilt) for tool in tools])
@@ -61,9 +61,9 @@ def _tilted(tools: Sequence[Pressing], settled: Settled, between: Influence) -> 
 
 
 def _pulled(tools: Sequence[Pressing], settled: Settled, moved: Array) -> tuple[Array, Array]:
-    """Return how far depths are off (m) by forces aside on discs that stick, and by how much (N/Pa) these are.
+    """Return the errors of depths (m) by lateral forces on bonded discs, and the errors of these forces (N/Pa).
 
-    A disc that sticks has R. D. Mindlin's stiffness aside (1949).
+    A bonded disc has R. D. Mindlin's lateral stiffness (1949).
     """
     ratio, forces = tools[0].place.poisson, settled.forces
     sticks = np.array([tool.tool.sticks for tool in tools])

@@ -1,4 +1,4 @@
-"""The face that a tool presses on, flat or not: its height, its normal, and forces on a tool that moves over it."""
+"""The face below a tool, flat or curved: height, normal, and the forces on a tool that moves over it."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """A place of the face: ``height`` (m), slopes (2,) of it and its second derivatives (2, 2), 1/m.
+    """A place of the face: ``height`` (m), its gradient (2,) and second derivatives (2, 2), 1/m.
 
-    ``bend`` (1/m) is the mean curvature, positive on a dome, with its slope.
+    ``bend`` (1/m) is the mean curvature, positive on a dome, with its gradient.
     """
 
     height: float
@@ -33,22 +33,22 @@ class Spot:
 
     @property
     def outward(self) -> tuple[float, float, float]:
-        """The same, as numbers."""
+        """The normal as a tuple."""
         steep = sqrt(1 + self.slope[0] ** 2 + self.slope[1] ** 2)
         return -self.slope[0] / steep, -self.slope[1] / steep, 1 / steep
 
     @property
     def turn(self) -> Array:
-        """Two unit vectors along the face, the first one above x, and the outward normal, a row each."""
+        """Rows: two unit tangents, the first one above x, and the outward normal."""
         normal = self.normal
         first = np.array([normal[2], 0.0, -normal[0]])
         first /= np.sqrt(first @ first)
         return np.array([first, _cross(normal, first), normal])
 
     def force(self, contact: Contact, depth: float) -> tuple[float, float, float]:
-        """Return the force on a tool whose tip is at p - d n: its work is what the energy W(x, y, d) loses.
+        """Return the force on a tool whose tip is at p - d n: its work is the decrease of the energy W(x, y, d).
 
-        Along the normal it is ∂W/∂d; f · (∂p/∂x - d ∂n/∂x) is ``aside``, the slope of -W at a fixed depth.
+        Along the normal it is ∂W/∂d; f · (∂p/∂x - d ∂n/∂x) is ``aside``, the derivative of -W at a fixed depth.
         """
         if self is FLAT:
             return (*contact.aside, contact.force)
@@ -78,7 +78,7 @@ class Face:
         return not (self.height.any() or self.bend.any())
 
     def at(self, table: Table, x: float, y: float) -> Spot:
-        """Return what it is at a place (m) of a table's region."""
+        """Return the face at a place (m) of a table's region."""
         if self.is_flat:
             return FLAT
         (z, slope, (xx, xy, yy)), (bend, slope_bend, _) = table.local(self._derived, x, y)
@@ -90,5 +90,5 @@ class Face:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """np.cross takes 30 µs."""
+    """Return the cross product (np.cross takes 30 µs)."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

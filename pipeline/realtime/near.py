@@ -1,4 +1,4 @@
-"""What is seen next to a tool: the displacement of a half-space under it, for a force of one, in closed forms.
+"""The displacement near a tool: that of a half-space under it, for a unit force, in closed forms.
 
 On the face, ρ from the axis of a contact of radius a under a force F, E = 1 (K. L. Johnson, Contact Mechanics, ch. 3
 and 5; I. N. Sneddon, 1965):
@@ -7,11 +7,11 @@ and 5; I. N. Sneddon, 1965):
     ball    w = 3F/(4πE*a³)·((2a² - ρ²) asin(a/ρ) + a (ρ² - a²)^½),  P(ρ)/F = 1 - (1 - ρ²/a²)^(3/2)
     cone    w = 2F/(πE*a²)·(a asin(a/ρ) + (ρ² - a²)^½ - ρ),          P(ρ)/F = 1 - (1 - ρ²/a²)^½ + ρ²/a² arcosh(a/ρ)
 
-beyond the contact, within which the face has the tool's shape; aside it moves by (1 - 2ν)(1 + ν) P(ρ)/(2πρ) towards
-the axis, P the force within ρ. Below the face, a contact is its force and its second moment; what of a curved face is
-next to a tool has the closed form of the plane that touches it there, and as much less as a point force tells for the
-way below that plane. A blade presses like discs along its edge, whose second moments are its own; tissue that sticks to
-a disc is not drawn towards it at its edge.
+outside the contact. Inside, the face has the tool's shape. The lateral displacement is (1 - 2ν)(1 + ν) P(ρ)/(2πρ)
+towards the axis, where P is the force within ρ. Below the face, a contact is represented by its force and second
+moment. Near the tool, a curved face uses the closed form of its tangent plane, corrected by a point force for the
+distance to that plane. A blade is represented by discs along its edge with the same second moments. At the edge of a
+bonded disc there is no displacement towards the axis.
 """
 
 from dataclasses import dataclass
@@ -22,22 +22,21 @@ from numpy.typing import NDArray
 
 from pipeline.realtime.place import Array, Tool
 
-# What is nearer to the axis than this, in units of a, is it.
+# Distance from the axis, in units of a, that counts as 0.
 _AXIS = 1e-6
-# Up to so many radii of the contact, and no steeper below its plane, a curved face is next to a tool.
+# A curved face is near a tool up to so many contact radii, and up to this slope below the tangent plane.
 _NEXT, _STEEP = 4.0, 1.0
-# Of the distance to the force: so far above the plane through it the field of a half-space goes, and no farther.
+# Largest height above the force's plane, in units of the distance to the force, for the half-space's field.
 _OVER = 0.95
-# A contact reaches no farther from its plane than this, in units of its radius.
+# Largest distance of a contact's points from its plane, in units of its radius.
 _BOWED = 0.7
 
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """Where a ``tool`` presses: its kind of pressure of a radius ``a`` (m), at ``centres`` (k, 2), in equal parts.
+    """The footprint of a ``tool``: equal contacts of radius ``a`` (m) at ``centres`` (k, 2) in the plane of contact.
 
-    ``spread`` is the second moment ((xx, xy), (xy, yy)) of all of it (m²), for a force of one. Lengths lie in the plane
-    of contact.
+    ``spread`` is the second moment ((xx, xy), (xy, yy)) of the whole pressure (m²), for a unit force.
     """
 
     tool: Tool
@@ -47,16 +46,16 @@ class Footprint:
 
     @staticmethod
     def of(tool: Tool, radius: float) -> "Footprint":
-        """Return that of a tool whose radius of contact is ``radius`` (m)."""
+        """Return the footprint of a tool with contact ``radius`` (m)."""
         return Footprint(tool, *tool.discs(radius), tool.spread_of(radius))
 
     @property
     def reach(self) -> float:
-        """The farthest (m) from the axis that it presses."""
+        """The largest distance (m) of the contact from the axis."""
         return self.a if len(self.centres) == 1 else float(np.hypot(*self.tool.outline[0]))
 
     def within(self, away: Array) -> NDArray[np.intp]:
-        """Return which of the points (n, 3), in m from the axis and its plane, lie below it."""
+        """Return which of the points (n, 3), in m from the axis and the plane, are below the footprint."""
         flat = away[:, 0] ** 2 + away[:, 1] ** 2
         near = np.flatnonzero((flat <= self.reach**2) & (np.abs(away[:, 2]) <= _BOWED * self.reach))
         if len(self.centres) > 1:
@@ -65,9 +64,9 @@ class Footprint:
         return near
 
     def field(self, away: Array, poisson: float, flat: float) -> Array:
-        """Return the displacement (n, 3), E = 1, at points (n, 3), in m; what is within ``flat`` of the plane is on it.
+        """Return the displacement (n, 3), E = 1, at points (n, 3), in m; points within ``flat`` of the plane are on it.
 
-        Below the tool it is that of its edge.
+        Below the tool it is the displacement of the contact's edge.
         """
         square = float(np.trace(self.spread))
         is_face = np.abs(away[:, 2]) <= flat
@@ -105,7 +104,7 @@ class Footprint:
 
 
 def on_face(tool: str, rho: Array, a: float, plane: float) -> tuple[Array, Array]:
-    """Return w/F of a half-space beyond the contact, and P(ρ)/F; within, w is that of its edge."""
+    """Return w/F of a half-space outside the contact, and P(ρ)/F; inside, w is that of the edge."""
     far, near = np.maximum(rho, a), np.minimum(rho / a, 1.0)
     angle, beside, left = np.arcsin(a / far), np.sqrt(far**2 - a**2), np.sqrt(1 - near**2)
     if tool == "disc":
@@ -119,7 +118,7 @@ def on_face(tool: str, rho: Array, a: float, plane: float) -> tuple[Array, Array
 def boussinesq(away: Array, poisson: float, square: float) -> Array:
     """Return the displacement (n, 3) of a half-space under a newton, E = 1, whose mean of ρ² is ``square`` (m²).
 
-    J. Boussinesq, 1885; the second moment is Δ of it along the face times a quarter of the mean of ρ².
+    J. Boussinesq, 1885; the second moment adds its Laplacian along the face times a quarter of the mean of ρ².
     """
     flat = away[:, :2]
     across = (flat**2).sum(axis=1)

@@ -1,9 +1,9 @@
-"""What a force at one place does at another: the normal part of a body's Green's function, E = 1, on a flat face.
+"""Interaction of places: the normal part of a body's Green's function, E = 1, on a flat face.
 
     G(x, y) = (1 - ν²)/(π |x - y|) + R(x, y),    R(x, y) = Σ φ_k(x) S_kl(ν) φ_l(y),
 
-a half-space's (J. Boussinesq, 1885) and the regular part, of low rank: modes φ, polynomials over the region, and links
-S, symmetric as R is (E. Betti, 1872).
+The first term is a half-space's (J. Boussinesq, 1885). The regular part R has low rank: modes φ are polynomials over
+the region, and links S are symmetric, because R is (E. Betti, 1872).
 """
 
 from collections.abc import Mapping
@@ -17,17 +17,17 @@ from pipeline.realtime.classic import ModelError, check_shapes
 from pipeline.realtime.place import Array, Pair
 from pipeline.realtime.table import chebyshev, middle_of, polynomials
 
-# Modes, and coefficients of all of them: the C side holds as many; so does it links over ν.
+# Largest numbers of modes, and of their coefficients; the same as in C, as is that of links over ν.
 MOST_MODES, MOST_TERMS, MOST_LINKS = 96, 16384, 3
 PARTS = {"pair_modes": 3, "pair_links": 3, "pair_error": 0, "pair_aside": 0}
 
 
 @dataclass(frozen=True, eq=False)
 class Influence:
-    """Of places i and j: ``sinks`` (n, n) is G (1/m), 0 where i = j, ``slopes`` (n, n, 2) its slope with x_i (1/m²).
+    """Interaction of places i and j: ``sinks`` (n, n) is G (1/m), 0 for i = j; ``slopes`` (n, n, 2) ∂G/∂x_i (1/m²).
 
-    ``bends`` (n, n) is the size of the Laplacian of R with x_i (1/m³), ``near`` (n, n) a half-space's share of G, and
-    ``away`` (n, n, 2) and ``apart`` (n, n) are x_i - x_j and the distance (m), of a place and itself infinite.
+    ``bends`` (n, n) is the magnitude of the Laplacian of R in x_i (1/m³), ``near`` (n, n) the half-space's part of G.
+    ``away`` (n, n, 2) is x_i - x_j, and ``apart`` (n, n) the distance (m), infinite for i = j.
     """
 
     sinks: Array
@@ -42,8 +42,8 @@ class Influence:
 class Pairs:
     """``modes`` (rank, y, x), Chebyshev coefficients over ``reach`` (m), ``links`` (ν, rank, rank) in 1/m over ν.
 
-    R may be off by ``error`` over the root of both ways to the nearest side or the bottom; aside, a force of one moves
-    the face by ``aside`` over the distance at most.
+    The error of R is ``error`` over the root of both distances to the nearest side or the bottom. The lateral
+    displacement by a unit force is at most ``aside`` over the distance.
     """
 
     modes: Array
@@ -54,7 +54,7 @@ class Pairs:
     poisson: Pair
 
     def between(self, places: list[Pair], poisson: float, least: float = 0.0) -> Influence:
-        """Return what forces at ``places`` (m) do to each other, none of them nearer than ``least`` (m)."""
+        """Return the interaction of ``places`` (m); distances below ``least`` (m) are replaced by it."""
         terms = [self._terms(x, y) for x, y in places]
         flat = self._flat
         value, along, across, bend = (np.array([term[k] for term in terms]) @ flat.T for k in range(4))
@@ -83,7 +83,7 @@ class Pairs:
         return self.modes.reshape(len(self.modes), -1)
 
     def _terms(self, x: float, y: float) -> tuple[Array, Array, Array, Array]:
-        """Return all products of polynomials at a place, their slopes with x and y, and their Laplacian."""
+        """Return all products of polynomials at a place, their gradients, and their Laplacians."""
         (a, b), (_, rows, columns) = self.reach, self.modes.shape
         (u, du, ddu), (v, dv, ddv) = polynomials(x / a, columns), polynomials(y / b, rows)
         return (
@@ -95,10 +95,10 @@ class Pairs:
 
 
 def read_pairs(found: Mapping[str, Array], reach: Pair, poisson: Pair) -> Pairs | None:
-    """Return what a file's variables hold, or nothing if it is of one tool alone.
+    """Return the interaction in a file's variables, None if the file has none.
 
     Raises:
-        ModelError: if it is not that of a model.
+        ModelError: if a value is invalid.
     """
     if not any(name in found for name in PARTS):
         return None

@@ -1,12 +1,12 @@
-"""Any convex tip in real time: pressures on a patch of rectangles, a half-space's kernel plus the body's regular part.
+"""Any convex tip in real time: pressures on a patch of rectangles, with a half-space's kernel plus the regular part.
 
-Within the contact the face has the tip's shape, pressures are not negative, and beyond it the face stays below the tip:
+Inside the contact the face has the tip's shape and pressures are not negative; outside, the face is below the tip:
 
     ∑ⱼ (K_ij/E* + c + g·(sᵢ + tⱼ) + (sᵢ·A sᵢ + tⱼ·A tⱼ)/2) pⱼ ≥ d - f(sᵢ),    p ≥ 0,    one of both an equality,
 
-K the displacement of a half-space under a rectangle of uniform pressure (A. E. H. Love, Phil. Trans. R. Soc. A 228,
-1929), the other terms, those of ``pipeline.realtime.contact``, times its area. The patch follows the depth alone, so
-that forces stay the slopes of one energy; which rectangles press is first tried as it was in the last call.
+K is the displacement of a half-space by uniform pressure on a rectangle (A. E. H. Love, Phil. Trans. R. Soc. A 228,
+1929). The other terms, those of ``pipeline.realtime.contact``, are multiplied by its area. The patch depends on the
+depth only, so that forces derive from one energy. The active set of the last call is the initial guess.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,28 +23,28 @@ from pipeline.realtime.touch import Touch
 
 Array = NDArray[np.float64]
 Height = Callable[[Array, Array], Array]
-# Rectangles along one side: of 121 about 70 press. Directions, depths and halvings that a tip's outlines are found by.
+# Rectangles along one side: about 70 of 121 are in contact. Directions, depths and bisections for a tip's outlines.
 _SIDE, _ROUND, _DEPTHS, _HALVINGS = 11, 48, 40, 50
 _SHALLOWEST = 1e-5
-# What the contact fills of the patch in each direction, that it is told by at first, and what its force is good to: the
-# worst of balls and cones of any size of patch, times 1.3.
-_FILLED, _TOLD, _GOOD = 0.82, 4, 0.007
+# The contact's share of the patch in each direction; number of depths for it; relative error of the force: the largest
+# for balls and cones with any size of patch, times 1.3.
+_FILLED, _SHARES, _GOOD = 0.82, 4, 0.007
 _SETS, _GROWTHS = 40, 8
 _SMALLEST = 1e-6
-# Of the region: the step of differences, where the file has no tables for tools that are not round.
+# Step of finite differences, in units of the region, if the file has no tables for blades.
 _STEP = 1e-5
-# Of a depth: by how much a face may be through the tip, and a chord below it.
+# Tolerances in units of a depth: penetration of the tip by the face, and concavity of the tip.
 _THROUGH, _BENT = 1e-10, 1e-6
-# Of the rim's largest height: no tip is lower there, or its contact would end at the rim.
+# Least height of the rim anywhere, in units of its largest height.
 _FLAT = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Tip:
-    """A convex tip by its ``height`` (m) over x and y (m) along the face, 0 where it is lowest, up to a ``reach`` (m).
+    """A convex tip: its ``height`` (m) over x and y (m) along the face, 0 at the lowest point, up to a ``reach`` (m).
 
     Raises:
-        ValueError: if that is not finite, not convex, or not 0 on the axis x = y = 0.
+        ValueError: if the height is not finite, not convex, or not 0 at x = y = 0.
     """
 
     height: Height
@@ -54,7 +54,7 @@ class Tip:
 
     def __post_init__(self) -> None:
         if not self.reach >= _SMALLEST:
-            raise ValueError(f"a tip reaches at least {_SMALLEST:g} m, not {self.reach:g} m")
+            raise ValueError(f"the reach of a tip must be at least {_SMALLEST:g} m, not {self.reach:g} m")
         angles = 2 * np.pi * np.arange(_ROUND) / _ROUND
         rays = np.stack([np.cos(angles), np.sin(angles)])
         rim, axis = self._along(rays, np.full(_ROUND, self.reach)), float(self.height(np.zeros(1), np.zeros(1))[0])
@@ -67,11 +67,11 @@ class Tip:
 
     @property
     def deepest(self) -> float:
-        """The depth (m) at which the undeformed face would meet the tip's rim."""
+        """The depth (m) at which the tip's rim is in the plane of the undeformed face."""
         return float(self._depths[-1])
 
     def outline(self, depth: float) -> Array:
-        """Return how far (m) from the axis along x and y the tip is lower than ``depth`` (m)."""
+        """Return the half extents (m) along x and y of the part of the tip lower than ``depth`` (m)."""
         at, known = np.log(depth), np.log(self._depths)
         if at < known[0]:  # as a paraboloid
             return np.asarray(self._outlines[0] * np.sqrt(depth / self._depths[0]))
@@ -99,7 +99,7 @@ class Tip:
 
 @dataclass(eq=False)
 class Patch:
-    """A tip on a body: asked again and again, it begins where it ended. One of its own for each thread and tool.
+    """A tip on a body. Each call starts from the last one's contact, so every thread and tool needs its own object.
 
     Raises:
         ModelError: if the body's face is not flat.
@@ -115,8 +115,8 @@ class Patch:
         if not self.model.face.is_flat:
             raise ModelError("a patch knows flat faces only")
         self._pressed = np.ones(_SIDE**2, dtype=bool)
-        # What the contact with a half-space fills of the outline, at depths from shallow to deep.
-        none, self._fills = (0.0, 0.0), np.ones((_TOLD, 2))
+        # The contact's share of the outline on a half-space, at depths from shallow to deep.
+        none, self._fills = (0.0, 0.0), np.ones((_SHARES, 2))
         place = Place(0.0, 0.0, 0.0, none, none, none, 1.0)
         for number, depth in enumerate(self._told_depths()):
             for _ in range(2):
@@ -135,9 +135,9 @@ class Patch:
         young: float | None = None,
         poisson: float | None = None,
     ) -> Touch:
-        """Return what the tip feels, turned by ``turn`` (rad) about the outward normal from the face's x to its y.
+        """Return the force on the tip, turned by ``turn`` (rad) about the outward normal from the face's x to its y.
 
-        As ``Model.query`` else, which says why a query is refused; a tip whose contact comes near its rim is too large.
+        Otherwise like ``Model.query``. If the contact comes near the tip's rim, the status is "large".
         """
         model = self.model
         modulus, ratio = model.young if young is None else float(young), model.poisson if poisson is None else poisson
@@ -186,10 +186,10 @@ class Patch:
         return replace(place, shape=Shape(none, (none, none), lean, hessian, ((0.0, 0.0, 0.0),) * 3))
 
     def _told_depths(self) -> Array:
-        return self.tip.deepest * np.geomspace(_SHALLOWEST, 0.9, _TOLD)
+        return self.tip.deepest * np.geomspace(_SHALLOWEST, 0.9, _SHARES)
 
     def _within(self, place: Place, depth: float, turn: float) -> "_Pressed | None":
-        """Return the contact, on a patch that holds it, or nothing if the tip does not."""
+        """Return the contact, on a patch that contains it, None if it reaches the tip's rim."""
         at, known = np.log(depth), np.log(self._told_depths())
         fills = np.array([np.interp(at, known, column) for column in self._fills.T])
         size = fills * self.tip.outline(depth) / _FILLED
@@ -203,7 +203,7 @@ class Patch:
         return None
 
     def _solve(self, place: Place, depth: float, turn: float, size: Array) -> "_Pressed | None":
-        """Return the contact on a patch of half extents ``size`` (2,), in m; nothing where no set of places is it."""
+        """Return the contact on a patch of half extents ``size`` (2,), in m; None if no active set is found."""
         step, line = 2 * size / _SIDE, 2 * (np.arange(_SIDE) + 0.5) / _SIDE - 1
         own = np.stack(np.meshgrid(size[0] * line, size[1] * line, indexing="ij")).reshape(2, -1)
         places = np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]]) @ own
@@ -232,7 +232,7 @@ class Patch:
         return None
 
     def _shared(self, aspect: float) -> Array:
-        """Return K for rectangles of 1 × ``aspect``, from the last time if it was the same."""
+        """Return K for rectangles of 1 × ``aspect``; cached if the aspect is the same as before."""
         if not abs(aspect - self._kernel[0]) <= 1e-12 * aspect:
             steps = np.arange(1.0 - _SIDE, _SIDE)
             table = _love(steps[:, None], aspect * steps[None, :], aspect)
@@ -243,7 +243,7 @@ class Patch:
 
 @dataclass(frozen=True, eq=False)
 class _Pressed:
-    """Force (N/Pa), force aside (2,), dF/dd, largest distance from the axis, <r²>, and half extents of the contact."""
+    """Force (N/Pa), lateral force (2,), dF/dd, largest distance from the axis, <r²>, half extents of the contact."""
 
     force: float
     aside: Array
@@ -281,7 +281,7 @@ def _bent(place: Place, places: Array) -> Array:
 
 
 def _love(x: Array, y: Array, width: float) -> Array:
-    """Return the displacement at x, y under a unit pressure on a rectangle 1 × ``width`` round the origin, E* = 1."""
+    """Return the displacement at x, y by unit pressure on a rectangle 1 × ``width`` at the origin, E* = 1."""
     a, b = 0.5, width / 2
 
     def part(p: Array, top: Array, bottom: Array) -> Array:
