@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.pages import json_in_page
 from pipeline.report.dataset import write
-from pipeline.report.figures import draw
+from pipeline.report.figures import choose, draw
 from pipeline.report.guide import USUAL_ACCURACY, guide, guide_if_any
 from pipeline.report.page import render, write_page
 from pipeline.report.page.cases import case_table
@@ -156,6 +156,18 @@ def test_table_says_what_the_dataset_says():
     assert "force_exact_ratio" not in columns  # no F_exact was asked for
     assert columns["epsilon"].words[-1] == "full"
     assert columns["epsilon"].keys[-1] == max(columns["epsilon"].keys)
+
+
+def test_every_kind_of_figure_is_in_the_page_for_a_phone_as_well():
+    raster = {"x": {"from": "-8 mm", "to": "8 mm", "steps": 3}, "y": ["-4 mm", "0 mm", "4 mm"]}
+    probe = {k: v for k, v in raw()["probe"].items() if k != "at"} | {"path": {"raster": raster}}
+    data = dataset(probe=probe, mesh={"epsilon": "8 mm"})
+    assert choose(data)[0] == "map"
+    found = Reader(render(data, "places"))
+    assert found.ids.count("figure-map") == 1
+    classes = [given.get("class") for tag, given in found.tags if tag == "div"]
+    assert classes.count("phone") == classes.count("wide") - 2 == len(choose(data))  # tables are wide, too
+    assert case_table(data).across == "x"
 
 
 def test_a_written_dataset_gives_the_same_table(tmp_path):

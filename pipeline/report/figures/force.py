@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from pipeline.quantities import symbol
 from pipeline.report.figures.curves import Panel, draw
 from pipeline.report.figures.facets import arrange, swept
-from pipeline.report.figures.style import FAILED, LINE, QUIET, finish, look, new_figure
+from pipeline.report.figures.style import FAILED, LINE, QUIET, finish, look, new_figure, write_above
 from pipeline.report.values import relative
 from pipeline.report.words import at_most, choices, heading, scale
 
@@ -71,28 +71,11 @@ def _draw_column(axes: np.ndarray, dataset: xr.Dataset, dim: str, quantities: li
     axes[-1].set_xlabel(heading(dataset[dim]))
     at = textwrap.fill(choices(dataset, facets.fixed), 34)
     if len(facets.curves) > 1:
-        _write_legend(axes[0], at)
+        longest = max(map(len, axes[0].get_legend_handles_labels()[1]), default=0)
+        write_above(axes[0], at, 34, 2 if longest <= 12 else 1)
     else:
         axes[0].set_title(at, color=QUIET)
     return facets.part
-
-
-def _write_legend(ax: Axes, title: str) -> None:
-    """Name the curves above their panel."""
-    handles, texts = ax.get_legend_handles_labels()
-    texts = [textwrap.fill(text, 34) for text in texts]
-    columns = 2 if max(map(len, texts), default=0) <= 12 else 1
-    ax.legend(
-        handles,
-        texts,
-        title=title,
-        title_fontsize="medium",
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.01),
-        borderaxespad=0.0,
-        ncol=columns,
-        frameon=False,
-    )
 
 
 def _legend_lines(ax: Axes) -> int:

@@ -102,10 +102,27 @@ def write_legend(figure: Figure, above: Axes | None = None) -> None:
     )
 
 
+def write_above(ax: Axes, title: str, letters: int, columns: int) -> None:
+    """Name the curves of a panel above it."""
+    handles, texts = ax.get_legend_handles_labels()
+    ax.legend(
+        handles,
+        [textwrap.fill(text, letters) for text in texts],
+        title=title,
+        title_fontsize="medium",
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.01),
+        borderaxespad=0.0,
+        ncol=columns,
+        frameon=False,
+    )
+
+
 def stack(figure: Figure) -> Figure:
     """Put the panels of a figure below one another, each with its own title, ticks and axis titles: for a phone."""
-    places = {ax: spec for ax in figure.axes if (spec := ax.get_subplotspec()) is not None}
-    at = {ax: (spec.rowspan.start, spec.colspan.start) for ax, spec in places.items()}
+    # A bar of colours is no panel: it follows those that it belongs to.
+    specs = {ax: ax.get_subplotspec() for ax in figure.axes if hasattr(ax, "get_subplotspec")}
+    at = {ax: (spec.rowspan.start, spec.colspan.start) for ax, spec in specs.items() if spec is not None}
     panels = sorted(at, key=at.__getitem__)
     words = {}
     for ax in panels:
@@ -119,7 +136,8 @@ def stack(figure: Figure) -> Figure:
     is_beside = len(legends) == 1 and legends[0].get_bbox_to_anchor().x0 > legends[0].axes.bbox.x1
     lines = sum(text.get_text().count("\n") + 1 for text in legends[0].get_texts()) if is_beside else 0
     heights = [_PHONE_LINE * lines + 0.01, *([_PHONE_PANEL] * len(panels))]
-    figure.set_size_inches(_PHONE, sum(heights) + 0.4 * len(panels))
+    turned = [label for ax in panels for label in ax.get_xticklabels() if label.get_rotation()]
+    figure.set_size_inches(_PHONE, sum(heights) + (1.3 if turned else 0.4) * len(panels))
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     for number, ax in enumerate(panels, start=1):
         ax.set_subplotspec(grid[number, 0])
@@ -128,6 +146,11 @@ def stack(figure: Figure) -> Figure:
         ax.set_title(textwrap.fill(title, _PHONE_LETTERS))
         ax.set_xlabel(textwrap.fill(x, _PHONE_LETTERS))
         ax.set_ylabel(textwrap.fill(y, 26))
+        if own := None if is_beside else ax.get_legend():
+            write_above(ax, own.get_title().get_text(), _PHONE_LETTERS - 12, 1)
+        for label in ax.get_xticklabels() if turned else ():
+            if label.get_rotation():
+                label.set(rotation=90, ha="center", rotation_mode="default")
     if is_beside:
         legends[0].remove()
         above = figure.add_subplot(grid[0, 0])

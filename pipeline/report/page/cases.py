@@ -11,7 +11,7 @@ from pipeline.pages import json_in_page
 from pipeline.quantities import LARGEST, QUANTITIES
 from pipeline.report.values import by_case, relative
 from pipeline.report.words import heading as title_of_axis
-from pipeline.report.words import is_numeric, number, scale, symbol
+from pipeline.report.words import is_numeric, lengths, number, scale, symbol
 
 # Rows of a page of the table.
 FIRST_ROWS = 50
@@ -85,9 +85,10 @@ class Table:
         return json_in_page({"columns": columns, "order": self.order, "rows": FIRST_ROWS})
 
     @property
-    def is_swept(self) -> bool:
-        """Whether there is something to draw curves against."""
-        return any(column.is_axis and len(column.words or ()) > 1 for column in self.columns)
+    def across(self) -> str:
+        """What curves are drawn against at first: ε, else the first numbers, else the first axis; "" if there is none."""
+        swept = [column for column in self.columns if column.is_axis and len(column.words or ()) > 1]
+        return min(swept, key=lambda c: (c.name != "epsilon", c.keys is None)).name if swept else ""
 
     @property
     def filters(self) -> list[Column]:
@@ -126,7 +127,7 @@ def _axis(dataset: xr.Dataset, dim: str, position: int, dims: list[str]) -> Colu
     values = coordinate.values
     keys = [min(float(value), 1e300) for value in values] if is_numeric(coordinate) else None
     hint = str(coordinate.attrs.get("long_name", dim))
-    words = [number(coordinate, value) for value in values]
+    words = [lengths(coordinate, number(coordinate, value)) for value in values]
     return Column(
         dim,
         symbol(coordinate),

@@ -141,7 +141,7 @@ function curves(x, y) {
     if (isFirst) named.set(entry, named.size);
     const number = named.get(entry);
     return {
-      name: escaped(entry),
+      name: wrapped(entry, 34),
       legendgroup: String(number),
       showlegend: isFirst,
       x: rows.map((row) => (x.words ? place(x, x.values[row]) : x.values[row])),
