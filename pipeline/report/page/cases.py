@@ -86,7 +86,7 @@ class Table:
 
     @property
     def across(self) -> str:
-        """What curves are drawn against at first: ε, else the first numbers, else the first axis; "" if there is none."""
+        """What curves are drawn against at first: ε, else the first numbers, else the first axis, or ""."""
         swept = [column for column in self.columns if column.is_axis and len(column.words or ()) > 1]
         return min(swept, key=lambda c: (c.name != "epsilon", c.keys is None)).name if swept else ""
 
