@@ -71,7 +71,7 @@ def test_examples_and_templates_come_along(installed):
     assert done.returncode == 0, done.stderr
     script = "from pathlib import Path; import pipeline.report.page as p; print(*Path(p.__file__).parent.rglob('*.j2'))"
     assert "page.html.j2" in installed("-c", script).stdout
-    assert "meshes/liver.stl: the body's" in installed("-m", "pipeline", "new", "liver", "--like", "organ").stdout
+    assert "meshes/liver.stl: file of the body" in installed("-m", "pipeline", "new", "liver", "--like", "organ").stdout
     done = installed("-m", "pipeline", "export", "--evaluator", "c")
     assert "epsmesh_patch.h, " in done.stdout, done.stderr
     assert "examples/hand.h" in done.stdout
