@@ -149,7 +149,7 @@ TUMOUR = {"name": "tumour", "at": ["0 mm"] * 3, "radius": "3 mm", "young": "1 kP
         ({"file": "none.stl"}, "cannot be read"),
         ({"unit": "inch"}, "unit"),
         ({"unit": None}, "unit"),
-        ({"inclusion": [TUMOUR | {"at": ["0 mm"] * 2 + ["26.9 mm"]}]}, r"at = .* 0.3 mm .* 0.0\d+ mm below it.*tissue reaches"),
+        ({"inclusion": [TUMOUR | {"at": ["0 mm"] * 2 + ["26.9 mm"]}]}, r"0.3 mm .* 0.0\d+ mm below it.*tissue reaches"),
         ({"inclusion": [TUMOUR | {"at": ["0 mm"] * 2 + ["29 mm"]}]}, r"reaches 2(\.0\d*)? mm out of the body"),
         ({"inclusion": [TUMOUR | {"radius": "100 mm"}]}, r"reaches \d+\.?\d* mm out of the body"),
         ({"layer": [TUMOUR]}, r"body.layer"),
