@@ -103,9 +103,18 @@ def compare(study: Study, raw: dict[str, Any]) -> None:
             value = tables[key]
             vector = key in ("size", "axes")
             swept = value if isinstance(value, list) and (not vector or isinstance(value[0], list)) else [value]
-            expected = {tuple(map(number, v)) if isinstance(v, list) else number(v) for v in swept}
             found = {getattr(variant, key) for variant in study.sections[section]}
-            assert found == expected, (section, key)
+            if any(isinstance(v, dict) for v in swept):
+                expected = sorted({one for v in swept for one in (spread(v) if isinstance(v, dict) else [number(v)])})
+                assert sorted(found) == pytest.approx(expected, rel=1e-11), (section, key)
+            else:
+                assert found == {tuple(map(number, v)) if isinstance(v, list) else number(v) for v in swept}, key
+
+
+def spread(table: dict[str, Any]) -> list[float]:
+    """Return the values of a range."""
+    start, end, steps = number(table["from"]), number(table["to"]), table["steps"]
+    return [start + (end - start) * n / (steps - 1) for n in range(steps)]
 
 
 def number(value: Any) -> float:
@@ -172,7 +181,7 @@ def test_more_than_any_study_needs_is_refused_before_it_is_gone_through(name):
 
 FOUND = {
     "a body that is a number": ({"body": [5]}, "body[1] = 5: must be a table"),
-    "no bodies": ({"body": []}, "body = []: an empty list sweeps nothing"),
+    "no bodies": ({"body": []}, "body = []: is an empty list"),
     "an empty body": ({"body": [{}]}, "body[1].name: is required"),
     "a name that is a list": (
         {"probe": [{"name": ["a"], "shape": "disc", "radius": "2 mm", "depth": ["0.1 mm", "0.2 mm"]}]},
