@@ -13,7 +13,6 @@ from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.capabilities import obstacle
 from pipeline.study.loads import Load
-from pipeline.study.renamed import STORED
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
 from pipeline.units import canonical
@@ -194,7 +193,7 @@ def _slides_across_a_mirror(case: Case) -> bool:
 
 
 def _text(content: dict[str, Any]) -> str:
-    return json.dumps({STORED.get(key, key): _plain(value) for key, value in content.items()}, sort_keys=True)
+    return json.dumps({key: _plain(value) for key, value in content.items()}, sort_keys=True)
 
 
 def _plain(value: Any) -> Any:
