@@ -59,7 +59,7 @@ def measure(
     """
     comm, used, clock = MPI.COMM_WORLD, time.process_time, time.perf_counter
     if not bar:
-        estimate.enriched_memory = lambda *_, **__: inf
+        estimate.error_bar_memory = lambda *_, **__: inf
     plan = make_plan(parse(study), without=without)
     prepare(comm, plan.solves)
     with threadpool_limits(limits=1):

@@ -182,7 +182,7 @@ def _cells(model: Model, groups: Sequence[Sequence[Check]]) -> list[str]:
         str(len(groups)),
         _percent(np.median(errors)),
         _percent(errors.max()),
-        f"{sum(check.is_held for check in of)}",
+        f"{sum(check.is_covered for check in of)}",
         f"{np.sum(errors <= bars + [check.full_error for check in of])}",
         f"{np.median(bars / np.maximum(errors, 1e-6)):.2g}",
         _percent(float(np.median([check.full_error for check in of]))),

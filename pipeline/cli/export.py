@@ -122,7 +122,7 @@ def export(
         fail(fault, status=status)
     if comm.rank == 0:
         _print_result(exported, wanted, path)
-    raise typer.Exit(DONE if exported.held >= _COVERED else SOME_FAILED)
+    raise typer.Exit(DONE if exported.covered >= _COVERED else SOME_FAILED)
 
 
 def _print_result(exported: "Exported", wanted: float, path: Path) -> None:
@@ -137,7 +137,7 @@ def _print_result(exported: "Exported", wanted: float, path: Path) -> None:
         f"wrote {path}: {counted(int(found['places']), 'place')} solved, {found['coefficients']} coefficients",
         f"touches solved in full: {counted(checked, 'force')} of {1e3 * found['smallest_force']:.3g} to "
         f"{1e3 * found['largest_force']:.3g} mN",
-        f"test on {found['judged']} touches: the error bar covers {100 * found['held']:.0f} % of the errors; largest "
+        f"test on {found['tested']} touches: error bar covers {100 * found['covered']:.0f} % of the errors; largest "
         f"error {100 * found['largest_error']:.2g} %, median error bar {100 * found['median_bar']:.2g} %",
     )
 

@@ -55,7 +55,7 @@ class Check:
         return self.force / self.full - 1
 
     @property
-    def is_held(self) -> bool:
+    def is_covered(self) -> bool:
         """Whether the model's error bar covers both errors, along the normal and lateral."""
         return max(abs(self.error), self.aside) <= self.bar
 

@@ -69,7 +69,7 @@ def curved_model(
             bars_of_full.extend(bars)
         return np.array([known[place][ratios.index(poisson)] for place in places])
 
-    table, missed = tabulate(region, scope.poissons, found, _SHARE * accuracy, _SIZES, sparse=not region.is_round)
+    table, error = tabulate(region, scope.poissons, found, _SHARE * accuracy, _SIZES, sparse=not region.is_round)
     table = replace(table, leans=False)
     face, off, bend_error = _face(scope, table, middle)
     model = Model(
@@ -87,7 +87,7 @@ def curved_model(
         _ALIGNED,
         bend_error,
     )
-    return model, missed, len(known) * len(ratios)
+    return model, error, len(known) * len(ratios)
 
 
 def curved_region(scope: Scope, room: float) -> Region:
@@ -144,8 +144,8 @@ def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, 
     else:
         bends, doubt = _bends(scope, middle, xs, ys)
     bend = _fitted(rows, vander, bends)
-    missed = [float(np.abs(rows @ fit @ vander.T - known).max()) for fit, known in ((height, heights), (bend, bends))]
-    return Face(height, bend), missed[0], doubt + missed[1] if doubt else 0.0
+    errors = [float(np.abs(rows @ fit @ vander.T - known).max()) for fit, known in ((height, heights), (bend, bends))]
+    return Face(height, bend), errors[0], doubt + errors[1] if doubt else 0.0
 
 
 def _heights(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArray, what: str) -> FloatArray:

@@ -16,8 +16,8 @@ from pipeline.export.pairs import tabulate_pairs
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
-from pipeline.export.seen import seen_body
 from pipeline.export.surface import tabulate_surface
+from pipeline.export.surface_body import surface_body
 from pipeline.export.tabulate import Places, tabulate
 from pipeline.realtime.model import Model
 from pipeline.realtime.surface import SurfaceTable
@@ -39,21 +39,21 @@ _OFF = 1e-6
 class Exported:
     """A model, the touches of its calibration (``fitted``) and of its test (``judged``), the number of places solved.
 
-    ``missed`` is the error of its table; ``unseen`` is why it has no deforming surface, "" if it has one or needs none.
+    ``table_error`` is that of its table; ``unseen`` is why it has no deforming surface, "" if it has one or needs none.
     """
 
     model: Model
     fitted: list[Check]
     judged: list[Check]
-    missed: float
+    table_error: float
     places: int
     surface: SurfaceTable | None = None
     unseen: str = ""
 
     @property
-    def held(self) -> float:
+    def covered(self) -> float:
         """The share of the test touches whose error the error bar covers."""
-        return float(np.mean([check.is_held for check in self.judged]))
+        return float(np.mean([check.is_covered for check in self.judged]))
 
     @property
     def tools(self) -> str:
@@ -65,18 +65,18 @@ class Exported:
         )
 
     def summary(self, accuracy: float) -> dict[str, float]:
-        """Return the numbers of its quality; ``as_asked`` is the share of test touches within the ``accuracy``."""
+        """Return the model's quality; ``within_accuracy`` is the share of test touches within the ``accuracy``."""
         errors = np.abs([check.error for check in self.judged])
         forces = [check.full for check in (*self.fitted, *self.judged)]
         return {
             "places": self.places,
             "coefficients": 2 * self.model.table.reciprocal.size,
-            "judged": len(self.judged),
-            "held": self.held,
+            "tested": len(self.judged),
+            "covered": self.covered,
             "largest_error": float(errors.max()),
-            "as_asked": float(np.mean(errors <= accuracy)),
+            "within_accuracy": float(np.mean(errors <= accuracy)),
             "median_bar": float(np.median([check.bar for check in self.judged])),
-            "table_missed": self.missed,
+            "table_error": self.table_error,
             "smallest_force": min(forces),
             "largest_force": max(forces),
         }
@@ -104,7 +104,7 @@ def export(
     solver = Solver(scope.sections, scope.file, scope.young, precise)
     make = _flat if scope.is_flat else curved_model
     of_table = replace(solver, accuracy=_PRECISE_TABLE * accuracy)
-    bare, missed, places = make(scope, of_table, accuracy, largest, (*_BARS, precise), margin, ranks)
+    bare, error, places = make(scope, of_table, accuracy, largest, (*_BARS, precise), margin, ranks)
     tools = range(len(TOOLS)) if len(bare.table.tensors) else (0,)
     halves = [checks - checks // 2, checks // 2]
     touches = [random_touches(bare, count, seed, tools) for count, seed in zip(halves, _SEEDS, strict=True)]
@@ -121,13 +121,13 @@ def export(
     if surface or scope.is_flat:
         ranks.note("solving for the deforming surface")
         try:
-            far = far_fields(seen_body(scope, model, margin, ranks), scope.poissons)
+            far = far_fields(surface_body(scope, model, margin, ranks), scope.poissons)
         except ExportError as reason:
             unseen = str(reason)
         else:
             seen = tabulate_surface(far, model.origin) if surface else None
             model = replace(model, pairs=tabulate_pairs(far)) if scope.is_flat else model
-    return Exported(model, fitted, judged, missed, places, seen, unseen)
+    return Exported(model, fitted, judged, error, places, seen, unseen)
 
 
 def _flat(
@@ -154,7 +154,7 @@ def _flat(
         law = law_of(scope, poisson)
         return np.array(ranks.together(places, lambda some: list(compliances(mesh, region, some, poisson, law))))
 
-    table, missed = tabulate(region, scope.poissons, counted, _SHARE * accuracy)
+    table, error = tabulate(region, scope.poissons, counted, _SHARE * accuracy)
     model = Model(
         table,
         np.array([0.0, 0.0, scope.body.heights[1]]),
@@ -167,7 +167,7 @@ def _flat(
         bar,
         off=_OFF * region.thickness,
     )
-    return model, missed, len(solved)
+    return model, error, len(solved)
 
 
 def write(exported: Exported, path: Path, scope: Scope, study: Path, version: str) -> None:
@@ -177,8 +177,8 @@ def write(exported: Exported, path: Path, scope: Scope, study: Path, version: st
     attributes = {
         "title": f"Real-time model of a {body.shape}",
         "source": f"epsmesh {version}, {study.name}",
-        "body": f"{body.shape}, {body.face}, {1e3 * height:g} mm high, held at {body.fixed}",
+        "body": f"{body.shape}, {body.face}, {1e3 * height:g} mm high, fixed at {body.fixed}",
         "tools": exported.tools,
-        "held": f"{sum(check.is_held for check in exported.judged)} of {len(exported.judged)} judged touches",
+        "covered": f"{sum(check.is_covered for check in exported.judged)} of {len(exported.judged)} test touches",
     }
     write_model(path, model, columns(exported.fitted, exported.judged), attributes, exported.surface)

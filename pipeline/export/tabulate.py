@@ -41,7 +41,7 @@ def tabulate(
     """
     ratios = ratios_of(poissons)
     known: list[dict[tuple[float, float], FloatArray]] = [{} for _ in ratios]
-    table, missed = None, np.inf
+    table, error = None, np.inf
     used: set[tuple[float, float]] = set()
     grids = [(size, few) for n, size in enumerate(sizes) for few in ((True, False) if sparse and n else (False,))]
     for number, (size, few) in enumerate(grids):
@@ -55,17 +55,17 @@ def tabulate(
         new = [place for place in dict.fromkeys(_image(region, p) for p in places) if place not in used]
         used.update(new)
         if table is not None:
-            missed = max(
-                _missed(table, (x, y), float(ratio), found[x, y][0]) * region.room(x, y)
+            error = max(
+                _error(table, (x, y), float(ratio), found[x, y][0]) * region.room(x, y)
                 for ratio, found in zip(ratios, known, strict=True)
                 for x, y in new
             )
         values = np.array([[_turned(region, place, found) for place in _places(region, size)] for found in known])
         table = _table(region, poissons, size, values)
-        if missed <= tolerance:
+        if error <= tolerance:
             break
     assert table is not None
-    return table, float(missed)
+    return table, float(error)
 
 
 def ratios_of(poissons: tuple[float, float]) -> FloatArray:
@@ -74,7 +74,7 @@ def ratios_of(poissons: tuple[float, float]) -> FloatArray:
     return np.asarray((low + high) / 2 + (high - low) / 2 * (extrema(_POISSONS - 1) if low < high else np.zeros(1)))
 
 
-def _missed(table: Table, place: tuple[float, float], poisson: float, c: float) -> float:
+def _error(table: Table, place: tuple[float, float], poisson: float, c: float) -> float:
     """Return the error of a table for c at a place; infinite if the table has a pole there."""
     try:
         return abs(table.at(*place, poisson).c - c)

@@ -113,7 +113,7 @@ def solving_memory(dofs: float, degree: int, formulation: str = "displacement", 
     return _BASE + _BYTES_PER_DOF.get(formulation, _BYTES_PER_DOF["large"])[degree] * dofs
 
 
-def enriched_memory(dofs: float, degree: int, formulation: str = "displacement") -> float:
+def error_bar_memory(dofs: float, degree: int, formulation: str = "displacement") -> float:
     """Return the estimated bytes of an error bar: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
     return _BASE + _OF_BAR.get(formulation, _OF_BAR["large"])[degree + 1] * growth * dofs
@@ -126,7 +126,7 @@ def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, 
     """
     degree = case.mesh.degree
     count = dofs((share if of_bar is None else of_bar) * cells(case), degree)
-    enriched = enriched_memory(count, degree, case.formulation)
+    enriched = error_bar_memory(count, degree, case.formulation)
     basis = basis_memory(dofs(share * cells(case), degree), degree) if reduced else 0.0
     return _LOADED + max(case_memory(case, share), enriched) + basis
 

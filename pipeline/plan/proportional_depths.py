@@ -22,7 +22,7 @@ class ProportionalDepth:
 
 def depth_key(case: Case) -> str | None:
     """Return a key that is the same for all proportional depths; None if each depth must be solved."""
-    if not (_is_lifted_in_proportion(case) or _stands_and_slides(case)):
+    if not (_is_flat_and_unilateral(case) or _is_frictionless_in_slit(case)):
         return None
     # The same arbitrary depth for all.
     some = replace(case, probe=case.probe.model_copy(update={"depth": 1.0}))
@@ -31,10 +31,12 @@ def depth_key(case: Case) -> str | None:
 
 def proportional_to_depth(case: Case, other: Case) -> ProportionalDepth:
     """Return how ``case`` follows from the solution of ``other``, which has the same :func:`depth_key`."""
-    return ProportionalDepth(other.index, 1.0 if _stands_and_slides(case) else case.probe.depth / other.probe.depth)
+    return ProportionalDepth(
+        other.index, 1.0 if _is_frictionless_in_slit(case) else case.probe.depth / other.probe.depth
+    )
 
 
-def _is_lifted_in_proportion(case: Case) -> bool:
+def _is_flat_and_unilateral(case: Case) -> bool:
     """Return whether a flat tool with unilateral contact is pressed straight down on a plane face.
 
     A curved surface has an initial gap below the tool, which does not scale with the depth.
@@ -44,7 +46,7 @@ def _is_lifted_in_proportion(case: Case) -> bool:
     return is_flat and not obstacle("proportional depths", case)
 
 
-def _stands_and_slides(case: Case) -> bool:
+def _is_frictionless_in_slit(case: Case) -> bool:
     """Return whether a blade is in a slit, without friction."""
-    stands = case.probe.slit is not None and case.probe.contact == "frictionless"
-    return stands and not obstacle("proportional depths", case)
+    in_slit = case.probe.slit is not None and case.probe.contact == "frictionless"
+    return in_slit and not obstacle("proportional depths", case)

@@ -57,7 +57,7 @@ def memory_of(case: Case, dofs: int) -> tuple[float, float]:
     degree, direct = case.mesh.degree, is_direct(case.solve.method, dofs, DIRECT_LIMIT[case.mesh.degree])
     return (
         estimate.solving_memory(dofs, degree, case.formulation, direct=direct),
-        estimate.enriched_memory(dofs, degree, case.formulation),
+        estimate.error_bar_memory(dofs, degree, case.formulation),
     )
 
 

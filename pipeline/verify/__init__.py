@@ -13,12 +13,12 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     """Yield the comparisons one by one, the same on every rank; ``quick`` yields a few of each kind; collective."""
     from pipeline.solve.compiled import compiling  # noqa: PLC0415 (importing this package loads no solver)
     from pipeline.verify.bodies import body_rows  # noqa: PLC0415
-    from pipeline.verify.closure import closure_rows  # noqa: PLC0415
     from pipeline.verify.compliance import compliance_rows  # noqa: PLC0415
     from pipeline.verify.contact import contact_rows  # noqa: PLC0415
     from pipeline.verify.elements import element_rows  # noqa: PLC0415
+    from pipeline.verify.far_fields import far_field_rows  # noqa: PLC0415
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
-    from pipeline.verify.large import large_rows  # noqa: PLC0415
+    from pipeline.verify.hyperelastic import hyperelastic_rows  # noqa: PLC0415
     from pipeline.verify.loads import load_rows  # noqa: PLC0415
     from pipeline.verify.paths import path_rows  # noqa: PLC0415
     from pipeline.verify.regions import region_rows  # noqa: PLC0415
@@ -37,7 +37,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from contact_rows(comm, quick=quick)
     yield from wedge_rows(comm, quick=quick)
     yield from slit_rows(comm, quick=quick)
-    yield from closure_rows(comm, quick=quick)
+    yield from far_field_rows(comm, quick=quick)
     yield from path_rows(comm, quick=quick)
     yield from load_rows(comm, quick=quick)
-    yield from large_rows(comm, quick=quick)
+    yield from hyperelastic_rows(comm, quick=quick)

@@ -9,7 +9,7 @@ from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.study.load import parse
 from pipeline.verify import known
-from pipeline.verify.closure import LEFT_OUT, OF_BODY, OFF_MIDDLE
+from pipeline.verify.far_fields import LEFT_OUT, OF_BODY, OFF_MIDDLE
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section, box, cylinder, disc, mesh, mm, study
 

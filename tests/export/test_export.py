@@ -287,4 +287,4 @@ def test_bars_grow_until_they_hold_what_they_were_fitted_to():
     assert needed(touches[:1], 0.002) == 1.0
     factor = needed(touches, 0.002)
     assert 0.011 < 0.002 + factor * (0.006 - 0.002) < 0.015
-    assert [touch.is_held for touch in touches] == [True, False]
+    assert [touch.is_covered for touch in touches] == [True, False]

@@ -9,7 +9,7 @@ from pipeline.export.compliance import compliances
 from pipeline.export.far import FarFields, far_fields
 from pipeline.export.pairs import tabulate_pairs
 from pipeline.export.scope import scope_of
-from pipeline.export.seen import seen_body
+from pipeline.export.surface_body import surface_body
 from pipeline.realtime.model import Model
 from pipeline.realtime.near import boussinesq
 from pipeline.realtime.table import Table
@@ -18,7 +18,7 @@ from tests.export.test_export import BOX, CYLINDER, SKIN, study
 
 def fields(body: dict, poissons: tuple[float, float], margin: float) -> FarFields:
     scope = scope_of(study(body=body, material={"young": "10 kPa", "poisson": poissons[0]}))
-    return far_fields(seen_body(scope, None, margin), poissons)
+    return far_fields(surface_body(scope, None, margin), poissons)
 
 
 @pytest.mark.parametrize(

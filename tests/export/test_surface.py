@@ -12,8 +12,8 @@ from pipeline.export.curved import curved_model
 from pipeline.export.far import far_fields
 from pipeline.export.placed_force import PlacedForce
 from pipeline.export.scope import scope_of
-from pipeline.export.seen import seen_body
 from pipeline.export.surface import tabulate_surface
+from pipeline.export.surface_body import surface_body
 from pipeline.mesh.curve import EDGES
 from pipeline.realtime.near import boussinesq
 from pipeline.realtime.surface import SurfaceTable
@@ -40,7 +40,7 @@ def volume_within(table: SurfaceTable) -> float:
 @pytest.mark.parametrize(("body", "volume"), [(CYLINDER, pi * 20**2 * 20e-9), (BOX, 40 * 50 * 20e-9)])
 def test_the_far_field_is_that_of_the_body(body, volume):
     scope = scope_of(study(body=body))
-    pressed = seen_body(scope, None, 0.5)
+    pressed = surface_body(scope, None, 0.5)
     mesh, region = pressed.mesh, pressed.region
     corners, middles = np.split(mesh.mesh.geometry.x[geometry_dofs(mesh.mesh)], [4], axis=1)
     ends = corners[:, EDGES]
@@ -64,7 +64,7 @@ def test_the_far_field_is_that_of_the_body(body, volume):
 def test_a_skin_has_a_far_field_of_its_own(monkeypatch):
     monkeypatch.setattr(compliance, "_TO_TISSUE", 1)
     scope = scope_of(study(body=CYLINDER | {"layer": [SKIN | {"thickness": "6 mm"}]}))
-    pressed = seen_body(scope, None, 0.5)
+    pressed = surface_body(scope, None, 0.5)
     table = tabulate_surface(far_fields(pressed, scope.poissons), np.zeros(3))
     middle = np.argmin(np.linalg.norm(table.points, axis=1))
     # Tissue a fourth as stiff below it yields more than a half-space of skin; were it all skin, its support less.
@@ -75,7 +75,7 @@ def test_what_a_force_on_a_dome_does_elsewhere_a_force_there_does_here():
     """E. Betti, 1872: of the field next to a force, and of what the body's own shape and support add to it."""
     scope = scope_of(study(body=DOME, probe=DISC | {"radius": "5 mm"}))
     model, *_ = curved_model(scope, Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
-    pressed = seen_body(scope, model, 0.0)
+    pressed = surface_body(scope, model, 0.0)
     table = tabulate_surface(far_fields(pressed, scope.poissons), model.origin)
     a, c, below = 30e-3, 15e-3, -5e-3
     # Of the ellipsoid, points that are below the support are part of the body, too.

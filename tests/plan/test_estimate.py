@@ -56,7 +56,7 @@ def test_memory_of_a_solve_is_not_underestimated(method):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     memory, dofs = map(float, done.stdout.split())
-    estimated = max(estimate.solving_memory(dofs, 2, direct=method == "direct"), estimate.enriched_memory(dofs, 2))
+    estimated = max(estimate.solving_memory(dofs, 2, direct=method == "direct"), estimate.error_bar_memory(dofs, 2))
     assert memory < 1.3 * estimated < 3 * memory
 
 

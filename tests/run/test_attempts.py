@@ -137,7 +137,7 @@ def test_accuracy_without_memory_for_its_proof_is_refused_and_no_finer_mesh_is_t
     changes = {"mesh": {"accuracy": GOAL, "degree": 2}, "solve": {"exact": True, "method": "iterative"}, "plan": {}}
     plan = make_plan(parse({**raw(), **changes}), without=("axisymmetric",))
     monkeypatch.setattr("pipeline.run.memory.FreeMemory.available", lambda self: 1e9)
-    monkeypatch.setattr("pipeline.plan.estimate.enriched_memory", lambda *_, **__: 2e9)
+    monkeypatch.setattr("pipeline.plan.estimate.error_bar_memory", lambda *_, **__: 2e9)
     found, notes = [], Notes()
     execute(plan, WORLD, found.append, notes)
     if WORLD.rank == 0:

@@ -151,7 +151,7 @@ def test_without_memory_for_a_reduced_basis_every_case_is_solved(monkeypatch):
 def test_bars_of_a_reduced_basis_are_unknown_where_a_neighbours_is(begin, monkeypatch):
     """Memory that suffices for every second bar: what is between a known and an unknown one claims none."""
     calls = itertools.count(begin)
-    monkeypatch.setattr("pipeline.plan.estimate.enriched_memory", lambda *_, **__: (0.0, 1e18)[next(calls) % 2])
+    monkeypatch.setattr("pipeline.plan.estimate.error_bar_memory", lambda *_, **__: (0.0, 1e18)[next(calls) % 2])
     records = solve(WORLD, material={"poisson": [0.02 * i for i in range(20)]})
     solved = [index for index, record in sorted(records.items()) if record.origin == "symmetric"]
     unknown = {index for index in solved if isnan(records[index].force_error)}

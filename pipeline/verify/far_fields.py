@@ -18,7 +18,7 @@ _HALF_SPACE = (("bonded", 0.3), ("bonded", 0.5), ("frictionless", 0.3), ("fricti
 _BODY = (("bonded", 0.45), ("frictionless", 0.3))
 
 
-def closure_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
+def far_field_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows; ``quick`` yields one of each kind; collective."""
     for contact, nu in _HALF_SPACE[: 1 if quick else None]:
         truth = (*known.half_space_disc(10e3, nu, 1e-3, 1e-5, contact), LEFT_OUT)

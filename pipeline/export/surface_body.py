@@ -29,7 +29,7 @@ _BLUNT, _NEXT = 0.1, 0.5
 _STRAIGHT_ABOVE = 0.9
 
 
-def seen_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE) -> Pressed:
+def surface_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE) -> Pressed:
     """Return the body of a model, with the forces on its face; collective.
 
     Raises:

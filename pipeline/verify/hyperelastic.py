@@ -16,7 +16,7 @@ _RATIO_BAR = 1.5e-3
 _SMALL = 1e-3
 
 
-def large_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
+def hyperelastic_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows; ``quick`` leaves out the deepest; collective."""
     sizes = mesh(rim=0.6, growth=0.6, fine=3)
     linear, nonlinear = (_scene(law, _SMALL) for law in ("linear", "neo-hookean"))
