@@ -139,7 +139,7 @@ def test_a_study_names_any_file_that_can_be_read(folders, file, epsmesh):
         ("../meshes/zero.stl", "it is not a regular file"),
         ("../meshes/pipe.stl", "it is not a regular file"),
         ("..", "it is not a regular file"),
-        ("/etc/passwd", "read are .stl, .ply, .obj"),
+        ("/etc/passwd", "allowed are .stl, .ply, .obj"),
     ],
 )
 def test_what_cannot_be_read_is_named_with_its_reason(folders, file, why):
