@@ -78,5 +78,5 @@ def test_a_depth_that_the_body_does_not_have_is_an_error(depth, allowed):
     if allowed:
         assert study(probe={"depth": depth}).shape == ()
         return
-    with pytest.raises(StudyError, match="below the 20 mm that the body reaches below the probe"):
+    with pytest.raises(StudyError, match="must be below 20 mm, the thickness of the tissue"):
         study(probe={"depth": depth})
