@@ -114,7 +114,7 @@ FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
     "compliance": ("compliance", of_kind("compliance")),
     "one_number": ("compliance", one_number),
     "closure": ("closure", closure),
-    "needle": ("needle", of_kind("force")),
+    "needles": ("needles", of_kind("force")),
     "path": ("path", of_kind("map")),
     "path_excess": ("path", path_excess),
     "retractor": ("retractor", of_kind("force")),

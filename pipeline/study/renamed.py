@@ -13,8 +13,6 @@ RENAMED = {
     "plan.tolerance": "plan.reduced_basis_error",
     "solve.tolerance": "solve.energy_tolerance",
 }
-# Names of renamed keys in stored records, so that records made before are found again.
-STORED = {new.rpartition(".")[2]: old.rpartition(".")[2] for old, new in RENAMED.items()}
 
 _HEADING = re.compile(r"\s*\[+\s*([^\]#]*?)\s*\]+")
 _WORD = re.compile(r"[A-Za-z_]+")
