@@ -32,7 +32,7 @@ from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 
 _TOLERANCE = 1e-8
 _MPI = ("messages", "bytes", "reductions")

@@ -28,7 +28,7 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Spaces
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.study.sweep import Case
 
 _REPEATS = 3

@@ -22,8 +22,8 @@ from pipeline.plan.plan import make_plan
 from pipeline.plan.recipe import half_width_of
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
-from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
+from pipeline.study.read import parse
 from pipeline.verify.sections import Section
 
 SEED, COUNT = 2026, 160

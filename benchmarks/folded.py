@@ -18,8 +18,8 @@ from benchmarks.tables import markdown
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.crossings import crossings
 from pipeline.shapes.files.stl import written
-from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
+from pipeline.study.read import parse
 from pipeline.study.sweep import Study
 
 Surface = tuple[FloatArray, IntArray]

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.realtime import load_surface
+from pipeline.realtime import read_surface
 from pipeline.realtime.surface import Surface
 from pipeline.touch.page import write_touch_page
 from tests.realtime.synthetic import random_surface
@@ -89,7 +89,7 @@ def main() -> None:
     parser.add_argument("model", nargs="?", type=Path, help="a file of `epsmesh export`")
     parser.add_argument("--frames", type=int, default=300)
     asked = parser.parse_args()
-    surface = load_surface(asked.model) if asked.model else _random()
+    surface = read_surface(asked.model) if asked.model else _random()
     with tempfile.TemporaryDirectory() as folder:
         page = write_touch_page(surface, Path(folder) / "page.html", "frames")
         with Browser(Path(folder) / "profile", webgl=True) as browser:

@@ -24,7 +24,7 @@ from pipeline.plan import estimate
 from pipeline.plan.plan import make_plan
 from pipeline.run.compile import prepare
 from pipeline.run.execute import compute
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 
 WARM = {
     "body": {"shape": "box", "size": ["30 mm", "30 mm", "15 mm"], "fixed": "bottom"},

@@ -31,7 +31,7 @@ from pipeline.run.progress import MESHING, Progress
 from pipeline.run.record import Record
 from pipeline.shapes.files.stl import parse as read_stl
 from pipeline.shapes.files.stl import written
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.study.toml import to_toml
 
 MESHES = Path(__file__).parents[1] / "meshes"

@@ -30,7 +30,7 @@ from benchmarks.processor import ROOT, processor_seconds
 from benchmarks.tables import markdown, options, write
 from pipeline.arrays import FloatArray
 from pipeline.plan import estimate
-from pipeline.study.load import load
+from pipeline.study.read import read_study
 from pipeline.study.sweep import Case, Study
 
 # Study that compiles all forms of a run, in seconds.
@@ -154,7 +154,7 @@ def main() -> int:
     parser.add_argument("--most-direct", type=int, default=MOST_DIRECT, help="unknowns up to which MUMPS solves")
     asked = parser.parse_args()
     os.environ["OMP_NUM_THREADS"] = "1"
-    study = load(asked.study)
+    study = read_study(asked.study)
     cases = chosen(study, asked.sample)
     ways: dict[str, dict[str, Any]] = {
         _WITH: {},
@@ -162,7 +162,7 @@ def main() -> int:
         _WHOLE: {"parts": asked.parts},
     }
     with TemporaryDirectory() as folder:
-        run_program(load(_WARM_UP), Path(folder, "warm-up"))
+        run_program(read_study(_WARM_UP), Path(folder, "warm-up"))
         program = {}
         for number, (name, how) in enumerate(ways.items()):
             program[name] = run_program(study, Path(folder, str(number)), **how)

@@ -29,9 +29,9 @@ from pipeline.export.export import export, write
 from pipeline.export.full import Solver
 from pipeline.export.scope import Scope, scope_of
 from pipeline.export.tabulate import shares
-from pipeline.realtime import load
+from pipeline.realtime import read
 from pipeline.realtime.model import Model
-from pipeline.study.load import load as load_study
+from pipeline.study.read import read_study
 
 _FOLDER = Path("results/realtime")
 # Accuracy of models; accuracies of the full solves for flat tools, for those on organs, and for others; number of
@@ -111,7 +111,7 @@ def main() -> None:
         for name in list(rounds):
             if next(rounds[name], None) is None:
                 del rounds[name]
-    rows = [row for name in names for row in _rows(name, load(_FOLDER / f"{name}.epsm.nc"))]
+    rows = [row for name in names for row in _rows(name, read(_FOLDER / f"{name}.epsm.nc"))]
     print(markdown(rows, dict.fromkeys(_COLUMNS, "")))
     if asked.seconds > 0:
         print()
@@ -142,10 +142,10 @@ def model_of(name: str, folder: Path, checks: int) -> tuple[Model, Scope]:
     study, path = folder / f"{name}.toml", folder / f"{name}.epsm.nc"
     folder.mkdir(parents=True, exist_ok=True)
     study.write_text(STUDIES[name], encoding="utf-8")
-    scope = scope_of(load_study(study))
+    scope = scope_of(read_study(study))
     if not path.exists():
         write(export(scope, ACCURACY, checks), path, scope, study, "benchmark")
-    return load(path), scope
+    return read(path), scope
 
 
 def _rows(name: str, model: Model) -> Iterator[dict[str, str]]:
@@ -238,7 +238,7 @@ def _latency(path: Path, seconds: float) -> str:
     subprocess.run(["cc", "-std=c99", "-O2", *sources, "-o", str(program), "-lm"], check=True)
     arguments = [str(program), str(path), "20000", f"{seconds:g}"]
     in_c = subprocess.run(arguments, check=True, capture_output=True, text=True).stdout
-    return in_c + "".join(_in_numpy(load(path)))
+    return in_c + "".join(_in_numpy(read(path)))
 
 
 def _in_numpy(model: Model) -> Iterator[str]:

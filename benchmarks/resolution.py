@@ -25,8 +25,8 @@ from pipeline.report.figures.style import WIDTH, finish, look, new_figure
 from pipeline.shapes.files.image import march
 from pipeline.shapes.files.shells import largest_shell
 from pipeline.shapes.triangles import enclosed
-from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
+from pipeline.study.read import parse
 from scripts.make_organs import ORGANS, Organ, stl
 
 LIVER = ORGANS["liver.stl"]

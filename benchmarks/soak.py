@@ -27,7 +27,7 @@ from pipeline.run.execute import execute
 from pipeline.run.progress import Progress
 from pipeline.run.record import Record
 from pipeline.run.store import Store
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 
 CASES, _ON_A_MESH = 20_000, 10
 _GROWTH, _RECORD = 30e3, 4e3  # bytes per mesh, and per case

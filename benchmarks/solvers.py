@@ -98,7 +98,7 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
 
 def case_of(degree: int, size: tuple[float, float]) -> Any:
     """Return the case whose mesh has elements of these sizes (mm)."""
-    from pipeline.study.load import parse
+    from pipeline.study.read import parse
 
     mesh = graded(f"{size[0]} mm", "20 mm", f"{size[1]} mm", 0.5, degree=degree)
     return parse(study(BOX, 0.3, DISC, mesh)).case(())

@@ -25,8 +25,8 @@ from benchmarks.tables import options
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.record import UNFORESEEN, Record
-from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
+from pipeline.study.read import parse
 
 # Largest relative change under an exact invariance.
 INVARIANT = 1e-8

@@ -32,7 +32,7 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.meridian.problem import MeridianProblem
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.verify import known
 
 NAME = "work_precision"

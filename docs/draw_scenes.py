@@ -70,11 +70,11 @@ def draw(path: Path) -> Path:
     from mpi4py import MPI
     from PIL import Image
 
-    from pipeline.study.load import load
+    from pipeline.study.read import read_study
     from pipeline.view.compute import compute_fields, solve_to_view
     from pipeline.view.picture import draw_mesh
 
-    study = load(path)
+    study = read_study(path)
     (case,) = study.cases()
     fields = compute_fields(solve_to_view(study, case), MPI.COMM_SELF, mesh_only=True)
     assert fields is not None

@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 from types import MappingProxyType
 
-from pipeline.realtime import load_surface
+from pipeline.realtime import read_surface
 from pipeline.touch.page import write_touch_page
 from tests.report.browser import Browser
 
@@ -31,7 +31,7 @@ _WAIT = "new Promise(done => setTimeout(() => requestAnimationFrame(() => reques
 def draw(name: str, model: Path) -> None:
     """Write the picture of that name."""
     with tempfile.TemporaryDirectory() as folder:
-        page = write_touch_page(load_surface(model), Path(folder) / "page.html", TITLES[name])
+        page = write_touch_page(read_surface(model), Path(folder) / "page.html", TITLES[name])
         with Browser(Path(folder) / "profile", webgl=True) as browser:
             browser.look_like(1000, 640)
             browser.open(page)

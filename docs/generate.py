@@ -14,7 +14,7 @@ from pipeline.report.dataset import build
 from pipeline.study.capabilities import FEATURES, OBSTACLES, REFUSALS
 from pipeline.study.json_schema import schema_text
 from pipeline.study.keys import SECTION_TEXTS, all_sections, heading, keys_of
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.study.starter import starter
 
 # Studies that together have every variable: changes of the one that `epsmesh new` writes.

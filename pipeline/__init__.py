@@ -1,6 +1,6 @@
 """How fine must a finite-element mesh be, and where, for the reaction force of a surgical tool?
 
-From Python: :func:`load` a study, plan and run it; :func:`open` a dataset (docs/python.md). Nothing heavy is imported
+From Python: :func:`read` a study, plan and run it; :func:`open` a dataset (docs/python.md). Nothing heavy is imported
 before it is needed.
 """
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pipeline.api import RunnableStudy
 
 __version__ = "0.1.0"
-__all__ = ["DatasetError", "StoreError", "StudyError", "__version__", "load", "open"]
+__all__ = ["DatasetError", "StoreError", "StudyError", "__version__", "open", "read"]
 
 _ERRORS = {
     "DatasetError": "pipeline.report.table",
@@ -23,7 +23,7 @@ _ERRORS = {
 }
 
 
-def load(study: str | Path | Mapping[str, Any], name: str = "study", folder: str | Path = ".") -> "RunnableStudy":
+def read(study: str | Path | Mapping[str, Any], name: str = "study", folder: str | Path = ".") -> "RunnableStudy":
     """Return the study of a file, or of a dictionary with what stands in such a file; it plans and runs itself.
 
     That of a dictionary is called ``name``, as its dataset will be; files that bodies name are looked for in
@@ -35,7 +35,7 @@ def load(study: str | Path | Mapping[str, Any], name: str = "study", folder: str
     """
     from pipeline.api import RunnableStudy  # noqa: PLC0415
 
-    return RunnableStudy.load(study, name, folder)
+    return RunnableStudy.read(study, name, folder)
 
 
 def open(path: str | Path, output: str | Path = "results") -> "xr.Dataset":

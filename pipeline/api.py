@@ -10,8 +10,8 @@ from pipeline.files import STORE_NAME
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.progress import Terminal
-from pipeline.study.load import load, load_mapping
 from pipeline.study.named import NAME, is_name
+from pipeline.study.read import read_mapping, read_study
 from pipeline.study.sweep import Study
 
 if TYPE_CHECKING:
@@ -26,18 +26,18 @@ class RunnableStudy:
     declared: Study
 
     @staticmethod
-    def load(study: str | Path | Mapping[str, Any], name: str = "study", folder: str | Path = ".") -> "RunnableStudy":
-        """Read the study file at a path, or the study that stands in a dictionary: see :func:`pipeline.load`.
+    def read(study: str | Path | Mapping[str, Any], name: str = "study", folder: str | Path = ".") -> "RunnableStudy":
+        """Read the study file at a path, or the study that stands in a dictionary: see :func:`pipeline.read`.
 
         Raises:
             StudyError: with every problem of the study.
             ValueError: if ``name`` cannot be that of files.
         """
         if not isinstance(study, Mapping):
-            return RunnableStudy(load(study))
+            return RunnableStudy(read_study(study))
         if not is_name(name):
             raise ValueError(f"name = {name!r}: must be {NAME}")
-        return RunnableStudy(load_mapping(study, name, folder))
+        return RunnableStudy(read_mapping(study, name, folder))
 
     @property
     def name(self) -> str:
@@ -128,6 +128,6 @@ def open_dataset(path: str | Path, output: str | Path = "results") -> "xr.Datase
         DatasetError: if there is none, or if it is not a study's.
     """
     from pipeline.report import accessor  # noqa: F401, PLC0415 (registers dataset.epsmesh)
-    from pipeline.report.read import read  # noqa: PLC0415 (xarray is slow to load)
+    from pipeline.report.read import read  # noqa: PLC0415 (xarray is slow to read_file)
 
     return read(path, output)

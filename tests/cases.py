@@ -7,7 +7,7 @@ from mpi4py import MPI
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.study.sweep import Study
 from tests.studies import changed
 

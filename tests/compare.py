@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.report.read import load
+from pipeline.report.read import read_file
 
 # Times, memory, iterations and round-off say how the work was done.
 HOW = {"speedup", "machine_load", "memory", "iterations", "balance"}
@@ -15,7 +15,7 @@ def assert_same(one: Path, two: Path, *, rtol: float = 1e-7, alike: bool = True)
 
     ``alike``: none of it was read back from a store, and it was done on as many ranks.
     """
-    first, second = load(one), load(two)
+    first, second = read_file(one), read_file(two)
     as_many = first.attrs["ranks"] == second.attrs["ranks"]
     assert set(first) == set(second)
     assert first.sizes == second.sizes
@@ -38,4 +38,4 @@ def assert_same(one: Path, two: Path, *, rtol: float = 1e-7, alike: bool = True)
 
 def all_done(path: Path) -> bool:
     """Tell whether every case of a dataset has a force, or needs none."""
-    return set(np.unique(load(path)["status"])) <= {"ok", "skipped"}
+    return set(np.unique(read_file(path)["status"])) <= {"ok", "skipped"}

@@ -218,13 +218,13 @@ def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> 
     """Run one study in ``folder``, which has the files of :func:`write_bodies`; only read it unless ``solved``."""
     from pipeline.plan.plan import declare, make_plan
     from pipeline.study.capabilities import obstacle
-    from pipeline.study.load import load_mapping
     from pipeline.study.problems import StudyError
+    from pipeline.study.read import read_mapping
 
     name, start = name_of(features), time.process_time()
     done = partial(Result, name)
     try:
-        study = load_mapping(study_of(features), "pair", folder)
+        study = read_mapping(study_of(features), "pair", folder)
     except StudyError as error:
         return done("refused", " | ".join(str(problem) for problem in error.problems))
     except Exception:

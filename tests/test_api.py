@@ -32,7 +32,7 @@ def folder(tmp_path):
 
 @pytest.mark.mpi
 def test_study_runs_and_every_rank_has_the_dataset(folder):
-    study = pipeline.load(folder / "small.toml")
+    study = pipeline.read(folder / "small.toml")
     assert study.shape == {"young": 2, "epsilon": 2}
     data = study.run(WORLD, output=folder / "out", store=folder / "kept.sqlite")
     assert (data["status"] == "ok").all()
@@ -54,7 +54,7 @@ def test_study_runs_and_every_rank_has_the_dataset(folder):
 @pytest.mark.mpi
 def test_store_that_cannot_be_used_is_an_exception_on_every_rank(folder):
     with pytest.raises(pipeline.StoreError, match="cannot be"):
-        pipeline.load(folder / "small.toml").run(WORLD, output=folder, store=folder / "small.toml" / "no.sqlite")
+        pipeline.read(folder / "small.toml").run(WORLD, output=folder, store=folder / "small.toml" / "no.sqlite")
 
 
 @pytest.mark.mpi
@@ -62,7 +62,7 @@ def test_failed_cases_are_counted_in_a_warning(folder):
     if WORLD.rank == 0:
         (folder / "small.toml").write_text(TEXT.replace('"0.5 mm"', '["1e-9 mm", "0.5 mm"]'))
     WORLD.barrier()
-    study = pipeline.load(folder / "small.toml")
+    study = pipeline.read(folder / "small.toml")
     if WORLD.rank == 0:
         with pytest.warns(RuntimeWarning, match=r"4 failed, the first: .*GB of memory"):
             data = study.run(WORLD, output=folder)
@@ -74,7 +74,7 @@ def test_failed_cases_are_counted_in_a_warning(folder):
 
 def test_plan_says_what_a_run_would_do(tmp_path):
     (tmp_path / "small.toml").write_text(TEXT)
-    study = pipeline.load(str(tmp_path / "small.toml"))
+    study = pipeline.read(str(tmp_path / "small.toml"))
     assert (study.name, study.title, study.warnings) == ("small", "small", ())
     plan = study.plan()
     assert isinstance(plan, Plan)
@@ -89,13 +89,13 @@ def test_plan_says_what_a_run_would_do(tmp_path):
 @pytest.mark.parametrize("name", [None, 3, "", "a b", "../x", "é" * 101])
 def test_a_study_is_called_what_a_file_can_be(name):
     with pytest.raises(ValueError, match="must be letters, digits, - and _, at most 200 bytes"):
-        pipeline.load({}, name=name)
+        pipeline.read({}, name=name)
 
 
 def test_what_is_wrong_is_raised(tmp_path):
     (tmp_path / "bad.toml").write_text(TEXT.replace('"2 mm"', "2"))
     with pytest.raises(pipeline.StudyError, match=r"probe.radius = 2: must be a number with a unit"):
-        pipeline.load(tmp_path / "bad.toml")
+        pipeline.read(tmp_path / "bad.toml")
     with pytest.raises(pipeline.DatasetError, match="make it with `epsmesh run"):
         pipeline.open(tmp_path / "bad.toml", tmp_path)
     (tmp_path / "bad.nc").write_text("no netCDF")
@@ -109,7 +109,7 @@ def test_what_is_wrong_is_raised(tmp_path):
     ("code", "heavy"),
     [
         ("pass", {"numpy", "xarray", "pydantic", "mpi4py", "dolfinx", "matplotlib", "gmsh"}),
-        ("pipeline.load('studies/quick.toml').plan()", {"xarray", "mpi4py", "dolfinx", "matplotlib", "gmsh"}),
+        ("pipeline.read('studies/quick.toml').plan()", {"xarray", "mpi4py", "dolfinx", "matplotlib", "gmsh"}),
     ],
 )
 def test_what_answers_at_once_imports_little(code, heavy):

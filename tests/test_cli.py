@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from mpi4py import MPI
 
-from pipeline.report.read import load
+from pipeline.report.read import read_file
 from pipeline.run.reading import open_to_read
 from tests.commands import ENVIRONMENT, ROOT, command
 from tests.compare import assert_same
@@ -63,7 +63,7 @@ def test_second_run_reads_back_and_two_ranks_agree(epsmesh, spawn, small, whole,
     parallel = spawn("run", small, "--output", tmp_path / "b", ranks=2)
     assert again.exit_code == parallel.returncode == 0, parallel.stderr
     assert "Stored cases are read, not computed again." in again.stdout
-    one, two = (load(tmp_path / folder / "small.nc") for folder in "ab")
+    one, two = (read_file(tmp_path / folder / "small.nc") for folder in "ab")
     assert {name.rpartition(", ")[::2] for name in np.unique(one["origin"])} == {("symmetric", "stored")}
     np.testing.assert_allclose(one["force"], two["force"], rtol=1e-8)
     assert parallel.stdout.count("wrote") == 1
@@ -105,10 +105,10 @@ def test_interrupted_run_leaves_what_is_done_and_goes_on(epsmesh, small, whole, 
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "continues" in errors
-    partial = load(tmp_path / "a" / "small.nc")
+    partial = read_file(tmp_path / "a" / "small.nc")
     assert 0 < int((partial["status"] == "ok").sum()) < partial["status"].size
     assert epsmesh("run", small, "--output", tmp_path / "a").exit_code == 0
-    resumed, undisturbed = (load(folder / "small.nc") for folder in (tmp_path / "a", whole))
+    resumed, undisturbed = (read_file(folder / "small.nc") for folder in (tmp_path / "a", whole))
     for name in ("force", "force_vector", "energy", "dofs", "cells", "force_ratio", "status"):
         xr.testing.assert_allclose(resumed[name], undisturbed[name], rtol=1e-9)
 
@@ -128,7 +128,7 @@ def test_interrupted_parallel_run_writes_what_is_done(epsmesh, small, tmp_path):
         assert len(records.rows()) >= 2  # F_exact of scenes among them
     again = epsmesh("run", small, "--output", tmp_path)
     assert again.exit_code == 0, again.stderr
-    assert (load(tmp_path / "small.nc")["status"] == "ok").all()
+    assert (read_file(tmp_path / "small.nc")["status"] == "ok").all()
 
 
 def test_run_killed_at_random_moments_yields_the_same_dataset(epsmesh, small, whole, tmp_path):

@@ -10,8 +10,8 @@ import nibabel
 import numpy as np
 import pytest
 
-from pipeline.shapes.files.image import load_image
-from pipeline.shapes.files.read import load_surface
+from pipeline.shapes.files.image import read_image
+from pipeline.shapes.files.read import read_surface
 
 ROOT = Path(__file__).resolve().parents[1]
 MESHES = ROOT / "meshes"
@@ -30,7 +30,7 @@ def script() -> ModuleType:
 
 def test_the_script_makes_the_kidney_again(script: ModuleType, tmp_path: Path):
     (tmp_path / "kidney.obj").write_bytes(script.make("kidney.obj"))
-    again, kept = (load_surface(folder / "kidney.obj", 1e-3).triangles for folder in (tmp_path, MESHES))
+    again, kept = (read_surface(folder / "kidney.obj", 1e-3).triangles for folder in (tmp_path, MESHES))
     # Another processor may round otherwise and leave other facets out, not another body.
     assert again.facets.shape == kept.facets.shape
     assert again.volume == pytest.approx(kept.volume, rel=1e-3)
@@ -49,7 +49,7 @@ def test_the_script_makes_the_label_map_again(script: ModuleType):
 
 @pytest.mark.parametrize(("name", "volume"), [("liver.stl", 427), ("kidney.obj", 128), ("brain.ply", 744)])
 def test_they_bound_tissue_and_need_no_mending(name: str, volume: float):
-    loaded = load_surface(MESHES / name, 1e-3)
+    loaded = read_surface(MESHES / name, 1e-3)
     assert loaded.notices == ()
     assert 1e6 * loaded.triangles.volume == pytest.approx(volume, rel=0.01)
     assert (MESHES / name).stat().st_size < 400_000
@@ -57,8 +57,8 @@ def test_they_bound_tissue_and_need_no_mending(name: str, volume: float):
 
 def test_the_image_holds_the_liver_of_the_surface():
     surface, image = (
-        load_surface(MESHES / "liver.stl", 1e-3).triangles,
-        load_image(MESHES / "liver.nii.gz", 1).triangles,
+        read_surface(MESHES / "liver.stl", 1e-3).triangles,
+        read_image(MESHES / "liver.nii.gz", 1).triangles,
     )
     assert image.volume == pytest.approx(surface.volume, rel=2e-3)
     assert np.allclose(image.bounds, surface.bounds, atol=5e-4)

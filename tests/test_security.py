@@ -21,11 +21,11 @@ from pipeline.report.read import read
 from pipeline.report.table import DatasetError, study_of
 from pipeline.run.reading import known_of
 from pipeline.run.store import Store, StoreError
-from pipeline.shapes.files.image import load_image
+from pipeline.shapes.files.image import read_image
 from pipeline.shapes.files.read import Loaded
 from pipeline.shapes.triangles import SurfaceError
-from pipeline.study.load import load
 from pipeline.study.problems import StudyError
+from pipeline.study.read import read_study
 from tests.cases import raw, study
 from tests.commands import ROOT, talk
 from tests.organs import box, write_stl
@@ -126,7 +126,7 @@ def written(project, *files):
 def test_a_study_names_any_file_that_can_be_read(folders, file, epsmesh):
     project, strange = folders
     path = written(project, file.format(strange=strange))
-    assert load(path).shape == ()
+    assert read_study(path).shape == ()
     assert epsmesh("plan", "--check", path).exit_code == 0
 
 
@@ -145,7 +145,7 @@ def test_a_study_names_any_file_that_can_be_read(folders, file, epsmesh):
 def test_what_cannot_be_read_is_named_with_its_reason(folders, file, why):
     path = written(folders[0], "box.stl", file)
     with pytest.raises(StudyError) as refused:
-        load(path)
+        read_study(path)
     (line,) = str(refused.value).splitlines()
     assert line.startswith(f"{path}: body.file = ")
     assert why in line
@@ -155,7 +155,7 @@ def test_other_mistakes_are_told_in_the_same_breath(folders):
     path = written(folders[0], "none.stl")
     path.write_text(path.read_text().replace("0.45", "0.6"))
     with pytest.raises(StudyError, match=r"(?s)cannot be read.*poisson|poisson.*cannot be read"):
-        load(path)
+        read_study(path)
 
 
 def test_names_are_shown_as_they_are():
@@ -323,7 +323,7 @@ def test_the_data_of_an_image_lie_where_its_header_says_and_are_what_it_says(fol
         (folder / "data.gz").write_bytes(packed)
 
     def image(*lines: str, data: bytes = b"") -> Loaded:
-        return load_image(nrrd(project / "meshes" / "box.nhdr", data, "encoding: gzip", *lines), 1, 1e-3)
+        return read_image(nrrd(project / "meshes" / "box.nhdr", data, "encoding: gzip", *lines), 1, 1e-3)
 
     own = image(data=packed).triangles.points
     np.testing.assert_array_equal(own, image("data file: data.gz").triangles.points)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.study.load import load
+from pipeline.study.read import read_study
 from pipeline.units import canonical, parse_quantity
 from tests.studies import small_text
 
@@ -104,5 +104,5 @@ def test_any_text_is_a_finite_number_or_refused(text):
 def test_a_file_may_begin_with_the_mark_of_its_encoding(tmp_path):
     file = tmp_path / "marked.toml"
     file.write_text(small_text(), encoding="utf-8-sig")
-    assert load(file).cases()
-    assert not load(file).text.startswith("\ufeff")
+    assert read_study(file).cases()
+    assert not read_study(file).text.startswith("\ufeff")

@@ -16,7 +16,7 @@ from pathlib import Path
 import psutil
 
 from benchmarks.faults.victim import WIDTH
-from pipeline.report.read import load
+from pipeline.report.read import read_file
 from pipeline.report.table import DatasetError
 from pipeline.run.reading import read_rows
 from pipeline.run.store import Store, StoreError
@@ -216,7 +216,7 @@ class Scene:
             store.close()
         if self.dataset.exists():
             try:
-                load(self.dataset)
+                read_file(self.dataset)
             except DatasetError as error:
                 yield f"the dataset is torn: {error}"
 

@@ -14,7 +14,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.measure import TIMES
 from pipeline.run.record import Record
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.study.sweep import Study
 
 YOUNG = 1e4  # Pa: F is proportional to it

@@ -9,7 +9,7 @@ import typer
 from pipeline import __version__
 from pipeline.cli.console import say, warning
 from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option, of_unwritten, refusing
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, by_name, check_machine, check_output, load_all
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, by_name, check_machine, check_output, read_all
 from pipeline.files import write_new
 from pipeline.printable import counted
 
@@ -86,7 +86,7 @@ def export(
         least, most = (f"{100 * share:g}%" for share in _ACCURACIES)
         fail(of_option("--accuracy", accuracy, f"must be between {least} and {most}"))
     file = by_name(file)
-    (study,) = load_all([file])
+    (study,) = read_all([file])
     path = output or DEFAULT_OUTPUT / f"{study.name}.epsm.nc"
     check_output(path)
     check_machine()

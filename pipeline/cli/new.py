@@ -106,11 +106,11 @@ def _titled(text: str, name: str) -> str:
 def _converted(old: Path) -> tuple[str, Path, dict[str, str]]:
     """Return the text of an old study file with new key names, its path, and the keys that have changed."""
     from pipeline.study.problems import StudyError
-    from pipeline.study.read import read
     from pipeline.study.renamed import converted
+    from pipeline.study.text import read_toml
 
     try:
-        text, changed = converted(read(old)[0], str(old))
+        text, changed = converted(read_toml(old)[0], str(old))
     except StudyError as wrong:
         fail(*of_study(wrong))
     except ValueError as unknown_form:

@@ -21,8 +21,8 @@ from pipeline.cli.words import (
     by_name,
     check_names,
     check_store,
-    load_all,
     meant,
+    read_all,
     warn,
 )
 from pipeline.files import STORE_NAME
@@ -85,7 +85,7 @@ def plan(
     from pipeline.plan.describe import summary
     from pipeline.run.room import MEMORY_SHARE, machine_room
 
-    (study,) = load_all([file])
+    (study,) = read_all([file])
     chosen = find_case(study, more[0]) if more else None
     made, records = _planned(study, store or output / STORE_NAME, check_names(without))
     if chosen is not None:
@@ -111,13 +111,13 @@ def plan(
 def _check(files: list[Path]) -> NoReturn:
     """Say of each study file everything that is wrong with it, and exit."""
     from pipeline.plan.plan import make_plan
-    from pipeline.study.load import load
     from pipeline.study.problems import StudyError
+    from pipeline.study.read import read_study
 
     report: list[dict[str, Any]] = []
     for file in files:
         try:
-            study = load(file)
+            study = read_study(file)
         except StudyError as wrong:
             faults = of_study(wrong, meant(file))
             report.append({"file": str(file), "errors": as_data(faults, BAD_INPUT)["errors"], "warnings": []})

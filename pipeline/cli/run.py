@@ -28,7 +28,7 @@ from pipeline.cli.words import (
     check_output,
     check_shard,
     check_store,
-    load_all,
+    read_all,
     warn,
 )
 from pipeline.files import STORE_NAME, result_files
@@ -75,7 +75,7 @@ def run(
 
     Example: epsmesh run studies/figure3.toml --shard 3/8
     """
-    studies, left_out = load_all(files), check_names(without)
+    studies, left_out = read_all(files), check_names(without)
     if store:
         check_store(store)
     part = check_shard(shard, studies)

@@ -9,7 +9,7 @@ import typer
 
 from pipeline.cli.console import error, is_json_wanted, say
 from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, of_results, refusing
-from pipeline.cli.words import CLUSTER, check_names, check_output, check_store, load_all
+from pipeline.cli.words import CLUSTER, check_names, check_output, check_store, read_all
 from pipeline.files import result_files
 from pipeline.printable import counted
 
@@ -29,7 +29,7 @@ def merge_shards(
     """Merge the ``stores`` of a study's shards into ``target``, write the study's results to ``output``, and exit."""
     from pipeline.plan.plan import make_plan
 
-    (study,) = load_all([file])
+    (study,) = read_all([file])
     paths = _stores(study, stores, output)
     check_store(target)
     check_output(target, *result_files(output, study.name))

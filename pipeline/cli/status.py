@@ -18,7 +18,7 @@ from pipeline.cli.words import (
     by_name,
     check_names,
     check_store,
-    load_all,
+    read_all,
 )
 from pipeline.files import STORE_NAME
 from pipeline.printable import counted
@@ -110,7 +110,7 @@ def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) ->
     from pipeline.run.outcome import count_states, failures
     from pipeline.run.stop import skipped
 
-    (study,) = load_all([file])
+    (study,) = read_all([file])
     plan = make_plan(study, without=without)
     records: dict[str, Record] = {}
     if path.exists():

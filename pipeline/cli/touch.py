@@ -47,13 +47,13 @@ def touch(
 
     Example: epsmesh touch results/quick.epsm.nc -o quick.html
     """
-    from pipeline.realtime import ModelError, load_surface
+    from pipeline.realtime import ModelError, read_surface
     from pipeline.touch.page import render, write_touch_page
 
     if output is not None:
         check_output(output)
     try:
-        surface = load_surface(model)
+        surface = read_surface(model)
         if output is not None:
             path = write_touch_page(surface, output, model.name)
             size = path.stat().st_size

@@ -8,7 +8,7 @@ import typer
 from pipeline.cli.cases import find_case
 from pipeline.cli.console import error, say
 from pipeline.cli.faults import SOME_FAILED, Fault, fail
-from pipeline.cli.words import DEFAULT_MESHES, DEFAULT_OUTPUT, File, Json, Output, check_machine, check_output, load_all
+from pipeline.cli.words import DEFAULT_MESHES, DEFAULT_OUTPUT, File, Json, Output, check_machine, check_output, read_all
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -40,7 +40,7 @@ def view(
 
     Example: epsmesh view studies/figure3.toml 12 --export html
     """
-    (study,) = load_all([file])
+    (study,) = read_all([file])
     chosen = find_case(study, case)
     number = next(n for n, other in enumerate(study.cases()) if other.index == chosen.index)
     stem = output / f"{study.name}_{number}"

@@ -79,15 +79,15 @@ Without = Annotated[
 ]
 
 
-def load_all(files: list[Path]) -> "list[Study]":
+def read_all(files: list[Path]) -> "list[Study]":
     """Load studies, or exit with every problem of every file; on several ranks only the first one prints."""
-    from pipeline.study.load import load
     from pipeline.study.problems import StudyError
+    from pipeline.study.read import read_study
 
     studies, faults = [], list[Fault]()
     for file in files:
         try:
-            studies.append(load(file))
+            studies.append(read_study(file))
         except StudyError as wrong:
             faults += of_study(wrong, meant(file))
     names = [study.name for study in studies]

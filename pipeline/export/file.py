@@ -50,9 +50,9 @@ import xarray as xr
 
 from pipeline.arrays import FloatArray
 from pipeline.netcdf import write_netcdf
+from pipeline.realtime.file import numbers_of
 from pipeline.realtime.model import Model
 from pipeline.realtime.pairs import Pairs
-from pipeline.realtime.read import numbers_of
 from pipeline.realtime.surface import SurfaceTable
 
 Checks = Mapping[str, tuple[str, FloatArray]]

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from pipeline.arrays import FloatArray, np
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 
 
 @dataclass(frozen=True)

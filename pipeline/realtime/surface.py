@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.realtime.classic import ModelError, read_numbers
+from pipeline.realtime.file import model_of
 from pipeline.realtime.model import Model
 from pipeline.realtime.near import Footprint
 from pipeline.realtime.query import Query
-from pipeline.realtime.read import model_of
 from pipeline.realtime.table import middle_of, polynomials
 from pipeline.realtime.touch import Touch
 
@@ -107,7 +107,7 @@ class Surface:
         return touch, moved @ model.axes
 
 
-def load_surface(path: str | Path) -> Surface:
+def read_surface(path: str | Path) -> Surface:
     """Return the model at ``path`` with its deforming surface.
 
     Raises:

@@ -61,7 +61,7 @@ def read(file: str | Path, output: str | Path = "results", warn: Callable[[str],
         DatasetError: if there is none, or if it is not a study's.
     """
     path = dataset_path(file, output)
-    dataset = _shown(load(path))
+    dataset = _shown(read_file(path))
     if missing := [name for name in _NEEDED if name not in {*dataset.data_vars, *dataset.attrs}]:
         raise DatasetError(f"{path}: not a study's dataset: it has no {', '.join(missing)}")
     for warning in warnings_of(dataset):
@@ -72,7 +72,7 @@ def read(file: str | Path, output: str | Path = "results", warn: Callable[[str],
     return dataset
 
 
-def load(path: Path) -> xr.Dataset:
+def read_file(path: Path) -> xr.Dataset:
     """Return the dataset at ``path``, its group ``run`` with it, in memory; every array is compared with its checksum.
 
     ``status`` is in words.

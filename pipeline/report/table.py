@@ -13,8 +13,8 @@ import xarray as xr
 from pipeline.quantities import MESH_DIMENSIONS
 from pipeline.report.sinking import LOADS, PLACES, Sinking
 from pipeline.report.values import by_case, relative
-from pipeline.study.load import load_text
 from pipeline.study.problems import StudyError
+from pipeline.study.read import read_text
 from pipeline.study.sweep import Case, Study
 
 Labels = dict[str, Any]
@@ -146,7 +146,7 @@ def warnings_of(dataset: xr.Dataset) -> list[str]:
 @lru_cache(8)  # figures, report and guide of a dataset ask for it again and again
 def _study(text: str, file: str) -> Study | None:
     try:
-        return load_text(text, file)
+        return read_text(text, file)
     except StudyError:
         return None
 

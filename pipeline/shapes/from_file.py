@@ -44,7 +44,7 @@ class FromFile(Facetted):
 
     @classmethod
     @abstractmethod
-    def load(cls, file: str, given: Mapping[str, Any]) -> Loaded:
+    def read(cls, file: str, given: Mapping[str, Any]) -> Loaded:
         """Return the surface in a file, read as the fields ``given`` say.
 
         Raises:
@@ -56,7 +56,7 @@ class FromFile(Facetted):
     def _readable(cls, file: str, info: ValidationInfo) -> str:
         if info.data.keys() >= cls.READ_BY:
             try:
-                cls.load(file, info.data)
+                cls.read(file, info.data)
             except SurfaceError as error:
                 # Braces in the message are not placeholders.
                 raise PydanticCustomError("surface", "{what}", {"what": str(error)}) from None
@@ -74,7 +74,7 @@ class FromFile(Facetted):
 
     def model_post_init(self, context: Any, /) -> None:
         """Load the surface, which is read once for all bodies of one file."""
-        self._loaded = self.load(self.file, dict(self))
+        self._loaded = self.read(self.file, dict(self))
 
     @field_serializer("file", check_fields=False)
     def _content(self, file: str) -> str:

@@ -1,89 +1,151 @@
-"""The text of a study file, and its TOML, within the limits of any study."""
+"""Read a study file: TOML to checked sections and axes, or all problems at once."""
 
-import re
-import tomllib
-import unicodedata
-from collections.abc import Iterator
+import difflib
+from collections.abc import Mapping
+from math import prod
 from pathlib import Path
 from typing import Any
 
-from pipeline.study.problems import Problem, Problems, StudyError
-
-# A hundred times the longest study with a path of its own points: what is larger is another kind of file.
-_MOST_BYTES = 1_000_000
-# The deepest place of a study is a coordinate of a cap on a load: section, array, table, list, value.
-_DEEPEST = 12
-# Parts of a dotted key: the library's time grows with the square of their number.
-_LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}""")
-# Integers of TOML, and of what is made of them.
-LARGEST = 2**63
-# Control characters and what turns the direction of writing: on a terminal they make a line say something else.
-_CONTROLS = ("Cc", "Cs", "Zl", "Zp")
-_TURNS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+from pipeline.shapes.section import Section
+from pipeline.study.check import check_sense
+from pipeline.study.check_loads import check_loads
+from pipeline.study.loads import Load
+from pipeline.study.problems import Problem, Problems, StudyError, nearest
+from pipeline.study.regions import check_regions, material_without_section
+from pipeline.study.schema import NESTED, SECTIONS, Mesh
+from pipeline.study.sweep import Axis, Study
+from pipeline.study.tables import MOST_CASES, read_section
+from pipeline.study.text import check_text, read_toml, toml_of
+from pipeline.study.toml import to_toml
 
 
-def read(path: Path) -> tuple[str, dict[str, Any]]:
-    """Return the text of a study file, and the TOML in it.
+def read_study(path: str | Path) -> Study:
+    """Read the study file at ``path``.
 
     Raises:
-        StudyError: if it cannot be read, or is no study of a sane size.
+        StudyError: with every problem of the file: key, value found, what is allowed.
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(_MOST_BYTES + 1)
-    except (OSError, ValueError) as error:  # a name with a NUL is a ValueError
-        raise _refused(str(path), "file", getattr(error, "strerror", None) or str(error)) from None
-    _check_size(len(data), str(path))
-    try:
-        text = data.decode("utf-8-sig")  # some editors begin a file with the mark of its encoding
-    except UnicodeDecodeError as error:
-        raise _refused(str(path), "file", f"is not UTF-8 text: {error}") from None
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
-    return text, toml_of(text, str(path))
+    text, raw = read_toml(Path(path))
+    return parse(raw, file=str(path), text=text)
 
 
-def toml_of(text: str, file: str) -> dict[str, Any]:
-    """Return the TOML in the ``text`` of a study; ``file`` is for messages.
+def read_mapping(study: Mapping[str, Any], name: str, folder: str | Path = ".") -> Study:
+    """Read a study from a dictionary, as from a file ``name``.toml with that content in ``folder``.
 
     Raises:
-        StudyError: if it is none, or no study of a sane size.
+        StudyError: with every problem of it.
     """
-    _check_size(len(text), file)
+    path = Path(folder) / f"{name}.toml"
     try:
-        if _LONG_KEY.search(text):
-            raise _refused(file, "TOML", f"is nested more than {_DEEPEST} levels deep: this is no study")
-        raw = tomllib.loads(text)
-    except RecursionError:
-        raise _refused(file, "TOML syntax", "is nested too deeply") from None
-    except ValueError as error:  # besides its own, those of numbers with thousands of digits and of days that are none
-        raise _refused(file, "TOML syntax", str(error)) from None
-    layer: list[Any] = [raw]
-    for _ in range(_DEEPEST):
-        if any(isinstance(value, int) and not -LARGEST <= value < LARGEST for value in layer):
-            raise _refused(file, "TOML", "has an integer of more than 64 bits: write 1e30 for a large number")
-        layer = list(_inside(layer))
-    if layer:
-        raise _refused(file, "TOML", f"is nested more than {_DEEPEST} levels deep: this is no study")
-    return raw
+        text = to_toml(study, str(path))
+        text.encode()  # datasets store it as UTF-8
+        return read_text(text, str(path))
+    except (RecursionError, UnicodeEncodeError) as error:
+        why = "is nested too deeply" if isinstance(error, RecursionError) else "has text that is not Unicode"
+        raise StudyError(str(path), [Problem("study", None, why)]) from None
 
 
-def _check_size(size: int, file: str) -> None:
-    if size > _MOST_BYTES:
-        raise _refused(file, "file", f"is larger than {_MOST_BYTES / 1e6:g} MB: this is no study")
+def read_text(text: str, file: str) -> Study:
+    """Read the text of a study, such as that in a dataset. Files of bodies are relative to the folder of ``file``.
+
+    Raises:
+        StudyError: with every problem of it.
+    """
+    return parse(toml_of(text, file), file=file, text=text)
 
 
-def _refused(file: str, what: str, why: str) -> StudyError:
-    return StudyError(file, [Problem(what, None, why)])
+def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
+    """Turn a study, read from TOML into ``raw``, into a :class:`Study`.
+
+    ``file`` is for messages, and the files of bodies are looked for from its folder.
+    """
+    problems = Problems(tables=_names_of(raw))
+    raw = _beside(raw, Path(file).parent)
+    _check_top(raw, problems)
+    axes: list[Axis] = []
+    sections: dict[str, tuple[Section, ...]] = {}
+    for name in [*(n for n in raw if n in SECTIONS), *(n for n in SECTIONS if n not in raw)]:
+        own_axes, variants = read_section(name, raw.get(name, {}), problems)
+        axes += own_axes
+        sections[name] = variants
+    cases = prod(map(len, axes))
+    if not problems.errors and cases > MOST_CASES:
+        sweeps = " × ".join(f"{len(axis)} {axis.name}" for axis in axes)
+        problems.error(
+            "study", None, f"has {cases} cases ({sweeps}): at most {MOST_CASES}; split it into several studies"
+        )
+    if all(problem.key != "study" for problem in problems.errors):
+        _check_together(sections, tuple(axes), problems)
+    if problems.errors:
+        raise StudyError(file, problems.named(problems.errors))
+    warnings = tuple(f"{file}: {warning}" for warning in problems.told_once())
+    title = str(raw.get("title", Path(file).stem))
+    return Study(file, Path(file).stem, title, text, tuple(axes), sections, warnings)
 
 
-def check_text(key: str, text: str, problems: Problems) -> None:
-    """Report a text that is not safe to print: one with several lines, control characters, or a reversed direction."""
-    if any(unicodedata.category(letter) in _CONTROLS or letter in _TURNS for letter in text):
-        problems.error(key, text, "must be one line of text without control characters")
+def _check_together(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
+    """Check what must fit together.
+
+    A section with an error is omitted, so that errors of the others are reported at once. Sections that the file omits
+    get their defaults only here.
+    """
+    check_regions(problems.sound(sections), axes, problems)
+    if not problems.errors:
+        sections["material"] = sections["material"] or (material_without_section(sections["body"]),)
+    sections["load"] = sections["load"] or (Load(),)
+    check_sense(problems.sound(sections), axes, problems)
+    check_loads(problems.sound(sections), axes, problems)
 
 
-def _inside(layer: list[Any]) -> Iterator[Any]:
-    """Yield the values in the tables and lists of a layer."""
-    for outer in layer:
-        if isinstance(outer, dict | list):
-            yield from outer.values() if isinstance(outer, dict) else outer
+def _names_of(raw: dict[str, Any]) -> dict[str, tuple[str, ...]]:
+    """Return the names of the tables of each section that is an array; "" for a table without a name."""
+    return {
+        section: tuple(str(table.get("name", "")) if isinstance(table, dict) else "" for table in tables)
+        for section, tables in raw.items()
+        if section in SECTIONS and isinstance(tables, list)
+    }
+
+
+def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the study with paths of bodies' files that begin with the ``folder`` of the study."""
+
+    def found(value: Any) -> Any:
+        if isinstance(value, list):
+            return [found(v) for v in value]
+        return str(folder / value) if isinstance(value, str) else value
+
+    def table(body: Any) -> Any:
+        return body | {"file": found(body["file"])} if isinstance(body, dict) and "file" in body else body
+
+    bodies = raw.get("body")
+    return raw | {"body": [table(b) for b in bodies] if isinstance(bodies, list) else table(bodies)} if bodies else raw
+
+
+def _check_top(raw: dict[str, Any], problems: Problems) -> None:
+    for key, value in raw.items():
+        if key not in (*SECTIONS, "title"):
+            problems.error(key, None, f"unknown section; {_meant(key)}")
+        elif key == "title" and not isinstance(value, str):
+            problems.error(key, value, "must be text")
+        elif key == "title":
+            check_text(key, value, problems)
+    bodies = raw.get("body")
+    tables = bodies if isinstance(bodies, list) else [bodies]
+    layered = any("layer" in table for table in tables if isinstance(table, dict))
+    for name in ("body", *(() if layered else ("material",)), "probe", "mesh"):
+        if name not in raw or raw[name] == {}:
+            problems.error(f"[{name}]", None, "this section is required")
+    meshes = raw.get("mesh")
+    for table in meshes if isinstance(meshes, list) else [meshes]:
+        if isinstance(table, dict) and table and "accuracy" not in table:
+            for key in Mesh.SIZES:
+                if key not in table:
+                    problems.error(f"mesh.{key}", None, "is required: give the sizes, or `accuracy` instead of them")
+
+
+def _meant(key: str) -> str:
+    """Return a suggestion for an unknown section: a section, or an array of tables within one."""
+    pieces = {piece: section for section, inner in NESTED.items() for piece in inner}
+    if close := difflib.get_close_matches(key, pieces, n=1, cutoff=0.6):
+        return f"it is part of another section: write [[{pieces[close[0]]}.{close[0]}]]"
+    return nearest(key, [*SECTIONS, "title"])

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from pipeline.study.read import toml_of
+from pipeline.study.text import toml_of
 
 # Old name to new name. Messages about unknown keys and the conversion both read this table.
 RENAMED = {

@@ -12,11 +12,11 @@ from pipeline.shapes.section import Section
 from pipeline.study.path import Way, read_path
 from pipeline.study.problems import MOST_ERRORS, Problems, closest, nearest, tuples
 from pipeline.study.ranges import without_ranges
-from pipeline.study.read import check_text
 from pipeline.study.renamed import renamed
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE
 from pipeline.study.sweep import Axis
 from pipeline.study.swept import Place, axis_of, placed, sweeps, written
+from pipeline.study.text import check_text
 from pipeline.study.vocabulary import NOT_COMPUTED
 
 # Limits of a list and of a study. Each case costs a few hundred bytes and a tenth of a millisecond.

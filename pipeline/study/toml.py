@@ -13,7 +13,7 @@ from os import PathLike, fspath
 from typing import Any
 
 from pipeline.study.problems import Problem, Problems, StudyError
-from pipeline.study.read import LARGEST
+from pipeline.study.text import LARGEST
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.files import write_whole
 from pipeline.realtime.blade import RECTANGLE
-from pipeline.realtime.read import numbers_of
+from pipeline.realtime.file import numbers_of
 from pipeline.realtime.surface import Surface
 from pipeline.realtime.touch import SENTENCES
 from pipeline.view import palette

@@ -4,7 +4,7 @@ from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section
 

@@ -10,7 +10,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.shapes.rounded import Rounded
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.verify import known
 from pipeline.verify.compare import against_meridian, solve
 from pipeline.verify.layer_contact import layer_contact

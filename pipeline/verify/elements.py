@@ -21,7 +21,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.forms import ElasticForms, MixedForms
 from pipeline.solve.physics import MaterialLaw
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.verify.row import Row
 
 _ROUND_OFF = 1e-10

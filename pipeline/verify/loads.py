@@ -17,7 +17,7 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import apply_loads
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.verify.forces import FAR
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section, box, cylinder, disc, mesh, mm, tissue

@@ -20,7 +20,7 @@ from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.verify.row import Row
 
 Section = dict[str, Any]

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from benchmarks import plain_loop
 from benchmarks.plain_case import MOST_DIRECT, solve
-from pipeline.study.load import load
+from pipeline.study.read import read_study
 from tests import cases
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="times one process")
@@ -69,7 +69,7 @@ def test_the_program_is_run_with_and_without_f_exact(tmp_path):
     file = tmp_path / "small.toml"
     file.write_text(STUDY)
     for exact in (True, False):
-        found = plain_loop.run_program(load(file), tmp_path / str(exact), exact=exact)
+        found = plain_loop.run_program(read_study(file), tmp_path / str(exact), exact=exact)
         with xr.open_dataset(found["dataset"]) as data:
             assert bool(data["force_exact"].notnull().all()) is exact
         assert found["cpu"] > 0
@@ -80,7 +80,7 @@ def test_a_part_without_reductions_has_the_same_forces(tmp_path):
     file = tmp_path / "small.toml"
     file.write_text(STUDY.replace('"full"', '["6 mm", "8 mm", "10 mm", "full"]'))
     with_all, part = (
-        plain_loop.forces(plain_loop.run_program(load(file), tmp_path / str(parts), parts=parts)["dataset"])
+        plain_loop.forces(plain_loop.run_program(read_study(file), tmp_path / str(parts), parts=parts)["dataset"])
         for parts in (0, 2)
     )
     known = ~np.isnan(part)

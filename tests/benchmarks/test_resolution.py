@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.resolution import BENDS, LIVER, REFERENCE, File, relative, surface, write
-from pipeline.shapes.files.image import load_image
+from pipeline.shapes.files.image import read_image
 from pipeline.shapes.triangles import enclosed
 from scripts.make_organs import liver
 
@@ -22,7 +22,7 @@ def test_points_of_a_surface_are_on_the_true_one():
 @pytest.mark.parametrize("offset", [(0.0, 0.0, 0.0), (0.5, 0.25, 0.0)])
 def test_a_grid_that_is_moved_leaves_the_body_where_it_is(offset: tuple[float, float, float], tmp_path: Path):
     body = write(File("grid", "image", 4, offset=offset), LIVER, tmp_path)
-    triangles = load_image(Path(body["file"]), 1).triangles
+    triangles = read_image(Path(body["file"]), 1).triangles
     assert 1e6 * triangles.volume == pytest.approx(427.09, rel=5e-3)
     truth = _centre(*surface(LIVER, 5))
     assert np.linalg.norm(_centre(1e3 * triangles.points, triangles.facets) - truth) < 0.5

@@ -16,7 +16,7 @@ from pipeline import __version__
 from pipeline.cli import app
 from pipeline.cli.console import paint, print_json
 from pipeline.report.figures import KINDS
-from pipeline.report.read import load
+from pipeline.report.read import read_file
 from tests.commands import ENVIRONMENT, ROOT, talk
 from tests.conftest import SMALL
 from tests.studies import small_text
@@ -122,7 +122,7 @@ def test_json_of_a_run_is_one_object_with_what_failed_and_why(epsmesh, tmp_path)
     assert {"GB of memory" in failure["message"] for failure in study["failures"]} == {True}
     assert all(Path(name).exists() for name in study["files"])
     assert study["seconds"] > 0
-    states = load(tmp_path / "small.nc")["status"]
+    states = read_file(tmp_path / "small.nc")["status"]
     assert (states.sel(rim=1e-12) == "failed").all() and (states.sel(rim=0.5e-3) == "ok").all()
     status = json.loads(epsmesh("status", file, "--output", tmp_path, "--json").stdout)
     assert (status["ok"], status["failed"], status["pending"]) == (2, 2, 0)

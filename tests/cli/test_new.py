@@ -9,8 +9,8 @@ import pytest
 
 from pipeline.plan.plan import make_plan
 from pipeline.study.keys import SECTION_TEXTS, all_sections, keys_of, shapes_of, words_of
-from pipeline.study.load import load, parse
 from pipeline.study.named import SCHEMA, SHORT, examples
+from pipeline.study.read import parse, read_study
 from pipeline.study.renamed import RENAMED
 from pipeline.study.starter import starter
 from tests.commands import epsmesh
@@ -70,7 +70,7 @@ def test_what_the_starter_leaves_out_can_be_let_in(key):
 def test_new_writes_a_short_study_and_leaves_an_existing_one_alone(elsewhere):
     assert new("mine").exit_code == 0
     file = elsewhere / "studies" / "mine.toml"
-    assert load(file).title == "mine"
+    assert read_study(file).title == "mine"
     assert len(file.read_text().splitlines()) <= 25
     file.write_text("changed")
     again = new("mine")
@@ -88,7 +88,7 @@ def test_all_writes_every_key(elsewhere):
 def test_short_examples_are_short_named_in_the_help_and_without_warnings(name):
     assert 10 <= len((STUDIES / f"{name}.toml").read_text().splitlines()) <= 30
     assert name in new("--help").stdout
-    study = load(STUDIES / f"{name}.toml")
+    study = read_study(STUDIES / f"{name}.toml")
     assert 1 < prod(study.shape) <= 20
     assert not study.warnings
 
@@ -97,7 +97,7 @@ def test_short_examples_are_short_named_in_the_help_and_without_warnings(name):
 def test_like_copies_the_studies_that_come_with_the_program(elsewhere, name):
     assert new("mine", "--like", name).exit_code == 0
     assert (elsewhere / "studies" / "mine.toml").read_text() == _SCHEMA + (STUDIES / f"{name}.toml").read_text()
-    load(elsewhere / "studies" / "mine.toml")  # with the file of its body
+    read_study(elsewhere / "studies" / "mine.toml")  # with the file of its body
 
 
 def test_the_schema_for_editors_is_beside_every_study_and_up_to_date(elsewhere):
@@ -150,7 +150,7 @@ def test_an_old_study_is_converted_with_its_comments(elsewhere):
         "\ntolerance = 1e-5", "\nreduced_basis_error = 1e-5"
     )
     assert text == _SCHEMA + expected.replace("\nstop_when = ", "\nstop_near_exact = ")
-    study = load(elsewhere / "studies" / "mine.toml")
+    study = read_study(elsewhere / "studies" / "mine.toml")
     assert (study.solve.energy_tolerance, study.planning.reduced_basis_error) == (1e-8, 1e-5)
 
 

@@ -9,7 +9,7 @@ import pytest
 from pipeline.plan.plan import make_plan
 from pipeline.run.record import Record
 from pipeline.run.store import Store
-from pipeline.study.load import load
+from pipeline.study.read import read_study
 
 LOOKING = ("plan", "status")
 
@@ -55,7 +55,7 @@ def test_a_damaged_store_is_named_and_left_where_it_is(epsmesh, small, tmp_path,
 @pytest.mark.parametrize("text", ["{", "[1, 2]", '{"key": "k", "status": "ok"}', '{"force_vector": [1], "colour": 1}'])
 def test_an_unreadable_record_is_told_with_what_removes_it(epsmesh, small, tmp_path, command, text):
     store = tmp_path / "cases.sqlite"
-    plan = make_plan(load(small))
+    plan = make_plan(read_study(small))
     fill(store, plan, at_4="ok", at_6="ok", at_inf="ok")
     with sqlite3.connect(store) as database:
         database.execute("UPDATE records SET record = ? WHERE key = ?", (text, plan.keys[0]))
@@ -83,7 +83,7 @@ def test_status_counts_what_is_not_to_be_run_as_skipped(epsmesh, small, tmp_path
     """F is at F_exact at 4 and 6 mm: the full order need not be run, and never will be."""
     store = tmp_path / "cases.sqlite"
     small.write_text(small.read_text() + '[plan]\nstop_near_exact = "5 %"\n')
-    fill(store, make_plan(load(small)), at_4="ok", at_6="ok")
+    fill(store, make_plan(read_study(small)), at_4="ok", at_6="ok")
     told = json.loads(epsmesh("status", small, "--store", store, "--json").stdout)
     assert [told[state] for state in ("ok", "skipped", "failed", "pending")] == [8, 4, 0, 0]
     assert "8 ok, 0 failed, 4 skipped, 0 pending" in epsmesh("status", small, "--store", store).stdout
@@ -91,9 +91,9 @@ def test_status_counts_what_is_not_to_be_run_as_skipped(epsmesh, small, tmp_path
 
 def test_status_asks_after_a_run_without_reductions(epsmesh, small, tmp_path):
     """Such a run keeps other records: 12 of its own where the full order is shared no more."""
-    store, plan = tmp_path / "cases.sqlite", make_plan(load(small), without=["all"])
+    store, plan = tmp_path / "cases.sqlite", make_plan(read_study(small), without=["all"])
     fill(store, plan, at_4="failed", at_6="ok", at_inf="ok")
-    assert len(plan.solves) > len(make_plan(load(small)).solves)
+    assert len(plan.solves) > len(make_plan(read_study(small)).solves)
     told = json.loads(epsmesh("status", small, "--store", store, "--without", "all", "--json").stdout)
     assert [told[state] for state in ("ok", "failed", "pending")] == [8, 4, 0]
     assert {failure["message"] for failure in told["failures"]} == {"it went wrong"}
@@ -132,7 +132,7 @@ def test_a_case_is_found_by_its_numbers_in_any_unit(epsmesh, small, case):
 
 
 def test_a_force_on_record_that_is_no_number_is_computed_again(epsmesh, small, tmp_path):
-    store, plan = tmp_path / "cases.sqlite", make_plan(load(small))
+    store, plan = tmp_path / "cases.sqlite", make_plan(read_study(small))
     fill(store, plan, at_4="ok", at_6="ok", at_inf="ok")
     opened = Store(store)
     opened.put(replace(opened.get(plan.keys[:1])[plan.keys[0]], force=float("nan")))

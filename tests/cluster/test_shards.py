@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 from typer.testing import Result
 
-from pipeline.report.read import load
+from pipeline.report.read import read_file
 from tests.commands import epsmesh
 from tests.compare import all_done, assert_same
 from tests.studies import small_text
@@ -56,7 +56,7 @@ def test_a_lost_shard_is_told_and_completed(whole, meshes, tmp_path):
     assert found["pending"] > 0
     assert found["again"][0] == f"epsmesh run {study} --shard 2/3"
     assert found["again"][1] == f"SHARDS=3 sbatch --array=2 scripts/slurm/shards.sbatch {study}"
-    assert int((load(tmp_path / "small.nc")["status"] == "pending").sum()) == found["pending"]
+    assert int((read_file(tmp_path / "small.nc")["status"] == "pending").sum()) == found["pending"]
     told = epsmesh("status", study, "--merge", "--output", tmp_path)
     assert f"{found['pending']} pending" in told.output
     assert "--shard 2/3" in told.output
@@ -92,7 +92,7 @@ def test_early_stop_in_shards(whole, meshes, tmp_path):
     assert epsmesh("status", study, "--merge", "--output", tmp_path).exit_code == 0
     assert run(study, tmp_path / "whole", meshes).exit_code == 0
     assert_same(tmp_path / "small.nc", tmp_path / "whole" / "small.nc")
-    assert "skipped" in np.unique(load(tmp_path / "small.nc")["status"])
+    assert "skipped" in np.unique(read_file(tmp_path / "small.nc")["status"])
 
 
 def test_damaged_and_failed(whole, meshes, tmp_path):

@@ -12,7 +12,7 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.report.dataset import write
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.study.starter import starter
 from tests.docs.blocks import PYTHON, ROOT, blocks, missing, pages
 from tests.report.synthetic import FIGURE, dataset

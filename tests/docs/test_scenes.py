@@ -6,7 +6,7 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.shapes.registry import BODIES, PROBES
-from pipeline.study.load import load
+from pipeline.study.read import read_study
 from tests.docs.blocks import ROOT
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="once is enough")
@@ -22,12 +22,12 @@ def test_page_is_what_the_studies_make_of_it():
 
 @pytest.mark.parametrize("path", scenes.studies(), ids=lambda path: path.stem)
 def test_every_scene_is_one_case_with_a_small_picture(path):
-    assert load(path).shape == ()
+    assert read_study(path).shape == ()
     picture = scenes.PICTURES / f"{path.stem}.png"
     assert 20_000 < picture.stat().st_size <= scenes.MOST
 
 
 def test_every_body_and_every_probe_is_shown():
-    cases = [case for path in scenes.studies() for case in load(path).cases()]
+    cases = [case for path in scenes.studies() for case in read_study(path).cases()]
     assert {case.body.shape for case in cases} == {*BODIES}
     assert {case.probe.shape for case in cases} == {*PROBES}

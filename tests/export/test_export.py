@@ -19,7 +19,7 @@ from pipeline.realtime import Model
 from pipeline.realtime.contact import tangent
 from pipeline.realtime.place import Place
 from pipeline.solve.physics import MaterialLaw
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.verify.compare import solve
 
 DISC = {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "frictionless"}

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 from pipeline.plan.plan import make_plan
 from pipeline.realtime import ModelError
-from pipeline.realtime import load as load_model
+from pipeline.realtime import read as read_model
 from pipeline.run.reading import known_of, open_to_read, read_rows
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
-from pipeline.shapes.files.image import load_image
-from pipeline.shapes.files.read import load_surface
+from pipeline.shapes.files.image import read_image
+from pipeline.shapes.files.read import read_surface
 from pipeline.shapes.files.step import entities_of, named_faces, unit_of
 from pipeline.shapes.triangles import SurfaceError
 from tests.cases import study
@@ -86,7 +86,7 @@ def test_surfaces(good, thrown_at, data, ending, repair):
     file = thrown_at / f"box.{ending}"
     file.write_bytes(data.draw(damaged((good / file.name).read_bytes())))
     try:
-        loaded = load_surface(file, 1e-3, repair=repair)
+        loaded = read_surface(file, 1e-3, repair=repair)
     except SurfaceError as refused:
         readable(refused)
     else:
@@ -99,7 +99,7 @@ def test_label_maps(good, thrown_at, data, ending):
     file = thrown_at / f"ball.{ending}"
     file.write_bytes(data.draw(damaged((good / file.name).read_bytes())))
     try:
-        loaded = load_image(file, 1)
+        loaded = read_image(file, 1)
     except SurfaceError as refused:
         readable(refused)
     else:
@@ -129,7 +129,7 @@ def test_models(good, thrown_at, data):
     file = thrown_at / "box.epsm.nc"
     file.write_bytes(data.draw(damaged((good / "box.epsm.nc").read_bytes())))
     try:
-        load_model(file)
+        read_model(file)
     except ModelError as refused:
         readable(refused)
 

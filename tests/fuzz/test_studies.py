@@ -12,8 +12,8 @@ from hypothesis import given
 
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import make_plan
-from pipeline.study.load import load, parse
 from pipeline.study.problems import StudyError
+from pipeline.study.read import parse, read_study
 from pipeline.study.sweep import Study
 from tests.cases import raw, study
 from tests.fuzz.profile import thrown
@@ -69,7 +69,7 @@ def test_what_is_accepted_has_the_numbers_of_the_text(file, raw):
 def judge(file) -> Study | None:
     """Read and plan a study, None if it was refused; whatever else happens is a failure."""
     try:
-        study = load(file)
+        study = read_study(file)
     except StudyError as refused:
         lines = str(refused).split("\n")
         assert len(lines) == len(refused.problems), lines
@@ -148,7 +148,7 @@ def test_what_is_no_study_by_its_size_is_refused_at_once(file, name):
     data, message = HUGE[name]
     file.write_bytes(data)
     with pytest.raises(StudyError, match=message):
-        load(file)
+        read_study(file)
 
 
 LONG = {

@@ -65,7 +65,7 @@ def test_estimates_follow_what_the_store_knows(factor, tmp_path):
     file = tmp_path / "next.toml"
     file.write_text(STUDY)
     known = tmp_path / "cases.sqlite"
-    first = pipeline.load(file).summary()["seconds"]
+    first = pipeline.read(file).summary()["seconds"]
     store = Store(known)
     model = CostModel()
     for number in range(20):
@@ -79,11 +79,11 @@ def test_estimates_follow_what_the_store_knows(factor, tmp_path):
         )  # fmt: skip
     store.put(Record("other", "failed", "no force"))
     store.close()
-    told = pipeline.load(file).summary(store=known)
+    told = pipeline.read(file).summary(store=known)
     assert told["fitted_to"] == 20
     assert told["factor"] < 2.0
     assert told["seconds"] == pytest.approx(factor * first, rel=0.2)
-    assert pipeline.load(file).summary()["fitted_to"] == 0
+    assert pipeline.read(file).summary()["fitted_to"] == 0
     shown = epsmesh("plan", file, "--store", known, "--json")
     assert json.loads(shown.stdout)["seconds"] == pytest.approx(told["seconds"])
 

@@ -8,7 +8,7 @@ from pipeline.plan.describe import story
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from tests.cases import raw
 
 # A disc on a stiff skin, from which tissue lifts off within: the area of contact is a question, and has no depth in it.

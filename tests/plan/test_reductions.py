@@ -9,7 +9,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.plan.reductions import REDUCTIONS
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from tests.cases import BLADE, raw, study
 
 ROUND = {"shape": "cylinder", "radius": "20 mm", "height": "15 mm"}

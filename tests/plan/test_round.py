@@ -6,7 +6,7 @@ import pytest
 
 from pipeline.mesh.of_case import meridian_of
 from pipeline.plan.symmetry import is_round
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from tests.cases import raw
 
 CYLINDER = {"shape": "cylinder", "radius": "20 mm", "height": "10 mm", "fixed": "bottom", "size": None}

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.export.file import write_model
+from pipeline.realtime import read
 from pipeline.realtime.face import Face
 from pipeline.realtime.model import Model
 from pipeline.realtime.pairs import Pairs
-from pipeline.realtime.read import load
-from pipeline.realtime.surface import Surface, SurfaceTable, load_surface
+from pipeline.realtime.surface import Surface, SurfaceTable, read_surface
 from pipeline.realtime.table import Table
 
 
@@ -46,7 +46,7 @@ def write_random(path: Path, **kind: bool) -> Model:
     """Write a model, and return it as it is read."""
     checks = {"force": ("N", np.array([0.1, 0.2])), "bar": ("1", np.array([0.01, 0.01]))}
     write_model(path, random_model(**kind), checks, {"title": "random"})
-    return load(path)
+    return read(path)
 
 
 def random_surface(*, rank: int = 5, **kind: bool) -> Surface:
@@ -73,4 +73,4 @@ def write_surface(path: Path, **kind: bool) -> Surface:
     """Write a model with its surface, and return it as it is read."""
     made = random_surface(**kind)
     write_model(path, made.model, {}, {"title": "random"}, made.table)
-    return load_surface(path)
+    return read_surface(path)

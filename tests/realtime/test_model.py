@@ -11,8 +11,8 @@ from pipeline.realtime import Model, ModelError
 from pipeline.realtime.blade import blade
 from pipeline.realtime.classic import read_doubles
 from pipeline.realtime.contact import Disc, ball, cone
+from pipeline.realtime.file import model_of, numbers_of
 from pipeline.realtime.place import Place, Shape
-from pipeline.realtime.read import model_of, numbers_of
 from pipeline.verify import known
 from tests.realtime.synthetic import random_model, write_random
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pipeline.realtime import ModelError
+from pipeline.realtime.file import model_of
 from pipeline.realtime.model import Model
 from pipeline.realtime.pairs import Pairs, read_pairs
-from pipeline.realtime.read import model_of
 from pipeline.realtime.table import Table
 from tests.realtime.synthetic import random_model, write_random
 

@@ -8,7 +8,7 @@ import xarray as xr
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.run.record import Record
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.study.sweep import Case
 
 TEXT = """

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.run.record import Record
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from tests.cases import BLADE, raw
 from tests.fuzz.studies import toml
 

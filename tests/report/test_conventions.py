@@ -16,7 +16,7 @@ from pipeline.quantities import RUN
 from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
 from pipeline.report.dataset import build, write
 from pipeline.report.values import relative
-from pipeline.study.load import load
+from pipeline.study.read import read_study
 from tests.report.synthetic import FIGURE, dataset
 
 STUDIES = sorted(Path("studies").glob("*.toml"))
@@ -47,7 +47,7 @@ def test_datasets_of_all_studies_follow_the_conventions(tmp_path):
     pytest.importorskip("cfchecker")
     files = []
     for study in STUDIES:
-        found = build(make_plan(load(study)), {})
+        found = build(make_plan(read_study(study)), {})
         files.append(tmp_path / f"{study.stem}.nc")
         write(found, files[-1])
         files.append(tmp_path / f"{study.stem}_run.nc")

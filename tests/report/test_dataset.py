@@ -11,8 +11,8 @@ from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build, write
 from pipeline.report.read import read
 from pipeline.report.table import study_of
-from pipeline.study.load import load
 from pipeline.study.problems import StudyError
+from pipeline.study.read import read_study
 from tests.cases import raw
 from tests.fuzz.studies import toml
 from tests.organs import ellipsoid, write_stl
@@ -118,7 +118,7 @@ def test_a_dataset_finds_the_files_of_its_study_from_any_folder(tmp_path, monkey
     content = raw(body=body, probe={"at": ["5 mm", "3 mm"], "radius": "4 mm"})
     file = tmp_path / "study" / "own.toml"
     file.write_text(toml(content))
-    data = build(make_plan(load(file)), {})
+    data = build(make_plan(read_study(file)), {})
     monkeypatch.chdir(tmp_path)
     write(data, tmp_path / "own.nc")
     found = study_of(read(tmp_path / "own.nc"))

@@ -12,7 +12,7 @@ from pipeline.report.guide import guide
 from pipeline.report.laws import LAWS, Forces, judge
 from pipeline.report.sinking import why_not
 from pipeline.report.table import DatasetError
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from tests.cases import raw
 from tests.report.chosen import dataset
 

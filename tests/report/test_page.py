@@ -15,7 +15,7 @@ from pipeline.report.figures import choose, draw
 from pipeline.report.guide import USUAL_ACCURACY, guide, guide_if_any
 from pipeline.report.page import render, write_page
 from pipeline.report.page.cases import case_table
-from pipeline.report.read import load
+from pipeline.report.read import read_file
 from pipeline.report.table import case_at, study_of
 from tests.cases import BLADE, raw
 from tests.commands import epsmesh
@@ -173,7 +173,7 @@ def test_every_kind_of_figure_is_in_the_page_for_a_phone_as_well():
 def test_a_written_dataset_gives_the_same_table(tmp_path):
     data = small()
     write(data, tmp_path / "small.nc")
-    assert case_table(load(tmp_path / "small.nc")).json == case_table(data).json
+    assert case_table(read_file(tmp_path / "small.nc")).json == case_table(data).json
 
 
 def test_the_case_of_the_answer_is_found_by_its_labels():

@@ -13,7 +13,7 @@ from pipeline.plan.recipe import rungs_for
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.run.measure import is_graded_to_contact
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.verify import known
 from tests.cases import BLADE, raw
 from tests.sampling import sampled

@@ -13,7 +13,7 @@ from pipeline.run.execute import compute, execute
 from pipeline.run.progress import Progress
 from pipeline.run.record import Record
 from pipeline.run.runner import StepRunner
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from tests.cases import raw, study
 
 WORLD = MPI.COMM_WORLD

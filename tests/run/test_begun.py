@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
-from pipeline.report.read import load
+from pipeline.report.read import read_file
 from pipeline.run.begun import Begun, fail_begun
 from pipeline.run.record import Record
 from pipeline.run.store import Store
@@ -130,7 +130,7 @@ def test_a_case_that_ends_its_process_fails_in_the_next_run_alone(epsmesh, tmp_p
     assert following.exit_code == 1, following.stderr
     assert "the process of an earlier run ended: the case that it was at has failed" in following.stderr
     assert "2 ok, 1 failed (the process was killed while it computed this case" in following.stdout
-    data = load(tmp_path / "small.nc").squeeze()
+    data = read_file(tmp_path / "small.nc").squeeze()
     assert list(data["status"].values) == ["failed", "ok", "ok"]
     assert np.isfinite(data["force"].values).tolist() == [False, True, True]
     again = epsmesh(*words)

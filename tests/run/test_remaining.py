@@ -5,7 +5,7 @@ import pytest
 from pipeline.plan.plan import make_plan
 from pipeline.run.progress import Terminal
 from pipeline.run.remaining import Expected, Remaining, expectations, format_seconds
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from tests.cases import raw
 
 

@@ -168,11 +168,11 @@ def test_what_makes_no_sense_is_refused(folder, changes, words):
 
 
 def test_a_file_is_sought_beside_the_study(folder):
-    from pipeline.study.load import load
+    from pipeline.study.read import read_study
 
     (folder / "s.toml").write_text(
         '[body]\nshape = "surface"\nfile = "ellipsoid.stl"\nunit = "mm"\nfixed = {below = "-10 mm"}\n'
         '[material]\nyoung = "1 kPa"\npoisson = 0.3\n[probe]\nshape = "disc"\nradius = "3 mm"\ndepth = "0.1 mm"\n'
         '[mesh]\naccuracy = "2 %"\n'
     )
-    assert load(folder / "s.toml").case(()).body.extent == pytest.approx(120e-3, rel=2e-3)
+    assert read_study(folder / "s.toml").case(()).body.extent == pytest.approx(120e-3, rel=2e-3)

@@ -9,7 +9,7 @@ from pipeline.run.execute import compute
 from pipeline.run.meshing import mesh_case
 from pipeline.solve.cell_values import plain_share
 from pipeline.solve.estimate import error_bar, extrapolate, is_graded
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from tests.cases import BLADE, solve, study
 from tests.sampling import sampled
 

@@ -5,8 +5,8 @@ import itertools
 import pytest
 
 from pipeline.study.capabilities import FEATURES, OBSTACLES, REFUSALS, obstacle
-from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
+from pipeline.study.read import parse
 from tests.cases import BLADE, raw, study
 from tests.studies import changed
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
+from pipeline.study.read import parse
 from tests.cases import raw, study
 
 

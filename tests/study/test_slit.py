@@ -3,8 +3,8 @@
 import pytest
 
 from pipeline.plan.plan import make_plan
-from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
+from pipeline.study.read import parse
 from tests.cases import BLADE, raw
 
 BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}

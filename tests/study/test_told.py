@@ -7,8 +7,8 @@ import pytest
 
 from pipeline.study.howto import page_of, pages
 from pipeline.study.keys import all_sections, keys_of
-from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
+from pipeline.study.read import parse
 from pipeline.study.renamed import RENAMED
 from tests.cases import BLADE, raw, study
 

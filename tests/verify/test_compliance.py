@@ -4,7 +4,7 @@ from math import inf, radians, tan
 
 import pytest
 
-from pipeline.study.load import parse
+from pipeline.study.read import parse
 from pipeline.verify import known
 from pipeline.verify.layer_contact import layer_contact
 from pipeline.verify.layered import Solid, added_compliance, layered_disc

@@ -76,18 +76,18 @@ class FromCad(FromFile):
     _loaded: Solid = PrivateAttr()
 
     @classmethod
-    def load(cls, file: str, given: Mapping[str, Any]) -> Solid:
+    def read(cls, file: str, given: Mapping[str, Any]) -> Solid:
         """Return the solid in a file."""
-        from pipeline.shapes.files.cad import load_solid  # noqa: PLC0415 (only when a file is read)
+        from pipeline.shapes.files.cad import read_solid  # noqa: PLC0415 (only when a file is read)
 
-        return load_solid(Path(file), given["unit"], SIZES[given["unit"]])
+        return read_solid(Path(file), given["unit"], SIZES[given["unit"]])
 
     @field_validator("file")
     @classmethod
     def _has_the_face(cls, file: str, info: ValidationInfo) -> str:
         fixed = info.data.get("fixed")
         if isinstance(fixed, NamedFace) and info.data.keys() >= cls.READ_BY:
-            names = cls.load(file, info.data).names
+            names = cls.read(file, info.data).names
             if fixed.face not in names:
                 listed = "it has " + ", ".join(sorted(names)) if names else "none of its faces has a name"
                 message = f"the support names the face {fixed.face}, which the file does not have: {listed}"

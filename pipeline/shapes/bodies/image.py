@@ -42,9 +42,9 @@ class FromImage(FromFile, Scanned):
     ]
 
     @classmethod
-    def load(cls, file: str, given: Mapping[str, Any]) -> Loaded:
+    def read(cls, file: str, given: Mapping[str, Any]) -> Loaded:
         """Return the surface of the label."""
-        from pipeline.shapes.files.image import load_image  # noqa: PLC0415 (only when a file is read)
+        from pipeline.shapes.files.image import read_image  # noqa: PLC0415 (only when a file is read)
 
         unit = UNITS[given["unit"]] if given["unit"] else None
-        return load_image(Path(file), given["label"], unit, given["smooth"])
+        return read_image(Path(file), given["label"], unit, given["smooth"])

@@ -45,8 +45,8 @@ class FromSurface(FromFile, Scanned):
     ]
 
     @classmethod
-    def load(cls, file: str, given: Mapping[str, Any]) -> Loaded:
+    def read(cls, file: str, given: Mapping[str, Any]) -> Loaded:
         """Return the surface in a file."""
-        from pipeline.shapes.files.read import load_surface  # noqa: PLC0415 (only when a file is read)
+        from pipeline.shapes.files.read import read_surface  # noqa: PLC0415 (only when a file is read)
 
-        return load_surface(Path(file), UNITS[given["unit"]], given["repair"], given["smooth"] or None)
+        return read_surface(Path(file), UNITS[given["unit"]], given["repair"], given["smooth"] or None)

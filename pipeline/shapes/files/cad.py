@@ -28,7 +28,7 @@ _LONGEST = 600  # s
 _MISSED, _OFF = 0.03, 1e-5
 
 
-def load_solid(path: Path, unit: str, size: float) -> Solid:
+def read_solid(path: Path, unit: str, size: float) -> Solid:
     """Return the solid in a file whose numbers are in a ``unit`` of ``size`` (m).
 
     Raises:

@@ -34,7 +34,7 @@ _AWAY = 0.005
 _CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 
 
-def load_image(path: Path, label: int, unit: float | None = None, smooth: float | None = None) -> Loaded:
+def read_image(path: Path, label: int, unit: float | None = None, smooth: float | None = None) -> Loaded:
     """Return the surface of the voxels with a ``label`` in a NIfTI or NRRD file, and notices of what was changed.
 
     ``unit`` (m) is needed only if the header names none; ``smooth`` (m) is the standard deviation of the filter. Files

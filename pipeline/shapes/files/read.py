@@ -17,7 +17,7 @@ _PARSERS: dict[str, Callable[[bytes], Raw]] = {".stl": stl.parse, ".ply": ply.pa
 LARGEST_FILE = 600_000_000  # bytes
 
 
-def load_surface(path: Path, unit: float, repair: bool = False, smooth: float | None = None) -> Loaded:
+def read_surface(path: Path, unit: float, repair: bool = False, smooth: float | None = None) -> Loaded:
     """Return the surface in an STL, PLY or OBJ file whose numbers are in a ``unit`` (m).
 
     ``repair`` allows repairs of a broken surface; ``smooth`` (m) is the length of the smoothing filter. The file is

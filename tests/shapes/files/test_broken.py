@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.shapes.files.read import load_surface
+from pipeline.shapes.files.read import read_surface
 from pipeline.shapes.triangles import SurfaceError
 from tests.shapes.files.broken import Broken, corpus
 
@@ -14,14 +14,14 @@ def test_each_broken_file_is_refused_with_what_was_found(broken: Broken, tmp_pat
     path = tmp_path / broken.name
     path.write_bytes(broken.data)
     with pytest.raises(SurfaceError) as refused:
-        load_surface(path, broken.unit)
+        read_surface(path, broken.unit)
     for word in broken.words:
         assert word in str(refused.value)
 
 
 def test_a_file_that_is_not_there_and_a_folder_are_refused(tmp_path: Path):
     with pytest.raises(SurfaceError, match="No such file"):
-        load_surface(tmp_path / "liver.stl", 1e-3)
+        read_surface(tmp_path / "liver.stl", 1e-3)
     (tmp_path / "folder.stl").mkdir()
     with pytest.raises(SurfaceError, match="directory"):
-        load_surface(tmp_path / "folder.stl", 1e-3)
+        read_surface(tmp_path / "folder.stl", 1e-3)

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from pipeline.shapes.files import checked, image, read
-from pipeline.shapes.files.image import load_image
-from pipeline.shapes.files.read import load_surface
+from pipeline.shapes.files.image import read_image
+from pipeline.shapes.files.read import read_surface
 from pipeline.shapes.triangles import SurfaceError
 from tests.organs import ellipsoid, write_stl
 
@@ -22,7 +22,7 @@ def folder(tmp_path, monkeypatch):
 
 def again(path, unit=1e-3, **given):
     read._load.cache_clear()
-    return load_surface(path, unit, **given)
+    return read_surface(path, unit, **given)
 
 
 def refuse(*_):
@@ -31,7 +31,7 @@ def refuse(*_):
 
 def test_a_surface_is_checked_once(folder, monkeypatch):
     path = write_stl(folder / "body.stl", *ellipsoid(8))
-    first = load_surface(path, 1e-3)
+    first = read_surface(path, 1e-3)
     monkeypatch.setattr(read, "made_whole", refuse)
     second = again(path)
     assert second.triangles.hash == first.triangles.hash and second.notices == first.notices
@@ -45,7 +45,7 @@ def test_a_surface_is_checked_once(folder, monkeypatch):
 
 def test_what_is_cut_short_is_made_again(folder):
     path = write_stl(folder / "body.stl", *ellipsoid(8))
-    first = load_surface(path, 1e-3)
+    first = read_surface(path, 1e-3)
     (kept,) = (folder / "cache" / "surfaces").glob("*.npz")
     whole = kept.read_bytes()
     for content in (b"", whole[:200], whole[: len(whole) // 2]):
@@ -73,7 +73,7 @@ def write_ball(path, radius=9.0):
 
 def image_again(path, label=1, **given):
     image._load.cache_clear()
-    return load_image(path, label, **given)
+    return read_image(path, label, **given)
 
 
 @pytest.mark.parametrize("name", ["ball.nrrd", "ball.nhdr"])
@@ -94,10 +94,10 @@ def test_the_surface_round_a_label_is_made_once(name, folder, monkeypatch):
 def test_the_data_that_a_header_names_count(folder):
     """If only the data file beside a header changes, the surface changes: within one process, and on disk."""
     path = write_ball(folder / "ball.nhdr")
-    header, first = path.read_bytes(), load_image(path, 1).triangles
+    header, first = path.read_bytes(), read_image(path, 1).triangles
     write_ball(path, radius=8.0)
     path.write_bytes(header)  # the library writes the time of day into a comment
-    second = load_image(path, 1).triangles
+    second = read_image(path, 1).triangles
     assert second.volume < 0.8 * first.volume
     assert image_again(path).triangles.hash == second.hash
     (folder / "ball.raw.gz").unlink()

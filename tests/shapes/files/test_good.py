@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.files.loaded import Loaded
-from pipeline.shapes.files.read import load_surface
+from pipeline.shapes.files.read import read_surface
 from tests.shapes.files.solids import Surface, ball, obj, ply, stl, stl_text
 
 BALL = ball()
@@ -61,7 +61,7 @@ WRITTEN: dict[str, Callable[[], bytes]] = {
 
 def _load(folder: Path, name: str, data: bytes) -> Loaded:
     (folder / name).write_bytes(data)
-    return load_surface(folder / name, 1e-3)
+    return read_surface(folder / name, 1e-3)
 
 
 @pytest.mark.parametrize("name", WRITTEN)
@@ -147,8 +147,8 @@ def test_points_without_facets_and_bytes_after_the_last_one_do_no_harm(tmp_path:
 
 def test_a_file_is_read_again_only_when_it_has_changed(tmp_path: Path):
     first = _load(tmp_path, "organ.stl", stl(BALL))
-    assert load_surface(tmp_path / "organ.stl", 1e-3) is first
-    assert load_surface(tmp_path / "organ.stl", 1e-2).triangles.volume == pytest.approx(1e3 * VOLUME, rel=1e-6)
+    assert read_surface(tmp_path / "organ.stl", 1e-3) is first
+    assert read_surface(tmp_path / "organ.stl", 1e-2).triangles.volume == pytest.approx(1e3 * VOLUME, rel=1e-6)
     larger = _load(tmp_path, "organ.stl", stl(ball(2)))
     assert larger.triangles.hash != first.triangles.hash
 

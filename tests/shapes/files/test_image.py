@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.files.crossings import crossings
-from pipeline.shapes.files.image import default_smooth, load_image
+from pipeline.shapes.files.image import default_smooth, read_image
 from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals
 
 AXES = np.array([40.0, 30.0, 20.0])  # mm
@@ -55,7 +55,7 @@ def scan(tmp_path: Path) -> Path:
 def test_the_surface_is_within_a_tenth_of_a_voxel_and_keeps_the_volume(size: float, tmp_path: Path):
     affine = _affine(size)
     path = _nifti(tmp_path / "scan.nii", _ellipsoid(affine, (int(100 / size) + 1,) * 3), affine)
-    triangles = load_image(path, 2).triangles
+    triangles = read_image(path, 2).triangles
     assert np.sqrt((_distances(triangles) ** 2).mean()) < 0.1e-3 * size
     assert triangles.volume == pytest.approx(VOLUME, rel=0.005)
 
@@ -69,13 +69,13 @@ def test_without_the_filter_the_steps_between_voxels_stay(scan: Path):
         cosine = np.einsum("ij,ij->i", normal, exact) / area / np.linalg.norm(exact, axis=1)
         return float(np.degrees(np.sqrt((area * np.arccos(np.clip(cosine, -1, 1)) ** 2).sum() / area.sum())))
 
-    assert normals_off(load_image(scan, 2).triangles) < 4
-    assert normals_off(load_image(scan, 2, smooth=0.0).triangles) > 15
+    assert normals_off(read_image(scan, 2).triangles) < 4
+    assert normals_off(read_image(scan, 2, smooth=0.0).triangles) > 15
 
 
 def test_thick_slices_are_smoothed_over_their_distance(tmp_path: Path):
     affine = _affine((1.0, 1.0, 5.0))
-    triangles = load_image(_nifti(tmp_path / "scan.nii", _ellipsoid(affine, (101, 101, 21)), affine), 2).triangles
+    triangles = read_image(_nifti(tmp_path / "scan.nii", _ellipsoid(affine, (101, 101, 21)), affine), 2).triangles
     assert default_smooth(np.array([1e-3, 1e-3, 5e-3])) == pytest.approx(5e-3)
     assert np.sqrt((_distances(triangles) ** 2).mean()) < 0.12 * 5e-3
     assert triangles.volume == pytest.approx(VOLUME, rel=0.01)
@@ -85,7 +85,7 @@ def test_voxels_may_be_turned_and_mirrored(tmp_path: Path):
     turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0] @ np.diag([2.0, 2.0, -2.0])
     affine = np.eye(4)
     affine[:3, :3], affine[:3, 3] = turn, CENTRE - turn @ (40, 40, 40)
-    triangles = load_image(_nifti(tmp_path / "scan.nii", _ellipsoid(affine, (81, 81, 81)), affine), 2).triangles
+    triangles = read_image(_nifti(tmp_path / "scan.nii", _ellipsoid(affine, (81, 81, 81)), affine), 2).triangles
     assert triangles.volume == pytest.approx(VOLUME, rel=0.005)
     assert abs(_distances(triangles)).max() < 1.2e-3
 
@@ -99,7 +99,7 @@ def test_the_same_place_from_both_formats(scan: Path, tmp_path: Path):
         "space origin": LPS @ affine[:3, 3],
     }
     nrrd.write(str(tmp_path / "scan.nrrd"), values, header)
-    assert load_image(tmp_path / "scan.nrrd", 2).triangles.hash == load_image(scan, 2).triangles.hash
+    assert read_image(tmp_path / "scan.nrrd", 2).triangles.hash == read_image(scan, 2).triangles.hash
 
 
 @pytest.mark.parametrize("smooth", [0.0, 2e-3, None])
@@ -109,7 +109,7 @@ def test_no_facets_cross_however_ragged_the_label_is(smooth: float | None, tmp_p
     random = np.random.Generator(np.random.PCG64(4)).random(values.shape)
     values[random < 0.03] = 0
     values[(np.roll(values, 1, axis=0) > 0) & (random > 0.5)] = 2
-    triangles = load_image(_nifti(tmp_path / "ragged.nii", values, affine), 2, smooth=smooth).triangles
+    triangles = read_image(_nifti(tmp_path / "ragged.nii", values, affine), 2, smooth=smooth).triangles
     assert not len(crossings(triangles.points, triangles.facets))
 
 
@@ -117,17 +117,17 @@ def test_units_of_the_header(tmp_path: Path):
     affine = _affine(2.0)
     values = _ellipsoid(affine, (51, 51, 51))
     metres = affine * np.array([[1e-3]] * 3 + [[1.0]])
-    assert load_image(_nifti(tmp_path / "m.nii", values, metres, "meter"), 2).triangles.volume == pytest.approx(
+    assert read_image(_nifti(tmp_path / "m.nii", values, metres, "meter"), 2).triangles.volume == pytest.approx(
         VOLUME, rel=0.01
     )
     unknown = _nifti(tmp_path / "unknown.nii", values, affine, "unknown")
     with pytest.raises(SurfaceError, match="names no unit"):
-        load_image(unknown, 2)
-    assert load_image(unknown, 2, unit=1e-3).triangles.volume == pytest.approx(VOLUME, rel=0.01)
+        read_image(unknown, 2)
+    assert read_image(unknown, 2, unit=1e-3).triangles.volume == pytest.approx(VOLUME, rel=0.01)
     with pytest.raises(SurfaceError, match="another unit"):
-        load_image(_nifti(tmp_path / "mm.nii", values, affine), 2, unit=1e-2)
+        read_image(_nifti(tmp_path / "mm.nii", values, affine), 2, unit=1e-2)
     with pytest.raises(SurfaceError, match=r"2 mm allowed|across, allowed"):
-        load_image(_nifti(tmp_path / "um.nii", values, affine, "micron"), 2)
+        read_image(_nifti(tmp_path / "um.nii", values, affine, "micron"), 2)
 
 
 def test_crumbs_hollows_and_the_image_s_end_are_told(tmp_path: Path):
@@ -135,11 +135,11 @@ def test_crumbs_hollows_and_the_image_s_end_are_told(tmp_path: Path):
     values = _ellipsoid(affine, (51, 51, 51))
     values[0:2, 0:2, 0:2] = 2
     values[25, 25, 25] = 7
-    loaded = load_image(_nifti(tmp_path / "scan.nii", values, affine), 2)
+    loaded = read_image(_nifti(tmp_path / "scan.nii", values, affine), 2)
     assert any("1 pieces besides" in notice for notice in loaded.notices)
     assert any("1 voxels that it encloses" in notice for notice in loaded.notices)
     assert loaded.triangles.volume == pytest.approx(VOLUME, rel=0.01)
-    half = load_image(_nifti(tmp_path / "half.nii", values[25:], _affine(2.0, (10, -70, 5))), 2)
+    half = read_image(_nifti(tmp_path / "half.nii", values[25:], _affine(2.0, (10, -70, 5))), 2)
     assert any("image's boundary on 1 of 6 sides" in notice for notice in half.notices)
     more = np.pi * AXES[1] * AXES[2] * (CENTRE[0] - 9.0) * 1e-9  # the outermost voxels reach to x = 9 mm
     assert half.triangles.volume == pytest.approx(VOLUME / 2 + more, rel=0.01)
@@ -174,9 +174,9 @@ def test_what_is_no_label_map_is_refused(scan: Path, tmp_path: Path):
         else:
             _nifti(path, content, affine)
         with pytest.raises(SurfaceError, match=words):
-            load_image(path, label)
+            read_image(path, label)
     nrrd.write(str(tmp_path / "nowhere.nrrd"), values, {})
     with pytest.raises(SurfaceError, match="names no unit"):
-        load_image(tmp_path / "nowhere.nrrd", 2)
+        read_image(tmp_path / "nowhere.nrrd", 2)
     with pytest.raises(SurfaceError, match="voxel size is unknown"):
-        load_image(tmp_path / "nowhere.nrrd", 2, unit=1e-3)
+        read_image(tmp_path / "nowhere.nrrd", 2, unit=1e-3)

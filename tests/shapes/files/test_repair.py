@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.shapes.files.read import load_surface
+from pipeline.shapes.files.read import read_surface
 from pipeline.shapes.triangles import SurfaceError
 from tests.shapes.files.broken import Broken, corpus
 from tests.shapes.files.solids import ball, stl
@@ -19,7 +19,7 @@ VOLUME = 4 / 3 * np.pi * 40 * 30 * 20 * 1e-9
 def test_what_can_be_mended_is_and_is_told(broken: Broken, tmp_path: Path):
     path = tmp_path / broken.name
     path.write_bytes(broken.data)
-    loaded = load_surface(path, broken.unit, repair=True)
+    loaded = read_surface(path, broken.unit, repair=True)
     assert loaded.triangles.volume == pytest.approx(VOLUME, rel=0.02)
     assert any(notice.startswith("repaired") for notice in loaded.notices)
 
@@ -29,14 +29,14 @@ def test_what_cannot_is_refused_all_the_same(broken: Broken, tmp_path: Path):
     path = tmp_path / broken.name
     path.write_bytes(broken.data)
     with pytest.raises(SurfaceError):
-        load_surface(path, broken.unit, repair=True)
+        read_surface(path, broken.unit, repair=True)
 
 
 def test_a_good_file_is_left_as_it_is(tmp_path: Path):
     path = tmp_path / "organ.stl"
     path.write_bytes(stl(ball()))
-    loaded = load_surface(path, 1e-3, repair=True)
-    assert loaded.triangles.hash == load_surface(path, 1e-3).triangles.hash
+    loaded = read_surface(path, 1e-3, repair=True)
+    assert loaded.triangles.hash == read_surface(path, 1e-3).triangles.hash
     assert loaded.notices == ()
 
 
@@ -48,21 +48,21 @@ def test_smoothing_takes_noise_off_and_leaves_the_shape(splits: int, tmp_path: P
     path.write_bytes(stl((points, facets)))
 
     def roughness(smooth: float | None) -> float:
-        place = 1e3 * load_surface(path, 1e-3, smooth=smooth).triangles.points / (40, 30, 20)
+        place = 1e3 * read_surface(path, 1e-3, smooth=smooth).triangles.points / (40, 30, 20)
         level = np.linalg.norm(place, axis=1)
         return float(((level - 1) * level / np.linalg.norm(place / (40, 30, 20), axis=1)).std())
 
     assert roughness(2e-3) < 0.5 * roughness(None)
-    loaded = load_surface(path, 1e-3, smooth=2e-3)
-    assert loaded.triangles.volume == pytest.approx(load_surface(path, 1e-3).triangles.volume, rel=2e-3)
+    loaded = read_surface(path, 1e-3, smooth=2e-3)
+    assert loaded.triangles.volume == pytest.approx(read_surface(path, 1e-3).triangles.volume, rel=2e-3)
     assert any(notice.startswith("smoothed: volume") for notice in loaded.notices)
 
 
 def test_smoothing_a_ball_shrinks_it_as_its_filter_says(tmp_path: Path):
     path = tmp_path / "ball.stl"
     path.write_bytes(stl(ball(4, (30.0, 30.0, 30.0))))
-    radius = np.linalg.norm(load_surface(path, 1e-3, smooth=6e-3).triangles.points, axis=1)
-    plain = np.linalg.norm(load_surface(path, 1e-3).triangles.points, axis=1)
+    radius = np.linalg.norm(read_surface(path, 1e-3, smooth=6e-3).triangles.points, axis=1)
+    plain = np.linalg.norm(read_surface(path, 1e-3).triangles.points, axis=1)
     # Coordinates of a ball are waves with k² = 2 / R².
     assert np.allclose(radius / plain, 1 / (1 + 4 * 0.2**4), rtol=1e-3)
 
@@ -71,7 +71,7 @@ def test_too_much_smoothing_is_refused(tmp_path: Path):
     path = tmp_path / "organ.stl"
     path.write_bytes(stl(ball()))
     with pytest.raises(SurfaceError, match="would change the volume"):
-        load_surface(path, 1e-3, smooth=20e-3)
+        read_surface(path, 1e-3, smooth=20e-3)
 
 
 def test_without_meshfix_it_is_said_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -80,6 +80,6 @@ def test_without_meshfix_it_is_said_what_to_install(tmp_path: Path, monkeypatch:
     points, facets = ball()
     path.write_bytes(stl((points, facets[1:])))
     with pytest.raises(SurfaceError, match="pip install pymeshfix"):
-        load_surface(path, 1e-3, repair=True)
+        read_surface(path, 1e-3, repair=True)
     path.write_bytes(stl((points, np.vstack([facets[:1, ::-1], facets[1:]]))))
-    assert "repaired: 1 inverted facets turned" in load_surface(path, 1e-3, repair=True).notices
+    assert "repaired: 1 inverted facets turned" in read_surface(path, 1e-3, repair=True).notices

@@ -19,7 +19,7 @@ MOST, MOST_IN_ALL = 64, 4096
 _NUMBERS = ("thickness", "young", "poisson", "largest", "off", "aligned")
 
 
-def load(path: str | Path) -> Model:
+def read(path: str | Path) -> Model:
     """Return the model at ``path``.
 
     Raises:

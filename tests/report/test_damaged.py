@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 from pipeline.report.dataset import write
-from pipeline.report.read import load
+from pipeline.report.read import read_file
 from pipeline.report.table import DatasetError
 from tests.report.synthetic import FIGURE, dataset
 
@@ -32,13 +32,13 @@ def test_a_bit_that_has_flipped_in_an_array_is_told(file, name):
         changed[at] ^= 1 << int(random.integers(8))
         file.write_bytes(changed)
         with pytest.raises(DatasetError, match=r"known.nc: cannot be read as netCDF: .*damaged.*`epsmesh run` writes"):
-            load(file)
+            read_file(file)
 
 
 def test_what_another_program_has_changed_is_read(file):
     with netCDF4.Dataset(file, "a") as changed:
         changed.note = "looked at"
-    found = load(file)
+    found = read_file(file)
     assert found.attrs["note"] == "looked at"
     xr.testing.assert_equal(found["force"], dataset(**FIGURE)["force"])
 
@@ -46,4 +46,4 @@ def test_what_another_program_has_changed_is_read(file):
 def test_a_file_that_ends_early_is_refused(file):
     file.write_bytes(file.read_bytes()[:9000])
     with pytest.raises(DatasetError, match=r"known.nc: cannot be read as netCDF: .*damaged"):
-        load(file)
+        read_file(file)

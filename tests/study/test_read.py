@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.plan.key import case_key
-from pipeline.study.load import load, load_text, parse
 from pipeline.study.problems import StudyError
+from pipeline.study.read import parse, read_study, read_text
 from pipeline.study.toml import to_toml
 from tests import organs
 from tests.cases import BLADE, raw, study
@@ -233,17 +233,17 @@ def test_syntax_error_has_line_and_column(tmp_path):
     file = tmp_path / "bad.toml"
     file.write_text("[body]\nshape = box\n")
     with pytest.raises(StudyError, match=r"bad.toml: TOML syntax: .*line 2, column 9"):
-        load(file)
+        read_study(file)
 
 
 def test_missing_file():
     with pytest.raises(StudyError, match=r"nowhere\.toml: file: No such file"):
-        load("nowhere.toml")
+        read_study("nowhere.toml")
 
 
 @pytest.mark.parametrize("file", STUDIES, ids=lambda path: path.name)
 def test_every_study_validates(file):
-    assert len(load(file).shape) > 0
+    assert len(read_study(file).shape) > 0
 
 
 def test_doubtful_input_is_a_warning():
@@ -318,10 +318,10 @@ def test_the_text_of_a_study_is_read_as_if_it_lay_in_its_folder(tmp_path):
     organs.write_stl(tmp_path / "box.stl", *organs.box(40e-3, 40e-3, 20e-3))
     body = {"shape": "surface", "file": "box.stl", "unit": "mm", "fixed": {"below": "-16 mm"}}
     text = to_toml(raw(body=body), "study.toml")
-    (case,) = load_text(text, f"{tmp_path}/study.toml").cases()
+    (case,) = read_text(text, f"{tmp_path}/study.toml").cases()
     assert case.body.volume == pytest.approx(32e-6)
     with pytest.raises(StudyError, match=r"box\.stl"):
-        load_text(text, f"{tmp_path}/elsewhere/study.toml")
+        read_text(text, f"{tmp_path}/elsewhere/study.toml")
 
 
 def test_several_materials_beside_layers_are_told_to_be_a_sweep():
