@@ -58,11 +58,11 @@ def _facts(surface: Surface) -> list[str]:
     region = (
         f"places up to {x:.3g} mm from the middle" if model.table.is_round else f"x to ±{x:.3g} mm and y to ±{y:.3g} mm"
     )
-    friction = "but for the bonded disc without friction" if "bonded disc" in _tools(surface) else "without friction"
-    along = "straight down" if model.face.is_flat else "along the normal"
+    friction = "without friction; the bonded disc sticks" if "bonded disc" in _tools(surface) else "without friction"
+    along = "straight down" if model.face.is_flat else "along the surface's normal"
     return [
-        f"Good for {region}, the grey line; tools {friction}, {along}.",
-        "Drag on the face to move the tool, beside it to turn the body; scroll to zoom.",
+        f"Valid within the grey line: {region}. Tools move {along}, {friction}.",
+        "Drag on the body's face to move the tool, beside it to turn the body; scroll to zoom.",
     ]
 
 

@@ -64,6 +64,6 @@ def test_case_that_cannot_be_solved_ends_with_1_and_says_why(view, tmp_path):
 def test_case_that_is_not_there_is_refused(view):
     done = view("epsilon=5 mm", "--export", "vtu")
     assert done.exit_code == 2
-    assert "there are epsilon = 2 mm, 4 mm" in done.output
+    assert "the study has epsilon = 2 mm, 4 mm" in done.output
     assert view("99", "--export", "vtu").exit_code == 2
     assert view("0", "--export", "stl").exit_code == 2

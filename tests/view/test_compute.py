@@ -53,7 +53,7 @@ def test_strain_and_unknowns_are_the_record_s(changes):
 
 
 def test_reflected_quarter_is_the_whole_model():
-    solve = {"tolerance": 1e-10}  # strains are linear in the solver's error
+    solve = {"energy_tolerance": 1e-10}  # strains are linear in the solver's error
     quarter, whole = (fields(mesh={"model": model}, solve=solve) for model in ("auto", "3d"))
     np.testing.assert_array_equal(quarter.points, whole.points)
     np.testing.assert_array_equal(quarter.cells, whole.cells)
