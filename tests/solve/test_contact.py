@@ -190,7 +190,7 @@ def test_a_fixed_column_must_be_wider_than_the_tool_at_the_surface():
         mesh = COARSE | {"outside": "fixed", "rim": "0.2 mm", "model": model}
         (found,) = solve(body=SMALL, probe=SPHERE, mesh=mesh | {"epsilon": "1.413 mm"}, plan={"without": []}).values()
         assert found.status == "ok", found.message
-        with pytest.raises(StudyError, match=r'epsilon = "1.41 mm": .* sphere reaches, 1.411 mm .* must be above'):
+        with pytest.raises(StudyError, match=r'epsilon = "1.41 mm": .* the sphere reaches it; must be above 1.411 mm'):
             study(body=SMALL, probe=SPHERE, mesh=mesh | {"epsilon": "1.41 mm"})
 
 

@@ -105,7 +105,7 @@ def test_plan_tells_why_depths_are_solved_alone():
     assert "depth_range" in reason
     together = make_plan(study(body=SMALL, probe=sphere(DEPTHS), mesh=MESH))
     assert len(together.meshes) == 1
-    assert "condensed for 10 depths" in " ".join(story(together, (3,))["steps"])
+    assert "condensed to the contact surface for 10 depths" in " ".join(story(together, (3,))["steps"])
     timed = make_plan(study(body=SMALL, probe=sphere(DEPTHS), mesh=MESH, solve={"timing": True, "exact": False}))
     assert not timed.struck
     assert len(timed.meshes) == len(DEPTHS)
@@ -126,7 +126,7 @@ def test_keys_of_tools_without_a_range_and_of_the_exact_force_do_not_know_of_it(
         ({"probe": sphere("0.2 mm")}, r"probe\.depth.*is outside depth_range, 0\.04 mm to 0\.12 mm"),
         ({"probe": sphere("0.1 mm") | {"depth_range": ["0.2 mm", "0.1 mm"]}}, "must begin with the smaller depth"),
         ({"mesh": {"accuracy": "1 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))},
-         "is for meshes with sizes of your own"),
+         "needs given element sizes"),
     ],
 )  # fmt: skip
 def test_depths_that_a_mesh_cannot_be_for_are_refused(changes, message):
