@@ -273,9 +273,9 @@ class Probe(Section, ABC):
     def mean_square(self) -> float:
         """Mean square distance (m²) of F from the axis on a half-space, without friction, for the compliance.
 
-        A compliance c + g (s² + s'²)/2 between points at s and s' from the axis adds c + g ``mean_square``. Where
-        contact grows with the depth, this is the mean square of the pressure times 1 + p / 2n, with F of power n in the
-        depth and the radius squared of power p: energies change by F² times the mean square. NaN where unknown.
+        A compliance c + g (s² + s'²)/2 between points at s and s' from the axis adds c + g ``mean_square``. It is
+        NaN where unknown. Where contact grows with the depth, it is the mean square of the pressure times 1 + p / 2n,
+        with F of power n in the depth and the radius squared of power p. Energies change by F² times it.
         """
 
     def realtime_error(self) -> str:

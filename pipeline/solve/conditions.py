@@ -51,8 +51,7 @@ class Conditions:
 
     With ``unilateral`` contact the footprint prescribes nothing: the active set does. The support is fixed. On planes
     of symmetry that bound the mesh the normal displacement is zero. A probe in a slit with that ``front`` touches both
-    faces of the slit; unless it is bonded, it prescribes their opening only, and the force that drives it acts at its
-    ``tip``.
+    faces of the slit. Without bond it prescribes their opening only, and its driving force acts at its ``tip``.
     """
 
     bonded: bool = True

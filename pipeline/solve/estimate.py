@@ -35,8 +35,8 @@ _LIMITS = {
     ("mixed", 3): (0.58, 0.34),
 }
 _LIMITS_SEVERAL = (0.5, 0.35)
-# For mixed elements the spread is at least this many θ (N - |s|), by degree: s may be the difference of two errors of
-# opposite sign, while N contains both.
+# For mixed elements the spread is at least this many θ (N - |s|), by degree. Two errors of opposite sign may cancel in
+# s, while N contains both.
 _APART = {2: 0.3, 3: 0.15}
 _LIMITS_COARSE, _LIMITS_PLAIN = (0.4, 1.0), (0.85, 0.85)
 # Interfaces between materials, curved surfaces and thin plates add errors. The next degree removes another share of

@@ -1,8 +1,8 @@
 """Far field of a tool on a plane face, coupled to a half ball that is cut out around the contact.
 
 Far away a tool acts as a point force, up to terms of order a/r (bonded: it also pulls sideways) or (a/r)². One *unit*
-of the far field belongs to a force of 4πμε newtons a metre, with ε the radius of the half ball, so that it displaces
-the cut face by about a metre. The body beyond the cut has one unknown, the amplitude of the far field, for which the
+of the far field is that of a force of 4πμε newtons a metre, with ε the radius of the half ball. It displaces the cut
+face by about a metre. The body beyond the cut has one unknown, the amplitude of the far field, for which the
 energy is stationary. The force is an upper bound: the neglected energy is of order (a/ε)³ (small, bonded) and (a/ε)⁵.
 
 On a finite body the Green's function is the half-space's field u plus a regular part R, which is smooth at the force

@@ -21,8 +21,8 @@ from pipeline.units import Length
 # Segments of each ellipse in pictures and in the search for the reach, and bisections for the farthest point.
 _ROUND = 200
 _BISECTIONS = 80
-# Angle (rad) by which the poles of the ball, from which the ellipsoid is stretched, are turned about the point of
-# contact: gmsh's surface mesher sometimes fails with poles at the ends of the axes, where curvature is largest.
+# The ellipsoid is a stretched ball: angle (rad) by which the ball's poles are turned about the point of contact. gmsh's
+# surface mesher sometimes fails with poles at the ends of the axes, where curvature is largest.
 _ASIDE = 0.7
 
 
