@@ -4,8 +4,8 @@ from typing import Any
 
 import pipeline
 from pipeline import __version__ as __version__
-from pipeline import load as load
 from pipeline import open as open
+from pipeline import read as read
 
 __all__ = pipeline.__all__
 

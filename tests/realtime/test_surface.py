@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.export.file import write_model
-from pipeline.realtime import ModelError, load
+from pipeline.realtime import ModelError
 from pipeline.realtime.blade import blade
 from pipeline.realtime.contact import Bonded, Disc, ball, cone
 from pipeline.realtime.near import Footprint, boussinesq, on_face
@@ -180,7 +180,7 @@ def test_a_file_holds_the_surface_and_one_without_says_so(tmp_path):
         (touch, one), (_, other) = (s.press(at=AT, depth=1e-4, **asked) for s in (made, read))
         assert touch.status == "ok"
         np.testing.assert_array_equal(one, other)
-    assert load(tmp_path / "model.nc").query("disc", radius=2e-3, at=AT, depth=1e-4).status == "ok"
+    assert read(tmp_path / "model.nc").query("disc", radius=2e-3, at=AT, depth=1e-4).status == "ok"
     write_random(tmp_path / "bare.nc")
     with pytest.raises(ModelError, match="surface"):
         surface_of((tmp_path / "bare.nc").read_bytes())
