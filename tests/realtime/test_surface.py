@@ -175,9 +175,9 @@ def test_no_touch_moves_nothing_and_a_refusal_shows_nothing():
 
 
 def test_a_file_holds_the_surface_and_one_without_says_so(tmp_path):
-    made, read = random_surface(), write_surface(tmp_path / "model.nc")
+    made, again = random_surface(), write_surface(tmp_path / "model.nc")
     for asked in ({"tool": "disc", "radius": 2e-3}, {"tool": "cone", "radius": 2e-3, "angle": 1.0}):
-        (touch, one), (_, other) = (s.press(at=AT, depth=1e-4, **asked) for s in (made, read))
+        (touch, one), (_, other) = (s.press(at=AT, depth=1e-4, **asked) for s in (made, again))
         assert touch.status == "ok"
         np.testing.assert_array_equal(one, other)
     assert read(tmp_path / "model.nc").query("disc", radius=2e-3, at=AT, depth=1e-4).status == "ok"
