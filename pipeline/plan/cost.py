@@ -42,6 +42,8 @@ _MISSED, _MISSED_BY_SEVERAL = 0.08, 0.19
 _LOCKING = -0.35
 # Time of each further movement of the probe, in units of the first.
 _MOVEMENT = 1.0
+# Typical factor of the prior's error, and at large displacements, where the number of load steps is unknown.
+_PRIOR_ERROR, _PRIOR_ERROR_LARGE = 2.0, 4.0
 # Weight of the prior in observations: for the factor, and for both exponents.
 _WEIGHT = (0.5, 5.0, 5.0)
 
@@ -77,7 +79,13 @@ class CostModel:
 
     laws: Mapping[tuple[str, str], _Numbers] = field(default_factory=dict)
     count: int = 0
-    error: float = 2.0
+    error: float = _PRIOR_ERROR
+
+    def error_for(self, solves: Iterable[Solve]) -> float:
+        """Return the typical factor of the error for ``solves``; kinds without stored times have that of the prior."""
+        unknown = [solve for solve in solves if ("solve", features(solve)[0]) not in self.laws]
+        large = any(solve.case.material.is_large for solve in unknown)
+        return max(self.error, *((_PRIOR_ERROR_LARGE if large else _PRIOR_ERROR,) if unknown else ()), 1.0)
 
     def seconds(self, stage: str, kind: str, cells: float, poisson: float) -> float:
         """Return the seconds on one rank of a stage."""

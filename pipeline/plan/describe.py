@@ -57,7 +57,7 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
         "memory": max((step["memory"] for step in steps), default=0.0),
         "ranks": ranks,
         "fitted_to": plan.cost.count,
-        "factor": plan.cost.error,
+        "factor": plan.cost.error_for(plan.solves),
         "steps": steps,
     }
 

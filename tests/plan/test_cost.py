@@ -12,6 +12,7 @@ from pipeline.plan.plan import declare, first_attempts
 from pipeline.plan.steps import OperatorStep
 from pipeline.run.record import Record
 from pipeline.run.store import Store
+from pipeline.study.load import load_text
 from tests.cases import study
 from tests.commands import epsmesh
 
@@ -101,3 +102,15 @@ def test_meshes_that_may_have_to_follow_are_counted():
 def test_large_displacements_are_expected_to_take_many_solves():
     linear, large = (CostModel().seconds("solve", f"{kind} 2", 1e4, 0.4) for kind in ("displacement", "neo-hookean"))
     assert 20 < large / linear < 80  # 27 to 60 of them, as measured; more at a third of the radius
+
+
+def test_the_error_of_an_estimate_is_that_of_the_prior_for_work_of_another_kind():
+    fitted = fit(observed(noise=0.05))
+    linear, large = (declare(_study_of(law)).solves[0] for law in ("linear", "neo-hookean"))
+    assert fitted.error_for([linear]) == fitted.error < 1.2
+    assert fitted.error_for([linear, large]) == 4.0
+    assert CostModel().error_for([linear]) == 2.0
+
+
+def _study_of(law: str):
+    return load_text(STUDY.replace("poisson = [0.25, 0.35]", f'poisson = 0.3, law = "{law}"'), "next.toml")
