@@ -20,6 +20,17 @@ def test_a_file_of_that_name_comes_first(epsmesh, tmp_path, monkeypatch):
     assert epsmesh("plan", "--check", "mine").exit_code == 2
 
 
+@pytest.mark.parametrize("word", ["mine", "studies/mine.toml"])
+def test_the_model_of_a_study_is_found_by_the_study(epsmesh, tmp_path, monkeypatch, word):
+    monkeypatch.chdir(tmp_path)
+    assert epsmesh("new", "mine").exit_code == 0
+    without = epsmesh("touch", word)
+    assert "`epsmesh export studies/mine.toml` makes one" in without.stderr
+    (tmp_path / "results").mkdir(exist_ok=True)
+    (tmp_path / "results" / "mine.epsm.nc").write_bytes(b"cut short")
+    assert epsmesh("touch", word).stderr.startswith("results/mine.epsm.nc: ")
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
