@@ -6,6 +6,8 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 from tests.commands import ENVIRONMENT, ROOT, epsmesh
 
 # The command, which says when what answers Ctrl-C is in place: as it begins to load the rest.
@@ -78,17 +80,34 @@ main()
 """
 
 
-def test_a_library_that_is_missing_is_named_with_what_installs_it(small, tmp_path):
-    words = ["run", str(small), "--output", str(tmp_path / "results")]
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT, "gmsh", *words],
+def without(library, *words, **environment):
+    return subprocess.run(
+        [sys.executable, "-c", WITHOUT, library, *map(str, words)],
         cwd=ROOT,
-        env=ENVIRONMENT | {"PYTHONPATH": str(ROOT)},
+        env=ENVIRONMENT | {"PYTHONPATH": str(ROOT)} | environment,
         capture_output=True,
         text=True,
         check=False,
     )
+
+
+@pytest.mark.parametrize(
+    ("library", "words", "remedy"),
+    [
+        ("gmsh", ("run", "STUDY"), "environment.yml"),
+        ("pydantic", ("plan", "STUDY"), "`pip install '.'`"),
+        ("nibabel", ("plan", "docs/scenes/image.toml"), "`pip install '.[organs]'`"),
+    ],
+)
+def test_a_library_that_is_missing_is_named_with_what_installs_it(small, tmp_path, library, words, remedy):
+    words = [small if word == "STUDY" else word for word in words]
+    done = without(library, *words, "--output", tmp_path / "results", EPSMESH_CACHE=str(tmp_path / "cache"))
     assert done.returncode == 2, done.stderr
-    assert "the Python library gmsh is missing" in done.stderr
-    assert "make setup" in done.stderr and "environment.yml" in done.stderr
+    assert f"the Python library {library} is missing" in done.stderr
+    assert "make setup" in done.stderr and remedy in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_missing_library_is_data_for_a_script(small, tmp_path):
+    done = without("gmsh", "run", small, "--json", "--output", tmp_path / "results")
+    assert (done.returncode, json.loads(done.stdout)["status"]) == (2, 2)
