@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.export.file import write_model
-from pipeline.realtime import ModelError
+from pipeline.realtime import ModelError, read
 from pipeline.realtime.blade import blade
 from pipeline.realtime.contact import Bonded, Disc, ball, cone
 from pipeline.realtime.near import Footprint, boussinesq, on_face
