@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pipeline.study.load import load_text
 
 import pipeline
 from pipeline.plan.cost import CostModel, Observation, fit
@@ -12,7 +13,6 @@ from pipeline.plan.plan import declare, first_attempts
 from pipeline.plan.steps import OperatorStep
 from pipeline.run.record import Record
 from pipeline.run.store import Store
-from pipeline.study.load import load_text
 from tests.cases import study
 from tests.commands import epsmesh
 
