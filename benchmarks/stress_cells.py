@@ -258,7 +258,7 @@ def _naive() -> Iterator[_Corner]:
         yield f"rim = 4 a, mixed, nu {nu:g}", study(nu, sizes=mesh(8, 1.5)), "right"
     for nu in (0.2501, 0.2500001):
         yield f"mixed, nu {nu:.8g}", study(nu, sizes=mesh(element="mixed")), "right"
-    yield "tolerance 1e-3", study(0.3, method="iterative", tolerance=1e-3), "either"
-    yield "tolerance 1e-3, nu 0.5", study(0.5, method="iterative", tolerance=1e-3), "either"
-    yield "tolerance 1e-14", study(0.44, method="iterative", tolerance=1e-14), "either"
-    yield "tolerance 1e-14, nu 0.5", study(0.5, method="iterative", tolerance=1e-14), "either"
+    yield "tolerance 1e-3", study(0.3, method="iterative", energy_tolerance=1e-3), "either"
+    yield "tolerance 1e-3, nu 0.5", study(0.5, method="iterative", energy_tolerance=1e-3), "either"
+    yield "tolerance 1e-14", study(0.44, method="iterative", energy_tolerance=1e-14), "either"
+    yield "tolerance 1e-14, nu 0.5", study(0.5, method="iterative", energy_tolerance=1e-14), "either"

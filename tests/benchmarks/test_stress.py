@@ -100,7 +100,7 @@ def test_json_and_table_hold_every_result():
 
 
 def test_unknown_rows_are_refused():
-    with pytest.raises(ValueError, match="there are: Poisson's ratio"):
+    with pytest.raises(ValueError, match="rows are: Poisson's ratio"):
         next(run(MPI.COMM_SELF, ["nonsense"]))
 
 

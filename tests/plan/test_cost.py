@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipeline.study.load import load_text
 
 import pipeline
 from pipeline.plan.cost import CostModel, Observation, fit
@@ -13,6 +12,7 @@ from pipeline.plan.plan import declare, first_attempts
 from pipeline.plan.steps import OperatorStep
 from pipeline.run.record import Record
 from pipeline.run.store import Store
+from pipeline.study.read import read_text
 from tests.cases import study
 from tests.commands import epsmesh
 
@@ -113,4 +113,4 @@ def test_the_error_of_an_estimate_is_that_of_the_prior_for_work_of_another_kind(
 
 
 def _study_of(law: str):
-    return load_text(STUDY.replace("poisson = [0.25, 0.35]", f'poisson = 0.3, law = "{law}"'), "next.toml")
+    return read_text(STUDY.replace("poisson = [0.25, 0.35]", f'poisson = 0.3, law = "{law}"'), "next.toml")

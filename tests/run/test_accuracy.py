@@ -73,7 +73,7 @@ def test_what_is_known_of_an_accuracy_that_is_missed_is_how_far():
     plan, records = run(mesh=mesh, probe={"motion": "all"}, material={"young": ["1 kPa", "10 kPa"]})
     data = build(plan, records)
     assert (data["status"] == "failed").all()
-    assert "accuracy 0.001 missed" in str(data["message"].values[0])
+    assert "exceeds the accuracy 0.1 %" in str(data["message"].values[0])
     assert (data["force_error"] > 0).all()
     assert float(data["force_error"][1] / data["force_error"][0]) == pytest.approx(10, rel=1e-9)
     assert np.isnan(data["force"]).all()

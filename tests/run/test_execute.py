@@ -167,7 +167,7 @@ def test_wrong_solution_is_a_failed_case():
     """A solver told to stop early returns a solution; the balance of forces gives it away."""
     plan = make_plan(study(solve={"method": "iterative"}))
     (solve_,) = plan.solves
-    loose = replace(solve_.case, solve=solve_.case.solve.model_copy(update={"tolerance": 1e-3}))
+    loose = replace(solve_.case, solve=solve_.case.solve.model_copy(update={"energy_tolerance": 1e-3}))
     (record,) = compute(replace(plan, solves=(replace(solve_, case=loose),)), WORLD).values()
     assert record.status == "failed"
     assert "do not balance" in record.message

@@ -115,7 +115,7 @@ def test_symmetric_part_gives_the_force_of_the_whole(planes, changes):
     """Half or quarter of the body, and the whole made by reflection, have the same discrete solution."""
     mesh = changes.pop("mesh", {})
     # Force across the probe's axis is linear in the solver's error.
-    precise = {"solve": {"tolerance": 1e-10}}
+    precise = {"solve": {"energy_tolerance": 1e-10}}
     part, whole = (next(iter(solve(mesh=mesh | m, **precise, **changes).values())) for m in ({}, {"model": "3d"}))
     assert part.origin == ("symmetric" if planes else "solved")
     assert whole.origin == "solved"
