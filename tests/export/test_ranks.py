@@ -56,7 +56,7 @@ def test_what_fails_on_one_rank_is_raised_on_all(share):
 
 @several
 def test_ranks_that_ask_for_different_work_are_told_so():
-    with pytest.raises(RuntimeError, match="do not agree"):
+    with pytest.raises(RuntimeError, match="disagree on the number"):
         squares("together", 3 + WORLD.comm.rank)
 
 
