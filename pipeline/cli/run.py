@@ -119,7 +119,7 @@ def run(
             fail(fault, status=status, on_all_ranks=True)
         if speaks:
             seconds = time.monotonic() - start
-            _conclude(plan, opened, outcome, seconds, part, quiet=quiet or as_json)
+            _conclude(plan, opened, outcome, seconds, part, quiet=as_json)
             found.append(_as_data(plan, opened, outcome, seconds))
         failed = failed or outcome.counts["failed"] > 0
         if outcome.interrupted:

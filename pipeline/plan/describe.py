@@ -4,6 +4,8 @@ import heapq
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from pipeline.plan.cost import speed_up
 from pipeline.plan.estimate import on_ranks
 from pipeline.plan.plan import Plan
@@ -11,6 +13,7 @@ from pipeline.plan.proportional_depths import depth_key
 from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.printable import counted
+from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import in_mm
 from pipeline.study.capabilities import obstacle
 from pipeline.study.sweep import Case
@@ -63,7 +66,23 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
 
 
 def _notes(plan: Plan) -> list[str]:
-    """Return notes on large displacements: the largest depth to expect, and the number of cases beyond it."""
+    """Return notes on the place of a body from a file, and on the depths that large displacements reach."""
+    return [*_of_place(plan.study.case((0,) * len(plan.study.axes))), *_of_large_displacements(plan)]
+
+
+def _of_place(case: Case) -> list[str]:
+    """Return the extent of a body from a file, and the point and direction of contact of its first case."""
+    if not isinstance(case.body, Scanned) or case.lost_contact:
+        return []
+    ends = zip("xyz", *case.body.triangles.bounds, strict=True)
+    extent = ", ".join(f"{name} from {in_mm(low)} to {in_mm(high)}" for name, low, high in ends)
+    point, axis = np.multiply(1e3, case.frame.point).round(2), np.round(case.frame.axis, 3)
+    place, way = (f"({', '.join(f'{c:g}' for c in vector)})" for vector in (point, axis))
+    return [f"Body: {extent}. The first case touches it at {place} mm and advances along {way}."]
+
+
+def _of_large_displacements(plan: Plan) -> list[str]:
+    """Return the largest depth to expect with large displacements, and the number of cases beyond it."""
     large = [solve.case for solve in plan.solves if solve.case.material.is_large]
     if not large:
         return []

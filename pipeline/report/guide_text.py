@@ -48,8 +48,14 @@ def answer(guide: Guideline) -> str:
     allowed = " and ".join([percent(guide.accuracy), *([time(guide.budget)] if isfinite(guide.budget) else [])])
     return (
         f"{_named(guide, chosen)} is {smallest} that suffices: F is within {percent(chosen.error)} of F_exact"
-        f"{_all(guide.scenes)}, error bars included ({allowed} allowed)."
+        f"{_all(guide.scenes)}, error bars included ({allowed} allowed).{_untried(guide, chosen)}"
     )
+
+
+def _untried(guide: Guideline, chosen: Verdict) -> str:
+    """Say that the answer is the smallest ε of the study: a smaller one may suffice as well."""
+    tried = [v.labels["epsilon"] for v in guide.verdicts if "epsilon" in v.labels]
+    return " No smaller ε was tried." if len(set(tried)) > 1 and chosen.labels["epsilon"] == min(tried) else ""
 
 
 def _no_answer(guide: Guideline) -> str:
@@ -80,7 +86,8 @@ def details(guide: Guideline) -> list[tuple[str, str]]:
     if verdict is None:
         return []
     where = f", at {choices(guide.coordinates, verdict.limit)}" if verdict.limit else ""
-    bars = (f" ± {percent(bar)}" if isfinite(bar) else "" for bar in (verdict.force_bar, verdict.exact_bar))
+    own = verdict.exact / verdict.force  # from a share of F_exact to one of F
+    bars = (f" ± {percent(own * bar)}" if isfinite(bar) else "" for bar in (verdict.force_bar, verdict.exact_bar))
     force, exact = (f"{newton(f)}{bar}" for f, bar in zip((verdict.force, verdict.exact), bars, strict=True))
     return [
         ("Worst case", f"F = {force}, F_exact = {exact}{where}"),

@@ -77,7 +77,7 @@ def arrange(dataset: xr.Dataset) -> Table:
     """
     if "force_exact" not in dataset or not bool(np.isfinite(dataset["force_exact"]).any()):
         raise DatasetError(
-            "the dataset holds no F_exact, which errors are measured against: "
+            "the dataset holds no F_exact, against which a guide compares each mesh: "
             "run its study with `exact = true` in [solve]"
         )
     dims = [str(dim) for dim in dataset["force"].dims]

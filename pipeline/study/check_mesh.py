@@ -29,6 +29,12 @@ def check_sizes(mesh: Mesh, problems: Problems) -> None:
         problems.error("mesh.fine", in_mm(mesh.fine), f"must be at most coarse = {in_mm(mesh.coarse)}")
     if mesh.rim is not None and mesh.rim > mesh.fine:
         problems.error("mesh.rim", in_mm(mesh.rim), f"must be at most fine = {in_mm(mesh.fine)}")
+    if isfinite(mesh.fine) and mesh.epsilon < mesh.fine:
+        problems.warn(
+            "mesh.epsilon",
+            in_mm(mesh.epsilon),
+            f"is smaller than one element inside it, fine = {in_mm(mesh.fine)}: meshes of such ε hardly differ",
+        )
 
 
 def check_chosen(meshes: Sequence[Mesh], problems: Problems) -> None:

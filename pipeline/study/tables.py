@@ -17,7 +17,7 @@ from pipeline.study.schema import NESTED, SECTIONS, SINGLE
 from pipeline.study.sweep import Axis
 from pipeline.study.swept import Place, axis_of, placed, sweeps, written
 from pipeline.study.text import check_text
-from pipeline.study.vocabulary import NOT_COMPUTED
+from pipeline.study.vocabulary import NOT_COMPUTED, OTHER_NAMES
 
 # Limits of a list and of a study. Each case costs a few hundred bytes and a tenth of a millisecond.
 _MOST_VALUES = 10_000
@@ -210,8 +210,8 @@ def _lacking(name: str, model: type[Section], shape: str, key: str) -> str:
     models = SECTIONS[name]
     if new := renamed(name, key):
         return new
-    if key in NOT_COMPUTED:
-        return NOT_COMPUTED[key]
+    if key in (told := NOT_COMPUTED | OTHER_NAMES):
+        return told[key]
     if not isinstance(models, Mapping):
         return f"unknown key; {nearest(key, model.model_fields)}"
     article = "an" if shape[0] in "aeiou" else "a"

@@ -16,6 +16,14 @@ REDUCTIONS = (
     "all",
 )
 
+# Other names of a key, which no similarity of letters finds.
+OTHER_NAMES = {
+    "diameter": "unknown key; give `radius`, half of the diameter",
+    "E": "unknown key; Young's modulus is `young`",
+    "nu": "unknown key; Poisson's ratio is `poisson`",
+    "rho": "unknown key; the density is `density`",
+}
+
 # Keys of features that are not computed. A message says so, instead of suggesting a similar key.
 NOT_COMPUTED = {
     "friction": 'friction is not computed: tissue sticks to the tool (contact = "bonded") or slides ("frictionless")',

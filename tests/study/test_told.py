@@ -67,12 +67,19 @@ def test_errors_and_warnings_name_the_table():
     assert re.search(r'my\.toml: probe\[2\]\.at = .*\(probe "long"\)', error)
     (warning,) = parse(raw() | {"probe": needles(depth="1 mm")}).warnings
     assert re.search(r'probe\[2\]\.depth = "1 mm": is 33% .*\(probe "long"\)$', warning)
-    (warning,) = parse(raw(mesh={"epsilon": ["4 mm", "full"]}) | {"probe": needles(radius="5 mm")}).warnings
+    mesh = {"epsilon": ["4 mm", "full"], "fine": "3 mm"}
+    (warning,) = parse(raw(mesh=mesh) | {"probe": needles(radius="5 mm")}).warnings
     assert re.search(r'mesh\.epsilon = "4 mm": is less than the tool\'s radius 5 mm.*\(probe "long"\)$', warning)
 
 
+def test_an_epsilon_below_an_element_is_told():
+    """Meshes of two such ε are the same: the sweep would show a curve that is flat for no reason of the tissue."""
+    (warning,) = parse(raw(mesh={"epsilon": ["4 mm", "full"], "fine": "5 mm"})).warnings
+    assert "smaller than one element inside it, fine = 5 mm" in warning
+
+
 def test_a_warning_of_all_tables_names_none_and_stands_once():
-    content = raw(mesh={"epsilon": ["2.9 mm", "full"]}) | {"probe": needles()}
+    content = raw(mesh={"epsilon": ["2.9 mm", "full"], "fine": "2 mm"}) | {"probe": needles()}
     (warning,) = parse(content).warnings
     assert "tool's radius 3 mm" in warning
     assert "(probe" not in warning
@@ -137,3 +144,13 @@ def test_an_old_name_is_answered_with_the_new_one(section, old, value):
     with pytest.raises(StudyError, match=f"`{section}.{old}` is now `{new}`.*--from"):
         parse(raw(**{section: {old: value}}))
     parse(raw(**{section: {new.split(".")[1]: value}}))
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "words"),
+    [("probe", "diameter", "`radius`, half"), ("material", "E", "`young`"), ("material", "nu", "`poisson`")],
+)
+def test_another_name_of_a_key_is_answered_with_the_key(section, key, words):
+    content = raw()
+    content[section] |= {key: "3 mm"}
+    assert re.search(rf"{section}\.{key} = .*{re.escape(words)}", str(told(content)))

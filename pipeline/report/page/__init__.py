@@ -56,8 +56,8 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
     study = str(dataset.attrs.get("study", ""))
     guide = guide_if_any(dataset)
     table = case_table(dataset)
+    varying = {column.name for column in table.columns if column.varies}
     plotly = joined(_VENDOR / "plotly-basic.min.js")
-    names = [column.name for column in table.columns]
     return render_page(
         _TEMPLATES / "page.html.j2",
         f"{_data_tables()}\n{joined(_TEMPLATES / 'page.js')}",
@@ -77,7 +77,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         answer=guide.sentence if guide else summary(dataset),
         table=table,
         many_cases=counted(len(table.order), "case"),
-        main=next((name for name in _MAIN if name in names), "force"),
+        main=next((name for name in _MAIN if name in varying), "force"),
         first_rows=FIRST_ROWS,
         struck=struck(dataset),
         origins=origins(dataset),

@@ -63,6 +63,11 @@ class Column:
     is_axis: bool = False
     axis: str = ""
 
+    @property
+    def varies(self) -> bool:
+        """Whether its numbers differ."""
+        return len({value for value in self.values if value is not None}) > 1
+
     def text(self, row: int) -> str:
         """Return what stands in a row."""
         value = self.values[row]
