@@ -39,6 +39,10 @@ _VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
 )
 
 
+# Variables without the attribute `units` that are not text.
+_WITHOUT_UNIT = {"status": "flag", "stiffness": "several", "stiffness_error": "several"}
+
+
 def write_reference(folder: Path) -> None:
     """Write the pages of the reference into ``folder``, where they differ from what is there."""
     folder.mkdir(exist_ok=True)
@@ -93,13 +97,13 @@ def features_page() -> str:
     """Return the page of what does not go together in one study, and of what is computed the long way."""
     lines = [
         "# What goes together", "",
-        "Features that exclude each other. A study that has both is an error; the message has the key and the reason "
-        "of this table. All other pairs are computed.", "",
-        *_table(("feature", "with", "key of the message", "reason, and what to write instead")),
+        "Features that exclude each other. A study with both is an error; the message has key and reason. All other "
+        "pairs are computed. `free` and `fixed` mesh a column of radius ε, `halfspace` and `green` a half ball.", "",
+        *_table(("feature", "with", "key", "reason, and what to write instead")),
     ]  # fmt: skip
     lines += [_row(r.first, r.second, f"`{FEATURES[r.first].key}`", _escaped(r.reason)) for r in REFUSALS]
-    lines += ["", "Features that exclude a shorter way of computing, or a real-time model:", ""]
-    lines += _table(("way", "not with", "reason"))
+    lines += ["", "Features that exclude a faster method, or a real-time model:", ""]
+    lines += _table(("method", "not with", "reason"))
     lines += [
         _row(way, feature, _escaped(reason)) for way, found in OBSTACLES.items() for feature, reason in found.items()
     ]
@@ -122,31 +126,31 @@ def dataset_page() -> str:
         "each case cost and how its force was obtained. `pipeline.open` reads both as one dataset, with `status` in "
         "words.",
         "",
-        "Dimensions are what the study sweeps, in the file's order, with coordinates named like the keys of the file. "
-        "A variable has only those that it depends on. An array of tables gives the dimension `body`, `material`, "
-        "`probe` or `mesh`; a radius or shape is `probe_radius`, `body_radius`; a key of a layer or an inclusion has "
-        "its name before it, `skin_young`. A path gives the dimension `path`, a raster `x` and `y`: lengths in m, and "
-        "`at_x`, `at_y` and `at_z` are then coordinates.",
+        "Dimensions are the swept keys, in the file's order. Coordinates are named like the keys. "
+        "A variable has only the dimensions that it depends on. An array of tables gives the dimension `body`, "
+        "`material`, `probe` or `mesh`; a radius or shape is `probe_radius`, `body_radius`; a key of a layer or an "
+        "inclusion begins with its name: `skin_young`. A path gives the dimension `path`, a raster `x` and `y`: lengths in m, "
+        "and `at_x`, `at_y` and `at_z` are then coordinates.",
         "",
-        "`epsilon` is infinite for the full order. `dataset.epsmesh.finite_epsilon()` leaves it out, for `interp` and "
+        "`epsilon` is infinite for the full order. `dataset.epsmesh.finite_epsilon()` omits it, for `interp` and "
         "maps over ε.",
         "",
-        "Error bars are absolute, in the unit of their value, which names its error bar in `ancillary_variables`. "
+        "Error bars are absolute, in the unit of their value. The value names its bar in `ancillary_variables`. "
         '`dataset.epsmesh.relative("force_error")` returns one as a share.',
         "",
-        'Variables of loads, slits, found contact, `motion = "all"`, several laws, a surface of triangles or a '
+        'Variables of loads, slits, unilateral contact, `motion = "all"`, several laws, a surface of triangles or a '
         "repaired file exist only where the study has these.",
     ]
     groups = {"Results": sorted(found.keys() - {*RUN}), "Group `run`": [name for name in RUN if name in found]}
     for title, names in groups.items():
         lines += ["", f"## {title}", "", *_table(("variable", "unit", "meaning"))]
         for name in names:
-            unit = found[name].get("units", "flag" if name == "status" else "text")
+            unit = found[name].get("units", _WITHOUT_UNIT.get(name, "text"))
             lines.append(_row(f"`{name}`", "" if unit == "1" else unit, found[name].get("long_name", "")))
     lines += [
         "",
         "Values are missing (NaN; -1 for counts) where a case failed, was skipped or has not been run. Where a "
-        "path has left the body, `status` is `lost` and `force` 0.",
+        "path is off the body, `status` is `lost` and `force` 0.",
         "",
         "Attributes of the dataset: the study's text (`study`) and its hash, versions of the program and its "
         "libraries, git commit, host, ranks, start and end.",
@@ -160,10 +164,10 @@ def commands_page() -> str:
     lines = [
         "# Commands",
         "",
-        "`epsmesh COMMAND --help` says the same. `python -m pipeline` is the command, too.",
+        "`epsmesh COMMAND --help` prints the same. `python -m pipeline` is the same command.",
         "",
         "Exit status: 0 done, 1 some cases failed, 2 the input is wrong, 130 interrupted. "
-        "Errors and progress go to standard error. Colour is for terminals; `NO_COLOR=1` does without.",
+        "Errors and progress go to standard error. `NO_COLOR=1` switches colours off.",
     ]
     for name, command in root.commands.items():
         lines += ["", f"## `epsmesh {name}`", "", *_help(command.help or "")]

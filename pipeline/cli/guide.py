@@ -14,10 +14,10 @@ _HOWTO = "docs/guideline.md"
 
 def guide(
     file: Dataset,
-    accuracy: Annotated[str | None, typer.Option(help='How near F must be to F_exact: "5%".')] = None,
-    budget: Annotated[str | None, typer.Option(help='How long a case may take: "10ms".')] = None,
+    accuracy: Annotated[str | None, typer.Option(help='Largest relative distance of F from F_exact: "5%".')] = None,
+    budget: Annotated[str | None, typer.Option(help='Longest run time of a case: "10ms".')] = None,
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Add corrections of F, every value of outside, and what is missing.")
+        bool, typer.Option("--verbose", "-v", help="Also corrections of F, all values of outside, and missing cases.")
     ] = False,
     output: Found = DEFAULT_OUTPUT,
     as_json: Json = False,

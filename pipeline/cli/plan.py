@@ -46,28 +46,27 @@ def plan(
         list[str] | None,
         typer.Argument(
             metavar="[CASE]",
-            help='Of one case alone: "poisson=0.3, epsilon=10 mm", or its number. With --check: more study files.',
+            help='One case only: "poisson=0.3, epsilon=10 mm", or its number. With --check: more study files.',
             show_default=False,
         ),
     ] = None,
-    check: Annotated[bool, typer.Option("--check", help="Say what is wrong with study files, and no more.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="Only list the errors of study files.")] = False,
     output: Output = DEFAULT_OUTPUT,
     store: StoreFile = None,
     without: Without = None,
-    ranks: Annotated[int, typer.Option(metavar="N", help="Ranks that the run will have.", min=1)] = 1,
+    ranks: Annotated[int, typer.Option(metavar="N", help="Ranks of the run.", min=1)] = 1,
     memory: Annotated[
         float | None,
-        typer.Option(metavar="GB", help="Memory that the run will have; else what is free here, now.", min=0.1),
+        typer.Option(metavar="GB", help="Memory of the run [default: what is free now].", min=0.1),
     ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> None:
-    """Check a study, and show what it needs done, and what is struck out.
+    """Check a study, and show the work to do, the work skipped, and the reasons.
 
-    With the reasons, and an estimate of time and memory. Ends with 1 if no case would fit into memory, and with 2 if
-    the study is wrong: everything that is wrong with it is told at once. Of one case: its steps, where its force is
-    from, what it shares with others, and what a change would cost.
+    It estimates time and memory. For one case it shows the steps, the source of its force, what it shares with other
+    cases, and the cost of changes. Exit status 1: no case fits into memory; 2: the study has errors; all are listed.
 
     Example: epsmesh plan studies/figure3.toml
 
@@ -164,7 +163,7 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool) 
         print(f"  {struck['name']:13} {struck['count']:6}  {struck['reason']}")
     if (unasked := found["exact_unasked"])["scenes"]:
         more = format_seconds(unasked["seconds"])
-        print(f"  {'exact':13} {unasked['scenes']:6}  F_exact is not asked for: `exact = true` would add {more}.")
+        print(f"  {'exact':13} {unasked['scenes']:6}  F_exact is not computed: `exact = true` would add {more}.")
     for note in found["notes"]:
         print(f"  {note}")
     print(f"  to do: {to_do}")

@@ -37,20 +37,20 @@ def report(
     scene: Annotated[
         str | None,
         typer.Option(
-            help='A case to turn round on the page, "poisson=0.3, epsilon=10 mm", its number, "answer", that of the '
-            'report, or "none": meshed, not solved. Default: the answer\'s, where that takes seconds.',
+            help='Case in the 3D scene, meshed and not solved: "poisson=0.3, epsilon=10 mm", its number, "answer" (of '
+            'the report), or "none". Default: that of the answer, if it takes seconds.',
             show_default=False,
         ),
     ] = None,
     figures: Annotated[
         bool,
-        typer.Option("--figures", help="Draw figures alone, as PNG and SVG: <study>.png, others <study>_<kind>.png."),
+        typer.Option("--figures", help="Draw only figures, as PNG and SVG: <study>.png, others <study>_<kind>.png."),
     ] = False,
     kind: Annotated[
         list[str] | None,
         typer.Option(
-            help="With --figures: one to draw; may be repeated: ratio, error, force, map, compliance. "
-            "Default: all that suit.",
+            help="With --figures: kind of figure; may be repeated: ratio, error, force, map, compliance. "
+            "Default: all that suit the study.",
             show_default=False,
         ),
     ] = None,
@@ -58,15 +58,15 @@ def report(
         bool,
         typer.Option(
             "--rest",
-            help="With --figures: what a figure of a large study leaves out, too: <study>_<kind>_2.png …",
+            help="With --figures: also draw the scenes that figures of a large study leave out: <study>_<kind>_2.png …",
         ),
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Write the report of a dataset, one HTML page that needs nothing else, beside it: <study>.html.
+    """Write the report of a dataset beside it: one HTML page, <study>.html.
 
-    It holds the figures, a table of the cases to sort and filter, what failed or was skipped and why, the study file,
-    and how to run it again. With --figures those are drawn instead, as files.
+    It has the figures, a table of cases to sort and filter, failed and skipped cases with reasons, the study file, and
+    the command to run it again. With --figures, the figures are drawn as files instead.
 
     Example: epsmesh report results/figure3.nc
 

@@ -58,7 +58,7 @@ def status(
     ] = False,
     days: Annotated[
         float | None,
-        typer.Option(metavar="DAYS", help="With --prune: records at least so many days old.", min=0),
+        typer.Option(metavar="DAYS", help="With --prune: records of at least this age, in days.", min=0),
     ] = None,
     failed: Annotated[bool, typer.Option("--failed", help="With --prune: failed cases.")] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="With --prune: remove them.")] = False,

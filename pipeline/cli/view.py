@@ -24,9 +24,9 @@ def view(
     mesh_only: Annotated[bool, typer.Option("--mesh-only", help="Mesh, but do not solve.")] = False,
     export: Annotated[
         Literal["html", "vtu", "xdmf"] | None,
-        typer.Option(help="Write the page, or a file for ParaView, and no pictures."),
+        typer.Option(help="Write the page or a file for ParaView, without pictures."),
     ] = None,
-    meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = DEFAULT_MESHES,
+    meshes: Annotated[Path, typer.Option(help="Folder of the mesh cache.")] = DEFAULT_MESHES,
     as_json: Json = False,
 ) -> None:
     """Draw the mesh of one case, cut open, and the deformed body.

@@ -287,7 +287,7 @@ def _is_small(step: MeshStep) -> bool:
 
 def _asks_for_accuracy_or_truncation(plan: Plan) -> bool:
     """Return whether a study varies scenes and truncation only: no element sizes, no elements, no ε of a whole body."""
-    if any(obstacle("meridian of a comparison", solve.case) for solve in plan.solves):
+    if any(obstacle("meridian, in a comparison", solve.case) for solve in plan.solves):
         return False
     swept = {axis.key for axis in plan.study.axes if axis.section == "mesh"}
     if swept - {"epsilon", "outside", "accuracy"}:

@@ -104,13 +104,13 @@ FEATURES: dict[str, Feature] = {
     "layers": Feature("body.layer", lambda s: isinstance(s.body, Layered) and bool(s.body.layer)),
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
     "curved body": Feature("body.shape", lambda s: not isinstance(s.body, Layered)),
-    "large strains": Feature("material.law", lambda s: s.material.is_large),
+    "large displacements": Feature("material.law", lambda s: s.material.is_large),
     "ν < 0.2 or > 0.45": Feature(
         "material.poisson", lambda s: not s.material.OF_LARGE[0] <= s.material.poisson <= s.material.OF_LARGE[1]
     ),
     "ν > 0.49": Feature("material.poisson", lambda s: s.material.poisson > MOST_OF_GREEN),
     "tool that is not flat": Feature("probe.shape", lambda s: isinstance(s.probe, Indenter)),
-    "found contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
+    "unilateral contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
     "frictionless contact": Feature("probe.contact", lambda s: s.probe.contact == "frictionless"),
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),
     "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),
@@ -124,15 +124,15 @@ FEATURES: dict[str, Feature] = {
     ),
     "curved or inclined surface": Feature("probe.axis", lambda s: not _is_flat(s), ("body",)),
     "no flat top": Feature("body.shape", lambda s: not (isinstance(s.body, Layered) and _is_level(s)), ("probe",)),
-    "body of triangles": Feature("body.shape", lambda s: isinstance(s.body, FromFile) and not s.body.HAS_NAMES),
+    "surface or image": Feature("body.shape", lambda s: isinstance(s.body, FromFile) and not s.body.HAS_NAMES),
     "fixed sides": Feature("body.fixed", lambda s: s.body.support.gap(0.0) == 0.0),
-    "fixed sides alone": Feature("body.fixed", lambda s: not s.body.support.holds_column()),
-    "cut free": Feature("mesh.outside", lambda s: s.mesh.outside == "free" and isfinite(s.mesh.epsilon)),
-    "kept column": Feature("mesh.outside", _is_column, _PLACE),
+    "only sides fixed": Feature("body.fixed", lambda s: not s.body.support.holds_column()),
+    "free column": Feature("mesh.outside", lambda s: s.mesh.outside == "free" and isfinite(s.mesh.epsilon)),
+    "column": Feature("mesh.outside", _is_column, _PLACE),
     "fixed column": Feature("mesh.outside", lambda s: s.mesh.outside == "fixed" and _is_column(s), _PLACE),
     "half ball": Feature("mesh.outside", _is_ball, _PLACE),
-    "own far field": Feature("mesh.outside", lambda s: s.mesh.outside == "green" and _is_ball(s), _PLACE),
-    "part of the body": Feature("mesh.outside", lambda s: s.mesh.outside != "coarse" and isfinite(s.mesh.epsilon)),
+    "Green's function": Feature("mesh.outside", lambda s: s.mesh.outside == "green" and _is_ball(s), _PLACE),
+    "truncated body": Feature("mesh.outside", lambda s: s.mesh.outside != "coarse" and isfinite(s.mesh.epsilon)),
     "degree 1": Feature("mesh.degree", lambda s: s.mesh.degree == 1, write=int),
     "mixed elements": Feature("mesh.element", lambda s: s.mesh.element == "mixed"),
     "accuracy": Feature("mesh.accuracy", lambda s: s.mesh.accuracy is not None),
@@ -140,9 +140,9 @@ FEATURES: dict[str, Feature] = {
 }
 
 _COARSE = 'use outside = "coarse" here'
-_ONE_MATERIAL = f"the far field is known for one material, without layers or inclusions: {_COARSE}"
-_PRESSES = f"the far field is known for a tool that presses, and neither slides nor turns nor cuts: {_COARSE}"
-_HOLDS = 'a tool along which tissue slides has no stiffness sideways: use contact = "bonded"'
+_ONE_MATERIAL = f"the far field is known only for one material: {_COARSE}"
+_PRESSES = f"the far field is known only for a tool that presses: {_COARSE}"
+_HOLDS = 'a tool that slides along the tissue has no lateral stiffness: use contact = "bonded"'
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
 _OF_LAW = "with a law of large displacements"
 
@@ -151,12 +151,12 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("layers", "curved body", "layers need the flat top of a box or a cylinder"),
     Refusal("tool that is not flat", "frictionless contact", "the area in contact is computed, not prescribed"),
     # A half ball that a far field closes.
-    Refusal("half ball", "accuracy", "has an error besides that of the mesh: omit accuracy"),
+    Refusal("half ball", "accuracy", "the far field adds an error that accuracy does not cover: omit accuracy"),
     Refusal("degree 1", "half ball", "is too low for a half ball, since elements are straight: use 2 or 3"),
     Refusal(
         "half ball",
         "no flat top",
-        f"the far field is known for a tool that presses straight down on the top of a box or a cylinder: {_COARSE}",
+        f"the far field is known only for a tool that presses straight down on a box or a cylinder: {_COARSE}",
     ),
     Refusal("half ball", "layers", _ONE_MATERIAL),
     Refusal("half ball", "inclusion", _ONE_MATERIAL),
@@ -165,19 +165,19 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("half ball", "six motions", _PRESSES),
     Refusal(
         "ν > 0.49",
-        "own far field",
+        "Green's function",
         f'is too near to 0.5 for outside = "green": must be at most {MOST_OF_GREEN}; "halfspace" allows all values',
     ),
     # A column that is kept of the body.
     Refusal(
-        "kept column",
-        "body of triangles",
-        f"a column is cut out of boxes, cylinders, ellipsoids and CAD files, not out of triangles: {_COARSE}",
+        "column",
+        "surface or image",
+        f"a column cannot be cut out of triangles: {_COARSE}",
     ),
     Refusal("fixed column", "open slit", 'would stop the open slit at the side of the column: use ends = "blade"'),
     Refusal(
-        "cut free",
-        "fixed sides alone",
+        "free column",
+        "only sides fixed",
         "the column around the tool does not touch the fixed sides, and would float: "
         'use `outside = "coarse"` or "fixed", or fix the bottom',
     ),
@@ -185,24 +185,24 @@ REFUSALS: tuple[Refusal, ...] = (
     # Degrees of elements.
     Refusal(
         "degree 1",
-        "found contact",
-        "is too low for unilateral contact, whose edge is between straight elements: use 2 or 3",
+        "unilateral contact",
+        "is too low for unilateral contact, since elements are straight: use 2 or 3",
     ),
     Refusal("degree 1", "inclusion", "is too low for inclusions, since elements are straight: use 2 or 3"),
     Refusal("degree 1", "curved or inclined surface", "is too low for a curved surface, or a tilted tool: use 2 or 3"),
     Refusal("degree 1", "slit", "is too low for a slit, whose front needs quarter-point elements: use 2 or 3"),
     Refusal("mixed elements", "degree 1", "there is no stable mixed element of degree 1: use 2 or 3"),
     # Tools and how they touch.
-    Refusal("six motions", "found contact", _HOLDS),
+    Refusal("six motions", "unilateral contact", _HOLDS),
     Refusal("six motions", "frictionless contact", _HOLDS),
     Refusal("six motions", "slit", "a blade in a slit only presses and slides: omit it"),
     Refusal(
-        "found contact",
+        "unilateral contact",
         "slice",
         'unilateral contact has no friction, and so no slice: use contact = "bonded"',
     ),
     Refusal(
-        "found contact",
+        "unilateral contact",
         "slit",
         'tissue does not lift off a blade in a slit: use contact = "bonded" or "frictionless"',
     ),
@@ -224,75 +224,75 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     # Loads.
     Refusal(
-        "part of the body",
+        "truncated body",
         "loads",
         'loads act on the whole body, so no part of it may be cut away: use outside = "coarse"',
     ),
-    Refusal("large strains", "loads", 'loads need law = "linear": omit [load]'),
+    Refusal("large displacements", "loads", 'loads need law = "linear": omit [load]'),
     # Large strains.
     Refusal(
         "ν < 0.2 or > 0.45",
-        "large strains",
+        "large displacements",
         f"must be {Material.OF_LARGE[0]} to {Material.OF_LARGE[1]} {_OF_LAW}. Below, F depends on the elements "
         "at the tool's edge; above, displacement elements lock",
     ),
-    Refusal("large strains", "layers", "needs a body of one material: omit layers and inclusions"),
-    Refusal("large strains", "inclusion", "needs a body of one material: omit layers and inclusions"),
-    Refusal("found contact", "large strains", f'must be "bonded" {_OF_LAW}: unilateral contact is not computed'),
-    Refusal("frictionless contact", "large strains", f'must be "bonded" {_OF_LAW}'),
-    Refusal("six motions", "large strains", f'must be "press" {_OF_LAW}: there is no single stiffness'),
-    Refusal("slit", "large strains", _LINEAR),
-    Refusal("slice", "large strains", f"must be 0 mm {_OF_LAW}: the blade only presses"),
-    Refusal("mixed elements", "large strains", f'must be "auto" or "displacement" {_OF_LAW}'),
-    Refusal("accuracy", "large strains", f"{_LINEAR}, and give sizes"),
-    Refusal("half ball", "large strains", f'must be "coarse", "free" or "fixed" {_OF_LAW}'),
+    Refusal("large displacements", "layers", "needs a body of one material: omit layers and inclusions"),
+    Refusal("large displacements", "inclusion", "needs a body of one material: omit layers and inclusions"),
+    Refusal("unilateral contact", "large displacements", f'must be "bonded" {_OF_LAW}'),
+    Refusal("frictionless contact", "large displacements", f'must be "bonded" {_OF_LAW}'),
+    Refusal("six motions", "large displacements", f'must be "press" {_OF_LAW}: there is no single stiffness'),
+    Refusal("slit", "large displacements", _LINEAR),
+    Refusal("slice", "large displacements", f"must be 0 mm {_OF_LAW}: the blade only presses"),
+    Refusal("mixed elements", "large displacements", f'must be "auto" or "displacement" {_OF_LAW}'),
+    Refusal("accuracy", "large displacements", f"{_LINEAR}, and give sizes"),
+    Refusal("half ball", "large displacements", f'must be "coarse", "free" or "fixed" {_OF_LAW}'),
 )
 
-_PRESSED_ONLY = "a real-time model is of tools that press straight down, and neither slide nor turn nor cut"
+_PRESSED_ONLY = "real-time models are only for tools that press straight down"
 # Of each way that may be shorter, the features with which it is not taken, each with the reason.
 OBSTACLES: dict[str, dict[str, str]] = {
     "meridian": {
-        "large strains": "large strains are computed in three dimensions",
+        "large displacements": "large displacements are computed in three dimensions",
         "six motions": "most of the six motions are not axisymmetric",
         "half ball": "a half ball is coupled to its far field in three dimensions",
         "loads": "loads are computed in three dimensions",
     },
     # Taken if no case of the study is in the way: what is compared is computed alike.
-    "meridian of a comparison": {
-        "large strains": "both sides of a comparison with large strains are solved in three dimensions",
-        "half ball": "both sides of a comparison with a half ball are solved in three dimensions",
+    "meridian, in a comparison": {
+        "large displacements": "all cases of the comparison are solved in three dimensions",
+        "half ball": "all cases of the comparison are solved in three dimensions",
     },
     "reduced basis": {
         "layers": "a body of several materials has more than one parameter",
         "inclusion": "a body of several materials has more than one parameter",
-        "found contact": "the area of contact changes with Poisson's ratio",
+        "unilateral contact": "the contact area changes with Poisson's ratio",
         "half ball": "the far field changes with Poisson's ratio",
-        "large strains": "the problem is nonlinear",
-        "slit": "a slit needs more results than the work",
-        "loads": "loads do work, too",
+        "large displacements": "the problem is nonlinear",
+        "slit": "a slit has results besides F",
+        "loads": "loads have results besides F",
     },
     "scaling": {
-        "loads": "loads are not proportional to the modulus and the depth",
+        "loads": "their force is not proportional to modulus and depth",
     },
     "images": {
-        "six motions": "the stiffness of all motions is not symmetric",
+        "six motions": "the 6 × 6 stiffness differs in a mirror image",
         "loads": "loads break the symmetry",
     },
     "equivalent places": {
         "inclusion": "the distance to the inclusion differs",
         "loads": "loads act on the whole body",
-        "own far field": "the Green's function of the body depends on the place",
+        "Green's function": "the Green's function of the body depends on the place",
     },
     "proportional depths": {
-        "loads": "loads are not proportional to the depth",
-        "large strains": "large strains are not proportional to the depth",
+        "loads": "their force is not proportional to the depth",
+        "large displacements": "F is not proportional to the depth",
     },
     "F_exact": {
-        "large strains": "at large displacements, the converged force is known only to the error bars of meshes",
+        "large displacements": "at large displacements, F_exact would not be more accurate than F on a fine mesh",
     },
     "real-time model": {
         "loads": "[load]: gravity and tractions have no real-time model",
-        "large strains": "material.law: large displacements have no real-time model",
+        "large displacements": "material.law: large displacements have no real-time model",
         "slit": f"probe.incision: {_PRESSED_ONLY}",
         "six motions": f'probe.motion = "all": {_PRESSED_ONLY}',
         "slice": f"probe.slice: {_PRESSED_ONLY}",
