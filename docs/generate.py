@@ -129,7 +129,8 @@ def dataset_page() -> str:
         "Dimensions are the swept keys, in the file's order. Coordinates are named like the keys. "
         "A variable has only the dimensions that it depends on. An array of tables gives the dimension `body`, "
         "`material`, `probe` or `mesh`; a radius or shape is `probe_radius`, `body_radius`; a key of a layer or an "
-        "inclusion begins with its name: `skin_young`. A path gives the dimension `path`, a raster `x` and `y`: lengths in m, "
+        "inclusion begins with its name: `skin_young`. A path gives the dimension `path`, a raster `x` and "
+        "`y`: lengths in m, "
         "and `at_x`, `at_y` and `at_z` are then coordinates.",
         "",
         "`epsilon` is infinite for the full order. `dataset.epsmesh.finite_epsilon()` omits it, for `interp` and "

@@ -76,8 +76,8 @@ class Indenter(Probe):
     depth_range: Annotated[
         tuple[Length, Length] | None,
         Words(
-            "Range of depths that share one mesh: smallest and largest depth. Elements are small "
-            "wherever contact may end. Each depth is solved from the solution of the depth before.",
+            "Range of depths that share one mesh: smallest and largest depth. Elements are small wherever the "
+            "contact's edge may be. The initial guess at each depth is the solution at the depth before.",
             '["0.1 mm", "0.5 mm"]',
             default="a mesh for each depth",
         ),
@@ -85,9 +85,7 @@ class Indenter(Probe):
     contact: Annotated[
         Literal["unilateral"],
         BeforeValidator(_found),
-        Words(
-            "Contact: tissue slides along the tool and may lift off. The area in contact is computed.", '"unilateral"'
-        ),
+        Words("Contact: tissue slides along the tool and may lift off. The contact area is computed.", '"unilateral"'),
     ] = "unilateral"
 
     # ---- for each indenter to define --------------------------------------------------------------------

@@ -42,8 +42,7 @@ class Probe(Section, ABC):
     action: Annotated[
         Literal["pierce", "cut"] | None,
         Words(
-            "Label for people who read the study. No result depends on it. The dataset has it in the "
-            "study's text, and as a dimension if it is swept.",
+            "Label without effect on results. It is a dimension of the dataset if it is swept.",
             '"pierce"',
             default="none",
         ),
@@ -61,15 +60,15 @@ class Probe(Section, ABC):
         tuple[Coordinate, ...],
         AfterValidator(_two_or_three),
         Words(
-            "Place of contact: x and y of the highest point there, or x, y and z of a place whose "
-            "nearest point on the surface is used.",
+            "Point of contact: x and y of the highest surface point there, or x, y and z, moved to the "
+            "nearest surface point.",
             '["0 mm", "0 mm"]',
         ),
     ] = (0.0, 0.0)
     axis: Annotated[
         tuple[float, float, float] | None,
         Words(
-            "Direction in which the tool advances, a vector of any length. At most 60° from the inward normal.",
+            "Direction of the tool's advance, a vector of any length, at most 60° from the inward normal.",
             "[0.0, 0.0, -1.0]",
             default="the inward normal at the contact",
         ),
@@ -85,9 +84,8 @@ class Probe(Section, ABC):
     motion: Annotated[
         Literal["press", "all"],
         Words(
-            "Motions that are solved for: those of the study (press), or all six rigid motions (all). "
-            "All six give the 6 × 6 stiffness of a bonded tool: forces and torques about the point of "
-            "contact.",
+            "Rigid motions to compute: those of the study (press), or all six (all). All six give the 6 × 6 "
+            "stiffness of a bonded tool: forces and torques about the point of contact.",
             '"all"',
         ),
     ] = "press"

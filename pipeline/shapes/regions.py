@@ -29,7 +29,7 @@ class Layer(Region):
 
     thickness: Annotated[
         Length | None,
-        Words("Thickness of the layer. The last layer may omit it, and then reaches the bottom.", '"2 mm"'),
+        Words("Thickness of the layer. Optional for the last layer, which then reaches the bottom.", '"2 mm"'),
     ] = None
 
 

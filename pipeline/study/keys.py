@@ -28,24 +28,25 @@ class Key:
 
 
 SECTION_TEXTS = {
-    "body": "Body: the tissue, in its own coordinates. z points out of the top face, and the tissue is at z <= 0.",
-    "body.layer": "Layers: horizontal layers of other materials under a flat top, one table each, from the top down. "
+    "body": "The tissue, in its own coordinates. z points out of the top face, and the tissue is at z <= 0.",
+    "body.layer": "Horizontal layers of other materials below a flat top, one table each, from the top down. "
     "Optional; every value can be swept.",
-    "body.inclusion": "Inclusions: balls and ellipsoids of other materials, one table each. An inclusion is inside the "
-    "body and touches neither its surface, nor other inclusions, nor the ends of layers. Optional; every value can be "
+    "body.inclusion": "Balls and ellipsoids of other materials, one table each. An inclusion is inside the "
+    "body. It must not touch the surface, other inclusions or the ends of layers. Optional; every value can "
+    "be "
     "swept.",
     "material": "Material of all tissue outside layers and inclusions: isotropic and elastic. Omit it if layers fill "
     "the body.",
-    "probe": "Probe: the tool, and its movement.",
-    "probe.path": "Path: several places of contact, instead of `at`. Give one of `line`, `circle`, `raster` and "
+    "probe": "The tool, called probe in study files and datasets, and its motion.",
+    "probe.path": "Several points of contact, instead of `at`. Give one of `line`, `circle`, `raster` and "
     "`points`. Optional.",
-    "mesh": "Mesh: sizes and degree of elements, and the part of the body that is meshed.",
+    "mesh": "Sizes and degree of elements, and the meshed part of the body.",
     "solve": "Solver, and timing of cases. Optional; its lists are no sweeps.",
-    "load": "Loads besides the tool. They keep their size and direction. F is the additional force at the given depth; "
-    "`load_force` in the dataset is the force of the loads alone. Optional.",
-    "load.traction": "Tractions: forces per area on parts of the boundary, one table each. Optional; the values of a "
+    "load": "Loads besides the tool. They keep their size and direction. `force` in the dataset is due to the "
+    "depth alone, `load_force` to the loads alone. Optional.",
+    "load.traction": "Forces per area on parts of the boundary, one table each. Optional; the values of a "
     "named traction can be swept.",
-    "plan": "Plan: work that may be skipped. Optional; its lists are no sweeps.",
+    "plan": "Work that may be skipped. Optional; its lists are no sweeps.",
     "figure": "Main figure of the study. Forces do not depend on it. Optional; its lists are no sweeps.",
 }
 

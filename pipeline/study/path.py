@@ -86,7 +86,7 @@ class Raster(_Table):
     y: Coordinates
 
 
-_POINT = "x and y of the highest point there, or x, y and z of a place whose nearest point on the surface is used"
+_POINT = "x and y of the highest surface point there, or x, y and z, moved to the nearest surface point"
 
 
 class Path(_Table):
@@ -113,8 +113,8 @@ class Path(_Table):
     raster: Annotated[
         Raster | None,
         Words(
-            "Places on a grid: `x` and `y`, each a rising list, or a range of `from`, `to` and `steps`. They are the "
-            "dimensions `x` and `y`.",
+            "Places on a grid: `x` and `y`, each a rising list, or a range of `from`, `to` and `steps`. The "
+            "dimensions are `x` and `y`.",
             '{ x = ["-5 mm", "0 mm", "5 mm"], y = { from = "-6 mm", to = "6 mm", steps = 5 } }',
             default="none",
         ),
@@ -123,8 +123,7 @@ class Path(_Table):
         tuple[Place, ...] | None,
         BeforeValidator(_several),
         Words(
-            "Places one by one. The dimension `path` is the distance from the first place, straight from place to "
-            "place.",
+            "List of places. The dimension `path` is the summed straight distance from the first place.",
             '[["0 mm", "0 mm"], ["3 mm", "0 mm"], ["8 mm", "2 mm"]]',
             default="none",
         ),
@@ -132,8 +131,8 @@ class Path(_Table):
     off: Annotated[
         Literal["refuse", "lost"],
         Words(
-            "Places off the body. refuse: they are errors. lost: the path goes on without contact there. F is 0 where "
-            "the tool is clear of the body; where it overlaps an edge, there is no F, and `message` has the reason.",
+            "Places off the body. refuse: an error. lost: no contact there, F is 0. A tool across an edge has "
+            "no F; `message` has the reason.",
             '"lost"',
         ),
     ] = "refuse"

@@ -98,9 +98,9 @@ class Mesh(Section):
         Share | None,
         Field(ge=1e-4, le=0.2),
         Words(
-            "Largest error bar of F of each case, relative to F. Element sizes and degree that are "
-            "not given are chosen for it. A case whose error bar stays larger fails. The distance of "
-            "an ε-mesh's F from F_exact is not part of it: see `epsmesh guide --accuracy`.",
+            "Largest error bar of F in each case, relative to F. Omitted sizes and degree are chosen for it. "
+            "A case with a larger error bar fails. The effect of `outside` on F is not included: see `epsmesh "
+            "guide --accuracy`.",
             '"1 %"',
             default="none: the given sizes are used",
         ),
@@ -158,8 +158,7 @@ class Mesh(Section):
     model: Annotated[
         Literal["auto", "3d"],
         Words(
-            "Dimension of the model. auto: symmetry and two dimensions are used where the scene "
-            "allows them. 3d: never.",
+            "Dimension of the model. auto: symmetric parts and two dimensions, where possible. 3d: never.",
             '"auto"',
         ),
     ] = "auto"
@@ -204,8 +203,8 @@ class Solving(Section):
         float,
         Field(ge=1e-14, le=1e-6),  # above, forces do not balance to what every solve must show
         Words(
-            "Tolerance of the iterative solver: its relative error in the energy norm. The relative "
-            "error that it adds to F is the square of it.",
+            "Tolerance of the iterative solver: its relative error in the energy norm. The relative error of "
+            "F is its square.",
             "1e-8",
         ),
     ] = 1e-6
@@ -219,9 +218,7 @@ class Solving(Section):
     ] = True
     timing: Annotated[
         bool,
-        Words(
-            "Timing study: every case is solved from the beginning and alone, so that times can be compared.", "false"
-        ),
+        Words("Timing study: every case is computed alone, from the start, to compare times.", "false"),
     ] = False
     repeats: Annotated[
         int,
@@ -246,8 +243,8 @@ class Planning(Section):
         Share | None,
         Field(gt=0, le=0.5),
         Words(
-            "Relative distance of F from F_exact at which a sweep over epsilon ends. Once two values "
-            "of epsilon in a row are that near, larger ones are skipped.",
+            "Relative distance of F from F_exact that ends a sweep over epsilon. After two such values in a "
+            "row, larger ones are skipped.",
             '"1 %"',
             default="none: every epsilon is run",
         ),
@@ -264,8 +261,7 @@ class Drawing(Section):
     paper: Annotated[
         bool,
         Words(
-            "Marks of the paper's claims in the figure: 80 % of F_max at 10 mm for bodies cut free, "
-            "and a speed-up of 50.",
+            "Marks of the paper's claims in the figure: 80 % of F_max at 10 mm for free columns, and a speed-up of 50.",
             "true",
         ),
     ] = False

@@ -57,7 +57,7 @@ class FromCad(FromFile):
     unit: Annotated[
         Literal["m", "cm", "mm", "um", "µm", "in"],
         Field(exclude=True),
-        Words("Unit of length of the file. A STEP file names its own.", '"mm"'),
+        Words("Unit of length. A STEP file has its own.", '"mm"'),
     ]
     file: Annotated[
         str, Words("File of a solid, STEP or BREP: its path from the folder of the study.", '"phantom.step"')
@@ -66,7 +66,7 @@ class FromCad(FromFile):
         Below | NamedFace,
         BeforeValidator(_held),
         Words(
-            "Support of the body: all tissue below a height of the file, or faces of one name. "
+            "Support of the body: all tissue below a height, in the file's coordinates, or the faces of one name. "
             "Displacements are zero there.",
             '{face = "base"}',
             takes="{below = length} | {face = text}",

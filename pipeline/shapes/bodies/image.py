@@ -19,22 +19,20 @@ class FromImage(FromFile, Scanned):
     READ_BY: ClassVar[frozenset[str]] = frozenset({"label", "unit", "smooth"})
 
     shape: Literal["image"]
-    label: Annotated[
-        int, Field(gt=0, exclude=True), Words("Label of the body: the number of its voxels in the image.", "1")
-    ]
+    label: Annotated[int, Field(gt=0, exclude=True), Words("Label of the body: the value of its voxels.", "1")]
     unit: Annotated[
         Literal["m", "cm", "mm", "um", "µm"] | None,
         Field(exclude=True),
-        Words("Unit of length of the image, if its header names none.", '"mm"', "the header's"),
+        Words("Unit of length, if the image's header has none.", '"mm"', "the header's"),
     ] = None
     smooth: Annotated[
         Travel | None,
         Field(exclude=True),
         Words(
             "Smoothing length: standard deviation of the filter that removes the steps of the voxels. "
-            "The volume is kept.",
+            "The volume does not change.",
             '"2 mm"',
-            "one and a half voxels, or the distance of thick slices",
+            "one and a half voxels, or the slice distance if larger",
         ),
     ] = None
     file: Annotated[

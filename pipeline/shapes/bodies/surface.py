@@ -22,7 +22,7 @@ class FromSurface(FromFile, Scanned):
     unit: Annotated[
         Literal["m", "cm", "mm", "um", "µm"],
         Field(exclude=True),
-        Words("Unit of length of the file. Files of surfaces do not name their unit.", '"mm"'),
+        Words("Unit of length; surface files have none.", '"mm"'),
     ]
     repair: Annotated[
         bool,
@@ -37,7 +37,9 @@ class FromSurface(FromFile, Scanned):
         Travel | None,
         Field(exclude=True),
         Words(
-            "Smoothing length: bumps shorter than 2π times this length are removed.", '"1 mm"', "nothing is smoothed"
+            "Smoothing length: waves of 2π times this length are halved, shorter ones damped more.",
+            '"1 mm"',
+            "nothing is smoothed",
         ),
     ] = None
     file: Annotated[

@@ -34,15 +34,14 @@ class Blade(Punch):
     width: Annotated[Length, Words("Width of the blade's edge.", '"1 mm"')]
     direction: Annotated[
         tuple[float, float, float],
-        Words("Direction of the edge: the part of this vector that is normal to the axis.", "[1.0, 0.0, 0.0]"),
+        Words("Direction of the edge: this vector, projected normal to the axis.", "[1.0, 0.0, 0.0]"),
     ] = (1.0, 0.0, 0.0)
     slice: Annotated[Travel, Words("Travel along the edge while the blade is pressed in.", '"0.05 mm"')] = 0.0
     incision: Annotated[
         Travel,
         Words(
-            "Depth of an open slit that holds the blade. The blade keeps the faces of the slit apart "
-            "by its width; they stick to it (bonded) or slide (frictionless). 0: no slit, the edge "
-            "presses on the whole surface.",
+            "Depth of an open slit with the blade in it. The blade opens the slit by its width; tissue sticks "
+            "to the blade (bonded) or slides (frictionless). 0: no slit; the edge presses on the surface.",
             '"4 mm"',
         ),
     ] = 0.0

@@ -16,7 +16,7 @@ class Cone(RoundIndenter):
 
     shape: Literal["cone"]
     angle: Annotated[
-        Angle, Words("Half angle, between the axis and the flank. The larger, the blunter.", '"70 deg"', is_used=True)
+        Angle, Words("Half angle between axis and flank; a larger one is blunter.", '"70 deg"', is_used=True)
     ]
     radius: Annotated[Length, Words("Radius of the shaft, where the cone ends.", '"3 mm"', is_used=True)]
     tip: Annotated[Rounding, Words("Radius of the rounded tip. 0 is sharp.", '"0.2 mm"')] = 0.0

@@ -29,9 +29,7 @@ class Ellipse(RoundPunch):
     ]
     direction: Annotated[
         tuple[float, float, float],
-        Words(
-            "Direction of the first semi-axis: the part of this vector that is normal to the axis.", "[1.0, 0.0, 0.0]"
-        ),
+        Words("Direction of the first semi-axis: this vector, projected normal to the axis.", "[1.0, 0.0, 0.0]"),
     ] = (1.0, 0.0, 0.0)
 
     @property

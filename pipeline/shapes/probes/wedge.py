@@ -24,13 +24,13 @@ class Wedge(Indenter):
 
     shape: Literal["wedge"]
     angle: Annotated[
-        Angle, Words("Half angle, between the axis and the flank. The larger, the blunter.", '"70 deg"', is_used=True)
+        Angle, Words("Half angle between axis and flank; a larger one is blunter.", '"70 deg"', is_used=True)
     ]
     length: Annotated[Length, Words("Length of the wedge's edge.", '"6 mm"', is_used=True)]
     tip: Annotated[Rounding, Words("Radius of the rounded edge. 0 is sharp.", '"0.2 mm"')] = 0.0
     direction: Annotated[
         tuple[float, float, float],
-        Words("Direction of the edge: the part of this vector that is normal to the axis.", "[1.0, 0.0, 0.0]"),
+        Words("Direction of the edge: this vector, projected normal to the axis.", "[1.0, 0.0, 0.0]"),
     ] = (1.0, 0.0, 0.0)
 
     @property
