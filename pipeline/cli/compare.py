@@ -15,7 +15,7 @@ def compare(a: Dataset, b: Dataset, output: Found = DEFAULT_OUTPUT, as_json: Jso
 
     Cases are matched by the values of the study's keys. Meshes, machines and versions may differ; scenes may not.
 
-    Exit status 1 if forces differ by more than their error bars, or no case can be compared.
+    Exit status 1: forces differ by more than their error bars, or this is not decided; 2: no case can be compared.
 
     Example: epsmesh compare results/figure3.nc elsewhere/figure3.nc
 
