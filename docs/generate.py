@@ -98,7 +98,9 @@ def features_page() -> str:
     lines = [
         "# What goes together", "",
         "Features that exclude each other. A study with both is an error; the message has key and reason. All other "
-        "pairs are computed. `free` and `fixed` mesh a column of radius ε, `halfspace` and `green` a half ball.", "",
+        "pairs are computed. `free` and `fixed` mesh a column of radius ε, `halfspace` and `green` a half ball. The "
+        "meridian is the half plane through the axis of a round scene.",
+        "",
         *_table(("feature", "with", "key", "reason, and what to write instead")),
     ]  # fmt: skip
     lines += [_row(r.first, r.second, f"`{FEATURES[r.first].key}`", _escaped(r.reason)) for r in REFUSALS]

@@ -42,8 +42,8 @@ def new(
 ) -> None:
     """Begin a study file: studies/NAME.toml. Existing study files are not changed.
 
-    Without options, the study is the short example `pad`: a disc on a soft pad, which runs in seconds. The file of a
-    body that a study names is copied, too. So is study.schema.json, with which editors complete and check keys.
+    Default: the short example `pad`, a disc on a soft pad, which runs in seconds. The body's file is copied, too, and
+    study.schema.json, with which editors complete and check keys.
 
     Example: epsmesh new mine
 
