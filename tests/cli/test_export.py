@@ -52,7 +52,7 @@ LONGEST = 30
     ("line", "word"),
     [
         ("axis = [0.3, 0.0, -1.0]", "probe.axis: tools of a real-time model press straight down"),
-        ('motion = "all"', 'probe.motion = "all": a real-time model is of tools that press'),
+        ('motion = "all"', 'probe.motion = "all": real-time models are only for tools that press'),
     ],
 )
 def test_a_refused_tool_is_named_by_its_key(tmp_path, line, word):
