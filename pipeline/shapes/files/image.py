@@ -127,7 +127,9 @@ def _one_piece(mask: Any, voxel: float) -> tuple[Any, IntArray, list[str]]:
     filled = ndimage.binary_fill_holes(cut)
     hollow = int(filled.sum() - cut.sum())
     if hollow > MOST_APART * cut.sum():
-        raise SurfaceError(f"encloses {1e6 * voxel * hollow:.3g} cm³ of other labels: add them to it, or close it")
+        raise SurfaceError(
+            f"encloses {1e6 * voxel * hollow:.3g} cm³ of other labels or background: give them this label"
+        )
     if hollow:
         notices.append(f"{hollow:,} voxels that it encloses, {1e6 * voxel * hollow:.2g} cm³, added")
     return filled, np.array([part.start for part in box]), notices
