@@ -14,11 +14,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pipeline.printable import counted
+from pipeline.quantities import quantity_of, write
 from pipeline.report.parameters import Parameters, differing, parameters_of, varied
 from pipeline.report.table import DatasetError, study_of
 
 # Forces that agree to this share of them agree, whatever their bars: the tolerance of solvers.
 SAME = 1e-6
+# Keys that a message names where scenes differ.
+_MOST_KEYS = 4
 # What is compared: each has an error bar.
 _JUDGED = ("force", "load_force", "energy_release")
 
@@ -102,8 +106,7 @@ def compare(a: xr.Dataset, b: xr.Dataset) -> Comparison:
     ours, theirs = _cases(a, "A", alike=alike), _cases(b, "B", alike=alike)
     scene, settings = differing([one.parameters for one in ours], [one.parameters for one in theirs])
     if scene:
-        told = "; ".join(f"{key} is {one!r} in A, {other!r} in B" for key, one, other in scene)
-        raise DatasetError(f"they are of different scenes: {told}")
+        raise DatasetError(f"they are of different scenes: {_differences(scene)}")
     keys = varied([one.parameters for one in ours], [one.parameters for one in theirs])
     left, right = _by_values(ours, keys), _by_values(theirs, keys)
     common = [values for values in left if values in right]
@@ -157,6 +160,20 @@ def _cases(dataset: xr.Dataset, name: str, *, alike: bool) -> list[_Place]:
     if {axis.name: len(axis) for axis in study.axes} != sizes:
         raise DatasetError(f"{name} is part of a dataset, or of another study than it says: compare whole ones")
     return [_Place(parameters_of(case), str(case), case.index) for case in study.cases()]
+
+
+def _differences(scene: list[tuple[str, Any, Any]]) -> str:
+    """Return in words where two scenes differ: a few keys, those first that both have."""
+    both = sorted(scene, key=lambda row: row[1] is None or row[2] is None)
+    shown = [f"{key} is {worded(key, one)} in A, {worded(key, other)} in B" for key, one, other in both[:_MOST_KEYS]]
+    more = len(both) - _MOST_KEYS
+    return "; ".join([*shown, *([f"and {counted(more, 'more key')}"] if more > 0 else [])])
+
+
+def worded(key: str, value: Any) -> str:
+    """Write the value of a key as people read it; "missing" where a study has no such key."""
+    name = key.rpartition(".")[2]
+    return "missing" if value in (None, ()) else write(name, value) if quantity_of(name) else str(value)
 
 
 def _by_values(cases: list[_Place], keys: list[str]) -> dict[tuple[Any, ...], _Place]:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from pipeline.printable import counted
 from pipeline.quantities import readable
-from pipeline.report.compare import Comparison, Pair
+from pipeline.report.compare import Comparison, Pair, worded
 from pipeline.report.guide_text import percent
 
 # Cases that a list names; the JSON has all of them.
@@ -27,7 +27,9 @@ def verdict(found: Comparison) -> str:
 def text(found: Comparison, names: tuple[str, str], doubts: dict[str, list[str]]) -> str:
     """Return what came of it for people: ``names`` are those of A and B, ``doubts`` what makes their times doubtful."""
     lines = [verdict(found), *(f"{letter}: {name}" for letter, name in zip("AB", names, strict=True))]
-    lines += [f"  {key} differs: {one} in A, {other} in B" for key, one, other in found.settings]
+    lines += [
+        f"  {key} differs: {worded(key, one)} in A, {worded(key, other)} in B" for key, one, other in found.settings
+    ]
     lines.append(
         f"{counted(found.cases, 'case')} in both, {len(found.only_a)} in A only, {len(found.only_b)} in B only"
     )
