@@ -127,7 +127,7 @@ def test_tables_of_tensors_know_their_images(shape):
             "material.law",
         ),
         ({"body": [CYLINDER | {"name": "a"}, BOX | {"name": "b"}]}, "several"),
-        ({"probe": BLADE | {"incision": "4 mm"}}, "cut"),
+        ({"probe": BLADE | {"incision": "4 mm"}}, "press straight down"),
     ],
 )
 def test_what_has_no_model_yet_is_refused_by_name(sections, word):
