@@ -10,7 +10,7 @@ import typer
 from pipeline.cli.console import say
 from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study
 from pipeline.cli.words import Json
-from pipeline.files import atomic, write_new
+from pipeline.files import atomic, write_new, write_whole
 from pipeline.study.named import NAME, SCHEMA, SHORT, examples, is_name
 
 _FOLDER = Path("studies")
@@ -127,8 +127,7 @@ def _write_schema(folder: Path) -> None:
     """Copy the schema of study files into a folder, or bring the copy there up to date."""
     text, there = SCHEMA.read_text(encoding="utf-8"), folder / SCHEMA.name
     if not there.exists() or there.read_text(encoding="utf-8") != text:
-        with atomic(there) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        write_whole(there, text)
 
 
 def _copy_of(like: str) -> tuple[str, Path]:

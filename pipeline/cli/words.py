@@ -80,7 +80,7 @@ Without = Annotated[
 
 
 def read_all(files: list[Path]) -> "list[Study]":
-    """Load studies, or exit with every problem of every file; on several ranks only the first one prints."""
+    """Read studies, or exit with every problem of every file; on several ranks only the first one prints."""
     from pipeline.study.problems import StudyError
     from pipeline.study.read import read_study
 

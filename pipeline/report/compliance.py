@@ -20,7 +20,7 @@ import xarray as xr
 from pipeline.quantities import attributes
 from pipeline.report.sinking import LOADS, PLACES, Sinking
 from pipeline.report.table import DatasetError, case_at, study_of
-from pipeline.report.values import relative
+from pipeline.report.values import at_full_order, relative
 
 Against = Literal["exact", "full"]
 
@@ -42,7 +42,8 @@ def compliance(dataset: xr.Dataset, against: Against = "exact") -> xr.Dataset:
         missing = {"exact": "F_exact: run its study with `exact = true` in [solve]", "full": 'F_max: epsilon = "full"'}
         raise DatasetError(f"the dataset holds no {missing[against]}")
     bar = relative(dataset, "force_error")
-    other_bar = relative(dataset, "force_exact_error") if against == "exact" else _of_full_order(bar)
+    of_full = at_full_order(bar) if "epsilon" in bar.dims else bar
+    other_bar = relative(dataset, "force_exact_error") if against == "exact" else of_full
     known = sinking(dataset)
     if (known["why_not"] != "").all():
         raise DatasetError(f"compliances do not add: {known['why_not'].values.flat[0]}")
@@ -77,12 +78,6 @@ def beyond(whole: Any, ratio: Any, exponent: Any, bar: Any, other_bar: Any) -> t
     other = whole * ratio ** (1 / exponent)  # E d of the depth at which the other has the same force, over F
     c = whole - other
     return c, abs(c + other / exponent) * bar + other / exponent * other_bar
-
-
-def _of_full_order(bar: xr.DataArray) -> xr.DataArray:
-    if "epsilon" in bar.dims:
-        return bar.where(np.isinf(bar["epsilon"])).max("epsilon")
-    return bar
 
 
 def sinking(dataset: xr.Dataset) -> xr.Dataset:

@@ -16,7 +16,7 @@ from pipeline.plan.equivalent_places import EquivalentPlace
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST, MESH_DIMENSIONS, RUN, attributes, quantity_of
-from pipeline.report.values import with_flags
+from pipeline.report.values import at_full_order, with_flags
 from pipeline.run.outcome import LOST, without_contact
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
@@ -233,7 +233,7 @@ def _of_full_order(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Return a variable of the full-order case of the same scene and mesh settings."""
     values = dataset[name]
     if "epsilon" in values.dims:
-        return values.where(np.isinf(dataset["epsilon"])).max("epsilon")
+        return at_full_order(values)
     return values.where(bool(dataset.attrs["epsilon_is_full"]))
 
 

@@ -82,9 +82,12 @@ def read_file(path: Path) -> xr.Dataset:
     """
     try:
         # A few bytes of a packed file may stand for any number of values.
-        if (size := _size(path)) > _LARGEST:
+        size, groups = _described(path)
+        if size > _LARGEST:
             raise DatasetError(f"{path}: would take {size / 1e9:.3g} GB: no study's dataset has more than 1")
-        return with_words(xr.merge([xr.load_dataset(path), _run(path)], combine_attrs="override"))
+        # One that xarray has written again has no groups.
+        parts = [xr.load_dataset(path, group=group) for group in (None, *({"run"} & groups))]
+        return with_words(xr.merge(parts, combine_attrs="override"))
     except DatasetError:
         raise
     except Exception as error:  # of a damaged file the libraries raise many kinds
@@ -95,23 +98,15 @@ def read_file(path: Path) -> xr.Dataset:
         ) from None
 
 
-def _run(path: Path) -> xr.Dataset:
-    """Return the group ``run`` of a file; an empty dataset if there is none, as in one that xarray has written."""
-    from netCDF4 import Dataset  # noqa: PLC0415 (xarray loads it, too)
-
-    with Dataset(path) as file:
-        has_run = "run" in file.groups
-    return xr.load_dataset(path, group="run") if has_run else xr.Dataset()
-
-
-def _size(path: Path) -> int:
-    """Return how many bytes the variables of a file take in memory, without reading them."""
+def _described(path: Path) -> tuple[int, set[str]]:
+    """Return how many bytes the variables of a file take in memory, without reading them, and its groups."""
     from netCDF4 import Dataset  # noqa: PLC0415 (xarray loads it, too)
 
     with Dataset(path) as file:
         parts = [file, *file.groups.values()]
         kinds = [(variable.shape, variable.dtype) for part in parts for variable in part.variables.values()]
-        return sum(prod(map(int, shape)) * getattr(kind, "itemsize", _POINTER) for shape, kind in kinds)
+        size = sum(prod(map(int, shape)) * getattr(kind, "itemsize", _POINTER) for shape, kind in kinds)
+        return size, set(file.groups)
 
 
 def _text_of(study: Path) -> str:

@@ -28,6 +28,11 @@ def by_case(dataset: xr.Dataset, name: str) -> xr.DataArray:
     return dataset[name].broadcast_like(force).transpose(*force.dims, ...)
 
 
+def at_full_order(values: xr.DataArray) -> xr.DataArray:
+    """Return the values of the full order, whose ε is infinite, without that dimension; NaN if there is none."""
+    return values.where(np.isinf(values["epsilon"])).max("epsilon")
+
+
 def with_flags(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset with ``status`` as the integer flags of a file; :func:`with_words` is the inverse."""
     status = dataset["status"]
@@ -38,9 +43,9 @@ def with_flags(dataset: xr.Dataset) -> xr.Dataset:
 
 def with_words(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset with ``status`` as words: "ok", "failed", …; one that has them already is returned as it is."""
-    status = dataset["status"] if "status" in dataset else xr.DataArray("")
-    if "flag_meanings" not in status.attrs:
+    if "status" not in dataset or "flag_meanings" not in dataset["status"].attrs:
         return dataset
+    status = dataset["status"]
     words = dict(zip(status.attrs["flag_values"], status.attrs["flag_meanings"].split(), strict=True))
     texts = np.array([words[flag] for flag in status.values.ravel()], dtype=object).reshape(status.shape)
     attributes = {name: text for name, text in status.attrs.items() if not name.startswith("flag_")}

@@ -9,7 +9,7 @@ from pipeline.report.compliance import sinking, tool_dimension
 from pipeline.report.figures.curves import grid, share
 from pipeline.report.figures.facets import arrange
 from pipeline.report.figures.style import finish, look
-from pipeline.report.values import relative
+from pipeline.report.values import at_full_order, relative
 from pipeline.report.words import choice
 
 _PER_MM = 1e-3  # of 1/m
@@ -48,7 +48,7 @@ def _with_positions(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:
     linear = known[["scale", "inverse"]].where(known["exponent"] == 1)
     whole, inverse = _PER_MM * linear["scale"] / dataset["force"], _PER_MM * linear["inverse"]
     is_round = bool(np.isfinite(inverse.where(np.isfinite(whole), 0.0)).all())
-    full = whole.where(np.isinf(dataset["epsilon"])).max("epsilon").broadcast_like(whole)
+    full = at_full_order(whole).broadcast_like(whole)
     places = {"position": inverse if is_round else full, "of_full_order": full}
     places["force_bar"] = relative(dataset, "force_error")
     data = dataset.assign({_WHOLE: whole, "touch": known["contact"], **places})

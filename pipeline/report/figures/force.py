@@ -31,7 +31,7 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     quantities = ["force", *(name for name in _WITH_FORCE if _varies(dataset, name))]
     exact_bar = relative(dataset, "force_exact_error")
     of_ratio = abs(dataset["force_exact_ratio"]) * relative(dataset, "force_error")
-    dataset = dataset.assign(force_exact_ratio_error=of_ratio)
+    dataset = dataset.assign(force_exact_ratio_error=of_ratio, exact_bar=exact_bar)
     figure = new_figure(max(_WIDTH * len(shown), 4.6) + 0.6, _HEIGHT * len(quantities) + 1.6)
     axes = figure.subplots(len(quantities), len(shown), squeeze=False, sharex="col", sharey="row")
     left_out = [_draw_column(column, dataset, dim, quantities) for dim, column in zip(shown, axes.T, strict=True)]
@@ -66,7 +66,7 @@ def _draw_column(axes: np.ndarray, dataset: xr.Dataset, dim: str, quantities: li
         draw(Panel(ax, data, name, 0), facets)
         if name in _SHARES:
             ax.axhline(1.0, color=LINE, linewidth=0.7)
-        if name == "force_exact_ratio" and np.isfinite(bar := float(relative(dataset, "force_exact_error").max())):
+        if name == "force_exact_ratio" and np.isfinite(bar := float(dataset["exact_bar"].max())):
             ax.axhspan(1 - bar, 1 + bar, color=QUIET, alpha=0.25, linewidth=0)
     axes[-1].set_xlabel(heading(dataset[dim]))
     at = textwrap.fill(choices(dataset, facets.fixed), 34)
