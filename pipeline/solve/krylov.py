@@ -21,8 +21,6 @@ _TANGENT = {"ksp_norm_type": "natural", "ksp_rtol": 1e-4, "ksp_max_it": 400}
 # PETSc options by the system solved. Iterations use the vector passed as initial guess, except where noted.
 SOLVERS: dict[str, dict[str, Any]] = {
     "factors": _FACTORS,
-    # MUMPS enlarges its work space by this percentage: fill-in of an indefinite matrix exceeds the analysis.
-    "factors, indefinite": _FACTORS | {"mat_mumps_icntl_14": 100},
     "elasticity": _CG | {"ksp_norm_type": "natural", "ksp_max_it": 500},
     # No norm: it would cost one more application of the preconditioner.
     "energy decrements": _CG | {"ksp_norm_type": "none", "ksp_max_it": 60},
@@ -66,6 +64,11 @@ _ON_RANKS = {
     "pc_hypre_boomeramg_relax_type_down": "l1-Gauss-Seidel",
     "pc_hypre_boomeramg_relax_type_up": "backward-l1-Gauss-Seidel",
 }
+
+# Percentages by which MUMPS enlarges its predicted work space, one after the other until it is enough: the fill-in of
+# an indefinite matrix exceeds the prediction. INFOG(1) tells that it was too small.
+WORK_SPACE = (20, 100, 400, 1600)
+_ENLARGE, _RESULT, _TOO_SMALL = 14, 1, (-8, -9)
 
 _prefixes = itertools.count()
 INDEFINITE = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC
@@ -136,6 +139,26 @@ def solver_of(kind: str, matrix: PETSc.Mat, stack: ExitStack, preconditioner: An
         ksp.pc.setType("python")
         ksp.pc.setPythonContext(preconditioner)
     return ksp
+
+
+def factorised(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:
+    """Return an LDLᵀ factorisation, or Cholesky's of an SPD matrix, freed with the ``stack``; collective.
+
+    On several ranks the order of the pivots, and with it the work space, depends on which rank is ready first.
+
+    Raises:
+        SolveError: if no work space is enough.
+    """
+    for space in WORK_SPACE:
+        ksp = solver_of("factors", matrix, stack)
+        ksp.pc.setFactorSetUpSolverType()
+        factors = keep(stack, ksp.pc.getFactorMatrix())
+        factors.setMumpsIcntl(_ENLARGE, space)
+        ksp.setUp()
+        if factors.getMumpsInfog(_RESULT) not in _TOO_SMALL:
+            return ksp
+        ksp.reset()
+    raise SolveError(f"the factorisation needs more than {WORK_SPACE[-1]} % above its predicted work space")
 
 
 def algebraic(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.PC:

@@ -18,7 +18,7 @@ from pipeline import compat
 from pipeline.arrays import FloatArray
 from pipeline.solve.kernels.multigrid import Cycle, SmoothedLevel, free, interpolation
 from pipeline.solve.kernels.product import operator_of
-from pipeline.solve.krylov import INDEFINITE, algebraic, check_converged, explained, keep, solver_of
+from pipeline.solve.krylov import INDEFINITE, algebraic, check_converged, explained, factorised, keep, solver_of
 from pipeline.stages import stage
 
 # Recycled solutions: most of them, and most bytes of a process; and Fischer's second method, for symmetric positive
@@ -69,9 +69,11 @@ class LinearSolver:
         self._is_direct, self._looked_closer = direct, False
         with ExitStack() as stack, explained():
             self._stack = stack
-            kind, preconditioner = ("factors", None) if direct else ("elasticity", self._preconditioner(below))
-            self.ksp = solver_of(kind, self.matrix, stack, preconditioner)
-            self.ksp.setUp()
+            if direct:
+                self.ksp = factorised(self.matrix, stack)
+            else:
+                self.ksp = solver_of("elasticity", self.matrix, stack, self._preconditioner(below))
+                self.ksp.setUp()
             self._stack = stack.pop_all()
 
     def __enter__(self) -> "LinearSolver":

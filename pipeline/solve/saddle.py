@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.krylov import SOLVERS, check_converged, explained, keep, solver_of
+from pipeline.solve.krylov import SOLVERS, check_converged, explained, factorised, keep, solver_of
 from pipeline.solve.linear_solver import Level, LinearSolver
 from pipeline.stages import stage
 
@@ -122,9 +122,7 @@ class SaddleSolver:
     def _factors(self, nest: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:
         matrix = keep(stack, nest.convert("aij", PETSc.Mat()))
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        ksp = solver_of("factors, indefinite", matrix, stack)
-        ksp.setUp()
-        return ksp
+        return factorised(matrix, stack)
 
     def _preconditioner(self, c: Weight, stack: ExitStack) -> "_BlockTriangular":
         saddle = self._saddle

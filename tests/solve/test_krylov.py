@@ -178,3 +178,20 @@ def test_places_of_a_path_begin_from_the_others():
     assert [one.force_error for one in begun] == pytest.approx([one.force_error for one in afresh], rel=1e-6)
     assert begun[0].iterations == afresh[0].iterations
     assert all(one.iterations < 0.7 * other.iterations for one, other in zip(begun[1:], afresh[1:], strict=True))
+
+
+@pytest.mark.mpi
+def test_a_factorisation_that_lacks_space_starts_again_with_more(monkeypatch):
+    """MUMPS's work space is a guess; the first one here is far too small."""
+    expected = mixed_force()
+    factorisations, make = [], krylov.solver_of
+    monkeypatch.setattr(krylov, "WORK_SPACE", (-90, 300))
+    monkeypatch.setattr(krylov, "solver_of", lambda kind, *rest: factorisations.append(kind) or make(kind, *rest))
+    assert mixed_force() == pytest.approx(expected, rel=1e-9)
+    assert factorisations == ["factors", "factors"]
+
+
+def mixed_force():
+    body = make_mesh(MPI.COMM_WORLD)
+    with Spaces(body) as spaces, QuasiStaticProblem(spaces, 2, Conditions(), "mixed") as problem:
+        return problem.solve(law(0.49), PRESS, method="direct").reaction[2]

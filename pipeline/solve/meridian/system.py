@@ -16,7 +16,7 @@ from pipeline.quantities import CLEAR
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance
-from pipeline.solve.krylov import check_converged, explained, keep, solver_of
+from pipeline.solve.krylov import check_converged, explained, factorised, keep
 from pipeline.solve.meridian.forms import MeridianForms, Meshes
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
@@ -79,9 +79,8 @@ class System:
                 operator.setOption(PETSc.Mat.Option.SYMMETRIC, True)
                 if self.forms.is_definite:
                     operator.setOption(PETSc.Mat.Option.SPD, True)
-                ksp = solver_of("factors, indefinite", operator, stack)
+                ksp = factorised(operator, stack)
                 right, left = (keep(stack, vector) for vector in operator.createVecs())
-                ksp.setUp()
 
             def solve(load: FloatArray) -> FloatArray:
                 left.array[:] = load
