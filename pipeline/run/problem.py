@@ -152,9 +152,9 @@ def _moved(far: PointForce | BodyField, centre: Place) -> FarField:
 
 
 def law_of(case: Case) -> MaterialLaw:
-    """Return the material law of the body's regions."""
-    parameters = tuple(Parameters.of_moduli(tissue.young, tissue.poisson) for tissue in case.tissues)
-    return MaterialLaw(parameters, case.material.law)
+    """Return laws and parameters of the body's regions."""
+    law = case.material.law
+    return MaterialLaw(tuple(Parameters.of_moduli(tissue.young, tissue.poisson, law) for tissue in case.tissues))
 
 
 def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case | None = None) -> Solution:

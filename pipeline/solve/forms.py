@@ -4,6 +4,7 @@
 form is made at its first use, which is collective.
 """
 
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, Protocol
 from weakref import WeakKeyDictionary
@@ -19,7 +20,8 @@ from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.solve.compiled import cellwise_space, form, quadrature_degree, scalar_space, vector_space
-from pipeline.solve.physics import COEFFICIENTS, LAWS, MaterialLaw, of_regions, strain
+from pipeline.solve.laws import LAWS
+from pipeline.solve.physics import COEFFICIENTS, MaterialLaw, of_regions, strain
 
 
 class CellKernel(Protocol):
@@ -52,7 +54,20 @@ class ElasticForms:
     def set_law(self, law: MaterialLaw) -> None:
         """Set the parameters of ``law`` for the next assembly."""
         for name, coefficient in self.coefficients.items():
-            self._put(coefficient, law.values(name))
+            if (values := law.values(name)) is not None:
+                self._put(coefficient, values)
+
+    def coefficients_of(self, laws: Iterable[str]) -> dict[str, Any]:
+        """Return the coefficients of these laws by name; the next :meth:`set_law` sets new ones."""
+        for name in (name for law in laws for name in LAWS[law].parameters):
+            self.coefficients.setdefault(name, self._coefficient())
+        return self.coefficients
+
+    def cells_of(self, laws: Sequence[str]) -> dict[str, BoolArray | None]:
+        """Return for each law the mask of its local cells; None if it is the law of all regions."""
+        if len(set(laws)) == 1:
+            return {laws[0]: None}
+        return {law: np.array([each == law for each in laws])[self._regions] for law in sorted(set(laws))}
 
     def by_region(self, values: tuple[float, ...]) -> Any:
         """Return a coefficient with the given ``values`` by region: a constant, or a function."""
@@ -142,20 +157,21 @@ class MixedForms:
 
 
 class HyperelasticForms:
-    """Derivatives of a law's energy, with coefficients and displacement u shared with the ``elastic`` forms.
+    """Derivatives of the energy, with coefficients and displacement u shared with the ``elastic`` forms.
 
-    ``direction`` is the function w of ``product``.
+    ``laws`` are the names of the laws by region, or a single one. ``direction`` is the function w of ``product``.
     """
 
-    def __init__(self, space: Any, elastic: ElasticForms, law: str):
-        self._space, self._law = space, law
-        self._displacement, self._coefficients = elastic.displacement, elastic.coefficients
+    def __init__(self, space: Any, elastic: ElasticForms, laws: Sequence[str]):
+        self._space, self._cells = space, elastic.cells_of(laws)
+        self._displacement, self._coefficients = elastic.displacement, elastic.coefficients_of(laws)
         self.direction = fem.Function(space)
 
     @property
     def _energy(self) -> Any:
         gradient = ufl.Identity(3) + ufl.grad(self._displacement)
-        return LAWS[self._law](gradient, self._coefficients) * dx(self._space, more=_MORE)
+        measures = measures_of(self._space, self._cells, more=_MORE)
+        return sum(LAWS[law].density(gradient, self._coefficients) * each for law, each in measures.items())
 
     @property
     def _residual(self) -> Any:
@@ -199,6 +215,23 @@ def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:
     return measure(_STRAIGHT, metadata=exact) + measure(_CURVED, metadata=enough)
 
 
+def measures_of(space: Any, cells: Mapping[str, BoolArray | None], *, more: int) -> dict[str, Any]:
+    """Return a measure for each law on its ``cells``: see :func:`dx`."""
+    if None in cells.values():
+        return {law: dx(space, more=more) for law in cells}
+    degree, mesh = compat.degree(space), space.mesh
+    exact, enough = ({"quadrature_degree": d} for d in (2 * degree - 2 + more, quadrature_degree(degree)))
+    curved, count = curved_cells(mesh), len(cells)
+    marks = sum(number * mask for number, mask in enumerate(cells.values(), start=1))
+    if curved is not None:
+        marks = marks + count * curved
+    measure = ufl.Measure("dx", domain=mesh, subdomain_data=compat.cell_tags(mesh, marks.astype(np.int32)))
+    found = {law: measure(number, metadata=exact) for number, law in enumerate(cells, start=1)}
+    if curved is None:
+        return found
+    return {law: each + measure(count + n, metadata=enough) for n, (law, each) in enumerate(found.items(), start=1)}
+
+
 def curved_cells(mesh: Any) -> BoolArray | None:
     """Return a mask of local cells with a mid node off the middle of its edge; None if cells have no mid nodes."""
     if mesh not in _curved:
@@ -223,7 +256,12 @@ def _find_curved(mesh: Any) -> BoolArray | None:
 
 
 def compile_forms(
-    degree: int, element: str = "displacement", law: str = "linear", *, straight: bool = False, of_regions: bool = False
+    degree: int,
+    element: str = "displacement",
+    laws: Sequence[str] = ("linear",),
+    *,
+    straight: bool = False,
+    of_regions: bool = False,
 ) -> None:
     """Compile the forms for elements of ``degree``, for all lower degrees, and for the next one (error bar)."""
     regions = np.zeros(1, dtype=np.int32) if of_regions else None
@@ -235,8 +273,8 @@ def compile_forms(
         if element == "mixed" and level > 1:  # the search for contact begins at the lowest degree
             mixed = MixedForms(elastic.displacement, scalar_space(mesh, level - 1))
             _ = mixed.mass, mixed.coupling, mixed.dilation, mixed.pull
-        if law != "linear" and level >= degree:
-            large = HyperelasticForms(space, elastic, law)
+        if set(laws) != {"linear"} and level >= degree:
+            large = HyperelasticForms(space, elastic, laws)
             _ = large.residual, large.product
             if level == degree:
                 _ = large.energy, large.tangent

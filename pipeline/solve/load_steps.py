@@ -85,7 +85,7 @@ class LoadSteps(Solver):
         self._space = elements.displacements
         self._levels = elements.levels(law, stack, direct=direct)
         solver = stack.enter_context(LinearSolver(self._levels, direct=direct))
-        self._forms = HyperelasticForms(self._space.space, self._space.forms, law.name)
+        self._forms = HyperelasticForms(self._space.space, self._space.forms, law.names)
         self._body = HyperelasticBody(self._space, self._forms, solver)
         stack.callback(self._body.close)
 
@@ -141,7 +141,7 @@ class LoadSteps(Solver):
         self._body.move(displacement, unit, rate)
         elements, solver = self._elements.finer(self._law, self._levels, stack)
         finer = elements.displacements
-        forms = HyperelasticForms(finer.space, finer.forms, self._law.name)
+        forms = HyperelasticForms(finer.space, finer.forms, self._law.names)
         finer.forms.set_law(self._law)
         residuals = [stack.enter_context(vector(finer.space)) for _ in range(2)]
         with vector(finer.space) as there:

@@ -1,15 +1,10 @@
-"""Material laws: parameters of each region, and strain energies in UFL.
+"""Material of each region: its law, by name, and its parameters. The strain energies are in ``laws``."""
 
-A law gives the energy density ψ (J/m³, undeformed volume) as a function of F = I + ∇u and of parameters, named as in
-:class:`Parameters`. To second order in ∇u it must be linear elasticity with the same λ and μ. To add a law, write ψ and
-enter it in :data:`LAWS`; studies may use it once its name is in the list of ``pipeline/study/schema.py``. A further
-parameter is a field of :class:`Parameters`, named in :data:`COEFFICIENTS`: forms then have it in each region.
-"""
-
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,7 +13,7 @@ import ufl
 from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.shapes.tissue import lame
 
-# Parameters that are coefficients of forms; those that an energy does not use are not compiled in.
+# Parameters of every law.
 COEFFICIENTS = ("lame_lambda", "lame_mu")
 # Least λ₁, in units of μ: λ₀ may then be −μ/4, and K₀ is positive definite as long as λ₀ is above −2μ/3.
 _LEAST_REST = 0.25
@@ -26,19 +21,28 @@ _LEAST_REST = 0.25
 
 @dataclass(frozen=True)
 class Parameters:
-    """Material parameters of one region at small strain: Lamé's λ and μ (Pa); λ is infinite if incompressible.
+    """Material of one region. Lamé's λ and μ (Pa) are those of small strain; λ is infinite if incompressible.
 
+    ``law`` is one of :data:`pipeline.solve.laws.LAWS`, ``further`` its parameters besides λ and μ, by name.
     ``given_poisson`` is Poisson's ratio as given, None if λ and μ were given.
     """
 
     lame_lambda: float
     lame_mu: float
     given_poisson: float | None = field(default=None, compare=False)
+    law: str = "linear"
+    further: tuple[tuple[str, float], ...] = ()
 
     @staticmethod
-    def of_moduli(young: float, poisson: float) -> "Parameters":
-        """Return parameters from Young's modulus (Pa) and Poisson's ratio, 0 to ½."""
-        return Parameters(*lame(young, poisson), poisson)
+    def of_moduli(
+        young: float, poisson: float, law: str = "linear", further: Mapping[str, float] = MappingProxyType({})
+    ) -> "Parameters":
+        """Return parameters from Young's modulus (Pa) and Poisson's ratio, 0 to ½, with the law's ``further`` ones."""
+        return Parameters(*lame(young, poisson), poisson, law, tuple(further.items()))
+
+    def value(self, name: str) -> float | None:
+        """Return a parameter by its name, None if the law has no such parameter."""
+        return getattr(self, name) if name in COEFFICIENTS else dict(self.further).get(name)
 
     @property
     def poisson(self) -> float:
@@ -60,13 +64,9 @@ class Parameters:
 
 @dataclass(frozen=True)
 class MaterialLaw:
-    """A law, one of :data:`LAWS`, with the ``parameters`` of each region of the mesh, by region number.
-
-    A law with one region applies to all regions of a mesh.
-    """
+    """Laws and ``parameters`` of the regions of the mesh, by region number; a single one applies to all regions."""
 
     parameters: tuple[Parameters, ...]
-    name: str = "linear"
 
     @staticmethod
     def of(lame_lambda: float | Sequence[float], lame_mu: float | Sequence[float]) -> "MaterialLaw":
@@ -76,28 +76,37 @@ class MaterialLaw:
         return MaterialLaw((Parameters(lame_lambda, lame_mu),))  # type: ignore[arg-type]
 
     @staticmethod
-    def of_moduli(young: float, poisson: float, name: str = "linear") -> "MaterialLaw":
-        """Return the law of a body of one material, from Young's modulus (Pa) and Poisson's ratio, 0 to ½."""
-        return MaterialLaw((Parameters.of_moduli(young, poisson),), name)
+    def of_moduli(young: float, poisson: float, law: str = "linear", **further: float) -> "MaterialLaw":
+        """Return the law of a body of one material: see :meth:`Parameters.of_moduli`."""
+        return MaterialLaw((Parameters.of_moduli(young, poisson, law, further),))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The name of the law of each region."""
+        return tuple(each.law for each in self.parameters)
 
     @property
     def is_linear(self) -> bool:
         """Whether forces are proportional to displacements."""
-        return self.name == "linear"
+        return set(self.names) == {"linear"}
 
-    def values(self, name: str) -> tuple[float, ...]:
-        """Return one parameter, by its name, for each region."""
-        return tuple(getattr(each, name) for each in self.parameters)
+    def values(self, name: str) -> tuple[float, ...] | None:
+        """Return one parameter, by its name, for each region; None if no region has it.
+
+        A region whose law lacks it has 1, which no energy reads.
+        """
+        found = [each.value(name) for each in self.parameters]
+        return None if all(value is None for value in found) else tuple(1.0 if v is None else v for v in found)
 
     @cached_property
     def lame_lambda(self) -> tuple[float, ...]:
         """Lamé's λ (Pa) of each region."""
-        return self.values("lame_lambda")
+        return tuple(each.lame_lambda for each in self.parameters)
 
     @cached_property
     def lame_mu(self) -> tuple[float, ...]:
         """Lamé's μ (Pa) of each region."""
-        return self.values("lame_mu")
+        return tuple(each.lame_mu for each in self.parameters)
 
     def softened(self, ratio: float) -> "MaterialLaw":
         """Return linear elasticity of the same μ, with λ/μ of each region limited to ``ratio``."""
@@ -159,22 +168,3 @@ def small_strain(strain: Any, lame_lambda: Any, lame_mu: Any) -> Any:
 def pressurised(strain: Any, lame_lambda: Any, lame_mu: Any, pressure: Any, compliance: Any) -> Any:
     """Linear elasticity, with λ₁ added to λ by a pressure p = λ₁ tr ε and the compliance 1/λ₁; stationary in both."""
     return small_strain(strain, lame_lambda, lame_mu) + pressure * ufl.tr(strain) - compliance * pressure**2 / 2
-
-
-def linear(gradient: Any, of: Mapping[str, Any]) -> Any:
-    """Linear elasticity, ε the symmetric part of F − I."""
-    return small_strain(ufl.sym(gradient) - ufl.Identity(gradient.ufl_shape[0]), of["lame_lambda"], of["lame_mu"])
-
-
-def neo_hookean(gradient: Any, of: Mapping[str, Any]) -> Any:
-    """Compressible neo-Hookean law: μ/2 (F : F − 3) − μ ln J + λ/2 (J − 1)², J = det F.
-
-    It is polyconvex (J. M. Ball, Arch. Rational Mech. Anal. 63, 1977), and infinite at J = 0.
-    """
-    volume, lame_lambda, lame_mu = ufl.det(gradient), of["lame_lambda"], of["lame_mu"]
-    stretched = lame_mu / 2 * (ufl.inner(gradient, gradient) - 3) - lame_mu * ufl.ln(volume)
-    return stretched + lame_lambda / 2 * (volume - 1) ** 2
-
-
-# ψ as a function of F and of parameters by name; keys are the names in a study file.
-LAWS: dict[str, Callable[[Any, Mapping[str, Any]], Any]] = {"linear": linear, "neo-hookean": neo_hookean}

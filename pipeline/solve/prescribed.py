@@ -115,7 +115,7 @@ class PrescribedMotion:
         if law.is_linear:
             return self._elements.set_up(law, stack, direct=direct, keep=keep)
         if not isinstance(self._elements, DisplacementElements):
-            raise SolveError(f"the law {law.name} needs displacement elements")
+            raise SolveError("laws of large displacements need displacement elements")
         load_path = self._load_path
         if load_path is None or not load_path.can_reach(law, movement):
             load_path = LoadPath(law, movement.motions[0], np.zeros(self._elements.displacements.owned))

@@ -15,13 +15,22 @@ from pipeline.scene.model import FIXED
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.forms import ElasticForms, HyperelasticForms
 from pipeline.solve.kernels import multigrid
+from pipeline.solve.laws import LAWS
+from pipeline.solve.laws.law import Law
 from pipeline.solve.load_steps import LoadSteps, check_path
 from pipeline.solve.newton import LargeError
-from pipeline.solve.physics import LAWS, MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.study.schema import Material
 from tests.cases import force, solve, study
 
 LARGE = {"law": "neo-hookean"}
+# Parameters of each law besides λ and μ.
+FURTHER = {
+    "mooney-rivlin": {"c2": 0.3},
+    "yeoh": {"c2": 0.4, "c3": 0.1},
+    "gent": {"limit": 3.0},
+    "veronda-westmann": {"alpha": 1.5},
+}
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}
 
 
@@ -45,7 +54,7 @@ def test_uniform_stretch(stretch):
     linear = ElasticForms(space)
     linear.set_law(law)
     linear.displacement.interpolate(lambda x: np.array([(b - 1) * x[0], (b - 1) * x[1], (stretch - 1) * x[2]]))
-    forms = HyperelasticForms(space, linear, "neo-hookean")
+    forms = HyperelasticForms(space, linear, ("neo-hookean",))
     quarter = 20e-3**3
     assert fem.assemble_scalar(forms.energy) == pytest.approx(quarter * density, rel=1e-9, abs=1e-12)
     nodal = np.array(fem.assemble_vector(forms.residual).array).reshape(-1, 3)
@@ -159,11 +168,9 @@ def test_laws_are_linear_at_small_strains(law):
     body = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
     space = vector_space(body.mesh, 2)
     elastic = ElasticForms(space)
-    elastic.set_law(MaterialLaw.of_moduli(10e3, 0.4))
-    stiffness, tangent = (
-        compat.assemble_matrix(form, [], 1.0)
-        for form in (elastic.stiffness, HyperelasticForms(space, elastic, law).tangent)
-    )
+    forms = HyperelasticForms(space, elastic, (law,))
+    elastic.set_law(MaterialLaw.of_moduli(10e3, 0.4, law, **FURTHER.get(law, {})))
+    stiffness, tangent = (compat.assemble_matrix(form, [], 1.0) for form in (elastic.stiffness, forms.tangent))
     size = stiffness.norm()
     tangent.axpy(-1.0, stiffness)
     assert tangent.norm() < 1e-10 * size
@@ -171,7 +178,9 @@ def test_laws_are_linear_at_small_strains(law):
 
 def test_laws_of_one_space_have_forms_of_their_own(monkeypatch):
     """Forms of a second law are not confused with those of the first."""
-    monkeypatch.setitem(LAWS, "stiffer", lambda *of: 2 * LAWS["neo-hookean"](*of))
+    soft = LAWS["neo-hookean"]
+    stiffer = Law(lambda *of: 2 * soft.shape(*of), modulus=lambda of: 2 * soft.modulus(of))
+    monkeypatch.setitem(LAWS, "stiffer", stiffer)
     (planned,) = make_plan(study()).solves
     body = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
     space = vector_space(body.mesh, 1)
@@ -179,6 +188,6 @@ def test_laws_of_one_space_have_forms_of_their_own(monkeypatch):
     elastic.set_law(MaterialLaw.of_moduli(10e3, 0.4))
     elastic.displacement.interpolate(lambda x: 0.1 * x)
     energies = [
-        fem.assemble_scalar(HyperelasticForms(space, elastic, law).energy) for law in ("neo-hookean", "stiffer")
+        fem.assemble_scalar(HyperelasticForms(space, elastic, (law,)).energy) for law in ("neo-hookean", "stiffer")
     ]
     assert energies[1] == pytest.approx(2 * energies[0], rel=1e-12)

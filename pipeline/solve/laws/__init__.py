@@ -1,0 +1,13 @@
+"""Material laws, one file each: ``LAWS`` has them by the names of the study file. ``law`` says what a law is."""
+
+from pipeline.solve.laws import gent, linear, mooney_rivlin, neo_hookean, veronda_westmann, yeoh
+from pipeline.solve.laws.law import Law
+
+LAWS: dict[str, Law] = {
+    "linear": linear.LAW,
+    "neo-hookean": neo_hookean.LAW,
+    "mooney-rivlin": mooney_rivlin.LAW,
+    "yeoh": yeoh.LAW,
+    "gent": gent.LAW,
+    "veronda-westmann": veronda_westmann.LAW,
+}

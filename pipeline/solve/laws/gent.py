@@ -1,0 +1,18 @@
+"""Gent's law: −μ J_m/2 ln(1 − (Ī₁ − 3)/J_m), infinite at Ī₁ = 3 + J_m; J_m is the parameter ``limit``.
+
+A. N. Gent, Rubber Chem. Technol. 69, 1996.
+"""
+
+from typing import Any
+
+import ufl
+
+from pipeline.solve.laws.law import Law, Of, isochoric
+
+
+def _shape(gradient: Any, of: Of) -> Any:
+    _, first = isochoric(gradient)
+    return -of["lame_mu"] / 2 * of["limit"] * ufl.ln(1 - (first - 3) / of["limit"])
+
+
+LAW = Law(_shape, ("limit",))

@@ -1,0 +1,20 @@
+"""Veronda and Westmann's law: C₁ (exp(α (Ī₁ − 3)) − 1) − α C₁/2 (Ī₂ − 3), μ = α C₁; α is the parameter ``alpha``.
+
+D. R. Veronda and R. A. Westmann, J. Biomech. 3, 1970.
+"""
+
+from typing import Any
+
+import ufl
+
+from pipeline.solve.laws.law import Law, Of, isochoric, second_isochoric
+
+
+def _shape(gradient: Any, of: Of) -> Any:
+    volume, first = isochoric(gradient)
+    alpha = of["alpha"]
+    stiffening = (ufl.exp(alpha * (first - 3)) - 1) / alpha
+    return of["lame_mu"] * (stiffening - (second_isochoric(gradient, volume) - 3) / 2)
+
+
+LAW = Law(_shape, ("alpha",))
