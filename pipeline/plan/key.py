@@ -8,12 +8,13 @@ from math import inf
 from typing import Any
 
 from pipeline.plan.symmetry import mirror_planes, movement_planes
-from pipeline.shapes.body import Body
+from pipeline.shapes.body import PIECES, Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
+from pipeline.shapes.tissue import Tissue
 from pipeline.study.capabilities import obstacle
 from pipeline.study.loads import Load
-from pipeline.study.schema import Mesh
+from pipeline.study.schema import Material, Mesh
 from pipeline.study.sweep import Case
 from pipeline.units import canonical
 
@@ -23,8 +24,6 @@ PHYSICS_VERSION = 6
 # Keys of a probe without effect on any force: action is a label.
 _UNPHYSICAL = ("action",)
 _MANY = 200_000  # sections of a large study
-# Keys of a body's other materials.
-_PIECES = ("layer", "inclusion")
 
 
 def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
@@ -37,7 +36,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     parts = [
         str(PHYSICS_VERSION),
         _body_text(case.body, case.scale.stress if scaled else 1.0),
-        text_of(case.material, ("density", *(case.material.PROPORTIONAL_TO if scaled else ()))),
+        _material_text(case.material, scaled=scaled),
         text_of(case.probe, (*_UNPHYSICAL, *(case.moves_in_proportion if scaled else ()))),
         _ratios_text(case.probe) if scaled else "",
         _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, case.element),
@@ -57,7 +56,7 @@ def reference_key(case: Case, accuracy: float) -> str:
     parts = [
         f"{PHYSICS_VERSION} exact {accuracy!r}",
         _body_text(case.body, case.scale.stress),
-        text_of(case.material, ("density", *(() if case.is_bent else case.material.PROPORTIONAL_TO))),
+        _material_text(case.material, scaled=not case.is_bent),
         text_of(probe, (*_UNPHYSICAL, *probe.proportional_to)),
         ratios,
     ]
@@ -115,7 +114,7 @@ def _in_units_of(stress: float, body: Body) -> Body:
     """Return the body with its regions' Young's moduli in units of ``stress`` (Pa)."""
     changes = {
         key: tuple(piece.model_copy(update={"young": canonical(piece.young / stress)}) for piece in getattr(body, key))
-        for key in _PIECES
+        for key in PIECES
         if getattr(body, key, ())
     }
     return body.model_copy(update=changes) if changes else body
@@ -126,17 +125,31 @@ def _body_text(body: Body, stress: float | None = None) -> str:
     """Return a body in canonical form, moduli in units of ``stress`` (Pa); without it, only the geometry."""
     if not body.regions:
         return text_of(body)
-    content = (body if stress is None else _in_units_of(stress, body)).model_dump()
+    content = body.model_dump()
     ends = (*body.interfaces, body.heights[0])
     for number, layer in enumerate(content.get("layer", ())):
         layer["thickness"] = ends[number]  # its lower end, so that equal layers have equal texts
     for inclusion, ball in zip(content["inclusion"], body.inclusion, strict=True):
         inclusion.update(axes=ball.surface.axes, radius=None)
-    for piece in (piece for key in _PIECES for piece in content.get(key, ())):
-        del piece["density"]  # written with the loads
-        if stress is None:
-            del piece["young"], piece["poisson"]
+    for key in (key for key in PIECES if key in content):
+        content[key] = [
+            {name: value for name, value in piece.items() if name not in Tissue.model_fields}
+            | ({} if stress is None else _tissue_content(region))
+            for piece, region in zip(content[key], getattr(_in_units_of(stress or 1.0, body), key), strict=True)
+        ]
     return _text(content)
+
+@lru_cache(_MANY)
+def _material_text(material: Material, *, scaled: bool) -> str:
+    """Return a material in canonical form, without what F is proportional to if ``scaled``."""
+    content = {"law": material.law, **_tissue_content(material)}
+    return _text({key: content[key] for key in content if not (scaled and key in material.PROPORTIONAL_TO)})
+
+
+def _tissue_content(tissue: Tissue) -> dict[str, Any]:
+    """Return what the law of a tissue reads, with defaults; densities are written with the loads."""
+    law = {"law": tissue.law} if tissue.is_large else {}
+    return {"young": tissue.young, "poisson": tissue.poisson, **law, **tissue.further}
 
 
 @lru_cache(_MANY)

@@ -13,7 +13,6 @@ from pipeline.solve.crack import compile_release
 from pipeline.solve.forms import compile_forms
 from pipeline.solve.greens_function import compile_regular
 from pipeline.solve.kernels import native
-from pipeline.solve.laws import LAWS
 from pipeline.solve.meridian.problem import compile_axisymmetric
 from pipeline.solve.meridian.punch import TRIAL_DEGREE
 from pipeline.stages import stage
@@ -77,7 +76,8 @@ def _compile(forms: _Forms) -> None:
     if forms == _REGULAR:
         compile_regular()
         return
-    compile_forms(degree, element, (element if element in LAWS else "linear",), straight=degree == 1, of_regions=of_regions)
+    laws = ("linear",) if element in ("displacement", "mixed") else element.split("+")
+    compile_forms(degree, element, laws, straight=degree == 1, of_regions=of_regions)
     compile_cell_values(degree, straight=degree == 1)
     if forms.of_slit:
         compile_release(degree, mixed=element == "mixed", of_regions=of_regions)

@@ -153,8 +153,9 @@ def _moved(far: PointForce | BodyField, centre: Place) -> FarField:
 
 def law_of(case: Case) -> MaterialLaw:
     """Return laws and parameters of the body's regions."""
-    law = case.material.law
-    return MaterialLaw(tuple(Parameters.of_moduli(tissue.young, tissue.poisson, law) for tissue in case.tissues))
+    return MaterialLaw(
+        tuple(Parameters.of_moduli(each.young, each.poisson, each.law or "linear", each.further) for each in case.tissues)
+    )
 
 
 def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case | None = None) -> Solution:

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from functools import cached_property
 from itertools import accumulate
 from math import inf
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.frame import Frame, Units, Vector
@@ -14,7 +14,10 @@ from pipeline.shapes.regions import Inclusion, Layer, Region
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.support import Fixed, Support, support_of
 from pipeline.shapes.surface import Surface
+from pipeline.shapes.tissue import Tissue
 
+# Keys of a body's regions.
+PIECES = ("layer", "inclusion")
 # Layers fill the body if their sum differs from its height by at most this share.
 _SAME = 1e-9
 # An inclusion is centred on the z axis within this share of the extent.
@@ -58,6 +61,15 @@ class Body(Section, ABC):
     def is_filled(self) -> bool:
         """Whether its layers fill it, so that `[material]` applies nowhere."""
         return False
+
+    def with_law_of(self, material: Tissue) -> Self:
+        """Return the body; its regions that have no law of their own have that of ``material``."""
+        found = {key: getattr(self, key, ()) for key in PIECES}
+        if not material.is_large or not any(found.values()):
+            return self
+        return self.model_copy(
+            update={key: tuple(piece.completed(material) for piece in found[key]) for key in found if found[key]}
+        )
 
     @cached_property
     def support(self) -> Support:

@@ -1,7 +1,8 @@
 """Material of a region of tissue."""
 
 from math import inf
-from typing import Annotated
+from types import MappingProxyType
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field
 
@@ -9,17 +10,80 @@ from pipeline.shapes.section import Section, Words
 from pipeline.units import Density, Pressure
 
 
-class Tissue(Section):
-    """Isotropic linear elasticity."""
+# The keys that each law reads besides young and poisson.
+LAWS = MappingProxyType(
+    {
+        "linear": (),
+        "neo-hookean": (),
+        "mooney-rivlin": ("c2",),
+        "yeoh": ("c2", "c3"),
+        "gent": ("limit",),
+        "veronda-westmann": ("alpha",),
+    }
+)
+# Values of those that may be omitted.
+_DEFAULTS = {"c3": 0.0}
+_Tissue = TypeVar("_Tissue", bound="Tissue")
 
-    young: Annotated[Pressure, Words("Young's modulus.", '"10 kPa"', is_used=True)]
-    poisson: Annotated[float, Field(ge=0, le=0.5), Words("Poisson's ratio. 0.5 is incompressible.", "0.45")]
+
+class Tissue(Section):
+    """Elasticity: small-strain moduli, and a law."""
+
+    young: Annotated[Pressure, Words("Young's modulus at small strain.", '"10 kPa"', is_used=True)]
+    poisson: Annotated[
+        float, Field(ge=0, le=0.5), Words("Poisson's ratio at small strain. 0.5 is incompressible.", "0.45")
+    ]
+
+    law: Annotated[
+        Literal[tuple(LAWS)] | None,  # type: ignore[valid-type]
+        Words("Law of the region.", '"neo-hookean"', default="the material's, with its parameters"),
+    ] = None
+    c2: Annotated[
+        float | None,
+        Field(ge=-1000, le=1000),
+        Words(
+            "mooney-rivlin: C2 / (C1 + C2), where C1 (I1 - 3) + C2 (I2 - 3) is the strain energy; from 0 to 1. yeoh: "
+            "C2 / C1, where C1 x + C2 x^2 + C3 x^3 is the strain energy and x = I1 - 3.",
+            "0.3",
+        ),
+    ] = None
+    c3: Annotated[float | None, Field(ge=0, le=1000), Words("yeoh: C3 / C1.", "0.1", default="0 with yeoh")] = None
+    limit: Annotated[
+        float | None,
+        Field(ge=0.01, le=1e6),
+        Words("gent: the value J_m of I1 - 3 at which the tissue cannot be stretched farther.", "2.0"),
+    ] = None
+    alpha: Annotated[
+        float | None,
+        Field(ge=0.25, le=100),
+        Words("veronda-westmann: exponent of the strain energy. Larger values stiffen at smaller strains.", "2.0"),
+    ] = None
 
     density: Annotated[
         Density | None,
         Field(json_schema_extra={"unit": "kg/m^3"}),
         Words("Density. Gravity needs it.", '"1060 kg/m^3"', default="none; of regions, the material's"),
     ] = None
+
+    @property
+    def is_large(self) -> bool:
+        """Whether displacements are taken to be large: F is then not proportional to the depth."""
+        return self.law not in (None, "linear")
+
+    @property
+    def further(self) -> dict[str, Any]:
+        """The parameters of its law besides young and poisson, by key; None if one is missing."""
+        return {key: _DEFAULTS.get(key) if getattr(self, key) is None else getattr(self, key) for key in self._reads}
+
+    def completed(self: _Tissue, material: "Tissue") -> _Tissue:
+        """Return this tissue with the law of ``material``, and its parameters, if it has none of its own."""
+        if self.law is not None or not material.is_large:
+            return self
+        return self.model_copy(update={"law": material.law, **material.further})
+
+    @property
+    def _reads(self) -> tuple[str, ...]:
+        return LAWS[self.law] if self.law is not None else ()
 
     @property
     def lame(self) -> tuple[float, float]:

@@ -54,8 +54,7 @@ class ElasticForms:
     def set_law(self, law: MaterialLaw) -> None:
         """Set the parameters of ``law`` for the next assembly."""
         for name, coefficient in self.coefficients.items():
-            if (values := law.values(name)) is not None:
-                self._put(coefficient, values)
+            self._put(coefficient, law.values(name))
 
     def coefficients_of(self, laws: Iterable[str]) -> dict[str, Any]:
         """Return the coefficients of these laws by name; the next :meth:`set_law` sets new ones."""
@@ -216,20 +215,21 @@ def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:
 
 
 def measures_of(space: Any, cells: Mapping[str, BoolArray | None], *, more: int) -> dict[str, Any]:
-    """Return a measure for each law on its ``cells``: see :func:`dx`."""
-    if None in cells.values():
+    """Return a measure for each law on its ``cells``, None for all of them: see :func:`dx`."""
+    masks = [mask for mask in cells.values() if mask is not None]
+    if not masks:
         return {law: dx(space, more=more) for law in cells}
-    degree, mesh = compat.degree(space), space.mesh
+    degree, mesh, count = compat.degree(space), space.mesh, len(masks)
     exact, enough = ({"quadrature_degree": d} for d in (2 * degree - 2 + more, quadrature_degree(degree)))
-    curved, count = curved_cells(mesh), len(cells)
-    marks = sum(number * mask for number, mask in enumerate(cells.values(), start=1))
+    curved, marks = curved_cells(mesh), np.array(masks).argmax(axis=0) + 1
     if curved is not None:
-        marks = marks + count * curved
-    measure = ufl.Measure("dx", domain=mesh, subdomain_data=compat.cell_tags(mesh, marks.astype(np.int32)))
-    found = {law: measure(number, metadata=exact) for number, law in enumerate(cells, start=1)}
+        marks[curved] += count
+    measure = ufl.Measure("dx", domain=mesh, subdomain_data=compat.cell_tags(mesh, marks))
+    straight = [measure(number, metadata=exact) for number in range(1, count + 1)]
     if curved is None:
-        return found
-    return {law: each + measure(count + n, metadata=enough) for n, (law, each) in enumerate(found.items(), start=1)}
+        return dict(zip(cells, straight, strict=True))
+    bent = [measure(count + number, metadata=enough) for number in range(1, count + 1)]
+    return {law: one + other for law, one, other in zip(cells, straight, bent, strict=True)}
 
 
 def curved_cells(mesh: Any) -> BoolArray | None:

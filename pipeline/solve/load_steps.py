@@ -68,7 +68,7 @@ class LoadPath:
 
 
 class LoadSteps(Solver):
-    """A solver of displacement elements for a law of large displacements, one material and one motion.
+    """A solver of displacement elements for a law of large displacements and one motion.
 
     ``stored`` is the energy (J) of the modelled part at the end. What is made is freed with the stack.
     """
@@ -107,7 +107,7 @@ class LoadSteps(Solver):
             path = self._press(displacement, column)
             column.unknown[0].array[:] = displacement.array / column.amount - column.prescribed[:owned]
             column.unknown[0].array[self._space.prescribed_owned] = 0.0
-        check_path(path, _ROUNDING * self._law.lame_mu[0] * self._volume())
+        check_path(path, _ROUNDING * max(self._law.lame_mu) * self._volume())
         self.stored = float(path[-1, 2])
         return self._body.iterations - before
 

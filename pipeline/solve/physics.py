@@ -90,13 +90,10 @@ class MaterialLaw:
         """Whether forces are proportional to displacements."""
         return set(self.names) == {"linear"}
 
-    def values(self, name: str) -> tuple[float, ...] | None:
-        """Return one parameter, by its name, for each region; None if no region has it.
-
-        A region whose law lacks it has 1, which no energy reads.
-        """
-        found = [each.value(name) for each in self.parameters]
-        return None if all(value is None for value in found) else tuple(1.0 if v is None else v for v in found)
+    def values(self, name: str) -> tuple[float, ...]:
+        """Return one parameter, by its name, for each region; 1, which no energy reads, where the law lacks it."""
+        found = (each.value(name) for each in self.parameters)
+        return tuple(1.0 if value is None else value for value in found)
 
     @cached_property
     def lame_lambda(self) -> tuple[float, ...]:

@@ -236,8 +236,6 @@ REFUSALS: tuple[Refusal, ...] = (
         f"must be {Material.OF_LARGE[0]} to {Material.OF_LARGE[1]} {_OF_LAW}. Below, F depends on the elements "
         "at the tool's edge; above, displacement elements lock",
     ),
-    Refusal("large displacements", "layers", "needs a body of one material: omit layers and inclusions"),
-    Refusal("large displacements", "inclusion", "needs a body of one material: omit layers and inclusions"),
     Refusal("unilateral contact", "large displacements", f'must be "bonded" {_OF_LAW}'),
     Refusal("frictionless contact", "large displacements", f'must be "bonded" {_OF_LAW}'),
     Refusal("six motions", "large displacements", f'must be "press" {_OF_LAW}: there is no single stiffness'),

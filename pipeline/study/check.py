@@ -13,6 +13,7 @@ from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
 from pipeline.study.capabilities import check_features
+from pipeline.study.check_law import check_laws
 from pipeline.study.check_mesh import (
     check_chosen,
     check_column,
@@ -57,6 +58,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         for check in (check_column, check_ball, check_gap, check_slit_in):
             problems.each(check, body=(body,), probe=(probe,), mesh=meshes)
     check_features(sections, placed, problems)
+    check_laws(bodies, materials, problems)
     problems.each(_check_softness, body=bodies, material=materials)
     problems.each(check_locking, body=bodies, material=linear, mesh=meshes)
     check_reference(meshes, axes, problems)

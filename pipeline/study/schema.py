@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 from pipeline.shapes.regions import Inclusion, Layer
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import Section, Words
-from pipeline.shapes.tissue import Tissue
+from pipeline.shapes.tissue import LAWS, Tissue
 from pipeline.study.loads import Load, Traction
 from pipeline.study.path import Path
 from pipeline.study.vocabulary import FIGURES, REDUCTIONS
@@ -23,7 +23,7 @@ from pipeline.units import Length, Pressure, Share, parse_quantity
 
 
 class Material(Tissue):
-    """Isotropic elasticity, linear or, at large displacements, neo-Hookean."""
+    """Elasticity: linear, or a law of large displacements."""
 
     young: Annotated[Pressure, Words("Young's modulus. F is proportional to it.", '"10 kPa"', is_used=True)]
     poisson: Annotated[
@@ -37,30 +37,26 @@ class Material(Tissue):
     ]
 
     law: Annotated[
-        Literal["linear", "neo-hookean"],
+        Literal[tuple(LAWS)],  # type: ignore[valid-type]
         Words(
-            "Law of the material: linear elasticity, or neo-Hookean at large displacements. Both "
-            "agree at small depths. The neo-Hookean law needs a bonded tool that presses, one "
-            "material, and Poisson's ratios from 0.2 to 0.45.",
+            "Law of the material. linear: linear elasticity. All others are for large displacements, and agree with "
+            "linear elasticity at small depths. They need a bonded tool that presses, and Poisson's ratios from 0.2 "
+            "to 0.45.",
             '["linear", "neo-hookean"]',
         ),
     ] = "linear"
 
     # Keys that F is proportional to, if all of them change together.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]] = ("young",)
-    # Poisson's ratios of neo-Hookean bodies. Below the first, F depends on the elements at the probe's edge
+    # Poisson's ratios of laws of large displacements. Below the first, F depends on the elements at the probe's edge
     # (docs/accuracy.md). Above the second, displacement elements lock.
     OF_LARGE: ClassVar[tuple[float, float]] = (0.2, 0.45)
-
-    @property
-    def is_large(self) -> bool:
-        """Whether displacements are taken to be large: F is then not proportional to the depth."""
-        return self.law != "linear"
 
 
 def material_of(tissue: Tissue) -> Material:
     """Return the material of a layer or an inclusion."""
-    return Material.model_construct(young=tissue.young, poisson=tissue.poisson, density=tissue.density)
+    own = {key: getattr(tissue, key) for key in ("young", "poisson", "density", *tissue.further)}
+    return Material.model_construct(**own, law=tissue.law or "linear")
 
 
 # ---- mesh and solver --------------------------------------------------------------------------------

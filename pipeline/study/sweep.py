@@ -225,8 +225,8 @@ class Case:
 
     @property
     def formulation(self) -> str:
-        """What is solved: the element of linear elasticity, or the name of the law of large displacements."""
-        return self.material.law if self.material.is_large else self.element
+        """What is solved: the element of linear elasticity, or the names of the laws of large displacements."""
+        return "+".join(sorted({str(t.law) for t in self.tissues})) if self.material.is_large else self.element
 
     @property
     def is_followed(self) -> bool:
@@ -305,5 +305,9 @@ class Study:
 
 
 def _with_material_in_use(body: Body, material: Material, *others: Any) -> tuple[Any, ...]:
-    """Return the parts of a case: a body that layers fill has the first one's material, not the section's."""
-    return body, material_of(body.regions[0]) if body.is_filled else material, *others
+    """Return the parts of a case: a body that layers fill has the first one's material, not the section's.
+
+    Regions without a law have that of the material.
+    """
+    material = material_of(body.regions[0]) if body.is_filled else material
+    return body.with_law_of(material), material, *others

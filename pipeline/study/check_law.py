@@ -1,0 +1,76 @@
+"""Laws of large displacements: keys that they need, keys that none reads, and bounds that depend on the law."""
+
+from collections.abc import Iterator, Sequence
+from math import sqrt
+from typing import Any
+
+from pipeline.shapes.body import Body
+from pipeline.shapes.tissue import LAWS, Tissue
+from pipeline.study.problems import Problems
+from pipeline.study.regions import tissues_of
+from pipeline.study.schema import Material
+
+_OF_LAWS = tuple(dict.fromkeys(key for keys in LAWS.values() for key in keys))
+_UNSTABLE = "the tissue would lose its stiffness at some strain"
+
+
+def check_laws(bodies: Sequence[Body], materials: Sequence[Material], problems: Problems) -> None:
+    """Check the laws of all regions of every body, and their parameters."""
+    problems.each(_check_tissues, body=bodies, material=materials)
+    _check_unread([({"material": one}, "material", one) for one in materials], problems)
+    _check_unread([({"body": body}, key, one) for body in bodies for key, one in _regions(body)], problems)
+
+
+def _regions(body: Body) -> Iterator[tuple[str, Tissue]]:
+    unused = Material.model_construct(young=1.0, poisson=0.0)
+    return ((key, tissue) for key, tissue in tissues_of(body, unused) if key != "material")
+
+
+def _check_tissues(body: Body, material: Material, problems: Problems) -> None:
+    """Check each region; all must be for large displacements, or none."""
+    tissues = dict(tissues_of(body, material))
+    first = next(iter(tissues.values()))
+    low, high = Material.OF_LARGE
+    for key, tissue in tissues.items():
+        _check_tissue(key, tissue, problems)
+        complete = tissue.completed(first)
+        if complete.is_large != first.is_large:
+            problems.error(
+                f"{key}.law",
+                tissue.law or "linear",
+                "must be linear in all regions, or in none: linear elasticity resists the rotations of large "
+                "displacements",
+            )
+        elif key != "material" and complete.is_large and not low <= tissue.poisson <= high:
+            problems.error(
+                f"{key}.poisson", tissue.poisson, f"must be {low} to {high} with a law of large displacements"
+            )
+
+
+def _check_tissue(key: str, tissue: Tissue, problems: Problems) -> None:
+    """Report missing parameters, and values with which the law is unstable."""
+    for name, value in tissue.further.items():
+        if value is None:
+            problems.error(f"{key}.{name}", None, f'is required with law = "{tissue.law}"')
+            return
+    c2, c3 = tissue.c2, tissue.further.get("c3", 0.0)
+    if tissue.law == "mooney-rivlin" and c2 is not None and not 0 <= c2 <= 1:
+        problems.error(f"{key}.c2", c2, f'must be 0 to 1 with law = "mooney-rivlin": elsewhere, {_UNSTABLE}')
+    if tissue.law == "yeoh" and c2 is not None and c2 < -(least := sqrt(3 * c3)):
+        problems.error(
+            f"{key}.c2",
+            c2,
+            f'must be at least {-least:.4g}, which is −√(3 c3), with law = "yeoh": below, {_UNSTABLE}',
+        )
+
+
+def _check_unread(given: Sequence[tuple[dict[str, Any], str, Tissue]], problems: Problems) -> None:
+    """Report keys that are given and that no law of the sweep reads; ``given`` has tables, place and tissue."""
+    read = {(key, next(iter(about.values())).name, name) for about, key, tissue in given for name in tissue.further}
+    for about, key, tissue in given:
+        for name in _OF_LAWS:
+            owner = next(iter(about.values())).name
+            if name in tissue.model_fields_set and (key, owner, name) not in read:
+                laws = " and ".join(f'"{law}"' for law, keys in LAWS.items() if name in keys)
+                with problems.about(**about):
+                    problems.error(f"{key}.{name}", getattr(tissue, name), f"is read with law = {laws} only")
