@@ -139,6 +139,7 @@ def _body_text(body: Body, stress: float | None = None) -> str:
         ]
     return _text(content)
 
+
 @lru_cache(_MANY)
 def _material_text(material: Material, *, scaled: bool) -> str:
     """Return a material in canonical form, without what F is proportional to if ``scaled``."""

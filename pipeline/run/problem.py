@@ -154,7 +154,9 @@ def _moved(far: PointForce | BodyField, centre: Place) -> FarField:
 def law_of(case: Case) -> MaterialLaw:
     """Return laws and parameters of the body's regions."""
     return MaterialLaw(
-        tuple(Parameters.of_moduli(each.young, each.poisson, each.law or "linear", each.further) for each in case.tissues)
+        tuple(
+            Parameters.of_moduli(each.young, each.poisson, each.law or "linear", each.further) for each in case.tissues
+        )
     )
 
 

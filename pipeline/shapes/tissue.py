@@ -9,7 +9,6 @@ from pydantic import Field
 from pipeline.shapes.section import Section, Words
 from pipeline.units import Density, Pressure
 
-
 # The keys that each law reads besides young and poisson.
 LAWS = MappingProxyType(
     {

@@ -71,6 +71,6 @@ def _check_unread(given: Sequence[tuple[dict[str, Any], str, Tissue]], problems:
         for name in _OF_LAWS:
             owner = next(iter(about.values())).name
             if name in tissue.model_fields_set and (key, owner, name) not in read:
-                laws = " and ".join(f'"{law}"' for law, keys in LAWS.items() if name in keys)
+                laws = " or ".join(f'"{law}"' for law, keys in LAWS.items() if name in keys)
                 with problems.about(**about):
-                    problems.error(f"{key}.{name}", getattr(tissue, name), f"is read with law = {laws} only")
+                    problems.error(f"{key}.{name}", getattr(tissue, name), f"is read only with law = {laws}")

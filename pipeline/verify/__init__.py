@@ -19,6 +19,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from pipeline.verify.far_fields import far_field_rows  # noqa: PLC0415
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
     from pipeline.verify.hyperelastic import hyperelastic_rows  # noqa: PLC0415
+    from pipeline.verify.laws import law_rows  # noqa: PLC0415
     from pipeline.verify.loads import load_rows  # noqa: PLC0415
     from pipeline.verify.paths import path_rows  # noqa: PLC0415
     from pipeline.verify.regions import region_rows  # noqa: PLC0415
@@ -28,7 +29,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     found: list[Row] = []
     if comm.rank == 0:
         with compiling():
-            found = list(element_rows())
+            found = [*element_rows(), *law_rows()]
     yield from comm.bcast(found)
     yield from scene_rows(comm, quick=quick)
     yield from region_rows(comm, quick=quick)

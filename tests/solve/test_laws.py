@@ -1,0 +1,152 @@
+"""Material laws: energies that are objective, linear at small strain, and known in uniform stretch and shear."""
+
+from typing import get_args
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from scipy.spatial.transform import Rotation
+
+from pipeline import compat
+from pipeline.plan.plan import make_plan
+from pipeline.run.meshing import mesh_case
+from pipeline.shapes import tissue
+from pipeline.solve.compiled import vector_space
+from pipeline.solve.forms import ElasticForms, HyperelasticForms
+from pipeline.solve.laws import LAWS
+from pipeline.solve.physics import MaterialLaw
+from pipeline.study.schema import Material
+from pipeline.verify.laws import FURTHER, YOUNG, Cube, Stress
+from tests.cases import solve, study
+
+LARGE = tuple(FURTHER)
+SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}
+BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}
+
+
+def density(law, gradient, of=None, name="density", *more):
+    """Return the energy for a matrix F, by the value of its UFL expression."""
+    of = {"lame_mu": 1.0, "lame_lambda": 2.0} | FURTHER.get(law, {}) | (of or {})
+    return float(getattr(LAWS[law], name)(ufl.as_matrix(np.asarray(gradient).tolist()), of, *more))
+
+
+def gradients(seed, size=0.25, count=5):
+    found = np.eye(3) + size * np.random.default_rng(seed).standard_normal((count, 3, 3))
+    return found[np.linalg.det(found) > 0.2]
+
+
+def test_study_and_solver_name_the_same_laws_and_parameters():
+    assert {*get_args(Material.model_fields["law"].annotation)} == {*LAWS} == {*tissue.LAWS} == {"linear", *LARGE}
+    for name, law in LAWS.items():
+        assert law.parameters == tissue.LAWS[name]
+
+
+@pytest.mark.parametrize("law", LARGE)
+def test_an_energy_does_not_change_with_rotations(law):
+    for number, gradient in enumerate(gradients(1)):
+        turn = Rotation.random(random_state=number).as_matrix()
+        known = density(law, gradient)
+        assert density(law, turn @ gradient) == pytest.approx(known, rel=1e-11)
+        assert density(law, gradient @ turn) == pytest.approx(known, rel=1e-11)  # isotropic
+
+
+@pytest.mark.parametrize("law", LARGE)
+def test_rest_is_the_least_energy(law):
+    assert density(law, np.eye(3)) == pytest.approx(0.0, abs=1e-14)
+    assert all(density(law, gradient) > 0 for gradient in gradients(2))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_pressure_that_is_stationary_gives_the_same_energy(law):
+    """p = κ D, and then ψ(F, p) = ψ(F)."""
+    for gradient in gradients(3):
+        of = {"lame_mu": 1.0, "lame_lambda": 2.0}
+        modulus = LAWS[law].modulus(of)
+        pressure = modulus * float(LAWS[law].dilation(ufl.as_matrix(gradient.tolist())))
+        with_pressure = density(law, gradient, of, "pressurised", pressure, 1 / modulus)
+        assert with_pressure == pytest.approx(density(law, gradient, of), rel=1e-12)
+
+
+@pytest.mark.parametrize("law", LARGE)
+@pytest.mark.parametrize("stretch", [0.7, 1.0, 1.4])
+def test_uniaxial_stress_is_the_closed_form(law, stretch):
+    cube, stress = Cube(law), Stress.of_law(law)
+    lateral, nominal = stress.uniaxial(stretch) if stretch != 1 else (1.0, 0.0)
+    force, inside = cube.forces(np.diag([lateral, lateral, stretch]))
+    assert force == pytest.approx([0, 0, nominal], rel=1e-10, abs=1e-9 * YOUNG)
+    assert inside < 1e-12 * YOUNG
+    wide, _ = cube.forces(np.diag([stretch, lateral, lateral]))  # the same stress on other faces
+    assert wide == pytest.approx([0, 0, 0], abs=1e-9 * YOUNG)
+
+
+@pytest.mark.parametrize("law", LARGE)
+def test_simple_shear_is_the_closed_form(law):
+    force, inside = Cube(law).forces(np.eye(3) + 0.6 * np.outer([1, 0, 0], [0, 0, 1]))
+    assert force[0] == pytest.approx(Stress.of_law(law).shear(0.6), rel=1e-10)
+    assert inside < 1e-12 * YOUNG
+
+
+@pytest.mark.parametrize("law", LARGE)
+def test_inverted_tissue_has_no_finite_energy(law):
+    assert np.isfinite(Cube(law).energy(np.diag([0.5, 1.2, 1.1])))
+    assert not np.isfinite(Cube(law).energy(np.diag([-0.5, 1.2, 1.1])))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_laws_are_linear_at_small_strains(law):
+    """The tangent at zero displacement is the stiffness of linear elasticity."""
+    (planned,) = make_plan(study()).solves
+    body = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
+    space = vector_space(body.mesh, 2)
+    elastic = ElasticForms(space)
+    forms = HyperelasticForms(space, elastic, (law,))
+    elastic.set_law(MaterialLaw.of_moduli(10e3, 0.4, law, **FURTHER.get(law, {})))
+    stiffness, tangent = (compat.assemble_matrix(form, [], 1.0) for form in (elastic.stiffness, forms.tangent))
+    size = stiffness.norm()
+    tangent.axpy(-1.0, stiffness)
+    assert tangent.norm() < 1e-10 * size
+
+
+def test_regions_with_laws_of_their_own_add_up():
+    """The energy of a body is the sum over its regions, each with its law, and layers of one law are one body."""
+    (planned,) = make_plan(study(body=BOX | {"layer": [SKIN]})).solves
+    body = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
+    space = vector_space(body.mesh, 2)
+    deformation = np.diag([1.1, 0.95, 1.05])
+    energies = []
+    for laws in (("neo-hookean", "gent"), ("neo-hookean", "neo-hookean"), ("gent", "gent")):
+        elastic = ElasticForms(space, body.regions)
+        forms = HyperelasticForms(space, elastic, laws)
+        elastic.set_law(
+            MaterialLaw(tuple(MaterialLaw.of_moduli(10e3, 0.4, name, **FURTHER[name]).parameters[0] for name in laws))
+        )
+        elastic.displacement.interpolate(lambda x: (deformation - np.eye(3)) @ x)
+        energies.append(fem.assemble_scalar(forms.energy))
+    mixed, soft, stiff = energies
+    assert mixed == pytest.approx(0.9 * soft + 0.1 * stiff, rel=1e-9)  # the layer is a tenth of the box
+    assert soft != pytest.approx(stiff, rel=1e-4)
+
+
+def test_a_layer_of_the_same_tissue_is_not_felt():
+    """Within the meshes' error bars, for a law given by the layer, and for that of the material."""
+    material = {"law": "yeoh", "c2": 0.4, "poisson": 0.3}
+    same = {"young": "10 kPa", "poisson": 0.3}
+    probe = {"depth": "0.4 mm"}
+    (alone,) = solve(material=material, probe=probe).values()
+    (inherits,) = solve(body=BOX | {"layer": [SKIN | same]}, material=material, probe=probe).values()
+    own = SKIN | same | {"law": "yeoh", "c2": 0.4}
+    (given,) = solve(body=BOX | {"layer": [own]}, material=material, probe=probe).values()
+    assert given.force == pytest.approx(inherits.force, rel=1e-12)
+    assert abs(alone.force - given.force) < max(alone.force_error, given.force_error) * alone.force
+    assert given.status == "ok"
+
+
+def test_layers_are_linear_at_small_depths():
+    """For two laws in one body; F is proportional to the moduli of both."""
+    layer = SKIN | {"law": "gent", "limit": 2.0}
+    probe = {"depth": "0.005 mm"}
+    (linear,) = solve(body=BOX | {"layer": [SKIN]}, probe=probe).values()
+    (large,) = solve(body=BOX | {"layer": [layer]}, material={"law": "neo-hookean"}, probe=probe).values()
+    assert large.force == pytest.approx(linear.force, rel=1e-3)
