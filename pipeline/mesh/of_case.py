@@ -5,6 +5,8 @@ from math import inf
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pipeline.mesh.curve import curve
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.generate import MeshArrays, generate
@@ -34,13 +36,22 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" = None
     start = perf_counter()
     straight, planes, sizes = case.mesh.degree == 1, mirror_planes(case), sizes_of(case)
     segments = sizes.rim_segments(case.probe)
-    held, ball = case.mesh.outside not in ("coarse", "free"), case.is_closed
+    held, ball = not (case.mesh.keeps_all or case.mesh.outside == "free"), case.is_closed
     scene = Scene(case.body, case.probe, _column(case), held, segments, straight, planes, ball)
     arrays = _of_triangles(scene, case.body, sizes, kept) if isinstance(case.body, Scanned) else generate(scene, sizes)
     arrays = open_slit(arrays, scene) if scene.has_inner_slit else arrays
     arrays = arrays if straight else curve(arrays, scene)
+    arrays = _with_linear(arrays, case) if case.is_linear_beyond else arrays
     whole = reflect(arrays, tuple(plane for plane in planes if plane not in mirrors))
     return replace(whole, seconds=perf_counter() - start)
+
+
+def _with_linear(arrays: MeshArrays, case: Case) -> MeshArrays:
+    """Give cells beyond ε of the contact the numbers of further regions, in the order of the first ones."""
+    middle = arrays.points[arrays.cells[:, :4]].mean(axis=1)
+    beyond = np.linalg.norm(middle - np.array(case.frame.point), axis=1) > case.mesh.epsilon
+    within = 0 if arrays.regions is None else arrays.regions
+    return replace(arrays, regions=within + len(case.tissues) * beyond)
 
 
 def _column(case: Case) -> float:
@@ -69,7 +80,7 @@ def sizes_of(case: Case) -> Sizes:
     mesh = case.mesh
     epsilon = inf if case.is_full else mesh.epsilon
     # Round sides, of the body and of the column, are resolved over their whole length.
-    side = min(case.body.bend, inf if mesh.outside == "coarse" else epsilon)
+    side = min(case.body.bend, inf if mesh.keeps_all else epsilon)
     return Sizes(epsilon, mesh.fine, mesh.coarse, mesh.rim_size(case.probe.half_width), mesh.growth, side)
 
 

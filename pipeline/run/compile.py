@@ -65,7 +65,12 @@ def _forms(solve: Solve) -> _Forms:
         kind = "elliptic" if half_plane and half_plane.is_curved else "axisymmetric"
         return _Forms(kind, TRIAL_DEGREE if solve.case.probe.is_unilateral else 0)
     has_slit = solve.case.probe.slit is not None
-    return _Forms(solve.case.formulation, mesh.degree, of_regions=bool(body.regions), of_slit=has_slit)
+    return _Forms(
+        solve.case.formulation,
+        mesh.degree,
+        of_regions=bool(body.regions) or solve.case.is_linear_beyond,
+        of_slit=has_slit,
+    )
 
 
 def _compile(forms: _Forms) -> None:

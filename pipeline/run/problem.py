@@ -153,11 +153,11 @@ def _moved(far: PointForce | BodyField, centre: Place) -> FarField:
 
 def law_of(case: Case) -> MaterialLaw:
     """Return laws and parameters of the body's regions."""
-    return MaterialLaw(
-        tuple(
-            Parameters.of_moduli(each.young, each.poisson, each.law or "linear", each.further) for each in case.tissues
-        )
+    within = (
+        Parameters.of_moduli(each.young, each.poisson, each.law or "linear", each.further) for each in case.tissues
     )
+    beyond = (Parameters.of_moduli(each.young, each.poisson) for each in case.tissues if case.is_linear_beyond)
+    return MaterialLaw((*within, *beyond))
 
 
 def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case | None = None) -> Solution:

@@ -105,6 +105,8 @@ FEATURES: dict[str, Feature] = {
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
     "curved body": Feature("body.shape", lambda s: not isinstance(s.body, Layered)),
     "large displacements": Feature("material.law", lambda s: s.material.is_large),
+    "linear law": Feature("material.law", lambda s: not s.material.is_large),
+    "linear beyond ε": Feature("mesh.outside", lambda s: s.mesh.outside == "linear"),
     "ν < 0.2 or > 0.45": Feature(
         "material.poisson", lambda s: not s.material.OF_LARGE[0] <= s.material.poisson <= s.material.OF_LARGE[1]
     ),
@@ -132,7 +134,7 @@ FEATURES: dict[str, Feature] = {
     "fixed column": Feature("mesh.outside", lambda s: s.mesh.outside == "fixed" and _is_column(s), _PLACE),
     "half ball": Feature("mesh.outside", _is_ball, _PLACE),
     "Green's function": Feature("mesh.outside", lambda s: s.mesh.outside == "green" and _is_ball(s), _PLACE),
-    "truncated body": Feature("mesh.outside", lambda s: s.mesh.outside != "coarse" and isfinite(s.mesh.epsilon)),
+    "truncated body": Feature("mesh.outside", lambda s: not s.mesh.keeps_all and isfinite(s.mesh.epsilon)),
     "degree 1": Feature("mesh.degree", lambda s: s.mesh.degree == 1, write=int),
     "mixed elements": Feature("mesh.element", lambda s: s.mesh.element == "mixed"),
     "accuracy": Feature("mesh.accuracy", lambda s: s.mesh.accuracy is not None),
@@ -235,6 +237,9 @@ REFUSALS: tuple[Refusal, ...] = (
         "large displacements",
         f"must be {Material.OF_LARGE[0]} to {Material.OF_LARGE[1]} {_OF_LAW}. Below, F depends on the elements "
         "at the tool's edge; above, displacement elements lock",
+    ),
+    Refusal(
+        "linear beyond ε", "linear law", 'needs a law of large displacements within epsilon: use outside = "coarse"'
     ),
     Refusal("unilateral contact", "large displacements", f'must be "bonded" {_OF_LAW}'),
     Refusal("frictionless contact", "large displacements", f'must be "bonded" {_OF_LAW}'),

@@ -39,7 +39,7 @@ def check_sizes(mesh: Mesh, problems: Problems) -> None:
 
 def check_chosen(meshes: Sequence[Mesh], problems: Problems) -> None:
     """Report an ε without effect: with `accuracy`, and without a cut at ε, all sizes are chosen."""
-    if not all(mesh.accuracy is not None and mesh.outside == "coarse" for mesh in meshes):
+    if not all(mesh.accuracy is not None and mesh.keeps_all for mesh in meshes):
         return
     for mesh in meshes:
         if "epsilon" in mesh.model_fields_set:
@@ -60,7 +60,7 @@ def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
             gaps["body.fixed"] = gap
     elif (beside := body.support.gap(probe.gap(body, frame))) is not None:
         gaps["body.fixed"] = beside
-    if mesh.outside not in ("coarse", "free") and isfinite(column := mesh.column(body.reach(frame))):
+    if mesh.outside != "free" and isfinite(column := mesh.column(body.reach(frame))):
         gaps["mesh.epsilon"] = column - (probe.expected_radius if isinstance(probe, Indenter) else probe.circumradius)
     return {key: gap for key, gap in gaps.items() if gap > 0}
 

@@ -130,9 +130,10 @@ class Mesh(Section):
         Words("Growth of the element size with the distance from the edge: size added per unit of distance.", "0.5"),
     ] = 0.5
     outside: Annotated[
-        Literal["coarse", "free", "fixed", "halfspace", "green"],
+        Literal["coarse", "linear", "free", "fixed", "halfspace", "green"],
         Words(
-            "Treatment of the body beyond epsilon. coarse: a coarse mesh. free, fixed: cut away; a "
+            "Treatment of the body beyond epsilon. coarse: a coarse mesh. linear: a coarse mesh, with linear "
+            "elasticity there, and the law within epsilon. free, fixed: cut away; a "
             "column remains, whose side has no traction or no displacement. halfspace, green: cut "
             "away; a half ball remains, coupled to the far field of a half-space or to the Green's "
             "function of the body.",
@@ -171,13 +172,18 @@ class Mesh(Section):
         return self.rim if self.rim is not None else min(self.fine, self.RIM_SHARE * half_width)
 
     @property
+    def keeps_all(self) -> bool:
+        """Whether the whole body is modelled, for any epsilon."""
+        return self.outside in ("coarse", "linear")
+
+    @property
     def is_closed(self) -> bool:
         """Whether what is kept of a body is a half ball, closed by a far field."""
         return self.outside in ("halfspace", "green")
 
     def column(self, reach: float) -> float:
         """Return the radius (m) of what is kept of a body of that ``reach`` from the probe's axis; infinite if all."""
-        return inf if self.outside == "coarse" or self.epsilon >= reach else self.epsilon
+        return inf if self.keeps_all or self.epsilon >= reach else self.epsilon
 
     def element_for(self, poisson: float) -> Literal["displacement", "mixed"]:
         """Return the element for a Poisson's ratio; of degree 1 there is no stable mixed one."""

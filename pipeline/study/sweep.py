@@ -209,6 +209,11 @@ class Case:
         return self.column < inf
 
     @property
+    def is_linear_beyond(self) -> bool:
+        """Whether tissue beyond ε is linear elastic, and not that within."""
+        return self.mesh.outside == "linear" and not self.is_full
+
+    @property
     def is_closed(self) -> bool:
         """Whether only a half ball of the body is kept, which a far field closes."""
         return self.mesh.is_closed and not self.is_full
@@ -226,7 +231,10 @@ class Case:
     @property
     def formulation(self) -> str:
         """What is solved: the element of linear elasticity, or the names of the laws of large displacements."""
-        return "+".join(sorted({str(t.law) for t in self.tissues})) if self.material.is_large else self.element
+        if not self.material.is_large:
+            return self.element
+        beyond = ["linear"] if self.is_linear_beyond else []
+        return "+".join(sorted({*(str(tissue.law) for tissue in self.tissues), *beyond}))
 
     @property
     def is_followed(self) -> bool:

@@ -127,3 +127,18 @@ def test_laws_of_one_space_have_forms_of_their_own(monkeypatch):
         fem.assemble_scalar(HyperelasticForms(space, elastic, (law,)).energy) for law in ("neo-hookean", "stiffer")
     ]
     assert energies[1] == pytest.approx(2 * energies[0], rel=1e-12)
+
+
+def test_linear_tissue_beyond_epsilon():
+    """The force tends to that of the law everywhere as ε grows."""
+
+    def gap(epsilon):
+        scene = {"probe": {"depth": "0.6 mm"}, "material": LARGE}
+        linear, everywhere = (
+            force(**scene, mesh={"epsilon": epsilon, "outside": outside}) for outside in ("linear", "coarse")
+        )
+        return linear / everywhere - 1
+
+    gaps = [gap(epsilon) for epsilon in ("4 mm", "8 mm", "14 mm", "full")]
+    assert -2e-3 < gaps[0] < gaps[1] < gaps[2] < gaps[3] == 0.0
+    assert gaps[2] > -5e-4
