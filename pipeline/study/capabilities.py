@@ -105,8 +105,6 @@ FEATURES: dict[str, Feature] = {
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
     "curved body": Feature("body.shape", lambda s: not isinstance(s.body, Layered)),
     "large displacements": Feature("material.law", lambda s: s.material.is_large),
-    "linear law": Feature("material.law", lambda s: not s.material.is_large),
-    "linear beyond ε": Feature("mesh.outside", lambda s: s.mesh.outside == "linear"),
     "ν < 0.2 or > 0.45": Feature(
         "material.poisson", lambda s: not s.material.OF_LARGE[0] <= s.material.poisson <= s.material.OF_LARGE[1]
     ),
@@ -237,9 +235,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "large displacements",
         f"must be {Material.OF_LARGE[0]} to {Material.OF_LARGE[1]} {_OF_LAW}. Below, F depends on the elements "
         "at the tool's edge; above, displacement elements lock",
-    ),
-    Refusal(
-        "linear beyond ε", "linear law", 'needs a law of large displacements within epsilon: use outside = "coarse"'
     ),
     Refusal("unilateral contact", "large displacements", f'must be "bonded" {_OF_LAW}'),
     Refusal("frictionless contact", "large displacements", f'must be "bonded" {_OF_LAW}'),

@@ -19,6 +19,7 @@ from pipeline.study.check_mesh import (
     check_column,
     check_epsilon,
     check_gap,
+    check_linear,
     check_locking,
     check_reference,
     check_sizes,
@@ -51,6 +52,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     problems.each(check_sizes, mesh=meshes)
     check_chosen(meshes, problems)
     problems.each(check_epsilon, mesh=meshes, probe=probes)
+    problems.each(check_linear, material=materials, mesh=meshes)
     problems.each(check_support, body=bodies, mesh=meshes)
     way = next((axis for axis in axes if axis.off), None)
     placed = _placed(bodies, probes, way, problems)

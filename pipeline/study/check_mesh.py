@@ -37,6 +37,17 @@ def check_sizes(mesh: Mesh, problems: Problems) -> None:
         )
 
 
+def check_linear(material: Material, mesh: Mesh, problems: Problems) -> None:
+    """Report a linear body beyond ε of a body that is linear anyway."""
+    if mesh.outside == "linear" and not material.is_large:
+        problems.error(
+            "mesh.outside",
+            mesh.outside,
+            f'is linear elasticity beyond epsilon, but law = "{material.law}" is linear everywhere: use outside = '
+            '"coarse", or a law of large displacements',
+        )
+
+
 def check_chosen(meshes: Sequence[Mesh], problems: Problems) -> None:
     """Report an ε without effect: with `accuracy`, and without a cut at ε, all sizes are chosen."""
     if not all(mesh.accuracy is not None and mesh.keeps_all for mesh in meshes):
