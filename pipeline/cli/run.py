@@ -121,7 +121,7 @@ def run(
             seconds = time.monotonic() - start
             _conclude(plan, opened, outcome, seconds, part, quiet=as_json)
             found.append(_as_data(plan, opened, outcome, seconds))
-        failed = failed or outcome.counts["failed"] > 0
+        failed = failed or outcome.counts["failed"] + outcome.counts.get("partial", 0) > 0
         if outcome.interrupted:
             break
     ended = INTERRUPTED if outcome.interrupted else SOME_FAILED if failed else DONE
@@ -211,7 +211,9 @@ def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, sh
         most = [shorten(text, _LONGEST_REASON, placeholder=" …") for text, _ in reasons.most_common(_MOST_REASONS)]
         why = "; ".join(dict.fromkeys(filter(None, most)))
         more = "; …" if len(reasons) > _MOST_REASONS else ""
-        counts.append(f"{count} {state}{f' ({why}{more})' if why and state in ('failed', 'skipped') else ''}")
+        counts.append(
+            f"{count} {state}{f' ({why}{more})' if why and state in ('failed', 'partial', 'skipped') else ''}"
+        )
     stored = _read_back(plan)
     read_back = f" ({stored} from the store)" if stored else ""
     found, name = ", ".join(counts), plan.study.file

@@ -68,7 +68,7 @@ def merge_shards(
         for case, message in failed:
             error(f"failed: {case}: {message}")
         _print_pending(plan, missing, again)
-    raise typer.Exit(SOME_FAILED if problems or missing or counts["failed"] else DONE)
+    raise typer.Exit(SOME_FAILED if problems or missing or counts["failed"] or counts.get("partial") else DONE)
 
 
 def _stores(study: "Study", given: list[Path] | None, output: Path) -> list[Path]:

@@ -123,7 +123,7 @@ def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) ->
     records |= skipped(plan, records)
     counts, failed = count_states(plan, records), failures(plan, records)
     totals = f"{counts['ok']} ok, {counts['failed']} failed"
-    totals += "".join(f", {counts[state]} {state}" for state in ("skipped", "lost") if counts.get(state))
+    totals += "".join(f", {counts[state]} {state}" for state in ("partial", "skipped", "lost") if counts.get(state))
     lines = [f"{file}: {totals}, {counts['pending']} pending{axes_of(study)}"]
     lines += [f"  failed: {case}: {message}" for case, message in failed]
     if counts["pending"] and (shards := len(stores_of(output, study))):

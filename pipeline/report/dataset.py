@@ -53,6 +53,7 @@ _PARTS = (
         ("contact_area", "contact_area_error", "contact_radius", "contact_radius_error"),
         of=lambda case: case.probe.is_unilateral,
     ),
+    _Part(("depth_reached", "force_reached"), of=lambda case: case.material.is_large),
     _Part(("surface_deviation",), of=lambda case: isinstance(case.body, Scanned)),
     _Part((*LARGEST, *_COUNTS)),
     _Part(("force_exact", "force_exact_error"), is_exact=True),
@@ -68,7 +69,7 @@ _IN_RECORD = {"machine_load": "load"}
 # Error bars that a record has as a share of the value.
 _RELATIVE = {"force_error", "energy_release_error", "contact_area_error", "contact_radius_error"}
 # What is known of a failed case, too: what it took, and by how much its error bars are too wide.
-_OF_FAILURES = {*_COSTS, *_RELATIVE, "machine_load", "memory", "surface_deviation"}
+_OF_FAILURES = {*_COSTS, *_RELATIVE, "machine_load", "memory", "surface_deviation", "depth_reached", "force_reached"}
 # Translations, and rotations about the axes of the point of contact.
 _MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # Where the probe touches, and along which unit vector it advances.

@@ -177,7 +177,8 @@ def _reasons(status: np.ndarray, message: np.ndarray, bar: np.ndarray, exact: np
     told = np.where(message == "", "", ": " + message.astype(object))
     why[~np.isfinite(exact)] = "F_exact is not known"
     why[~(bar >= 0)] = ("no error bar" + told)[~(bar >= 0)]
-    for state, text in (("failed", "failed"), ("skipped", "skipped"), ("pending", "not yet run"), ("lost", "lost")):
+    reasons = {"failed": "failed", "partial": "partial", "skipped": "skipped", "pending": "not yet run", "lost": "lost"}
+    for state, text in reasons.items():
         why[status == state] = (text + told)[status == state]
     return why
 

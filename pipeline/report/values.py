@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 # What became of a case, in the order of its flags in a file.
-STATES = ("ok", "failed", "skipped", "lost", "pending")
+STATES = ("ok", "failed", "skipped", "lost", "pending", "partial")
 
 
 def relative(dataset: xr.Dataset, error: str) -> xr.DataArray:

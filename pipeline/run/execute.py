@@ -77,7 +77,7 @@ class _Desk:
         self.records[record.key] = record
         if self._keep is not None:
             self._keep(record)
-            self._progress.done(self._solves[record.key].label, record.message if record.status == "failed" else "")
+            self._progress.done(self._solves[record.key].label, record.message if record.has_failed else "")
 
     def skips(self, solve: Solve) -> bool:
         """Return whether a solve is skipped, and record the reason; the same on every rank."""
@@ -89,5 +89,7 @@ class _Desk:
     @property
     def failed(self) -> int:
         """The number of failed cases of the study."""
-        states = {key: record.status for key, record in self.records.items()}
-        return sum(len(solve.serves) for key, solve in self._solves.items() if states.get(key, "failed") == "failed")
+        records = self.records
+        return sum(
+            len(solve.serves) for key, solve in self._solves.items() if key not in records or records[key].has_failed
+        )

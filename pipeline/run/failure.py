@@ -31,9 +31,13 @@ _OF_LIBRARIES = (MemoryError, RuntimeError, ArithmeticError, np.linalg.LinAlgErr
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a computation failed; the same on all ranks."""
+    """Why a computation failed; the same on all ranks.
+
+    ``reached`` are the depth (m) and the force (N) at which a load path ended, None if it is no load path.
+    """
 
     message: str
+    reached: tuple[float, float] | None = None
 
 
 class AloneError(RuntimeError):
@@ -61,7 +65,7 @@ class Attempt:
             AloneError: on the rank that failed, if the others do not answer.
         """
         self._count += 1
-        count, found, message = self._count, None, ""
+        count, found, message, reached = self._count, None, "", None
         try:
             found = compute()
         except (StoreError, AloneError):
@@ -69,10 +73,10 @@ class Attempt:
         except Exception as error:
             if is_interrupt(error):
                 raise
-            message = describe(error)
+            message, reached = describe(error), getattr(error, "reached", None)
         if self._comm.size > 1:
             message = self._agreed(message, count)
-        return Failure(message) if message else found  # type: ignore[return-value]
+        return Failure(message, reached) if message else found  # type: ignore[return-value]
 
     def _agreed(self, message: str, count: int) -> str:
         """Return the message of the first rank that has one, "" if none has; collective."""

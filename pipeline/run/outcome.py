@@ -43,15 +43,13 @@ def count_states(plan: Plan, records: Mapping[str, Record]) -> dict[str, int]:
     """Return the number of a plan's cases in each state; for a shard, only its own cases count."""
     states = [_status(records.get(key) or without_contact(case)) for key, case in _cases(plan)]
     counts = {state: states.count(state) for state in ("ok", "skipped", "failed", "pending")}
-    return counts | ({LOST: states.count(LOST)} if LOST in states else {})
+    return counts | {state: states.count(state) for state in ("partial", LOST) if state in states}
 
 
 def failures(plan: Plan, records: Mapping[str, Record]) -> tuple[tuple[str, str], ...]:
     """Return (case, message) of failed cases, and of failed F_exact, which fail no case."""
     failed = [
-        (str(case), records[key].message)
-        for key, case in _cases(plan)
-        if key in records and records[key].status == "failed"
+        (str(case), records[key].message) for key, case in _cases(plan) if key in records and records[key].has_failed
     ]
     exact = {key: records[key].message for key in plan.reference_keys if key in records and not records[key].is_ok}
     return (*failed, *((f"F_exact ({key[:6]})", message) for key, message in exact.items()))

@@ -18,6 +18,7 @@ UNFORESEEN = "an error of the program: "
 # Quantities that are proportional to Young's modulus and to this power of the depth.
 _POWERS = {
     "force": 1,
+    "force_reached": 1,
     "force_vector": 1,
     "force_vector_error": 1,
     "stiffness": 0,
@@ -35,6 +36,8 @@ class Record:
     - ``force_vector`` (N): the force of the tissue on the probe, with error bars ``force_vector_error`` (N, NaN if
       unknown); ``force``: its part against the probe's advance, with the relative 95 % error bar ``force_error``, whose
       computation took ``time_error`` seconds.
+    - ``depth_reached`` (m), ``force_reached`` (N): where load steps ended before the depth, and the force there; such
+      a record is "partial".
     - ``stiffness``: of all six rigid motions, with the error bars ``stiffness_error``; empty without `motion = "all"`.
     - ``contact_area`` (m²), ``contact_radius`` (m): of unilateral contact, with relative error bars.
     - ``largest``: the largest values of cells away from the probe's edge, by their names in the dataset.
@@ -50,7 +53,7 @@ class Record:
     """
 
     key: str
-    status: str  # ok | failed
+    status: str  # ok | partial | failed
     message: str = ""
     origin: str = "solved"  # solved | symmetric
     young: float = nan
@@ -59,6 +62,8 @@ class Record:
     force_error: float = nan
     force_vector: tuple[float, float, float] = (nan, nan, nan)
     force_vector_error: tuple[float, float, float] = (nan, nan, nan)
+    depth_reached: float = nan
+    force_reached: float = nan
     stiffness: tuple[tuple[float, ...], ...] = ()
     stiffness_error: tuple[tuple[float, ...], ...] = ()
     energy: float = nan
@@ -94,6 +99,11 @@ class Record:
     provenance: dict[str, str | int] = field(default_factory=dict)
 
     @property
+    def has_failed(self) -> bool:
+        """Whether the case was computed, without a force at its depth."""
+        return self.status in ("failed", "partial")
+
+    @property
     def is_ok(self) -> bool:
         """Whether the record has a valid force."""
         return self.status == "ok" and isfinite(self.force)
@@ -125,7 +135,7 @@ class Record:
     def scaled(self, scale: Scale) -> "Record":
         """Return the record of a case that differs only in its ``scale``."""
         young, depth = scale.stress, scale.length
-        if (young, depth) == (self.young, self.depth) or not isfinite(self.force):
+        if (young, depth) == (self.young, self.depth) or not (isfinite(self.force) or self.status == "partial"):
             return self
         stiffer, deeper = young / self.young, depth / self.depth
         scaled = {name: _times(getattr(self, name), stiffer * deeper**power) for name, power in _POWERS.items()}

@@ -257,7 +257,8 @@ class StepRunner:
 
     def _fail(self, solves: Sequence[Solve], failure: Failure) -> None:
         for solve in solves:
-            self._finish(solve, Record(solve.key, "failed", failure.message, provenance=self._provenance))
+            record = Record(solve.key, "failed", failure.message, provenance=self._provenance)
+            self._finish(solve, record if failure.reached is None else _partial(solve, record, *failure.reached))
 
     def _finish(self, solve: Solve, record: Record) -> None:
         """Keep a record, unless another mesh follows."""
@@ -305,3 +306,9 @@ def _with_own_bars(sweep: tuple[Solve, ...]) -> tuple[Solve, ...]:
         if following is None or following.case.probe.depth > NEAR * chosen[-1].case.probe.depth:
             chosen.append(this)
     return tuple(dict.fromkeys(chosen))
+
+
+def _partial(solve: Solve, record: Record, depth: float, force: float) -> Record:
+    """Return ``record`` of a solve whose load steps ended at a ``depth`` (m) and ``force`` (N)."""
+    young, asked = solve.case.scale.stress, solve.case.scale.length
+    return replace(record, status="partial", young=young, depth=asked, depth_reached=depth, force_reached=force)

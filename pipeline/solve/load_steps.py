@@ -220,17 +220,18 @@ class LoadSteps(Solver):
                 except LargeError as error:
                     step /= 2
                     if step < _SMALLEST * depth:
-                        raise LargeError(self._stopped(load_path, depth, error)) from error
+                        raise self._stopped(load_path, depth, error) from error
 
-    def _stopped(self, load_path: LoadPath, depth: float, why: LargeError) -> str:
-        """Return the message about a path that ends before ``depth`` (m)."""
+    def _stopped(self, load_path: LoadPath, depth: float, why: LargeError) -> LargeError:
+        """Return the error of a path that ends before ``depth`` (m)."""
         reached, force, _ = load_path.path[-1]
         whole = 2.0 ** len(self._elements.body.mirrored) * force
-        return (
+        message = (
             f"load steps reached {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {whole:.4g} N "
             f"(Newton's method: {why}); the tissue becomes unstable, or elements at the probe's edge are flattened; "
             "use a smaller depth, or a larger rim"
         )
+        return LargeError(message, (reached, whole) if reached else None)
 
     def _norm_on_held(self, forces: PETSc.Vec) -> float:
         on_held = forces.array[self._space.prescribed_owned]

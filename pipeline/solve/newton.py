@@ -32,7 +32,14 @@ _GAIN = 1e-4
 
 
 class LargeError(SolveError):
-    """Newton's method does not converge at the prescribed displacement."""
+    """Newton's method does not converge at the prescribed displacement.
+
+    ``reached`` are the depth (m) and the force (N) of the whole body at the end of the load path, if it has one.
+    """
+
+    def __init__(self, message: str, reached: tuple[float, float] | None = None):
+        super().__init__(message)
+        self.reached = reached
 
 
 class HyperelasticBody:

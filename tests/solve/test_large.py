@@ -8,6 +8,8 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
+from pipeline.run.execute import compute
 from pipeline.run.meshing import mesh_case
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.forms import ElasticForms, HyperelasticForms
@@ -17,6 +19,7 @@ from pipeline.solve.laws.law import Law
 from pipeline.solve.load_steps import LoadSteps, check_path
 from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import MaterialLaw
+from pipeline.study.sweep import Scale
 from tests.cases import force, solve, study
 
 LARGE = {"law": "neo-hookean"}
@@ -67,8 +70,24 @@ def test_every_depth_is_solved_and_none_is_another_s():
 
 def test_a_depth_that_is_not_reached_fails_and_says_where():
     (record,) = solve(material=LARGE, probe={"depth": "9 mm"}).values()
-    assert record.status == "failed"
-    assert "mm of 9 mm, where F is" in record.message
+    assert record.status == "partial"
+    assert np.isnan(record.force)
+    assert 0 < record.depth_reached < 9e-3
+    reached, force = f"{record.depth_reached * 1e3:.3g} mm", f"{record.force_reached:.4g} N"
+    assert f"reached {reached} of 9 mm, where F is {force}" in record.message
+    stiffer = record.scaled(Scale(2 * record.young, record.depth))
+    assert stiffer.force_reached == pytest.approx(2 * record.force_reached)
+    assert stiffer.depth_reached == record.depth_reached
+
+
+def test_a_dataset_has_the_depth_reached():
+    study_ = study(material=LARGE, probe={"depth": ["0.4 mm", "9 mm"]})
+    plan = make_plan(study_)
+    dataset = build(plan, compute(plan, MPI.COMM_SELF))
+    assert dataset["status"].values.tolist() == ["ok", "partial"]
+    assert np.isnan(dataset["force"][1]) and np.isnan(dataset["force_reached"][0])
+    assert 0.4e-3 <= dataset["depth_reached"][1] < 9e-3
+    assert dataset["force_reached"][1] >= dataset["force"][0]
 
 
 def test_depths_of_a_sweep_share_one_load_path(monkeypatch):
@@ -86,7 +105,7 @@ def test_depths_of_a_sweep_share_one_load_path(monkeypatch):
     deep, first, far, second = solve(material=LARGE, probe=depths).values()
     shared = len(ends)
     assert [reached for reached, _ in ends] == sorted(reached for reached, _ in ends)
-    assert [record.status for record in (first, second, far, deep)] == ["ok", "ok", "failed", "failed"]
+    assert [record.status for record in (first, second, far, deep)] == ["ok", "ok", "partial", "partial"]
     reached = re.search(r"reached ([0-9.]+) mm of 8 mm, where F is ([0-9.]+) N", far.message)
     assert reached is not None
     assert float(reached[1]) >= 0.8

@@ -147,7 +147,13 @@ def _known(dataset: xr.Dataset, name: str) -> bool:
 
 def _missing(dataset: xr.Dataset) -> str:
     """Say which cases have no force, and what error bars leave out."""
-    words = {"failed": "failed (×)", "skipped": "skipped", "pending": "not yet run", "lost": "contact lost"}
+    words = {
+        "failed": "failed (×)",
+        "partial": "ended before the depth (×)",
+        "skipped": "skipped",
+        "pending": "not yet run",
+        "lost": "contact lost",
+    }
     counts = {word: int((dataset["status"] == state).sum()) for state, word in words.items()}
     text = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
     comment = str(dataset["force_error"].attrs.get("comment", "")) if "force_error" in dataset else ""

@@ -80,7 +80,7 @@ def draw(panel: Panel, facets: Facets) -> None:
             panel.ax.errorbar(beside, y, bars, label=label, **BARS, **style)
         else:
             panel.ax.plot(beside, y, label=label, **style)
-        failed = line["status"].values == "failed"
+        failed = np.isin(line["status"].values.astype(str), ("failed", "partial"))
         place = {"transform": panel.ax.get_xaxis_transform(), "zorder": 6}
         panel.ax.plot(x[failed], np.full(failed.sum(), 0.04), "x", color=FAILED, **place)
     write_ticks(panel.ax, panel.data[facets.x])

@@ -53,7 +53,7 @@ def draw_map(ax: Axes, part: xr.Dataset, values: np.ndarray, **look: Any) -> Any
     drawn = ax.pcolormesh(x, y, np.ma.masked_invalid(values), shading="nearest", **{"cmap": _COLOURS} | look)
     for state, marker, colour, label in (
         (["lost"], "o", LINE, "contact lost"),
-        (["failed", "skipped", "pending"], "x", FAILED, "no force"),
+        (["failed", "partial", "skipped", "pending"], "x", FAILED, "no force"),
     ):
         rows, columns = np.nonzero(np.isin(part["status"].values.astype(str), state))
         if rows.size:

@@ -69,7 +69,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         scene=scene,
         scene_scripts=_SCRIPT.findall(scene)[:2],
         facts=[fact for fact in facts(dataset) if not (guide and fact[0] == _TOLD)],
-        failures=by_status(dataset, "failed"),
+        failures=by_status(dataset, "failed") + by_status(dataset, "partial"),
         without_exact=without_exact(dataset),
         warnings=warnings_of(dataset),
         figures=_figures(dataset),

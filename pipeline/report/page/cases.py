@@ -15,7 +15,7 @@ from pipeline.report.words import is_numeric, lengths, number, scale, symbol
 
 # Rows of a page of the table.
 FIRST_ROWS = 50
-_STATES = ("failed", "pending", "skipped", "lost", "ok")  # the order of the rows
+_STATES = ("failed", "partial", "pending", "skipped", "lost", "ok")  # the order of the rows
 # The columns of numbers; some are shown only when asked for.
 _QUANTITIES = (
     "force",

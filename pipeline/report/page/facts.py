@@ -22,6 +22,7 @@ _MOST_NAMED = 5
 _STATES = {
     "ok": "with a force",
     "failed": "failed",
+    "partial": "ended before the depth",
     "skipped": "skipped",
     "lost": "without contact",
     "pending": "not yet run",
