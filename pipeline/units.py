@@ -30,6 +30,7 @@ mega- = 1e6 = M-
 giga- = 1e9 = G-
 meter = [length] = m = metre
 second = [time] = s
+hertz = 1 / second = Hz
 gram = [mass] = g
 newton = kilogram * meter / second ** 2 = N
 pascal = newton / meter ** 2 = Pa
@@ -57,7 +58,8 @@ _KINDS = {
         "10 kPa",
         {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "bar": 1e5, "mbar": 1e2, "N/m^2": 1.0, "N/mm^2": 1e6},
     ),
-    "s": _Kind("a time", "10 ms", {"s": 1.0, "ms": 1e-3, "µs": 1e-6}),
+    "s": _Kind("a time", "10 ms", {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "min": 60.0, "h": 3600.0}),
+    "Hz": _Kind("a frequency", "1 Hz", {"Hz": 1.0, "mHz": 1e-3, "kHz": 1e3, "1/s": 1.0}),
     "": _Kind("a share", "1 %", {"%": 1e-2}),
     "rad": _Kind("an angle", "60 deg", {"deg": pi / 180, "°": pi / 180, "rad": 1.0}),
     "kg/m^3": _Kind("a density", "1060 kg/m^3", {"kg/m^3": 1.0, "g/cm^3": 1e3}),
@@ -201,6 +203,14 @@ def _angle(text: Any) -> float:
     return angle
 
 
+def _time(text: Any) -> float:
+    return parse_quantity(text, "s")
+
+
+def _frequency(text: Any) -> float:
+    return parse_quantity(text, "Hz")
+
+
 def _share(text: Any) -> float:
     return parse_quantity(text, "")
 
@@ -215,3 +225,6 @@ Stress = Annotated[float, BeforeValidator(_pressure), Field(json_schema_extra={"
 Pressure = Annotated[Stress, Field(gt=0)]
 Density = Annotated[float, BeforeValidator(_density), Field(gt=0, json_schema_extra={"unit": "kg/m^3"})]
 Acceleration = Annotated[float, BeforeValidator(_acceleration), Field(json_schema_extra={"unit": "m/s^2"})]
+Duration = Annotated[float, BeforeValidator(_time), Field(ge=0, json_schema_extra={"unit": "s"})]
+Time = Annotated[float, BeforeValidator(_time), Field(gt=0, json_schema_extra={"unit": "s"})]
+Frequency = Annotated[float, BeforeValidator(_frequency), Field(gt=0, json_schema_extra={"unit": "Hz"})]

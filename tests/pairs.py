@@ -119,6 +119,16 @@ def _path(study: Study) -> None:
     study["probe"]["path"] = {"line": {"from": ["1 mm", "0 mm"], "to": ["4 mm", "0 mm"], "steps": 2}}
 
 
+def _history(study: Study) -> None:
+    study["probe"]["history"] = {"ramp": "1 s", "hold": "5 s"}
+
+
+def _relaxation(study: Study) -> None:
+    """Relaxing tissue, whose force needs a history."""
+    study["material"]["relaxation"] = [{"share": 0.4, "time": "2 s"}, {"share": 0.2, "time": "30 s"}]
+    _history(study)
+
+
 def _accuracy(study: Study) -> None:
     mesh = study["mesh"]
     kept = ("epsilon",) if mesh["outside"] != "coarse" else ()
@@ -159,6 +169,8 @@ FEATURES = (
     Feature("slit", "probe", _probe(**_SLIT)),
     Feature("frictionless", "contact", _update("probe", contact="frictionless")),
     Feature("unilateral", "contact", _update("probe", contact="unilateral")),
+    Feature("history", "history", _history),
+    Feature("relaxation", "relaxation", _relaxation),
     Feature("gravity", "gravity", _update("load", gravity=["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"])),
     Feature("traction", "traction", _traction),
     Feature("free", "outside", _update("mesh", outside="free")),

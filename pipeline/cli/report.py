@@ -49,7 +49,7 @@ def report(
     kind: Annotated[
         list[str] | None,
         typer.Option(
-            help="With --figures: kind of figure; may be repeated: ratio, error, force, map, compliance. "
+            help="With --figures: kind of figure; may be repeated: history, ratio, error, force, map, compliance. "
             "Default: all that suit the study.",
             show_default=False,
         ),

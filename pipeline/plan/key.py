@@ -24,6 +24,8 @@ PHYSICS_VERSION = 6
 # Keys of a probe without effect on any force: action is a label.
 _UNPHYSICAL = ("action",)
 _MANY = 200_000  # sections of a large study
+# Keys of what follows from the elastic force without a solve: pipeline/report/history.py.
+_OF_TIME = ("history", "relaxation")
 
 
 def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
@@ -173,7 +175,7 @@ def digest(text: str) -> str:
 @lru_cache(_MANY)
 def text_of(section: Section, without: tuple[str, ...] = ()) -> str:
     """Return a section in canonical form, ``without`` some of its keys."""
-    return _text({key: value for key, value in section.model_dump().items() if key not in without})
+    return _text({key: value for key, value in section.model_dump().items() if key not in (*without, *_OF_TIME)})
 
 
 def _mesh_text(mesh: Mesh, is_full: bool, half_width: float, element: str) -> str:

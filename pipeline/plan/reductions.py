@@ -30,7 +30,7 @@ def strike_past_body(plan: Plan) -> Plan:
 
 
 def strike_duplicates(plan: Plan) -> Plan:
-    """Equal cases are solved once."""
+    """Equal cases are solved once. Histories of the depth and relaxation need no solve of their own."""
     return _merged(plan, "duplicates", reason_of(strike_duplicates))
 
 
@@ -267,7 +267,7 @@ def _has_lone_depths(operators: list[OperatorStep]) -> bool:
     for solve in (solve for operator in operators for solve in operator.solves):
         case, probe = solve.case, solve.case.probe
         if probe.is_unilateral and any(getattr(probe, key) is None for key in probe.SWEPT):
-            same = repr((case.body, case.tissues, case.mesh, probe.model_dump(exclude={"depth"})))
+            same = repr((case.body, case.tissues, case.mesh, probe.model_dump(exclude={"depth", "history"})))
             if same in seen:
                 return True
             seen.add(same)

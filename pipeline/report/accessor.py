@@ -12,7 +12,7 @@ from pipeline.report.compliance import Against, compliance
 from pipeline.report.guide import Guide, guide
 from pipeline.report.locate import Located, locate
 from pipeline.report.pareto import front, is_by_chance
-from pipeline.report.values import relative, with_words
+from pipeline.report.values import at_peak, elastic, relative, with_words
 from pipeline.report.words import choices, heading
 
 if TYPE_CHECKING:
@@ -71,6 +71,10 @@ class Accessor:
         frame.attrs["units"] = {name: units[name] for name in frame.columns if name in units}
         return frame
 
+    def at_peak(self) -> xr.Dataset:
+        """Return the dataset at the time of each case's largest force, without the dimension ``time``."""
+        return at_peak(self._dataset)
+
     def finite_epsilon(self) -> xr.Dataset:
         """Return the dataset without the full order, whose ε is infinite: for ``interp`` and maps over ε.
 
@@ -115,10 +119,11 @@ class Accessor:
         A row of :meth:`to_frame` with ``error`` = |F/F_exact - 1| added, by scene and from the fastest on. Left out are
         errors that are small by chance: those of which a finer mesh has one 1.5 times as large.
         """
-        error = abs(self._dataset["force_exact_ratio"] - 1).where(self._dataset["status"] == "ok")
-        frame = Accessor(self._dataset.assign(error=error.where(~is_by_chance(error)))).to_frame()
+        dataset = elastic(self._dataset)
+        error = abs(dataset["force_exact_ratio"] - 1).where(dataset["status"] == "ok")
+        frame = Accessor(dataset.assign(error=error.where(~is_by_chance(error)))).to_frame()
         frame = frame[frame["error"].notna()]
-        scene = [str(d) for d in self._dataset["force"].dims if d not in MESH_DIMENSIONS]
+        scene = [str(d) for d in dataset["force"].dims if d not in MESH_DIMENSIONS]
         scenes = [rows for _, rows in frame.groupby(scene)] if scene else [frame]
         best = [label for rows in scenes for label in rows.index[front(rows["time_total"], rows["error"])]]
         return frame.loc[best].reset_index(drop=True)
@@ -137,7 +142,7 @@ class Accessor:
         """
         import matplotlib.pyplot as plt  # noqa: PLC0415 (slow to load)
 
-        data = self._dataset[variable].sel(labels)
+        data = at_peak(self._dataset)[variable].sel(labels)
         if "epsilon" not in data.dims:
             raise ValueError("the dataset has no dimension epsilon to draw against")
         if by is not None and by not in data.dims:

@@ -18,6 +18,7 @@ from pipeline.printable import counted
 from pipeline.quantities import quantity_of, write
 from pipeline.report.parameters import Parameters, differing, parameters_of, varied
 from pipeline.report.table import DatasetError, study_of
+from pipeline.report.values import at_peak
 
 # Forces that agree to this share of them agree, whatever their bars: the tolerance of solvers.
 SAME = 1e-6
@@ -102,6 +103,7 @@ def compare(a: xr.Dataset, b: xr.Dataset) -> Comparison:
     Raises:
         DatasetError: if they are not of the same scenes, or have no case in common.
     """
+    a, b = at_peak(a), at_peak(b)
     alike = a.attrs.get("study") == b.attrs.get("study")
     ours, theirs = _cases(a, "A", alike=alike), _cases(b, "B", alike=alike)
     scene, settings = differing([one.parameters for one in ours], [one.parameters for one in theirs])

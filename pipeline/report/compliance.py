@@ -20,7 +20,7 @@ import xarray as xr
 from pipeline.quantities import attributes
 from pipeline.report.sinking import LOADS, PLACES, Sinking
 from pipeline.report.table import DatasetError, case_at, study_of
-from pipeline.report.values import at_full_order, relative
+from pipeline.report.values import at_full_order, elastic, relative
 
 Against = Literal["exact", "full"]
 
@@ -37,6 +37,7 @@ def compliance(dataset: xr.Dataset, against: Against = "exact") -> xr.Dataset:
     """
     if against not in ("exact", "full"):
         raise ValueError(f'against = {against!r}: must be "exact" or "full"')
+    dataset = elastic(dataset)
     force, other = dataset["force"], dataset["force_exact" if against == "exact" else "force_max"]
     if not bool(np.isfinite(other).any()):
         missing = {"exact": "F_exact: run its study with `exact = true` in [solve]", "full": 'F_max: epsilon = "full"'}

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.report.table import DatasetError
-from pipeline.report.values import by_case, relative
+from pipeline.report.values import at_peak, by_case, relative
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,6 +67,7 @@ def locate(dataset: xr.Dataset, body: str, healthy: str) -> Located:
         DatasetError: if there is no path, if more is swept than it and the bodies, or if nowhere is the excess beyond
             its bar.
     """
+    dataset = at_peak(dataset)
     dims = _dimensions(dataset)
     dataset = dataset.isel({dim: 0 for dim in dataset["force"].dims if dim not in (*dims, "body")})
     for name in (body, healthy):

@@ -12,7 +12,7 @@ import xarray as xr
 
 from pipeline.quantities import MESH_DIMENSIONS
 from pipeline.report.sinking import LOADS, PLACES, Sinking
-from pipeline.report.values import by_case, relative
+from pipeline.report.values import by_case, elastic, relative
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_text
 from pipeline.study.sweep import Case, Study
@@ -75,6 +75,7 @@ def arrange(dataset: xr.Dataset) -> Table:
     Raises:
         DatasetError: if it holds no F_exact.
     """
+    dataset = elastic(dataset)
     if "force_exact" not in dataset or not bool(np.isfinite(dataset["force_exact"]).any()):
         raise DatasetError(
             "the dataset holds no F_exact, against which a guide compares each mesh: "

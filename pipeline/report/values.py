@@ -3,6 +3,16 @@
 import numpy as np
 import xarray as xr
 
+# Variables that are functions of time where a study has histories: they are proportional to it.
+OVER_TIME = (
+    "force",
+    "force_error",
+    "force_vector",
+    "force_vector_error",
+    "force_exact",
+    "force_exact_error",
+    "force_max",
+)
 # What became of a case, in the order of its flags in a file.
 STATES = ("ok", "failed", "skipped", "lost", "pending", "partial")
 
@@ -26,6 +36,29 @@ def by_case(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Return a variable on all dimensions of the study, in the order of ``force``."""
     force = dataset["force"]
     return dataset[name].broadcast_like(force).transpose(*force.dims, ...)
+
+
+def at_peak(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset at the time of each case's largest force; a static one as it is."""
+    if "time" not in dataset.dims:
+        return dataset
+    last = abs(dataset["force"]).fillna(-1.0).argmax("time")
+    return dataset.isel(time=last).drop_vars("time")
+
+
+def elastic(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset with elastic forces, of the instantaneous modulus at `depth`; a static one as it is."""
+    if "time" not in dataset.dims:
+        return dataset
+    dataset = at_peak(dataset)
+    times = dataset["force_elastic"] / dataset["force"]
+    names = [name for name in OVER_TIME if name in dataset]
+    return dataset.assign(
+        {
+            name: (dataset[name] * (abs(times) if name.endswith("_error") else times)).assign_attrs(dataset[name].attrs)
+            for name in names
+        }
+    )
 
 
 def at_full_order(values: xr.DataArray) -> xr.DataArray:

@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.history import History
 from pipeline.shapes.section import Problems, Section, Words
 from pipeline.shapes.slit import Slit
 from pipeline.units import Coordinate, Length
@@ -90,6 +91,15 @@ class Probe(Section, ABC):
         ),
     ] = "press"
 
+    history: Annotated[
+        History | None,
+        Words(
+            "Depth of the tool over time, as a table: [probe.history].",
+            '{ramp = "1 s", hold = "10 s"}',
+            default="none: static",
+        ),
+    ] = None
+
     # Keys to which F is proportional, with known contact, if all change together; the first is the unit of the others.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]]
     # Keys on which its footprint, and so the mesh, does not depend.
@@ -125,6 +135,11 @@ class Probe(Section, ABC):
     def not_drawn(self) -> tuple[str, ...]:
         """Keys on which the mesh does not depend."""
         return self.NOT_DRAWN
+
+    @property
+    def deepest(self) -> float:
+        """Largest depth (m) of its history, by magnitude."""
+        return self.history.motion(self.depth).largest if self.history else self.depth
 
     @property
     def is_unilateral(self) -> bool:

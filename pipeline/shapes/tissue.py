@@ -4,10 +4,42 @@ from math import inf
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.section import Section, Words
-from pipeline.units import Density, Pressure
+from pipeline.units import Density, Pressure, Time
+from pipeline.viscoelastic import Terms
+
+
+class Relaxation(Section):
+    """A term of a Prony series: a share of the instantaneous modulus, which decays exponentially."""
+
+    name: Annotated[
+        str,
+        Field(exclude=True, pattern=r"^([A-Za-z][A-Za-z0-9_-]*)?$"),
+        Words(
+            "Name of the term: letters, digits, _ and -. The dimension of a sweep begins with it: fast_time.",
+            '"fast"',
+            default="none",
+        ),
+    ] = ""
+    share: Annotated[
+        float,
+        Field(gt=0, lt=1),
+        Words("Share of the instantaneous modulus that relaxes. The sum of all shares is below 1.", "0.4"),
+    ]
+    time: Annotated[Time, Words("Relaxation time: after it, 37 % of the share are left.", '"2 s"')]
+
+
+def _below_one(terms: tuple[Relaxation, ...]) -> tuple[Relaxation, ...]:
+    total = sum(term.share for term in terms)
+    if total >= 1:
+        raise PydanticCustomError(
+            "not_supported",
+            f"shares must have a sum below 1; it is {total:g}, so that the tissue would flow like a fluid",
+        )
+    return terms
 
 # The keys that each law reads besides young and poisson.
 LAWS = MappingProxyType(
@@ -63,6 +95,22 @@ class Tissue(Section):
         Field(json_schema_extra={"unit": "kg/m^3"}),
         Words("Density. Gravity needs it.", '"1060 kg/m^3"', default="none; of regions, the material's"),
     ] = None
+
+    relaxation: Annotated[
+        tuple[Relaxation, ...],
+        AfterValidator(_below_one),
+        Words(
+            "Relaxation over time, as a Prony series: `young` is then the instantaneous modulus, and Poisson's ratio "
+            "is constant. It needs [probe.history].",
+            '[{share = 0.4, time = "2 s"}, {share = 0.2, time = "30 s"}]',
+            default="none: elastic; of regions, the material's",
+        ),
+    ] = ()
+
+    @property
+    def terms(self) -> Terms:
+        """Shares and times (s) of the relaxation, the shortest time first."""
+        return tuple(sorted(((term.share, term.time) for term in self.relaxation), key=lambda term: term[1]))
 
     @property
     def is_large(self) -> bool:

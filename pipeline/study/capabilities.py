@@ -21,6 +21,7 @@ from pipeline.shapes.section import Section, in_mm
 from pipeline.study.loads import Load
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Material, Mesh
+from pipeline.viscoelastic import Terms
 
 # Poisson's ratio beyond which displacement elements of degree 2, which find a body's own far field, lock.
 MOST_OF_GREEN = 0.49
@@ -100,11 +101,23 @@ def _is_flat(scene: Scene) -> bool:
     return is_flat(scene.body, scene.probe, scene.probe.frame_on(scene.body))
 
 
+def _relaxations(scene: Scene) -> set[Terms]:
+    """Return the different relaxations of a body's regions; of one without its own, the material's."""
+    regions = scene.body.regions
+    main = regions[0].terms if scene.body.is_filled else scene.material.terms
+    return {main, *(region.terms or main for region in regions)}
+
+
 FEATURES: dict[str, Feature] = {
     "layers": Feature("body.layer", lambda s: isinstance(s.body, Layered) and bool(s.body.layer)),
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
     "curved body": Feature("body.shape", lambda s: not isinstance(s.body, Layered)),
     "large displacements": Feature("material.law", lambda s: s.material.is_large),
+    "relaxation": Feature("material.relaxation", lambda s: any(_relaxations(s)), ("body",)),
+    "static relaxing tissue": Feature(
+        "probe.history", lambda s: any(_relaxations(s)) and s.probe.history is None, ("body", "material")
+    ),
+    "regions that relax differently": Feature("material.relaxation", lambda s: len(_relaxations(s)) > 1, ("body",)),
     "ν < 0.2 or > 0.45": Feature(
         "material.poisson", lambda s: not s.material.OF_LARGE[0] <= s.material.poisson <= s.material.OF_LARGE[1]
     ),
@@ -112,6 +125,7 @@ FEATURES: dict[str, Feature] = {
     "tool that is not flat": Feature("probe.shape", lambda s: isinstance(s.probe, Indenter)),
     "unilateral contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
     "frictionless contact": Feature("probe.contact", lambda s: s.probe.contact == "frictionless"),
+    "history": Feature("probe.history", lambda s: s.probe.history is not None),
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),
     "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),
     "open slit": Feature("probe.ends", lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
@@ -143,6 +157,7 @@ _COARSE = 'use outside = "coarse" here'
 _ONE_MATERIAL = f"the far field is known only for one material: {_COARSE}"
 _PRESSES = f"the far field is known only for a tool that presses: {_COARSE}"
 _HOLDS = 'a tool that slides along the tissue has no lateral stiffness: use contact = "bonded"'
+_STATIC = "omit [probe.history] and relaxation"
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
 _OF_LAW = "with a law of large displacements"
 
@@ -229,6 +244,38 @@ REFUSALS: tuple[Refusal, ...] = (
         'loads act on the whole body, so no part of it may be cut away: use outside = "coarse"',
     ),
     Refusal("large displacements", "loads", 'loads need law = "linear": omit [load]'),
+    # Relaxation, and histories of the depth.
+    Refusal(
+        "static relaxing tissue",
+        "relaxation",
+        "is required with relaxation, since F depends on how long ago the tool moved: write [probe.history], with "
+        'ramp = "1 s" and hold = "10 s", or omit relaxation',
+    ),
+    Refusal(
+        "history",
+        "unilateral contact",
+        f'the contact area changes with time, which is not computed: use contact = "frictionless", or {_STATIC}',
+    ),
+    Refusal(
+        "history",
+        "slit",
+        f"the opening of the slit has no history, and the energy release rate depends on the front's speed: {_STATIC}",
+    ),
+    Refusal("history", "large displacements", f"F is not proportional to the depth {_OF_LAW}: {_STATIC}"),
+    Refusal(
+        "relaxation",
+        "large displacements",
+        f"stresses then depend on the whole history of each point {_OF_LAW}: omit relaxation",
+    ),
+    Refusal(
+        "regions that relax differently",
+        "history",
+        "must be the same for all layers and inclusions: otherwise, the stress moves to the regions that relax less, "
+        "and F is not the elastic force times a function of time",
+    ),
+    Refusal(
+        "relaxation", "loads", "under loads, relaxing tissue creeps: the surface sinks with time. Omit one of the two"
+    ),
     # Large strains.
     Refusal(
         "ν < 0.2 or > 0.45",
@@ -291,6 +338,8 @@ OBSTACLES: dict[str, dict[str, str]] = {
     "real-time model": {
         "loads": "[load]: gravity and tractions have no real-time model",
         "large displacements": "material.law: large displacements have no real-time model",
+        "relaxation": "material.relaxation: real-time models are elastic, and have no time. Omit it and export the "
+        "instantaneous force",
         "slit": f"probe.incision: {_PRESSED_ONLY}",
         "six motions": f'probe.motion = "all": {_PRESSED_ONLY}',
         "slice": f"probe.slice: {_PRESSED_ONLY}",

@@ -98,11 +98,11 @@ def _check_depth(probe: Probe, problems: Problems) -> None:
     if isinstance(probe, Indenter) or probe.half_width <= 0:  # a slit that leaves nothing of a blade says so itself
         return
     proportional = "F stays proportional to depth" if probe.proportional_to else "strains are assumed small"
-    if probe.depth > _LINEAR * probe.half_width:
+    if probe.deepest > _LINEAR * probe.half_width:
         problems.warn(
             "probe.depth",
-            in_mm(probe.depth),
-            f"is {probe.depth / probe.half_width:.0%} of the tool's half width {in_mm(probe.half_width)}. Above "
+            in_mm(probe.deepest),
+            f"is {probe.deepest / probe.half_width:.0%} of the tool's half width {in_mm(probe.half_width)}. Above "
             f"{_LINEAR:.0%}, linear elasticity is an extrapolation ({proportional}); at {_LINEAR:.0%}, F of a "
             "neo-Hookean "
             "body is about 1 % smaller",
@@ -130,18 +130,18 @@ def _check_softness(body: Body, material: Material, problems: Problems) -> None:
 def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:
     """Report a depth larger than the thickness of the body, and warn of one that compresses all of the thickness."""
     thickness = body.thickness(probe.frame_on(body))
-    if probe.depth >= thickness:
+    if probe.deepest >= thickness:
         problems.error(
             "probe.depth",
-            in_mm(probe.depth),
+            in_mm(probe.deepest),
             f"must be below {in_mm(thickness)}, the thickness of the tissue under the tool, along its axis",
         )
         return False
-    if _LINEAR * thickness < probe.depth <= _LINEAR * probe.half_width:
+    if _LINEAR * thickness < probe.deepest <= _LINEAR * probe.half_width:
         problems.warn(
             "probe.depth",
-            in_mm(probe.depth),
-            f"is {probe.depth / thickness:.0%} of the thickness of the tissue under the tool, "
+            in_mm(probe.deepest),
+            f"is {probe.deepest / thickness:.0%} of the thickness of the tissue under the tool, "
             f"{in_mm(thickness)}. Above "
             f"{_LINEAR:.0%}, linear elasticity is an extrapolation",
         )

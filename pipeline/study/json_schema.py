@@ -13,6 +13,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
+from pipeline.shapes.history import History, Sine
 from pipeline.shapes.section import Section, words_of
 from pipeline.study.named import SCHEMA
 from pipeline.study.ranges import KEYS
@@ -26,6 +27,8 @@ _QUANTITIES = {
     "Pa": ("pressure", "pressures"),
     "1": ("per cent", "per cent"),
     "rad": ("angle", "angles"),
+    "s": ("time", "times"),
+    "Hz": ("frequency", "frequencies"),
     "kg/m^3": ("density", "densities"),
     "m/s^2": ("acceleration", "accelerations"),
     "": ("number", "numbers"),
@@ -60,7 +63,7 @@ def study_schema() -> Schema:
     for section, inner in TABLES.items():
         for owner, (key, model) in product(sections[section], inner.items()):
             definitions[owner.__name__]["properties"][key] = {"$ref": f"#/$defs/{model.__name__}"}
-    swept = {model.__name__: model for model in _swept()}
+    swept: dict[str, type[BaseModel]] = {model.__name__: model for model in (*_swept(), History, Sine)}
     words = swept | {model.__name__: model for model in (*chain(*sections.values()), *tables)}
     for name, definition in definitions.items():
         definition.pop("description", None)  # a docstring, which is not for authors of studies
@@ -148,7 +151,7 @@ def _in_file(schema: Schema, is_swept: bool, key: str) -> Schema:
     default = value.pop("default", None)
     if default is not None and "unit" not in json.dumps(schema) and not (isinstance(default, float) and isinf(default)):
         value["default"] = default
-    if not is_swept or key in ("name", "shape", *_INNER):
+    if not is_swept or key in ("name", "shape", "table", "sine", *_INNER):
         return value
     (kind, *others) = value.pop("anyOf", [value])
     if others or "type" not in kind or kind["type"] == "array" or "enum" in kind or "const" in kind:

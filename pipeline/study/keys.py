@@ -35,11 +35,15 @@ SECTION_TEXTS = {
     "body. It must not touch the surface, other inclusions or the ends of layers. Optional; every value can "
     "be "
     "swept.",
-    "material": "Material of all tissue outside layers and inclusions: isotropic and elastic. Omit it if layers fill "
-    "the body.",
+    "material": "Material of all tissue outside layers and inclusions: isotropic, and elastic or relaxing. Omit it if "
+    "layers fill the body.",
+    "material.relaxation": "Relaxation over time: terms of a Prony series, one table each. `young` is then the "
+    "instantaneous modulus. Optional; every value can be swept.",
     "probe": "The tool, called probe in study files and datasets, and its motion.",
     "probe.path": "Several points of contact, instead of `at`. Give one of `line`, `circle`, `raster` and "
     "`points`. Optional.",
+    "probe.history": "Depth of the tool over time: ramp, hold and sine, or a table. The dataset has the dimension "
+    "`time`. Optional; every value but the table can be swept.",
     "mesh": "Sizes and degree of elements, and the meshed part of the body.",
     "solve": "Solver, and timing of cases. Optional; its lists are no sweeps.",
     "load": "Loads besides the tool. They keep their size and direction. `force` in the dataset is due to the "
@@ -56,7 +60,7 @@ def keys_of(section: str) -> tuple[Key, ...]:
     models = shapes_of(section)
     found: dict[str, dict[str, list[str]]] = {}
     # A section's name labels it; a piece's is a key like others.
-    hidden = {*NESTED.get(section, ()), *(() if section in _labelled() else ("name",))}
+    hidden = {*NESTED.get(section, ()), *TABLES.get(section, ()), *(() if section in _labelled() else ("name",))}
     for shape, model in models.items():
         for name in model.model_fields:
             if name not in hidden:

@@ -165,10 +165,12 @@ class Problems:
     def _from_item(self, where: str, item: Any, place: tuple[Any, ...], model: type[BaseModel], raw: Any) -> None:
         """Translate an error at a ``place`` within the table ``raw``, or within one of its own arrays of tables."""
         key = str(place[0]) if place else ""
-        inner = nested_model(model, key)
+        inner, table = nested_model(model, key), table_model(model, key)
         found: Any = raw.get(key) if isinstance(raw, dict) else raw
         if inner is not None and len(place) > 1:
             self._from_item(f"{where}.{key}[{place[1] + 1}]", item, place[2:], inner, found[place[1]])
+        elif table is not None and len(place) > 1 and isinstance(found, dict):
+            self._from_item(f"{where}.{key}", item, place[1:], table, found)
         elif (inner is not None and item["type"] != "not_supported") or not isinstance(raw, dict):
             what = f"must be an array of tables: write [[{where}.{key}]]" if inner else "must be a table"
             self.error(f"{where}.{key}".rstrip("."), found, what)
@@ -193,6 +195,14 @@ def nested_model(model: type[BaseModel], key: str) -> type[BaseModel] | None:
         return None
     kind = annotation.__args__[0]
     return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+
+
+def table_model(model: type[BaseModel], key: str) -> type[BaseModel] | None:
+    """Return the model of an optional table under ``key``, None if there is none."""
+    annotation: Any = model.model_fields[key].annotation if key in model.model_fields else None
+    kind, *others = getattr(annotation, "__args__", None) or (None,)
+    is_table = others == [type(None)] and isinstance(kind, type) and issubclass(kind, BaseModel)
+    return kind if is_table else None
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -250,6 +260,8 @@ def _list_of(model: type[BaseModel], key: str) -> str:
     annotation: Any = model.model_fields[key].annotation
     parts = (annotation, *getattr(annotation, "__args__", ()))
     items: tuple[Any, ...] = next((part.__args__ for part in parts if getattr(part, "__origin__", None) is tuple), ())
+    if get_origin(items[0]) is tuple:
+        return f"must be a list of rows, such as {words_of(model, key).example}"
     count = "" if get_origin(items[0]) is Literal else f" of {'2 or 3' if ... in items else len(items)} values"
     return f"must be a list{count}, such as {words_of(model, key).example}"
 

@@ -10,6 +10,8 @@ from pipeline.units import canonical
 KEYS = ("from", "to", "steps")
 MOST_STEPS = 10_000
 EXAMPLE = '{from = "0.1 mm", to = "1 mm", steps = 10}'
+# Tables whose values can be swept.
+_TABLES = ("history", "sine")
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
 
@@ -29,7 +31,7 @@ def without_ranges(raw: Any, where: str, problems: Problems) -> Any:
         if key != "path" and any(map(_is_range, parts)):
             several = (_values(part, place, problems) if _is_range(part) else [part] for part in parts)
             found[key] = [*islice(chain.from_iterable(several), MOST_STEPS + 1)]  # one more is reported as too many
-        elif any(isinstance(part, dict) for part in parts) and isinstance(value, list):
+        elif any(isinstance(part, dict) for part in parts) and (isinstance(value, list) or key in _TABLES):
             found[key] = without_ranges(value, place, problems)
         else:
             found[key] = value

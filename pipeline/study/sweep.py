@@ -19,6 +19,7 @@ from pipeline.study.closure import FarRegion
 from pipeline.study.loads import Load
 from pipeline.study.place import CLEAR, is_clear, place_error
 from pipeline.study.schema import Drawing, Material, Mesh, Planning, Solving, material_of
+from pipeline.viscoelastic import Terms
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy", "axis")
@@ -138,6 +139,11 @@ class Case:
         Where layers fill the body, no cell has number 0.
         """
         return self.material, *self.body.regions
+
+    @property
+    def relaxations(self) -> tuple[Terms, ...]:
+        """Terms of the relaxation of the regions of the body; where a region has none, the material's."""
+        return tuple(tissue.terms or self.material.terms for tissue in self.tissues)
 
     @property
     def densities(self) -> tuple[float | None, ...]:

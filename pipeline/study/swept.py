@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from pipeline.shapes.section import Section
-from pipeline.study.problems import Problems, nested_model
+from pipeline.study.problems import Problems, nested_model, table_model
 from pipeline.study.sweep import Axis
 
 # Place of a value within a section: keys, and numbers in arrays of tables, from 0.
@@ -22,6 +22,8 @@ def sweeps(model: type[BaseModel], raw: dict[str, Any], where: Place = ()) -> It
             for number, table in enumerate(value if isinstance(value, list) else ()):
                 if isinstance(table, dict):
                     yield from sweeps(inner, table, (*where, key, number))
+        elif (table := table_model(model, key)) is not None and isinstance(value, dict):
+            yield from sweeps(table, value, (*where, key))
         elif _is_sweep(model, key, value):
             yield (*where, key), value
 
@@ -41,7 +43,10 @@ def _is_sweep(model: type[BaseModel], key: str, value: Any) -> bool:
         return False
     info = model.model_fields.get(key)
     kinds = () if info is None else (info.annotation, *getattr(info.annotation, "__args__", ()))
-    if any(getattr(kind, "__origin__", None) is tuple for kind in kinds):
+    lists = [kind.__args__ for kind in kinds if getattr(kind, "__origin__", None) is tuple]
+    if any(getattr(items[0], "__origin__", None) is tuple for items in lists):
+        return False  # rows of a table
+    if lists:
         return bool(value) and isinstance(value[0], list)
     return info is not None and key not in ("name", "shape")
 
@@ -66,7 +71,7 @@ def axis_of(section: str, place: Place, raw: list[Any], parsed: list[Section], p
         unit = "1"
     if not outer:
         return Axis(section, str(key), tuple(labels), unit)
-    return Axis(section, str(key), tuple(labels), unit, written(tuple(outer)), owners[0].name)
+    return Axis(section, str(key), tuple(labels), unit, written(tuple(outer)), getattr(owners[0], "name", ""))
 
 
 def _labelled(table: dict[str, Any]) -> str:

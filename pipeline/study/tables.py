@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from pipeline.shapes.history import deepest
 from pipeline.shapes.section import Section
 from pipeline.study.path import Way, read_path
 from pipeline.study.problems import MOST_ERRORS, Problems, closest, nearest, tuples
@@ -29,10 +30,25 @@ def read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
     if name not in SINGLE:
         raw = without_ranges(raw, name, problems)
     if name == "probe":
+        raw = _reaching(raw, problems)
         raw, way = _walked(raw, problems)
         axes, variants = _read_tables(name, raw, problems)
         return (_axes_of(way, axes) if way else axes), variants
     return _read_tables(name, raw, problems)
+
+
+def _reaching(raw: Any, problems: Problems) -> Any:
+    """Return the probe's tables with the depth that a table of a history reaches."""
+    if isinstance(raw, list):
+        return [_reaching(table, problems) for table in raw]
+    history = raw.get("history") if isinstance(raw, dict) else None
+    if not isinstance(history, dict) or "table" not in history:
+        return raw
+    if "depth" in raw:
+        problems.error("probe.depth", raw["depth"], "excludes `table` in [probe.history], which has depths of its own")
+        return raw
+    depth = deepest(history["table"])
+    return raw if depth is None else {**raw, "depth": depth}
 
 
 def _walked(raw: Any, problems: Problems) -> tuple[Any, Way | None]:
@@ -186,7 +202,9 @@ def _shared_sweeps(name: str, tables: list[Any]) -> dict[Place, list[Any]]:
     return {
         place: values
         for place, values in first.items()
-        if len(place) == 1 and values and all(other.get(place) == values for other in others)
+        if all(isinstance(step, str) for step in place)
+        and values
+        and all(other.get(place) == values for other in others)
     }
 
 

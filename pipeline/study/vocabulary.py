@@ -28,12 +28,10 @@ OTHER_NAMES = {
 NOT_COMPUTED = {
     "friction": 'friction is not computed: tissue sticks to the tool (contact = "bonded") or slides ("frictionless")',
     "adhesion": 'adhesion is not computed; with contact = "bonded", the tool pulls as well as it presses',
-    "velocity": "velocity is not computed: forces are static",
-    "speed": "speed is not computed: forces are static",
-    "history": "forces are static: they depend on the present depth alone",
-    "relaxation": "viscoelasticity is not computed: forces are static",
-    "viscosity": "viscoelasticity is not computed: forces are static",
-    "damping": "viscoelasticity is not computed: forces are static",
+    "velocity": "the speed of the tool is given by `ramp` in [probe.history]; inertia is not computed",
+    "speed": "the speed of the tool is given by `ramp` in [probe.history]; inertia is not computed",
+    "viscosity": "viscosity is given as `relaxation` of [material]: shares of the modulus, and their times",
+    "damping": "damping is given as `relaxation` of [material]: shares of the modulus, and their times",
     "plasticity": "plasticity is not computed: materials are elastic",
     "yield": "plasticity is not computed: materials are elastic",
     "fibres": "anisotropy is not computed: materials are isotropic",
@@ -44,4 +42,4 @@ NOT_COMPUTED = {
 }
 
 # Each is drawn by the module of its name in pipeline/report/figures.
-FIGURES = ("ratio", "error", "force", "map", "compliance")
+FIGURES = ("history", "ratio", "error", "force", "map", "compliance")

@@ -23,6 +23,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from pipeline.verify.loads import load_rows  # noqa: PLC0415
     from pipeline.verify.paths import path_rows  # noqa: PLC0415
     from pipeline.verify.regions import region_rows  # noqa: PLC0415
+    from pipeline.verify.relaxation import relaxation_rows  # noqa: PLC0415
     from pipeline.verify.slits import slit_rows  # noqa: PLC0415
     from pipeline.verify.wedges import wedge_rows  # noqa: PLC0415
 
@@ -42,3 +43,4 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from path_rows(comm, quick=quick)
     yield from load_rows(comm, quick=quick)
     yield from hyperelastic_rows(comm, quick=quick)
+    yield from relaxation_rows(comm, quick=quick)

@@ -63,7 +63,57 @@ MISTAKES = {
     "number for a radius": ({"mesh": {"epsilon": float("inf")}}, ['or "full"']),
     "a loose solver": ({"solve": {"energy_tolerance": 1e-3}}, ["solve.energy_tolerance = 0.001", "at most 1e-06"]),
     "friction": ({"probe": {"friction": 0.3}}, ["probe.friction = 0.3", "friction is not computed", "bonded"]),
-    "viscoelasticity": ({"material": {"relaxation": []}}, ["material.relaxation", "viscoelasticity is not computed"]),
+    "relaxation without a history": (
+        {"material": {"relaxation": [{"share": 0.4, "time": "2 s"}]}},
+        ["probe.history", "is required with relaxation", 'ramp = "1 s"'],
+    ),
+    "shares that reach 1": (
+        {
+            "material": {"relaxation": [{"share": 0.4, "time": "2 s"}, {"share": 0.6, "time": "9 s"}]},
+            "probe": {"history": {"ramp": "1 s"}},
+        },
+        ["material.relaxation", "shares must have a sum below 1; it is 1"],
+    ),
+    "a share without a time": (
+        {"material": {"relaxation": [{"share": 1.0}]}, "probe": {"history": {"ramp": "1 s"}}},
+        ["material.relaxation[1].share = 1.0: must be less than 1", "material.relaxation[1].time: is required"],
+    ),
+    "a time of 0 s": (
+        {"material": {"relaxation": [{"share": 0.1, "time": "0 s"}]}, "probe": {"history": {"ramp": "1 s"}}},
+        ["material.relaxation[1].time", "must be greater than 0"],
+    ),
+    "a length for a time": ({"probe": {"history": {"ramp": "1 mm"}}}, ["probe.history.ramp", "a time", "ms"]),
+    "an unknown key of a history": ({"probe": {"history": {"ramps": "1 s"}}}, ["probe.history.ramps", "`ramp`"]),
+    "a history of nothing": ({"probe": {"history": {"steps": 3}}}, ["probe.history", "a ramp, a hold or a sine"]),
+    "a history that goes back in time": (
+        {"probe": {"depth": None, "history": {"table": [["0 s", "0 mm"], ["2 s", "1 mm"], ["1 s", "0 mm"]]}}},
+        ["probe.history.table", "goes back in time: row 3 must be later than 2 s, and is at 1 s"],
+    ),
+    "a history that begins late": (
+        {"probe": {"depth": None, "history": {"table": [["1 s", "0 mm"], ["2 s", "1 mm"]]}}},
+        ["probe.history.table", "must begin at 0 s"],
+    ),
+    "a depth beside a table": (
+        {"probe": {"history": {"table": [["0 s", "0 mm"], ["2 s", "1 mm"]]}}},
+        ["probe.depth", "excludes `table` in [probe.history]"],
+    ),
+    "a ramp beside a table": (
+        {"probe": {"depth": None, "history": {"ramp": "1 s", "table": [["0 s", "0 mm"], ["2 s", "1 mm"]]}}},
+        ["probe.history", "table excludes ramp"],
+    ),
+    "a history of large displacements": (
+        {"material": {"law": "neo-hookean"}, "probe": {"history": {"ramp": "1 s"}}},
+        ["probe.history", "F is not proportional to the depth"],
+    ),
+    "relaxing tissue under gravity": (
+        {
+            "material": {"density": "1000 kg/m^3", "relaxation": [{"share": 0.4, "time": "2 s"}]},
+            "probe": {"history": {"ramp": "1 s"}},
+            "load": {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]},
+        },
+        ["material.relaxation", "relaxing tissue creeps"],
+    ),
+    "a speed": ({"probe": {"speed": "1 mm/s"}}, ["probe.speed", "`ramp` in [probe.history]"]),
     "a radius beside an accuracy": (
         {
             "mesh": {"accuracy": "1 %", "epsilon": ["9 mm", "full"]}

@@ -15,17 +15,21 @@ from pipeline.report.compliance import tool_dimension
 from pipeline.report.figures.compliance import compliance
 from pipeline.report.figures.error import error, error_facets
 from pipeline.report.figures.facets import Facets, is_meshed, rest, swept
-from pipeline.report.figures.force import force, nothing
+from pipeline.report.figures.force import force, history, nothing
 from pipeline.report.figures.map import force_map
 from pipeline.report.figures.ratio import ratio, ratio_facets
 from pipeline.report.figures.style import STYLE, add_note, save
 from pipeline.report.table import study_of, warnings_of
+from pipeline.report.values import at_peak
 from pipeline.report.words import is_numeric
 from pipeline.study.vocabulary import FIGURES
 
 __all__ = ["KINDS", "STYLE", "choose", "describe", "draw", "figure", "files", "lacks", "save"]
 
+# Kinds that show time; all others show the time of the largest force.
+_OVER_TIME = ("history",)
 _DRAWN: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
+    "history": history,
     "ratio": ratio,
     "error": error,
     "force": force,
@@ -37,6 +41,7 @@ _DRAWN: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
 KINDS = (*FIGURES, "nothing")
 _FACETS: dict[str, Callable[[xr.Dataset], Facets]] = {"ratio": ratio_facets, "error": error_facets}
 _NEEDS = {
+    "history": "a history of the depth ([probe.history])",
     "ratio": "several ε, and the full order among them",
     "error": "swept meshes, and F_exact or F_max",
     "compliance": "several tools and ε, the full order among them, in scenes whose compliances add",
@@ -51,8 +56,11 @@ def choose(dataset: xr.Dataset) -> list[str]:
     """Return the kinds of figures that suit ``dataset``, its main one first: what its study asks for, if it suits."""
     if not _known(dataset, "force"):
         return ["nothing"]
+    is_over_time = "time" in dataset.dims
+    dataset = at_peak(dataset)
     is_of_depth = dataset.sizes.get("depth", 0) > 1
     suits = {
+        "history": is_over_time,
         "force": is_of_depth and (_known(dataset, "linear_ratio") or _known(dataset, "contact_area")),
         "ratio": dataset.sizes.get("epsilon", 0) > 1 and _known(dataset, "force_ratio"),
         "error": is_meshed(dataset) and (_known(dataset, "force_exact_ratio") or _known(dataset, "force_ratio")),
@@ -115,13 +123,15 @@ def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
     """Draw the figure of one ``kind``, with the study's title or without."""
     title = _plain(str(dataset.attrs.get("title", ""))) if titled else ""
     with mpl.rc_context(STYLE):
-        drawn = _DRAWN[kind](_with_short_names(dataset), title, _missing(dataset))
+        shown = dataset if kind in _OVER_TIME else at_peak(dataset)
+        drawn = _DRAWN[kind](_with_short_names(shown), title, _missing(dataset))
         if titled and (warnings := warnings_of(dataset)):
             add_note(drawn, f"{counted(len(warnings), 'warning')} about the model: see the report.")
     return drawn
 
 
 def _rest(dataset: xr.Dataset, kind: str) -> list[tuple[str, xr.Dataset]]:
+    dataset = at_peak(dataset)
     return list(rest(dataset, _FACETS[kind](dataset))) if kind in _FACETS else []
 
 

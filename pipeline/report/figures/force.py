@@ -12,13 +12,16 @@ from pipeline.quantities import symbol
 from pipeline.report.figures.curves import Panel, draw
 from pipeline.report.figures.facets import arrange, swept
 from pipeline.report.figures.style import FAILED, LINE, QUIET, finish, look, new_figure, write_above
-from pipeline.report.values import relative
+from pipeline.report.values import by_case, relative
 from pipeline.report.words import at_most, choices, heading, scale
 
 _MOST_PANELS, _MOST_CURVES = 4, 4
 _WIDTH, _HEIGHT, _LINE = 3.1, 2.2, 0.17  # inches: of a panel, and of a line of the legend above it
 # What is drawn below the force where a study has it; those that are shares of something have a line at 1.
 _WITH_FORCE = ("contact_area", "load_force", "sag", "linear_ratio", "force_exact_ratio")
+# What is drawn below the force over time.
+_OF_HISTORY = ("ramp", "hold", "frequency", "amplitude", "probe", "material")
+_OVER_TIME = ("tool_depth", "dissipated_energy")
 _SHARES = ("linear_ratio", "force_exact_ratio")
 
 
@@ -28,7 +31,24 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     if not dims:
         return _one(dataset, title, warning)
     shown = sorted(dims, key="depth".__ne__)[:_MOST_PANELS]
+    tells = "The force against each quantity that the study varies; bars are 95\N{NO-BREAK SPACE}% error bars."
+    more = f"Not shown: against {', '.join(map(symbol, dims[_MOST_PANELS:]))}." if dims[_MOST_PANELS:] else ""
     quantities = ["force", *(name for name in _WITH_FORCE if _varies(dataset, name))]
+    return _columns(dataset, shown, quantities, (title, tells, more, warning))
+
+
+def history(dataset: xr.Dataset, title: str, warning: str) -> Figure:
+    """The force, the depth of the tool and the dissipated energy over time."""
+    quantities = ["force", *(name for name in _OVER_TIME if _varies(dataset, name))]
+    tells = "The force over time; bars are 95\N{NO-BREAK SPACE}% error bars."
+    names = ("status", *quantities)
+    dataset = dataset.assign({name: by_case(dataset, name) for name in names})
+    return _columns(dataset, ["time"], quantities, (title, tells, "", warning))
+
+
+def _columns(dataset: xr.Dataset, shown: list[str], quantities: list[str], words: tuple[str, str, str, str]) -> Figure:
+    """Draw quantities against each dimension ``shown``; ``words`` are title, caption, what is not shown, warning."""
+    title, tells, more, warning = words
     exact_bar = relative(dataset, "force_exact_error")
     of_ratio = abs(dataset["force_exact_ratio"]) * relative(dataset, "force_error")
     dataset = dataset.assign(force_exact_ratio_error=of_ratio, exact_bar=exact_bar)
@@ -41,10 +61,8 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         if name not in _SHARES and low * high > 0 and low > -0.05 * high:
             row[0].set_ylim(0, 1.05 * high)  # a small change then looks small
     band = f"Grey: error bar of F_exact{at_most(exact_bar)}." if "force_exact_ratio" in quantities else ""
-    more = f"Not shown: against {', '.join(map(symbol, dims[_MOST_PANELS:]))}." if dims[_MOST_PANELS:] else ""
     figure.set_figheight(figure.get_figheight() + _LINE * max(map(_legend_lines, axes[0])))
     part = dict.fromkeys(words for column in left_out for words in column)
-    tells = "The force against each quantity that the study varies; bars are 95\N{NO-BREAK SPACE}% error bars."
     notes = (tells, band, f"Shown: {', '.join(part)}." if part else "", more)
     finish(figure, title, " ".join(filter(None, notes)), warning, legend=False)
     return figure
@@ -59,7 +77,8 @@ def _varies(dataset: xr.Dataset, name: str) -> bool:
 
 def _draw_column(axes: np.ndarray, dataset: xr.Dataset, dim: str, quantities: list[str]) -> tuple[str, ...]:
     """Draw every quantity against one dimension; return what is left out, in words."""
-    first = ("law", "probe") if "contact_area" in quantities else ("law", "poisson")
+    first: tuple[str, ...] = ("law", "probe") if "contact_area" in quantities else ("law", "poisson")
+    first = _OF_HISTORY if dim == "time" else first
     facets = arrange(dataset, quantities, dim, most=(_MOST_CURVES, 1, 1), first=first)
     data = dataset.sel(facets.at)
     for ax, name in zip(axes, quantities, strict=True):

@@ -29,6 +29,7 @@ from pipeline.report.page.facts import (
 )
 from pipeline.report.page.inline import inline_svg
 from pipeline.report.table import warnings_of
+from pipeline.report.values import at_peak
 
 # What the answer says of times, and the headlines need not say again.
 _TOLD = "speed-ups"
@@ -53,8 +54,9 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
 
     A page in a page is bound by the policies of both: the report's must allow the scripts of the ``scene``.
     """
+    over_time, dataset = dataset, at_peak(dataset)
     study = str(dataset.attrs.get("study", ""))
-    guide = guide_if_any(dataset)
+    guide = guide_if_any(over_time)
     table = case_table(dataset)
     varying = {column.name for column in table.columns if column.varies}
     plotly = joined(_VENDOR / "plotly-basic.min.js")
@@ -72,7 +74,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         failures=by_status(dataset, "failed") + by_status(dataset, "partial"),
         without_exact=without_exact(dataset),
         warnings=warnings_of(dataset),
-        figures=_figures(dataset),
+        figures=_figures(over_time),
         guide=guide,
         answer=guide.sentence if guide else summary(dataset),
         table=table,
