@@ -5,6 +5,7 @@ Each shape checks its own keys. This module checks combinations of sections.
 
 import itertools
 from collections.abc import Sequence
+from math import prod
 from typing import cast
 
 from pipeline.shapes.body import Body
@@ -37,6 +38,8 @@ from pipeline.study.sweep import Axis
 _LINEAR = 0.10
 # No tissue is softer (Pa): brain and fat have some hundred.
 _SOFTEST = 1.0
+# Forces of all cases and times: a dataset then has a few hundred megabytes.
+_MOST_FORCES = 2_000_000
 _OR_LOST = '. To go on without contact at such places, write `off = "lost"` in [probe.path]'
 
 
@@ -64,9 +67,23 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     problems.each(_check_softness, body=bodies, material=materials)
     problems.each(check_locking, body=bodies, material=linear, mesh=meshes)
     check_reference(meshes, axes, problems)
+    _check_times(probes, axes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
         if "repeats" in solve.model_fields_set and not solve.timing:
             problems.error("solve.repeats", solve.repeats, "is of timing studies: add `timing = true`, or omit it")
+
+
+def _check_times(probes: Sequence[Probe], axes: tuple[Axis, ...], problems: Problems) -> None:
+    """Report histories with more times, over all cases, than a dataset can have."""
+    histories = {probe.history for probe in probes} - {None}
+    times = {time for history in histories if history for time in history.times()}
+    cases = prod(map(len, axes))
+    if len(times) * cases > _MOST_FORCES:
+        problems.error(
+            "probe.history.steps",
+            None,
+            f"gives {len(times)} times of {cases} cases: at most {_MOST_FORCES} forces; write fewer steps",
+        )
 
 
 def _placed(

@@ -1,0 +1,87 @@
+"""The hereditary integral: closed forms, limits, energies."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.viscoelastic import Motion, moduli, respond
+
+TERMS = ((0.4, 2.0), (0.2, 30.0))
+RAMP = Motion((0.0, 1.0, 11.0), (0.0, 2.0, 2.0))
+
+
+def test_a_step_relaxes_as_the_modulus_does():
+    times = np.linspace(0, 100, 41)
+    force, _ = respond(Motion((0.0, 100.0), (1.0, 1.0)), TERMS, times)
+    assert force == pytest.approx(0.4 + 0.4 * np.exp(-times / 2) + 0.2 * np.exp(-times / 30), rel=1e-13)
+
+
+def test_fast_and_slow_ramps_are_those_of_both_moduli():
+    for duration, modulus in ((1e-6, 1.0), (1e8, 0.4)):
+        force, _ = respond(Motion((0.0, duration), (0.0, 1.0)), TERMS, np.array([duration]))
+        assert force[0] == pytest.approx(modulus, rel=1e-5)
+
+
+def test_without_terms_the_force_follows_the_depth_and_nothing_is_lost():
+    times = np.linspace(0, 11, 50)
+    force, lost = respond(RAMP, (), times)
+    assert force == pytest.approx(RAMP.at(times))
+    assert not lost.any()
+
+
+def test_after_its_end_a_motion_has_no_force():
+    force, lost = respond(RAMP, TERMS, np.array([11.0, 11.1]))
+    assert np.isfinite([force[0], lost[0]]).all()
+    assert np.isnan([force[1], lost[1]]).all()
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.01, 10), st.floats(-1, 1)), min_size=1, max_size=6),
+    st.tuples(st.floats(0.05, 0.5), st.floats(0.05, 0.45)),
+    st.tuples(st.floats(0.01, 1), st.floats(2, 100)),
+)
+def test_work_is_stored_or_dissipated(rows, shares, taus):
+    """The work of the force is the energy of all springs and what is lost; a coarser table is the same motion."""
+    times = np.concatenate([[0.0], np.cumsum([step for step, _ in rows])])
+    values = np.array([0.0, *(depth for _, depth in rows)])
+    motion, terms = Motion(tuple(times), tuple(values)), tuple(zip(shares, taus, strict=True))
+    fine = np.unique(np.concatenate([np.linspace(a, b, 2001) for a, b in pairwise(times)]))
+    force, lost = respond(motion, terms, fine)
+    depth = motion.at(fine)
+    work = np.sum((force[1:] + force[:-1]) / 2 * np.diff(depth))
+    springs = [(respond(motion, ((0.999999, tau),), fine)[0][-1] - 1e-6 * depth[-1]) / 0.999999 for tau in taus]
+    stored = (1 - sum(shares)) * depth[-1] ** 2 / 2 + sum(g * q**2 / 2 for g, q in zip(shares, springs, strict=True))
+    assert lost[-1] == pytest.approx(work - stored, abs=1e-5)
+    assert (np.diff(lost) >= -1e-12).all()
+
+
+@pytest.mark.parametrize("frequency", [0.01, 0.3, 5.0])
+def test_a_steady_sine_has_storage_and_loss_modulus(frequency):
+    """Of the last of so many periods that the transient is gone; a period loses pi E'' A^2."""
+    periods = max(10.0, np.ceil(700 * frequency))
+    motion = Motion((0.0,), (0.0,), 0.1, frequency, periods)
+    last = (periods - 1 + np.linspace(0, 1, 65)) / frequency
+    force, lost = respond(motion, TERMS, last)
+    wave = 2 * np.mean((force * np.exp(-2j * np.pi * frequency * last))[:-1]) * 1j
+    storage, loss = moduli(TERMS, frequency)
+    assert (wave.real, wave.imag) == pytest.approx((0.1 * storage, 0.1 * loss), rel=1e-7)
+    assert lost[-1] - lost[0] == pytest.approx(np.pi * loss * 0.1**2, rel=1e-6)
+
+
+def test_a_table_of_a_sine_is_the_sine():
+    motion = Motion((0.0, 1.0), (0.0, 1.0), 0.3, 0.5, 2.0)
+    fine = 1 + np.linspace(0, 4, 4001)
+    table = Motion((0.0, *fine), (0.0, *(1 + 0.3 * np.sin(np.pi * (fine - 1)))))
+    at = np.linspace(0, 5, 23)
+    for one, other in zip(respond(motion, TERMS, at), respond(table, TERMS, at), strict=True):
+        assert one == pytest.approx(other, abs=1e-6)
+
+
+def test_short_steps_lose_as_much_as_one_long_step():
+    """Where a series replaces differences of nearly equal numbers."""
+    many = Motion(tuple(np.linspace(0, 1, 3001)), tuple(np.linspace(0, 2, 3001)))
+    one = Motion((0.0, 1.0), (0.0, 2.0))
+    assert respond(many, TERMS, np.ones(1))[1] == pytest.approx(respond(one, TERMS, np.ones(1))[1], rel=1e-9)
