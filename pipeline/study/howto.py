@@ -18,6 +18,8 @@ _PAGES = {
     "material.density": "howto/loads",
     "material.law": "accuracy",
     "probe.path": "howto/path",
+    "probe.history": "howto/relaxation",
+    "material.relaxation": "howto/relaxation",
     "probe.incision": "howto/cut",
     "probe.ahead": "howto/cut",
     "probe.ends": "howto/cut",
