@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.viscoelastic import Motion, moduli, respond
+from pipeline.viscoelastic import Motion, follow, moduli, respond
 
 TERMS = ((0.4, 2.0), (0.2, 30.0))
 RAMP = Motion((0.0, 1.0, 11.0), (0.0, 2.0, 2.0))
@@ -85,3 +85,73 @@ def test_short_steps_lose_as_much_as_one_long_step():
     many = Motion(tuple(np.linspace(0, 1, 3001)), tuple(np.linspace(0, 2, 3001)))
     one = Motion((0.0, 1.0), (0.0, 2.0))
     assert respond(many, TERMS, np.ones(1))[1] == pytest.approx(respond(one, TERMS, np.ones(1))[1], rel=1e-9)
+
+
+# ---- contact that grows and shrinks: shares of depths, and an elastic curve that is no power of the depth ----
+
+DEPTHS = np.array([0.1, 0.17, 0.43, 0.81, 1.0])
+TOUCH = Motion((0.0, 1.0, 4.0, 6.0), (0.0, 1.0, 1.0, 0.0))
+
+
+def curve(depth):
+    return depth**1.5 * (1 + 0.3 * np.sqrt(depth) + 0.1 * depth)
+
+
+def modulus(time):
+    return 0.4 + 0.4 * np.exp(-time / 2) + 0.2 * np.exp(-time / 30)
+
+
+def loaded(until, time):
+    """Integrate E(t - s) dF over the loading, by quadrature in the depth."""
+    points, weights = np.polynomial.legendre.leggauss(60)
+    end = min(until, 1.0)
+    depth = end * (1 + points) / 2
+    slope = 1.5 * depth**0.5 + 0.6 * depth + 0.25 * depth**1.5
+    return end / 2 * np.sum(weights * modulus(time - depth) * slope)
+
+
+def test_growing_contact_is_the_hereditary_integral_of_the_elastic_force():
+    times = np.array([0.3, 0.7, 1.0, 2.5, 4.0])
+    found = follow(TOUCH, TERMS, times, DEPTHS, 1.5)
+    assert found.weights @ curve(DEPTHS) == pytest.approx([loaded(time, time) for time in times], rel=1e-5)
+    assert found.depth == pytest.approx(np.minimum(times, 1.0))
+
+
+def test_shrinking_contact_forgets_what_came_after_it_had_that_area():
+    """Only the loading before t1 counts, and the integral of E(t - s) d'(s) from t1 to t is zero (Ting)."""
+    times = np.array([4.1, 4.6, 5.0])
+    found = follow(TOUCH, TERMS, times, DEPTHS, 1.5)
+    for time, force, t1 in zip(times, found.weights @ curve(DEPTHS), found.depth, strict=True):
+        s = np.concatenate([np.linspace(t1, 1, 20001), np.linspace(4, time, 20001)])
+        rate = np.where(s <= 1, 1.0, -0.5)
+        steps = np.diff(s) * (np.diff(s) < 2)  # not over the hold
+        both = modulus(time - s) * rate
+        assert np.sum(steps * (both[1:] + both[:-1]) / 2) == pytest.approx(0, abs=2e-4)
+        assert force == pytest.approx(loaded(t1, time), rel=1e-4)
+
+
+def test_contact_is_lost_before_the_tool_is_back():
+    found = follow(TOUCH, TERMS, np.array([5.3, 5.6, 6.0, 7.0]), DEPTHS, 1.5)
+    assert found.weights[0] @ curve(DEPTHS) > 0
+    assert not found.weights[1:3].any()
+    assert np.isnan(found.weights[3]).all()
+
+
+def test_elastic_contact_follows_its_curve_both_ways():
+    times = np.array([0.25, 0.5, 1.0, 3.0, 5.0, 5.5])
+    found = follow(TOUCH, (), times, DEPTHS, 1.5)
+    assert found.depth == pytest.approx(TOUCH.at(times))
+    assert found.weights @ curve(DEPTHS) == pytest.approx(curve(TOUCH.at(times)), rel=1e-4)
+
+
+def test_a_step_of_found_contact_relaxes_as_the_modulus_does():
+    times = np.array([0.0, 1.0, 9.0])
+    found = follow(Motion((0.0, 10.0), (1.0, 1.0)), TERMS, times, DEPTHS, 1.5)
+    assert found.weights @ curve(DEPTHS) == pytest.approx(curve(1.0) * modulus(times), rel=1e-7)
+
+
+def test_a_force_proportional_to_the_depth_is_that_of_prescribed_contact():
+    """Until it would pull: contact of a flat tool has one area."""
+    times = np.linspace(0, 4.5, 31)
+    found = follow(TOUCH, TERMS, times, DEPTHS, 1.0)
+    assert found.weights @ DEPTHS == pytest.approx(respond(TOUCH, TERMS, times)[0], rel=1e-6, abs=1e-9)

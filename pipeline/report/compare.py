@@ -159,9 +159,9 @@ def _cases(dataset: xr.Dataset, name: str, *, alike: bool) -> list[_Place]:
         named = [{dim: labels[dim][i] for dim, i in zip(sizes, at, strict=True)} for at in np.ndindex(*sizes.values())]
         places = zip(named, np.ndindex(*sizes.values()), strict=True)
         return [_Place(one, ", ".join(f"{k} = {v}" for k, v in one.items()), index) for one, index in places]
-    if {axis.name: len(axis) for axis in study.axes} != sizes:
+    if {axis.name: len(axis) for axis in study.axes if not axis.is_stage} != sizes:
         raise DatasetError(f"{name} is part of a dataset, or of another study than it says: compare whole ones")
-    return [_Place(parameters_of(case), str(case), case.index) for case in study.cases()]
+    return [_Place(parameters_of(case), str(case), index) for index, case in study.whole_cases()]
 
 
 def _differences(scene: list[tuple[str, Any, Any]]) -> str:

@@ -16,8 +16,8 @@ from pipeline.plan.equivalent_places import EquivalentPlace
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST, MESH_DIMENSIONS, RUN, attributes, quantity_of
-from pipeline.report.history import Course, course_of, times_of
-from pipeline.report.values import OVER_TIME, at_full_order, with_flags
+from pipeline.report.history import over_time
+from pipeline.report.values import at_full_order, with_flags
 from pipeline.run.outcome import LOST, without_contact
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
@@ -87,8 +87,6 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     flat = [_imaged(record, plan.equivalent.get(case.index)) for record, case in zip(flat, cases, strict=True)]
     reference_keys = plan.reference_keys or [""] * len(cases)
     exact = _records_of(plan, cases, reference_keys, records)
-    times = times_of(cases)
-    courses = [course_of(case, times) for case in cases] if times.size else []
     variables, of_scene = {}, ["force_exact_message"]
     for part in _PARTS:
         if any(map(part.of, cases)):
@@ -97,28 +95,21 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
                     _value(record, case, name, part.dims)
                     for record, case in zip(exact if part.is_exact else flat, cases, strict=True)
                 ]
-                dims = part.dims
-                if courses and name in OVER_TIME:
-                    values, dims = _over_time(name, values, courses), (*dims, "time")
-                elif courses and name in LARGEST:
-                    values = [value * course.peak for value, course in zip(values, courses, strict=True)]
-                variables[name] = _variable(study, name, values, *dims)
+                variables[name] = _variable(study, name, values, *part.dims)
                 of_scene += [name] if part.is_exact else []
     variables |= _of_places(study, cases) | _texts(plan, cases, flat, exact)
     component = ("component", ["x", "y", "z"], attributes("component"))
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": component}
     if "stiffness" in variables:
         coordinates |= _motions()
-    if courses:
-        coordinates["time"] = ("time", times, attributes("time"))
-        variables |= _of_courses(study, flat, courses)
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
+    dataset = over_time(dataset, study, cases)
     if any(case.is_closed for case in cases if not case.lost_contact):
         dataset["force_error"].attrs["comment"] = _OF_CLOSURE
     for name in of_scene:
         dataset[name] = dataset[name].isel(_shared(study, reference_keys), drop=True)
     path = {axis.name for axis in study.axes if axis.off}
-    for name in {*_PLACE, "axis", "body_message", "tool_depth"} & {*variables}:
+    for name in {*_PLACE, "axis", "body_message", "tool_depth"} & {*dataset.variables}:
         dataset[name] = _along(dataset[name], {*path, "component", "time"})
     return _linked(_add_ratios(dataset.set_coords(_PLACE if path else ()), plan))
 
@@ -165,28 +156,6 @@ def _variable(study: Study, name: str, values: Sequence[Any], *more: str) -> tup
     dims = tuple(axis.name for axis in study.axes)
     missing = {"missing_value": _MISSING} if name in _COUNTS else {}
     return (*dims, *more), array.reshape((*study.shape, *array.shape[1:])), attributes(name) | missing
-
-
-def _over_time(name: str, values: Sequence[Any], courses: Sequence[Course]) -> list[Any]:
-    """Return what is proportional to the force over time, one a case; error bars are positive."""
-    factors = [abs(course.factor) if name.endswith("_error") else course.factor for course in courses]
-    return [np.multiply.outer(value, factor) for value, factor in zip(values, factors, strict=True)]
-
-
-def _of_courses(study: Study, flat: Sequence[Record | None], courses: Sequence[Course]) -> dict[str, Any]:
-    """Return the depth of the tool over time, and the dissipated energy with its error bar."""
-    forces = [record.force if record and record.is_ok else nan for record in flat]
-    energies = [record.energy if record and record.is_ok else nan for record in flat]
-    bars = [record.force_error if record and record.is_ok else nan for record in flat]
-    lost = [energy * course.dissipated for energy, course in zip(energies, courses, strict=True)]
-    return {
-        "force_elastic": _variable(study, "force_elastic", forces),
-        "tool_depth": _variable(study, "tool_depth", [course.depth for course in courses], "time"),
-        "dissipated_energy": _variable(study, "dissipated_energy", lost, "time"),
-        "dissipated_energy_error": _variable(
-            study, "dissipated_energy_error", [bar * value for bar, value in zip(bars, lost, strict=True)], "time"
-        ),
-    }
 
 
 def _motions() -> dict[str, Any]:

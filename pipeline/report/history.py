@@ -1,50 +1,185 @@
-"""Forces over time: each elastic force times a function of time, which follows from history and relaxation alone."""
+"""Forces over time: they follow from elastic forces, the history of the depth and relaxation, without a solve."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import xarray as xr
 
 from pipeline.arrays import FloatArray
-from pipeline.study.sweep import Case
-from pipeline.viscoelastic import Motion, Terms, respond
+from pipeline.quantities import LARGEST, attributes
+from pipeline.report.values import OVER_TIME, STATES
+from pipeline.study.sweep import Case, Study
+from pipeline.viscoelastic import Contact, Motion, Terms, follow, interpolation, respond
 
-_MANY = 10_000
+# What a history with several solves costs, and what is largest of them.
+_SUMS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total", "iterations")
+_LARGEST = ("dofs", "cells", "memory", "machine_load", "time_spread", "balance")
+_TEXTS = ("message", "force_exact_message")
+# States of a history, by those of its solves: the first that occurs.
+_WORST = ("failed", "pending", "skipped", "lost", "ok")
+# Powers of the depth to which contact is proportional on a half-space and a ball.
+_CONTACT = {"contact_area": 1.0, "contact_radius": 0.5}
+# Power of the depth of a force that is no power on a half-space.
+_POWER = 1.5
+_STAGE, _MANY = "stage", 10_000
 
 
 @dataclass(frozen=True)
 class Course:
     """What a case does over time (n,), NaN after the end of its history.
 
-    ``factor`` is the force in units of the elastic force at ``case.probe.depth``, ``depth`` (m) that of the tool,
-    ``dissipated`` the dissipated energy in units of the elastic energy, and ``peak`` the largest depth over
-    ``case.probe.depth``.
+    The force is ``weights`` (n, k) times the elastic forces of its k stages; ``others`` are those of other
+    interpolations, for the error bar. ``depth`` (m) is that of the tool, ``dissipated`` the energy in units of the
+    elastic one at the last stage, ``peak`` the largest depth over that of the last stage, ``contact`` (m) the depth of
+    elastic contact of equal area.
     """
 
-    factor: FloatArray
+    weights: FloatArray
+    others: tuple[FloatArray, ...]
     depth: FloatArray
     dissipated: FloatArray
     peak: float
+    contact: FloatArray
 
 
-def times_of(cases: Sequence[Case]) -> FloatArray:
-    """Return the times (s) of all histories of a study; none if it is static."""
+def over_time(dataset: xr.Dataset, study: Study, cases: Sequence[Case]) -> xr.Dataset:
+    """Return the dataset of a study with time in place of the stages of its histories; a static one as it is."""
     histories = {history for case in cases if (history := case.probe.history) is not None}
-    return np.unique(np.concatenate([history.times() for history in histories])) if histories else np.empty(0)
+    if not histories:
+        return dataset
+    times = np.unique(np.concatenate([history.times() for history in histories]))
+    dims = [axis.name for axis in study.axes if not axis.is_stage]
+    if not any(axis.is_stage for axis in study.axes):
+        dataset = dataset.assign({name: values.expand_dims(_STAGE) for name, values in dataset.data_vars.items()})
+    whole = [case for _, case in study.whole_cases()]
+    depths = np.array([case.probe.depth for case in cases]).reshape(study.shape)
+    if len(dims) < len(study.axes):
+        depths = np.moveaxis(depths, [axis.is_stage for axis in study.axes].index(True), -1)
+    depths = depths.reshape(len(whole), -1)
+    courses = [course_of(case, times, tuple(own)) for case, own in zip(whole, depths, strict=True)]
+    last = _last_stage(dataset)
+    found = {"force_elastic": last["force"].assign_attrs(attributes("force_elastic"))}
+    for name in (name for name in OVER_TIME if name in dataset):
+        found[name] = _transformed(dataset, name, dims, courses)
+    for name in (name for name in _CONTACT if name in dataset):
+        found |= _contact(dataset, name, dims, whole, courses, depths)
+    peaks = _variable(last, "force", dims, [np.array(course.peak) for course in courses])
+    found |= {name: (last[name] * peaks).assign_attrs(last[name].attrs) for name in LARGEST if name in last}
+    found["tool_depth"] = _variable(last, "tool_depth", dims, [course.depth for course in courses], "time")
+    lost = _variable(last, "dissipated_energy", dims, [course.dissipated for course in courses], "time")
+    found["dissipated_energy"] = (lost * last["energy"]).transpose(*dims, "time").assign_attrs(lost.attrs)
+    share = abs(last["force_error"] / last["force"])
+    found["dissipated_energy_error"] = (share * found["dissipated_energy"]).transpose(*dims, "time")
+    found["dissipated_energy_error"].attrs = attributes("dissipated_energy_error")
+    coordinate = ("time", times, attributes("time"))
+    return last.drop_vars(_STAGE, errors="ignore").assign(found).assign_coords(time=coordinate)
 
 
-def course_of(case: Case, times: FloatArray) -> Course:
-    """Return what a case does at ``times``; one without a history does not change."""
+def course_of(case: Case, times: FloatArray, depths: tuple[float, ...]) -> Course:
+    """Return what a case does at ``times``, solved at ``depths`` (m); one without a history does not change."""
     depth, history = case.probe.depth, case.probe.history
+    only_last = np.arange(len(depths)) == len(depths) - 1
     if history is None:
-        return Course(np.ones(len(times)), np.full(len(times), depth), np.zeros(len(times)), 1.0)
-    return _course(history.motion(depth), case.relaxations[0], depth, tuple(times))
+        ones = np.ones(len(times))
+        alone = np.outer(ones, only_last)
+        return Course(alone, (alone,), depth * ones, 0 * ones, 1.0, depth * ones)
+    motion, terms = history.motion(depth), case.relaxations[0]
+    if case.probe.is_unilateral:
+        contact = _follow(motion, terms, tuple(times), depths, case.probe.force_exponent or _POWER)
+        unknown = np.full(len(times), np.nan)
+        return Course(contact.weights, contact.others, motion.at(times), unknown, 1.0, contact.depth)
+    force, lost = respond(motion, terms, times)
+    weights = np.outer(force / depth, only_last)
+    # Energies are half of stiffness times depth squared.
+    return Course(weights, (weights,), motion.at(times), 2 * lost / depth**2, motion.largest / depth, motion.at(times))
 
 
 @lru_cache(_MANY)
-def _course(motion: Motion, terms: Terms, depth: float, times: tuple[float, ...]) -> Course:
-    at = np.array(times)
-    force, lost = respond(motion, terms, at)
-    # Energies are half of stiffness times depth squared.
-    return Course(force / depth, motion.at(at), 2 * lost / depth**2, motion.largest / depth)
+def _follow(
+    motion: Motion, terms: Terms, times: tuple[float, ...], depths: tuple[float, ...], exponent: float
+) -> Contact:
+    return follow(motion, terms, np.array(times), np.array(depths), exponent)
+
+
+def _transformed(dataset: xr.Dataset, name: str, dims: list[str], courses: Sequence[Course]) -> xr.DataArray:
+    """Return a force or its error bar over time. The error bar includes that of the elastic curve's interpolation."""
+    values = _table(dataset, name, dims)
+    more = [str(dim) for dim in dataset[name].dims if dim not in (*dims, _STAGE)]
+    if not name.endswith("_error"):
+        found = [np.tensordot(course.weights, own, 1) for course, own in zip(courses, values, strict=True)]
+    else:
+        forces = _table(dataset, name.removesuffix("_error"), dims)
+        found = [
+            abs(np.tensordot(course.others[0], bars, 1))
+            + sum(abs(np.tensordot(course.weights - other, own, 1)) for other in course.others)
+            for course, bars, own in zip(courses, values, forces, strict=True)
+        ]
+    found = [np.moveaxis(one, 0, -1) for one in found]
+    return _variable(dataset, name, dims, found, *more, "time")
+
+
+def _contact(
+    dataset: xr.Dataset,
+    name: str,
+    dims: list[str],
+    cases: Sequence[Case],
+    courses: Sequence[Course],
+    depths: FloatArray,
+) -> dict[str, xr.DataArray]:
+    """Return area or radius of contact over time, and the error bar."""
+    parts = [_table(dataset, part, dims) for part in (name, f"{name}_error")]
+    found: list[list[FloatArray]] = [[], []]
+    for number, (case, course, own) in enumerate(zip(cases, courses, depths, strict=True)):
+        if case.probe.history is None or not case.probe.is_unilateral:
+            weights = course.weights
+        else:
+            power = 0.0 if case.probe.has_singular_edge else _CONTACT[name]
+            weights = interpolation(np.nan_to_num(course.contact), own, power, "linear")
+            weights[course.contact == 0] = 0.0
+            weights[np.isnan(course.contact)] = np.nan
+        for part, values in zip(found, parts, strict=True):
+            part.append(weights @ values[number])
+    names = (name, f"{name}_error")
+    return {one: _variable(dataset, one, dims, part, "time") for one, part in zip(names, found, strict=True)}
+
+
+def _last_stage(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the dataset at the last stage, with what all stages cost, and the worst of their states."""
+    last = dataset.isel({_STAGE: -1}, drop=True)
+    found = {name: dataset[name].sum(_STAGE) for name in _SUMS if name in dataset}
+    found |= {name: dataset[name].max(_STAGE) for name in _LARGEST if name in dataset}
+    found |= {
+        name: xr.apply_ufunc(_first, dataset[name], input_core_dims=[[_STAGE]], vectorize=True) for name in _TEXTS
+    }
+    found["status"] = xr.apply_ufunc(_worst, dataset["status"], input_core_dims=[[_STAGE]], vectorize=True)
+    kept = {
+        name: values.astype(dataset[name].dtype).transpose(*last[name].dims).assign_attrs(dataset[name].attrs)
+        for name, values in found.items()
+    }
+    counts = {name: kept[name].where((dataset[name] >= 0).all(_STAGE), -1) for name in ("iterations",) if name in kept}
+    return last.assign(kept | {name: values.astype(dataset[name].dtype) for name, values in counts.items()})
+
+
+def _first(texts: np.ndarray) -> str:
+    return next((str(text) for text in texts if text), "")
+
+
+def _worst(states: np.ndarray) -> str:
+    return next((state for state in _WORST if state in states), STATES[0])
+
+
+def _table(dataset: xr.Dataset, name: str, dims: list[str]) -> FloatArray:
+    """Return the values of a variable: cases, stages, and its other dimensions."""
+    values = dataset[name].transpose(*dims, _STAGE, ...)
+    return np.asarray(values.values.reshape(-1, *values.shape[len(dims) :]))
+
+
+def _variable(
+    dataset: xr.Dataset, name: str, dims: list[str], values: Sequence[FloatArray], *more: str
+) -> xr.DataArray:
+    """Return a variable of ``values``, one a case, of which each has ``more`` dimensions."""
+    array = np.array(values)
+    shape = [dataset.sizes[dim] for dim in dims]
+    return xr.DataArray(array.reshape((*shape, *array.shape[1:])), dims=(*dims, *more), attrs=attributes(name))

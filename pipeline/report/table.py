@@ -196,6 +196,9 @@ def case_at(dataset: xr.Dataset, study: Study | None, labels: Labels, free: str 
     known |= {name: _plain(value) for name, value in labels.items()}
     index = []
     for axis in study.axes:
+        if axis.is_stage:
+            index.append(len(axis) - 1)
+            continue
         if axis.section != free and known.get(axis.name) not in axis.labels:
             return None
         index.append(0 if axis.section == free else axis.labels.index(known[axis.name]))

@@ -41,6 +41,7 @@ def _below_one(terms: tuple[Relaxation, ...]) -> tuple[Relaxation, ...]:
         )
     return terms
 
+
 # The keys that each law reads besides young and poisson.
 LAWS = MappingProxyType(
     {

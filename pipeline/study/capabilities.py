@@ -126,6 +126,7 @@ FEATURES: dict[str, Feature] = {
     "unilateral contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
     "frictionless contact": Feature("probe.contact", lambda s: s.probe.contact == "frictionless"),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
+    "bent surface": Feature("load", lambda s: s.load.acts and s.probe.is_unilateral, ("probe",)),
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),
     "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),
     "open slit": Feature("probe.ends", lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
@@ -253,8 +254,8 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal(
         "history",
-        "unilateral contact",
-        f'the contact area changes with time, which is not computed: use contact = "frictionless", or {_STATIC}',
+        "bent surface",
+        f"loads bend the surface on which contact is found, and the force is no power of the depth: {_STATIC}",
     ),
     Refusal(
         "history",

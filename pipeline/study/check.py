@@ -32,6 +32,7 @@ from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
 from pipeline.study.schema import Material, Mesh, Solving
 from pipeline.study.slit import check_slit, check_slit_in
+from pipeline.study.stages import check_history
 from pipeline.study.sweep import Axis
 
 # Linear elasticity: strain under the probe is of order depth / radius.
@@ -52,6 +53,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     if linear:
         problems.each(_check_depth, probe=probes)
     problems.each(lambda probe, _: probe.check(problems), probe=probes)
+    problems.each(check_history, probe=probes)
     problems.each(check_sizes, mesh=meshes)
     check_chosen(meshes, problems)
     problems.each(check_epsilon, mesh=meshes, probe=probes)

@@ -63,7 +63,9 @@ def study_schema() -> Schema:
     for section, inner in TABLES.items():
         for owner, (key, model) in product(sections[section], inner.items()):
             definitions[owner.__name__]["properties"][key] = {"$ref": f"#/$defs/{model.__name__}"}
-    swept: dict[str, type[BaseModel]] = {model.__name__: model for model in (*_swept(), History, Sine)}
+    swept: dict[str, type[BaseModel]] = {
+        model.__name__: model for model in chain[type[BaseModel]](_swept(), (History, Sine))
+    }
     words = swept | {model.__name__: model for model in (*chain(*sections.values()), *tables)}
     for name, definition in definitions.items():
         definition.pop("description", None)  # a docstring, which is not for authors of studies

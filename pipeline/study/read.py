@@ -13,6 +13,7 @@ from pipeline.study.loads import Load
 from pipeline.study.problems import Problem, Problems, StudyError, nearest
 from pipeline.study.regions import check_regions, material_without_section
 from pipeline.study.schema import NESTED, SECTIONS, Mesh
+from pipeline.study.stages import with_stages
 from pipeline.study.sweep import Axis, Study
 from pipeline.study.tables import MOST_CASES, read_section
 from pipeline.study.text import check_text, read_toml, toml_of
@@ -78,9 +79,10 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
         _check_together(sections, tuple(axes), problems)
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))
+    sections, every_axis = with_stages(sections, tuple(axes))
     warnings = tuple(f"{file}: {warning}" for warning in problems.told_once())
     title = str(raw.get("title", Path(file).stem))
-    return Study(file, Path(file).stem, title, text, tuple(axes), sections, warnings)
+    return Study(file, Path(file).stem, title, text, every_axis, sections, warnings)
 
 
 def _check_together(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:

@@ -39,6 +39,7 @@ class Axis:
     unit: str
     piece: str = ""  # of an array of tables within the section, such as layer[2]
     owner: str = ""  # the name of that piece
+    is_stage: bool = False  # depths on the way of a history, which the dataset replaces by time
     off: str = ""  # of a path: what becomes of places off the body, "refuse" or "lost"
 
     @property
@@ -54,6 +55,8 @@ class Axis:
     @property
     def path(self) -> str:
         """Place in the study file."""
+        if self.is_stage:
+            return "probe.history"
         if self.off:
             return "probe.path" if self.key == "path" else f"probe.path.raster.{self.key}"
         return ".".join(part for part in (self.section, self.piece, self.key) if part)
@@ -298,6 +301,13 @@ class Study:
         """Yield every case, the last axis fastest."""
         for index in itertools.product(*(range(n) for n in self.shape)):
             yield self.case(index)
+
+    def whole_cases(self) -> Iterator[tuple[tuple[int, ...], Case]]:
+        """Yield the cases of the dataset, each with its index there: those at the last stage of a history."""
+        stages = [number for number, axis in enumerate(self.axes) if axis.is_stage]
+        for case in self.cases():
+            if all(case.index[number] == len(self.axes[number]) - 1 for number in stages):
+                yield tuple(i for number, i in enumerate(case.index) if number not in stages), case
 
     def case(self, index: tuple[int, ...]) -> Case:
         """Return the case at ``index``, one number for each axis."""

@@ -3,16 +3,18 @@
 import numpy as np
 import pytest
 import xarray as xr
+from mpi4py import MPI
 
 import pipeline.report.accessor  # noqa: F401
 from pipeline.plan.plan import make_plan
 from pipeline.report.compare import compare
-from pipeline.report.dataset import write
+from pipeline.report.dataset import build, write
 from pipeline.report.figures import choose, figure
 from pipeline.report.guide import guide
 from pipeline.report.page import render
 from pipeline.report.read import read_file
 from pipeline.report.values import at_peak, elastic
+from pipeline.run.execute import compute
 from tests.cases import study
 from tests.report.synthetic import dataset
 
@@ -100,3 +102,57 @@ def test_the_peak_is_that_of_each_case():
     assert "time" not in peak.dims
     assert (peak["force"].sel(ramp=0.5) > peak["force"].sel(ramp=2.0)).all()
     assert (peak["force_elastic"] > peak["force"]).all()
+
+
+SPHERE = {"shape": "sphere", "radius": "4 mm", "depth": "0.4 mm", "contact": "unilateral"}
+
+
+def found(**changes):
+    material = {"young": "10 kPa", "poisson": 0.3, "relaxation": [{"share": 0.4, "time": "2 s"}]}
+    return dataset(material=material, probe=SPHERE | changes, mesh=MESHES)
+
+
+def test_stages_of_found_contact_become_time():
+    data = found(history={"ramp": ["1 s", "3 s"], "hold": "5 s"})
+    assert data["force"].dims == ("ramp", "epsilon", "time")
+    assert data["contact_area"].dims == ("ramp", "epsilon", "time")
+    assert data["status"].dims == data["time_total"].dims == ("ramp", "epsilon")
+    assert "stage" not in {*data.dims, *data.coords}
+    assert compare(data, data).agrees
+    for kind in choose(data):
+        figure(data, kind)
+    render(data, "found")
+
+
+def test_depths_of_found_contact_share_one_mesh_among_all_speeds():
+    plan = make_plan(study(probe=SPHERE | {"history": {"ramp": ["1 s", "3 s"]}}, mesh={"epsilon": "8 mm"}))
+    assert len(plan.solves) == 5
+    assert len(plan.meshes) == 1
+    assert [case.probe.depth for _, case in plan.study.whole_cases()] == [0.4e-3, 0.4e-3]
+
+
+def test_a_failed_stage_fails_the_history():
+    data = dataset(failed=1, material=RELAXING, probe=SPHERE | {"history": {"ramp": "1 s"}}, mesh={"epsilon": "8 mm"})
+    assert data["status"] == "failed"
+    assert data["message"] == "it went wrong"
+    assert np.isnan(data["force"]).all()
+
+
+def test_elastic_contact_over_time_is_that_of_the_depths_on_the_way():
+    """Of depths that no stage has; area and radius stay while the tool does."""
+    scene = {"body": {"shape": "cylinder", "radius": "20 mm", "height": "8 mm"}, "mesh": {"accuracy": "1 %"}}
+    scene["mesh"] |= dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
+    scene["body"] |= {"size": None}
+    sphere = {key: value for key, value in SPHERE.items() if key != "depth"}
+    table = {"table": [["0 s", "0 mm"], ["4 s", "0.4 mm"], ["6 s", "0.4 mm"]], "steps": 60}
+    plan = make_plan(study(**scene, probe=sphere | {"depth": None, "history": table}))
+    data = build(plan, compute(plan, MPI.COMM_SELF))
+    static = make_plan(study(**scene, probe=sphere | {"depth": ["0.02 mm", "0.1 mm", "0.3 mm"]}))
+    known = build(static, compute(static, MPI.COMM_SELF))
+    at = data.sel(time=[0.2, 1.0, 3.0], method="nearest")
+    assert data["status"] == "ok"
+    assert (abs(at["force"].values - known["force"].values) <= at["force_error"].values).all()
+    assert at["force"].values == pytest.approx(known["force"].values, rel=3e-3)
+    assert at["contact_radius"].values == pytest.approx(known["contact_radius"].values, rel=0.03)
+    for name in ("force", "contact_area", "contact_radius"):
+        assert float(data[name].sel(time=slice(4, 6)).std()) == pytest.approx(0, abs=1e-12)

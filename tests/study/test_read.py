@@ -101,6 +101,35 @@ MISTAKES = {
         {"probe": {"depth": None, "history": {"ramp": "1 s", "table": [["0 s", "0 mm"], ["2 s", "1 mm"]]}}},
         ["probe.history", "table excludes ramp"],
     ),
+    "a sine of unilateral contact": (
+        {
+            "probe": {
+                "contact": "unilateral",
+                "history": {"sine": {"amplitude": "0.01 mm", "frequency": "1 Hz", "periods": 2}},
+            }
+        },
+        ["probe.history.sine", "grows again after it has shrunk", "frictionless"],
+    ),
+    "unilateral contact that grows twice": (
+        {
+            "probe": {
+                "contact": "unilateral",
+                "depth": None,
+                "history": {"table": [["0 s", "0 mm"], ["1 s", "0.1 mm"], ["2 s", "0.05 mm"], ["3 s", "0.1 mm"]]},
+            }
+        },
+        ["probe.history.table", "the depth may rise to its largest value once"],
+    ),
+    "a tool with unilateral contact that pulls": (
+        {
+            "probe": {
+                "contact": "unilateral",
+                "depth": None,
+                "history": {"table": [["0 s", "0 mm"], ["1 s", "0.1 mm"], ["2 s", "-0.05 mm"]]},
+            }
+        },
+        ["probe.history.table", "does not pull"],
+    ),
     "a history of large displacements": (
         {"material": {"law": "neo-hookean"}, "probe": {"history": {"ramp": "1 s"}}},
         ["probe.history", "F is not proportional to the depth"],

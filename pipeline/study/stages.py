@@ -1,0 +1,72 @@
+"""Stages of a history: depths at which found contact is solved, since its force is not proportional to the depth."""
+
+from itertools import pairwise
+from math import cos, pi, sqrt
+from typing import Any, cast
+
+from pipeline.shapes.indenter import Indenter
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.section import Section, in_mm
+from pipeline.study.problems import Problems
+from pipeline.study.schema import Mesh
+from pipeline.study.sweep import Axis
+from pipeline.units import canonical
+
+# Depths of the elastic curve, as shares of the largest: F is a power of the depth times a smooth function of its root,
+# which five Chebyshev points give to some 1e-4. Below the smallest share, F is below 4 % of the largest force.
+_COUNT, _LEAST = 5, 0.1
+_FROM = sqrt(_LEAST)
+SHARES = tuple(
+    canonical((_FROM + (1 - _FROM) * (1 - cos(pi * number / (_COUNT - 1))) / 2) ** 2) for number in range(_COUNT)
+)
+
+
+def with_stages(
+    sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
+) -> tuple[dict[str, tuple[Section, ...]], tuple[Axis, ...]]:
+    """Return sections and axes in which each probe has its stages, if contact is found in a history."""
+    probes = cast("tuple[Probe, ...]", sections["probe"])
+    if not any(probe.history and probe.is_unilateral for probe in probes):
+        return sections, axes
+    meshes = cast("tuple[Mesh, ...]", sections["mesh"])
+    is_shared = all(mesh.accuracy is None for mesh in meshes)
+    staged = tuple(_at(probe, share, is_shared=is_shared) for probe in probes for share in SHARES)
+    return sections | {"probe": staged}, (*axes, Axis("probe", "stage", SHARES, "1", is_stage=True))
+
+
+def _at(probe: Probe, share: float, *, is_shared: bool) -> Probe:
+    """Return the probe at a share of its depth; one whose force is proportional to the depth is not changed."""
+    if not (probe.history and probe.is_unilateral):
+        return probe
+    changes: dict[str, Any] = {"depth": canonical(share * probe.depth)}
+    if is_shared and isinstance(probe, Indenter):
+        least, largest = probe.depth_range or (probe.depth, probe.depth)
+        changes["depth_range"] = (min(canonical(_LEAST * probe.depth), least), max(probe.depth, largest))
+    return probe.model_copy(update=changes)
+
+
+def check_history(probe: Probe, problems: Problems) -> None:
+    """Report a history in which found contact grows again after it has shrunk, and one that pulls."""
+    if probe.history is None or not probe.is_unilateral:
+        return
+    motion = probe.history.motion(probe.depth)
+    if motion.amplitude:
+        problems.error(
+            "probe.history.sine",
+            None,
+            "unilateral contact grows again after it has shrunk, which is not computed: use ramp and hold, a table "
+            'that rises once, or contact = "frictionless"',
+        )
+        return
+    if min(motion.values) < 0:
+        problems.error(
+            "probe.history.table", in_mm(min(motion.values)), "a tool with unilateral contact does not pull: >= 0 mm"
+        )
+    steps = [after - before for before, after in pairwise(motion.values) if after != before]
+    if any(before < 0 < after for before, after in pairwise(steps)):
+        problems.error(
+            "probe.history.table",
+            None,
+            "unilateral contact grows again after it has shrunk, which is not computed: the depth may rise to its "
+            "largest value once, then fall",
+        )
