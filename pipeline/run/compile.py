@@ -81,7 +81,8 @@ def _compile(forms: _Forms) -> None:
     if forms == _REGULAR:
         compile_regular()
         return
-    laws = ("linear",) if element in ("displacement", "mixed") else element.split("+")
+    laws = ("linear",) if element in ("displacement", "mixed") else element.removesuffix("-mixed").split("+")
+    element = "mixed" if element.endswith("mixed") else "displacement"
     compile_forms(degree, element, laws, straight=degree == 1, of_regions=of_regions)
     compile_cell_values(degree, straight=degree == 1)
     if forms.of_slit:

@@ -21,6 +21,7 @@ from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.solve.compiled import cellwise_space, form, quadrature_degree, scalar_space, vector_space
 from pipeline.solve.laws import LAWS
+from pipeline.solve.laws.law import Pressure
 from pipeline.solve.physics import COEFFICIENTS, MaterialLaw, of_regions, strain
 
 
@@ -158,23 +159,27 @@ class MixedForms:
 class HyperelasticForms:
     """Derivatives of the energy, with coefficients and displacement u shared with the ``elastic`` forms.
 
-    ``laws`` are the names of the laws by region, or a single one. ``direction`` is the function w of ``product``.
+    ``laws`` are the names of the laws by region, or a single one. ``pressure`` of mixed elements is p, and the coefficient 1/λ₁ (see :mod:`pipeline.solve.elements.mixed`). Forms are
+    by field, u or (u, p); ``directions`` are the functions of ``products``.
     """
 
-    def __init__(self, space: Any, elastic: ElasticForms, laws: Sequence[str]):
-        self._space, self._cells = space, elastic.cells_of(laws)
+    def __init__(self, space: Any, elastic: ElasticForms, laws: Sequence[str], pressure: Pressure | None = None):
+        self._space, self._cells, self._pressure = space, elastic.cells_of(laws), pressure
         self._displacement, self._coefficients = elastic.displacement, elastic.coefficients_of(laws)
-        self.direction = fem.Function(space)
+        self._fields = (elastic.displacement, *(pressure or ())[:1])
+        self.directions = tuple(fem.Function(field.function_space) for field in self._fields)
 
     @property
     def _energy(self) -> Any:
         gradient = ufl.Identity(3) + ufl.grad(self._displacement)
         measures = measures_of(self._space, self._cells, more=_MORE)
-        return sum(LAWS[law].density(gradient, self._coefficients) * each for law, each in measures.items())
+        return sum(
+            LAWS[law].energy(gradient, self._coefficients, self._pressure) * each for law, each in measures.items()
+        )
 
-    @property
-    def _residual(self) -> Any:
-        return ufl.derivative(self._energy, self._displacement, ufl.TestFunction(self._space))
+    @cached_property
+    def _derivatives(self) -> list[Any]:
+        return [ufl.derivative(self._energy, field, ufl.TestFunction(field.function_space)) for field in self._fields]
 
     @cached_property
     def energy(self) -> Any:
@@ -182,20 +187,34 @@ class HyperelasticForms:
         return form(self._energy)
 
     @cached_property
-    def residual(self) -> Any:
-        """Nodal forces, the first derivative of the energy."""
-        return form(self._residual)
+    def residuals(self) -> tuple[Any, ...]:
+        """First derivatives of the energy: nodal forces, and the residual of the pressure."""
+        return tuple(map(form, self._derivatives))
 
     @cached_property
-    def tangent(self) -> Any:
-        """Tangent K, the derivative of the nodal forces."""
-        trial = ufl.TrialFunction(self._space)
-        return form(ufl.derivative(self._residual, self._displacement, trial))
+    def tangents(self) -> tuple[Any, ...]:
+        """Second derivatives of the energy: K, and in mixed elements the coupling B and the block of the pressures."""
+        forces, *others = self._derivatives
+        pairs = [(forces, 0), *((other, column) for other in others for column in range(2))]
+        return tuple(form(self._derivative(of, column, ufl.TrialFunction)) for of, column in pairs)
 
     @cached_property
-    def product(self) -> Any:
-        """Product K w."""
-        return form(ufl.derivative(self._residual, self._displacement, self.direction))
+    def products(self) -> tuple[Any, ...]:
+        """Products of the tangent with the ``directions``."""
+        columns = range(len(self._fields))
+        return tuple(
+            form(sum(self._derivative(of, column, lambda _, at=column: self.directions[at]) for column in columns))
+            for of in self._derivatives
+        )
+
+    def set_directions(self) -> None:
+        """Copy the fields to the ``directions``."""
+        for direction, field in zip(self.directions, self._fields, strict=True):
+            direction.x.array[:] = field.x.array
+
+    def _derivative(self, of: Any, column: int, direction: Any) -> Any:
+        field = self._fields[column]
+        return ufl.derivative(of, field, direction(field.function_space))
 
 
 def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:
@@ -268,16 +287,17 @@ def compile_forms(
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
     for level in range(1, degree + 2):
         space = vector_space(mesh, level)
-        elastic = ElasticForms(space, regions)
+        elastic, mixed = ElasticForms(space, regions), None
         _ = elastic.stiffness, elastic.action
         if element == "mixed" and level > 1:  # the search for contact begins at the lowest degree
             mixed = MixedForms(elastic.displacement, scalar_space(mesh, level - 1))
             _ = mixed.mass, mixed.coupling, mixed.dilation, mixed.pull
         if set(laws) != {"linear"} and level >= degree:
-            large = HyperelasticForms(space, elastic, laws)
-            _ = large.residual, large.product
+            pressure = (mixed.pressure, elastic.by_region((1.0,))) if mixed is not None else None
+            large = HyperelasticForms(space, elastic, laws, pressure)
+            _ = large.residuals, large.products
             if level == degree:
-                _ = large.energy, large.tangent
+                _ = large.energy, large.tangents
 
 
 def one_cell(*, straight: bool) -> MeshArrays:

@@ -22,14 +22,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.compiled import assemble, global_sum, vector
-from pipeline.solve.elements.base import Column, HierarchicalEstimate, Products, Solver
-from pipeline.solve.elements.displacement import DisplacementElements
-from pipeline.solve.forms import HyperelasticForms
-from pipeline.solve.hierarchical_estimate import energy_decrements
-from pipeline.solve.linear_solver import LinearSolver
+from pipeline.solve.compiled import assemble, global_sum
+from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate, Products, Solver
 from pipeline.solve.movement import Motion, Movement
-from pipeline.solve.newton import HyperelasticBody, LargeError, tangent_product
+from pipeline.solve.newton import HyperelasticBody, LargeError
 from pipeline.solve.physics import MaterialLaw
 
 # Fewest load steps, and the smallest step as a share of the depth.
@@ -47,13 +43,13 @@ _WORK, _ROUNDING = 3e-4, 1e-13
 class LoadPath:
     """A load path: how far a ``motion`` of the probe has proceeded in a body of a ``law``.
 
-    ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part. ``displacement`` (owned dofs)
-    is that of the last step. The first step of the next depth is at most as long as the last one, ``step`` (m).
+    ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part. ``state`` is that of the last
+    step: displacement, and in mixed elements pressure (owned dofs). The first step of the next depth is at most as long as the last one, ``step`` (m).
     """
 
     law: MaterialLaw
     motion: Motion
-    displacement: FloatArray
+    state: FloatArray
     path: list[tuple[float, float, float]] = field(default_factory=lambda: [(0.0, 0.0, 0.0)])
     step: float = inf
 
@@ -68,25 +64,22 @@ class LoadPath:
 
 
 class LoadSteps(Solver):
-    """A solver of displacement elements for a law of large displacements and one motion.
+    """A solver for a law of large displacements and one motion.
 
     ``stored`` is the energy (J) of the modelled part at the end. What is made is freed with the stack.
     """
 
-    def __init__(self, elements: DisplacementElements, load_path: LoadPath, stack: ExitStack, *, direct: bool):
+    def __init__(self, elements: Elements, load_path: LoadPath, stack: ExitStack, *, direct: bool):
         """Set up for the law and motion of a load path, ``load_path``; collective.
 
         Raises:
             SolveError: if the preconditioner cannot be set up.
         """
         super().__init__(elements, load_path.law, is_exact=True)
-        self._elements, self._load_path, self._law = elements, load_path, load_path.law
-        law = load_path.law
+        self._load_path, self._law = load_path, load_path.law
         self._space = elements.displacements
-        self._levels = elements.levels(law, stack, direct=direct)
-        solver = stack.enter_context(LinearSolver(self._levels, direct=direct))
-        self._forms = HyperelasticForms(self._space.space, self._space.forms, law.names)
-        self._body = HyperelasticBody(self._space, self._forms, solver)
+        self._linear = elements.linearised(self._law, stack, direct=direct)
+        self._body = HyperelasticBody(elements, self._law, self._linear.preconditioner)
         stack.callback(self._body.close)
 
     def lift(self, columns: Sequence[Column]) -> None:
@@ -101,12 +94,10 @@ class LoadSteps(Solver):
             LargeError: if Newton's method does not converge, or the solution fails a check.
         """
         (column,), before = columns, self._body.iterations
-        self._space.forms.set_law(self._law)
-        owned = self._space.owned
-        with vector(self._space.space) as displacement:
-            path = self._press(displacement, column)
-            column.unknown[0].array[:] = displacement.array / column.amount - column.prescribed[:owned]
-            column.unknown[0].array[self._space.prescribed_owned] = 0.0
+        self.elements.set_law(self._law)
+        with self._body.state() as state:
+            path = self._press(state, column)
+            self.elements.put(column, self._body.split(state.array, column.unknown), column.amount)
         check_path(path, _ROUNDING * max(self._law.lame_mu) * self._volume())
         self.stored = float(path[-1, 2])
         return self._body.iterations - before
@@ -118,10 +109,12 @@ class LoadSteps(Solver):
     def products(self, columns: Sequence[Column]) -> Products:
         """Return residual and work of the solution as secants, per unit of the motion."""
         (column,), space = columns, self._space
-        with vector(space.space) as displacement, vector(space.space) as forces:
-            self._at(column, displacement)
-            self._body.forces(displacement, forces)
-            residual, moved = forces.array / column.amount, displacement.array / column.amount
+        with self._body.state() as state, self._body.state() as forces:
+            self._at(column, state)
+            self._body.forces(state, forces)
+            residual, moved = (
+                self._body.split(part.array / column.amount, column.unknown)[0] for part in (forces, state)
+            )
         held = space.prescribed_owned
         work = global_sum(space.comm, np.array([residual[held] @ column.prescribed[held]]))
         return Products(space, [moved], [residual], work[None], work)
@@ -134,45 +127,52 @@ class LoadSteps(Solver):
         Raises:
             LargeError: if the elements of one degree more fail.
         """
-        (column,), space = columns, self._space
-        displacement, rate, unit = (stack.enter_context(vector(space.space)) for _ in range(3))
-        self._at(column, displacement)
-        unit.array[:] = column.prescribed[: space.owned]
-        self._body.move(displacement, unit, rate)
-        elements, solver = self._elements.finer(self._law, self._levels, stack)
-        finer = elements.displacements
-        forms = HyperelasticForms(finer.space, finer.forms, self._law.names)
-        finer.forms.set_law(self._law)
-        residuals = [stack.enter_context(vector(finer.space)) for _ in range(2)]
-        with vector(finer.space) as there:
-            space.set_displacement(rate)
-            finer.forms.displacement.interpolate(space.forms.displacement)
-            there.array[:] = finer.forms.displacement.x.array[: finer.owned]
-            space.set_displacement(displacement)
-            finer.forms.displacement.interpolate(space.forms.displacement)
-            assemble(forms.residual, residuals[0])
-            tangent_product(forms, there, residuals[1])
-        for residual in residuals:
-            residual.scale(-1.0)
-            residual.array[finer.prescribed_owned] = 0.0
-        if not all(np.isfinite(residual.norm()) for residual in residuals):
+        (column,) = columns
+        state, rate, unit = (stack.enter_context(self._body.state()) for _ in range(3))
+        self._at(column, state)
+        self._put_unit(column, unit)
+        self._body.move(state, unit, rate)
+        finer = self._linear.finer()
+        forms = finer.large_forms(self._law)
+        finer.set_law(self._law)
+        residuals = [stack.enter_context(finer.fields()) for _ in range(2)]
+        self._body.show(rate)
+        finer.interpolate(self.elements)
+        forms.set_directions()
+        self._body.show(state)
+        finer.interpolate(self.elements)
+        for of_forms, residual in zip((forms.residuals, forms.products), residuals, strict=True):
+            for each, part in zip(of_forms, residual, strict=True):
+                assemble(each, part)
+            finer.weigh(residual)
+            for part in residual:
+                part.scale(-1.0)
+            residual[0].array[finer.displacements.prescribed_owned] = 0.0
+        if not all(np.isfinite(part.norm()) for residual in residuals for part in residual):
             raise LargeError("no error bar: elements of one degree more turn tissue inside out")
-        found, _, iterations = energy_decrements(solver, residuals)
-        taken = float(np.sqrt(found[0, 0] * found[1, 1])) / column.amount
-        if not taken < self.products(columns).stationary[0, 0]:
+        found, unseen, iterations = self._linear.decrements(residuals)
+        taken = found / column.amount
+        if not abs(taken) < self.products(columns).stationary[0, 0]:
             raise LargeError(
                 f"no error bar: it needs elements of degree {finer.degree}, which fail at the probe's edge; "
                 "use a smaller depth, a larger rim, or degree 2"
             )
-        return HierarchicalEstimate(elements, [], iterations, decrements=np.array([[taken]]))
+        rest = None if unseen is None else np.array([unseen / column.amount])
+        return HierarchicalEstimate(finer, [], iterations, decrements=np.array([[taken]]), unseen=rest)
 
-    def _at(self, column: Column, displacement: PETSc.Vec) -> None:
-        """Write the solution at the depth of a column into ``displacement``."""
-        self._elements.total(column, (displacement,))
-        displacement.scale(column.amount)
+    def _at(self, column: Column, state: PETSc.Vec) -> None:
+        """Write the solution at the depth of a column into ``state``."""
+        with self.elements.fields() as parts:
+            self.elements.total(column, parts)
+            state.array[:] = np.concatenate([part.array for part in parts])
+        state.scale(column.amount)
 
-    def _press(self, displacement: PETSc.Vec, column: Column) -> FloatArray:
-        """Continue ``displacement`` along the load path to the depth of a column.
+    def _put_unit(self, column: Column, state: PETSc.Vec) -> None:
+        """Write the prescribed displacement per unit of the motion into ``state``."""
+        state.array[: self._space.owned] = column.prescribed[: self._space.owned]
+
+    def _press(self, state: PETSc.Vec, column: Column) -> FloatArray:
+        """Continue ``state`` along the load path to the depth of a column.
 
         Return the path: depth, force and energy of each step. The tangent gives the initial guess of each step. A step
         is halved where Newton's method does not converge.
@@ -180,43 +180,43 @@ class LoadSteps(Solver):
         Raises:
             LargeError: if a step becomes too small; the path keeps the steps that converged.
         """
-        load_path, depth, space = self._load_path, column.amount, self._space.space
-        displacement.array[:] = load_path.displacement
+        load_path, depth = self._load_path, column.amount
+        state.array[:] = load_path.state
         longest = depth / _FEWEST
         step = min(load_path.step, longest)
         with ExitStack() as stack:
-            unit, rate, trial, forces = (stack.enter_context(vector(space)) for _ in range(4))
-            unit.array[:] = column.prescribed[: self._space.owned]
+            unit, rate, trial, forces = (stack.enter_context(self._body.state()) for _ in range(4))
+            self._put_unit(column, unit)
             while (reached := load_path.reached) < depth:
-                self._body.move(displacement, unit, rate)
-                step, steps = self._step(displacement, rate, trial, load_path, step, depth)
-                displacement.array[:] = trial.array
-                energy = self._body.energy(displacement)
-                self._body.forces(displacement, forces)
+                self._body.move(state, unit, rate)
+                step, steps = self._step(state, rate, trial, load_path, step, depth)
+                state.array[:] = trial.array
+                energy = self._body.energy(state)
+                self._body.forces(state, forces)
                 there = depth if step >= depth - reached else reached + step
                 load_path.path.append((there, forces.dot(unit), energy))
-                load_path.displacement[:] = displacement.array
+                load_path.state[:] = state.array
                 load_path.step = step = min(step * (2 if steps <= _EASY else 1), longest)
         return np.array(load_path.path)
 
     def _step(
-        self, displacement: PETSc.Vec, rate: PETSc.Vec, trial: PETSc.Vec, load_path: LoadPath, step: float, depth: float
+        self, state: PETSc.Vec, rate: PETSc.Vec, trial: PETSc.Vec, load_path: LoadPath, step: float, depth: float
     ) -> tuple[float, int]:
         """Write the equilibrium a ``step`` (m) farther into ``trial``; return the step and its Newton iterations.
 
-        ``rate`` is the tangent at ``displacement``, per metre; the path ends at ``depth`` (m).
+        ``rate`` is the tangent at ``state``, per metre; the path ends at ``depth`` (m).
         """
         reached = load_path.reached
         if step > (1 - _SLIVER) * (depth - reached):
             step = depth - reached  # no further step for a rounding error
-        with vector(self._space.space) as forces:
+        with self._body.state() as forces:
             while True:
-                trial.array[:] = displacement.array + step * rate.array
+                trial.array[:] = state.array + step * rate.array
                 try:
                     if not np.isfinite(self._body.energy(trial)):
                         raise LargeError("tissue is turned inside out")
                     self._body.forces(trial, forces)
-                    return step, self._body.settle(trial, self._norm_on_held(forces))
+                    return step, self._body.settle(trial, self._body.norm_on_held(forces))
                 except LargeError as error:
                     step /= 2
                     if step < _SMALLEST * depth:
@@ -225,7 +225,7 @@ class LoadSteps(Solver):
     def _stopped(self, load_path: LoadPath, depth: float, why: LargeError) -> LargeError:
         """Return the error of a path that ends before ``depth`` (m)."""
         reached, force, _ = load_path.path[-1]
-        whole = 2.0 ** len(self._elements.body.mirrored) * force
+        whole = 2.0 ** len(self.elements.body.mirrored) * force
         message = (
             f"load steps reached {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {whole:.4g} N "
             f"(Newton's method: {why}); the tissue becomes unstable, or elements at the probe's edge are flattened; "
@@ -233,12 +233,8 @@ class LoadSteps(Solver):
         )
         return LargeError(message, (reached, whole) if reached else None)
 
-    def _norm_on_held(self, forces: PETSc.Vec) -> float:
-        on_held = forces.array[self._space.prescribed_owned]
-        return float(np.sqrt(self._space.comm.allreduce(float(on_held @ on_held))))
-
     def _volume(self) -> float:
-        body = self._elements.body
+        body = self.elements.body
         return float(body.comm.allreduce(float(np.ptp(np.asarray(body.mesh.geometry.x), axis=0).prod())))
 
 

@@ -1,12 +1,13 @@
 """Newton's method for the equilibrium of a hyperelastic body with prescribed displacements.
 
-PETSc's SNES with a line search. The linear systems are solved by conjugate gradients, preconditioned by the multigrid
-of linear elasticity, which is set up once: at moderate strain the tangent is close to linear elasticity.
+PETSc's SNES with a line search. The linear systems are solved by conjugate gradients, in mixed elements by generalised
+conjugate residuals. The preconditioner is that of linear elasticity, which is set up once: at moderate strain the
+tangent is close to linear elasticity.
 """
 
-from collections.abc import Callable
-from contextlib import ExitStack
-from typing import Any
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any, Protocol
 
 import numpy as np
 from dolfinx import fem
@@ -15,12 +16,13 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
+from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
-from pipeline.solve.compiled import assemble, fill, vector
-from pipeline.solve.forms import HyperelasticForms
+from pipeline.solve.compiled import assemble
+from pipeline.solve.elements.base import Elements, Fields
+from pipeline.solve.elements.pressures import without_columns
 from pipeline.solve.krylov import INDEFINITE, SOLVERS, configure, explain, keep, solver_of
-from pipeline.solve.linear_solver import LinearSolver
-from pipeline.solve.spaces import ElasticSpace
+from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
 # Tolerance on the residual, relative to the forces at prescribed dofs, and most Newton iterations.
@@ -29,6 +31,16 @@ _LEFT = 1e-9
 _HALVINGS = 12
 # Sufficient decrease: least gain of energy, as a share of that predicted by the slope.
 _GAIN = 1e-4
+
+
+class Preconditioner(Protocol):
+    """A preconditioner of the tangent: linear elasticity."""
+
+    def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Apply it; PETSc calls this."""
+
+    def refine_eigenvalues(self) -> bool:
+        """Repair it if it is indefinite; return whether it was repaired."""
 
 
 class LargeError(SolveError):
@@ -43,100 +55,165 @@ class LargeError(SolveError):
 
 
 class HyperelasticBody:
-    """A hyperelastic body in the spaces of linear elasticity, and Newton's method for it; ``close`` frees it."""
+    """A hyperelastic body on the elements of linear elasticity, and Newton's method for it; ``close`` frees it.
 
-    def __init__(self, space: ElasticSpace, forms: HyperelasticForms, solver: LinearSolver):
-        """Set up; collective. ``solver`` is that of linear elasticity."""
-        self._space, self._forms, self._solver = space, forms, solver
-        self._held = space.prescribed_owned
-        self.tangent = fem_petsc.create_matrix(forms.tangent)
-        self.tangent.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self.tangent.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
-        start = 3 * space.space.dofmap.index_map.local_range[0]
+    Its state is one vector of owned dofs: displacement, and in mixed elements pressure.
+    """
+
+    def __init__(self, elements: Elements, law: MaterialLaw, solver: Preconditioner):
+        """Set up; collective. ``solver`` is a preconditioner of linear elasticity."""
+        self._elements, self._solver = elements, solver
+        self._space, self._unit = elements.displacements, elements.unit(law)
+        self._held = self._space.prescribed_owned
+        self._forms = forms = elements.large_forms(law)
+        self._stack = ExitStack()
+        self._blocks = [keep(self._stack, fem_petsc.create_matrix(tangent)) for tangent in forms.tangents]
+        stiffness, *others = self._blocks
+        stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        stiffness.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        self.tangent = stiffness
+        if others:
+            coupling, of_pressures = others
+            transpose = keep(self._stack, PETSc.Mat().createTranspose(coupling))
+            nest = PETSc.Mat().createNest([[stiffness, transpose], [coupling, of_pressures]], comm=self._space.comm)
+            self.tangent = keep(self._stack, nest)
+        start = 3 * self._space.space.dofmap.index_map.local_range[0]
         self._rows = (self._held + start).astype(PETSc.IntType)
         self.iterations = 0
 
     def close(self) -> None:
         """Free the tangent."""
-        self.tangent.destroy()
+        self._stack.close()
 
-    def energy(self, displacement: PETSc.Vec) -> float:
+    @contextmanager
+    def state(self) -> Iterator[PETSc.Vec]:
+        """Lend a zero state."""
+        with self._elements.fields() as parts:
+            size = sum(part.getLocalSize() for part in parts)
+        found = PETSc.Vec().createMPI((size, None), comm=self._space.comm)
+        try:
+            yield found
+        finally:
+            found.destroy()
+
+    def show(self, state: PETSc.Vec) -> None:
+        """Set the fields of the forms."""
+        with self._elements.fields() as parts:
+            for part, values in zip(parts, self.split(state.getArray(readonly=True), parts), strict=True):
+                part.array[:] = values
+            self._elements.set_fields(parts)
+
+    def split(self, values: FloatArray, parts: Fields) -> list[FloatArray]:
+        """Return the values of a state by field."""
+        return np.split(values, np.cumsum([part.getLocalSize() for part in parts])[:-1])
+
+    def energy(self, state: PETSc.Vec) -> float:
         """Return the stored energy (J) of the modelled part, NaN if tissue is inside out; collective."""
-        self._space.set_displacement(displacement)
-        return float(self._space.comm.allreduce(fem.assemble_scalar(self._forms.energy), op=MPI.SUM))
+        self.show(state)
+        return self._unit * float(self._space.comm.allreduce(fem.assemble_scalar(self._forms.energy), op=MPI.SUM))
 
-    def forces(self, displacement: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Write the nodal forces (N), prescribed dofs included, into ``result``; collective."""
-        self._space.set_displacement(displacement)
-        assemble(self._forms.residual, result)
+    def forces(self, state: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Write the residual (N), nodal forces at prescribed dofs included, into ``result``; collective."""
+        self._residual(state, result)
+        result.scale(self._unit)
+
+    def norm_on_held(self, forces: PETSc.Vec) -> float:
+        """Return the norm of ``forces`` (N) at prescribed dofs; collective."""
+        on_held = forces.array[self._held]
+        return float(np.sqrt(self._space.comm.allreduce(float(on_held @ on_held))))
 
     @stage("tangent solves")
-    def move(self, displacement: PETSc.Vec, prescribed: PETSc.Vec, result: PETSc.Vec) -> None:
+    def move(self, state: PETSc.Vec, prescribed: PETSc.Vec, result: PETSc.Vec) -> None:
         """Write the linearised response to a small change of the ``prescribed`` dofs into ``result``; collective.
 
         Raises:
             LargeError: if the tangent is not positive definite: the tissue is unstable.
         """
-        with ExitStack() as stack, vector(self._space.space) as load:
-            self._assemble(displacement)
+        with ExitStack() as stack, self.state() as load:
+            self._assemble(state)
             self.tangent.mult(prescribed, load)
             load.scale(-1.0)
             load.array[self._held] = prescribed.array[self._held]
-            self.tangent.zeroRowsColumns(self._rows, 1.0)
+            self._hold()
             # Prescribed values are in the initial guess: the preconditioner may ignore these dofs.
             result.set(0.0)
             result.array[self._held] = prescribed.array[self._held]
-            ksp = solver_of("tangent", self.tangent, stack, self._solver)
+            ksp = solver_of(self._kind("tangent"), self.tangent, stack, self._solver)
             self._run(ksp, ksp, lambda: ksp.solve(load, result))
 
     @stage("Newton's method")
-    def settle(self, displacement: PETSc.Vec, scale: float) -> int:
-        """Find the equilibrium from the initial guess ``displacement``, its prescribed dofs fixed; collective.
+    def settle(self, state: PETSc.Vec, scale: float) -> int:
+        """Find the equilibrium from the initial guess ``state``, its prescribed dofs fixed; collective.
 
         Return Newton's iterations. ``scale`` (N) is the size of the forces at prescribed dofs.
 
         Raises:
             LargeError: if Newton's method does not converge.
         """
-        with ExitStack() as stack, vector(self._space.space) as residual:
+        with ExitStack() as stack, self.state() as residual:
             snes = keep(stack, PETSc.SNES().create(self._space.comm))
-            configure(snes, SOLVERS["Newton's method"])
+            configure(snes, SOLVERS[self._kind("Newton's method")])
             snes.ksp.pc.setType("python")
             snes.ksp.pc.setPythonContext(self._solver)
             snes.setFunction(self._function, residual)
             snes.setJacobian(self._jacobian, self.tangent, self.tangent)
             snes.setLineSearchPreCheck(self._shorten)
-            snes.setTolerances(atol=_LEFT * scale)
-            self._run(snes, snes.ksp, lambda: snes.solve(None, displacement))
+            snes.setTolerances(atol=_LEFT * scale / self._unit)
+            self._run(snes, snes.ksp, lambda: snes.solve(None, state))
             return int(snes.getIterationNumber())
 
-    def _function(self, _: PETSc.SNES | None, displacement: PETSc.Vec, result: PETSc.Vec) -> None:
-        self._space.set_displacement(displacement)
-        assemble(self._forms.residual, result)
+    @property
+    def _is_mixed(self) -> bool:
+        return len(self._blocks) > 1
+
+    def _kind(self, solver: str) -> str:
+        return f"{solver}, mixed" if self._is_mixed else solver
+
+    def _residual(self, state: PETSc.Vec, result: PETSc.Vec) -> None:
+        self.show(state)
+        with self._elements.fields() as parts:
+            for residual, part in zip(self._forms.residuals, parts, strict=True):
+                assemble(residual, part)
+            self._elements.weigh(parts)
+            result.array[:] = np.concatenate([part.array for part in parts])
+
+    def _function(self, _: PETSc.SNES | None, state: PETSc.Vec, result: PETSc.Vec) -> None:
+        self._residual(state, result)
         result.array[self._held] = 0.0
 
-    def _jacobian(self, _: PETSc.SNES, displacement: PETSc.Vec, tangent: PETSc.Mat, __: PETSc.Mat) -> None:
-        self._assemble(displacement)
-        tangent.zeroRowsColumns(self._rows, 1.0)
+    def _jacobian(self, _: PETSc.SNES, state: PETSc.Vec, tangent: PETSc.Mat, __: PETSc.Mat) -> None:
+        self._assemble(state)
+        self._hold()
 
-    def _assemble(self, displacement: PETSc.Vec) -> None:
-        self._space.set_displacement(displacement)
-        compat.assemble_matrix(self._forms.tangent, [], 1.0, self.tangent)
+    def _assemble(self, state: PETSc.Vec) -> None:
+        self.show(state)
+        for tangent, block in zip(self._forms.tangents, self._blocks, strict=True):
+            compat.assemble_matrix(tangent, [], 1.0, block)
+        self._elements.weigh_blocks(self._blocks[1:])
+        self.tangent.assemble()
+
+    def _hold(self) -> None:
+        """Eliminate prescribed dofs."""
+        stiffness, *others = self._blocks
+        stiffness.zeroRowsColumns(self._rows, 1.0)
+        for coupling in others[:1]:
+            without_columns(coupling, self._held)
 
     def _shorten(self, here: PETSc.Vec, step: PETSc.Vec) -> bool:
         """Halve a ``step`` (which is subtracted) until no tissue is inside out after it, and less energy is stored.
 
-        Where rounding hides the decrease of the energy, the residual must fall.
+        Where rounding hides the decrease of the energy, and in mixed elements, whose energy is stationary and no
+        minimum, the residual must fall.
         """
-        with vector(self._space.space) as there, vector(self._space.space) as residual:
-            stored = self.energy(here)
+        with self.state() as there, self.state() as residual:
+            stored = self.energy(here) / self._unit
             self._function(None, here, residual)
             left, slope = residual.norm(), residual.dot(step)
             for halvings in range(_HALVINGS):
                 there.array[:] = here.array - step.array
-                energy, share = self.energy(there), 0.5**halvings
+                energy, share = self.energy(there) / self._unit, 0.5**halvings
                 if np.isfinite(energy):
-                    if energy <= stored - _GAIN * share * slope:
+                    if not self._is_mixed and energy <= stored - _GAIN * share * slope:
                         return halvings > 0
                     self._function(None, there, residual)
                     if residual.norm() <= (1 - _GAIN * share) * left:
@@ -164,9 +241,3 @@ class HyperelasticBody:
     def _counted(self, solver: Any, solve: Callable[[], None]) -> None:
         solve()
         self.iterations += solver.getLinearSolveIterations() if isinstance(solver, PETSc.SNES) else solver.its
-
-
-def tangent_product(forms: HyperelasticForms, x: PETSc.Vec, result: PETSc.Vec) -> None:
-    """Write K x, on all dofs, into ``result``, with the tangent K at the forms' displacement; collective."""
-    fill(forms.direction, x)
-    assemble(forms.product, result)

@@ -1,7 +1,7 @@
 """Material of each region: its law, by name, and its parameters. The strain energies are in ``laws``."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 from types import MappingProxyType
@@ -134,16 +134,16 @@ class SplitLaw:
     def of(law: MaterialLaw) -> "SplitLaw":
         """Split a law: λ₀ = μ, or less where λ is not much larger than μ, so that λ₁ stays positive."""
         unit = max(law.lame_mu)
-        elastic, compliance = [], []
+        elastic, compliance = list[Parameters](), []
         for region in law.parameters:
             mu = region.lame_mu / unit
             rest, kept = region.lame_lambda / unit - mu, mu
             if not law.is_uniform and rest < _LEAST_REST * mu:
                 rest = _LEAST_REST * mu
                 kept = region.lame_lambda / unit - rest
-            elastic.append(kept)
+            elastic.append(replace(region, lame_lambda=kept, lame_mu=mu, given_poisson=None))
             compliance.append(0.0 if rest == inf else 1 / rest)
-        return SplitLaw(unit, MaterialLaw.of(elastic, [mu / unit for mu in law.lame_mu]), tuple(compliance))
+        return SplitLaw(unit, MaterialLaw(tuple(elastic)), tuple(compliance))
 
 
 def strain(u: Any) -> Any:

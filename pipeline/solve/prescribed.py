@@ -17,7 +17,6 @@ from pipeline.solve import SolveError
 from pipeline.solve.balance import MOST_ROUNDS, check_balance, rest, sums
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.elements.base import Column, Elements, Equilibrium, Products, Solver, close_far
-from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.load_steps import LoadPath, LoadSteps
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
@@ -38,7 +37,7 @@ class PrescribedMotion:
     def __init__(self, elements: Elements, *, reuse: bool = False):
         """With ``reuse`` the last solution is the initial guess: depths of a nonlinear law share one load path."""
         self._elements = elements
-        self._reuse = reuse and elements.element == "displacement"
+        self._reuse, self._shares_path = reuse and elements.element == "displacement", reuse
         self.corrections: dict[Motion, tuple[FloatArray, ...]] = {}
         self._law: MaterialLaw | None = None  # of the corrections
         self._load_path: LoadPath | None = None  # load path to the last depth, for a nonlinear law
@@ -114,12 +113,10 @@ class PrescribedMotion:
         """
         if law.is_linear:
             return self._elements.set_up(law, stack, direct=direct, keep=keep)
-        if not isinstance(self._elements, DisplacementElements):
-            raise SolveError("laws of large displacements need displacement elements")
         load_path = self._load_path
         if load_path is None or not load_path.can_reach(law, movement):
-            load_path = LoadPath(law, movement.motions[0], np.zeros(self._elements.displacements.owned))
-        self._load_path = load_path if self._reuse else None
+            load_path = LoadPath(law, movement.motions[0], np.zeros(self._elements.unknowns))
+        self._load_path = load_path if self._shares_path else None
         return LoadSteps(self._elements, load_path, stack, direct=direct)
 
 

@@ -102,6 +102,17 @@ class SaddleSolver:
                 self.first_energies.append(0.0 if block is None else block.first_energy)
         return iterations
 
+    def preconditioner(self, c: Weight, stack: ExitStack) -> "_BlockTriangular | _Factors":
+        """Return a preconditioner of other saddle points; the ``stack`` frees it; collective.
+
+        Raises:
+            SolveError: if the factorisation fails.
+        """
+        if not self._direct:
+            return self._preconditioner(c, stack)
+        with explained():
+            return _Factors(self._factors(self._matrix(c, stack), stack))
+
     @property
     def multigrid(self) -> LinearSolver | None:
         """The multigrid solver for K₀; None for a factorisation."""
@@ -164,10 +175,29 @@ class _BlockTriangular:
         self.energy = abs(r_u.dot(z_u)) + abs(rest.dot(z_p))
         result.array[:split], result.array[split:] = z_u.array, z_p.array
 
+    def refine_eigenvalues(self) -> bool:
+        """Return False: GCR needs no definite preconditioner."""
+        return False
+
     def close(self) -> None:
         """Free the work vectors."""
         while self._vectors:
             self._vectors.pop().destroy()
+
+
+class _Factors:
+    """The factors of a saddle point as preconditioner."""
+
+    def __init__(self, ksp: PETSc.KSP):
+        self._ksp = ksp
+
+    def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Apply the preconditioner; PETSc calls this."""
+        self._ksp.solve(residual, result)
+
+    def refine_eigenvalues(self) -> bool:
+        """Return False: factors are exact."""
+        return False
 
 
 class _EnergyTest:

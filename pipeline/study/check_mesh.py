@@ -147,8 +147,10 @@ def check_support(body: Body, mesh: Mesh, problems: Problems) -> None:
 
 def check_locking(body: Body, material: Material, mesh: Mesh, problems: Problems) -> None:
     """Check elements against Poisson's ratios of all the materials of a body."""
-    poissons = {f"{key}.poisson": tissue.poisson for key, tissue in tissues_of(body, material)}
-    if mesh.element_for(max(poissons.values())) == "mixed":
+    tissues = dict(tissues_of(body, material))
+    poissons = {f"{key}.poisson": tissue.poisson for key, tissue in tissues.items()}
+    is_large = next(iter(tissues.values())).is_large
+    if mesh.element_for(max(poissons.values()), is_large=is_large) == "mixed":
         if max(poissons.values()) <= _LEAST_MIXED:
             problems.error(
                 "mesh.element",
@@ -157,12 +159,14 @@ def check_locking(body: Body, material: Material, mesh: Mesh, problems: Problems
             )
         return
     visible, most = _LOCKING[mesh.degree]
+    of_law = " with a law of large displacements" if is_large else ""
+    allowed = min(most, mesh.MIXED_FROM) if is_large else most
     for key, poisson in poissons.items():
-        if poisson > most:
+        if poisson > allowed:
             problems.error(
                 key,
                 poisson,
-                f"displacement elements of degree {mesh.degree} lock: must be at most {most}. Mixed elements "
+                f"displacement elements of degree {mesh.degree} lock: must be at most {allowed}{of_law}. Mixed elements "
                 "allow values "
                 'up to 0.5: use degree 2 or 3, and element = "auto"',
             )

@@ -42,16 +42,16 @@ class Material(Tissue):
         Words(
             "Law of the material. linear: linear elasticity. All others are for large displacements, and agree with "
             "linear elasticity at small depths. They need a bonded tool that presses, and Poisson's ratios from 0.2 "
-            "to 0.45.",
+            "to 0.5.",
             '["linear", "neo-hookean"]',
         ),
     ] = "linear"
 
     # Keys that F is proportional to, if all of them change together.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]] = ("young",)
-    # Poisson's ratios of laws of large displacements. Below the first, F depends on the elements at the probe's edge
-    # (docs/accuracy.md). Above the second, displacement elements lock.
-    OF_LARGE: ClassVar[tuple[float, float]] = (0.2, 0.45)
+    # Least Poisson's ratio at large displacements: below, F depends on the elements at the probe's edge
+    # (docs/accuracy.md).
+    LEAST_OF_LARGE: ClassVar[float] = 0.2
 
 
 def material_of(tissue: Tissue) -> Material:
@@ -186,11 +186,12 @@ class Mesh(Section):
         """Return the radius (m) of what is kept of a body of that ``reach`` from the probe's axis; infinite if all."""
         return inf if self.keeps_all or self.epsilon >= reach else self.epsilon
 
-    def element_for(self, poisson: float) -> Literal["displacement", "mixed"]:
+    def element_for(self, poisson: float, *, is_large: bool = False) -> Literal["displacement", "mixed"]:
         """Return the element for a Poisson's ratio; of degree 1 there is no stable mixed one."""
         if self.element != "auto":
             return self.element
-        return "mixed" if self.degree > 1 and poisson >= self.MIXED_FROM else "displacement"
+        is_mixed = poisson > self.MIXED_FROM or (poisson == self.MIXED_FROM and not is_large)
+        return "mixed" if self.degree > 1 and is_mixed else "displacement"
 
 
 class Solving(Section):

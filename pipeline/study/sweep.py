@@ -235,15 +235,16 @@ class Case:
     @property
     def element(self) -> str:
         """The element that solves it: displacement or mixed."""
-        return "displacement" if self.material.is_large else self.mesh.element_for(self.poisson)
+        return self.mesh.element_for(self.poisson, is_large=self.material.is_large)
 
     @property
     def formulation(self) -> str:
-        """What is solved: the element of linear elasticity, or the names of the laws of large displacements."""
+        """What is solved: the element, at large displacements the names of the laws, and -mixed if the element is."""
         if not self.material.is_large:
             return self.element
         beyond = ["linear"] if self.is_linear_beyond else []
-        return "+".join(sorted({*(str(tissue.law) for tissue in self.tissues), *beyond}))
+        names = "+".join(sorted({*(str(tissue.law) for tissue in self.tissues), *beyond}))
+        return names + ("-mixed" if self.element == "mixed" else "")
 
     @property
     def is_followed(self) -> bool:

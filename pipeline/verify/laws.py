@@ -108,7 +108,7 @@ class Cube:
         The second result is the largest nodal force inside the cube (N), which vanishes in uniform stress.
         """
         self._deform(deformation)
-        nodal = np.array(fem.assemble_vector(self._forms.residual).array).reshape(-1, 3)
+        nodal = np.array(fem.assemble_vector(self._forms.residuals[0]).array).reshape(-1, 3)
         points = self._space.tabulate_dof_coordinates()
         inside = ((points > _ON_FACE) & (points < 1 - _ON_FACE)).all(axis=1)
         return nodal[points[:, 2] > 1 - _ON_FACE].sum(axis=0), float(np.abs(nodal[inside]).max())

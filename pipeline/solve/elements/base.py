@@ -16,6 +16,7 @@ from pipeline.solve import SolveError
 from pipeline.solve.compiled import global_sum, vector
 from pipeline.solve.conditions import Conditions, Front
 from pipeline.solve.crack import Release
+from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.krylov import is_direct
 from pipeline.solve.linear_solver import Level
 from pipeline.solve.loads import Applied
@@ -150,6 +151,26 @@ class Solver(ABC):
         """Return the hierarchical estimate: see :class:`HierarchicalEstimator`."""
 
 
+class Linearised(ABC):
+    """Linear elasticity of elements in place of the tangent at large displacements. Methods are collective.
+
+    ``preconditioner`` is that of a KSP.
+    """
+
+    preconditioner: Any
+
+    @abstractmethod
+    def finer(self) -> "Elements":
+        """Return the elements of one degree more."""
+
+    @abstractmethod
+    def decrements(self, residuals: Sequence[Fields]) -> tuple[float, float | None, int]:
+        """Return the decrement (J) from two residuals in these elements: of a solution, and of its rate.
+
+        In mixed elements it is followed by N (J), otherwise by None; the last number are the iterations.
+        """
+
+
 class Elements(ABC):
     """Elements of one degree on a mesh, with their conditions; ``close`` frees them. Methods are collective.
 
@@ -178,6 +199,11 @@ class Elements(ABC):
     def dofs(self) -> int:
         """Number of unknowns of the modelled part."""
         return self.displacements.size
+
+    @property
+    def unknowns(self) -> int:
+        """Number of dofs of this rank."""
+        return self.displacements.owned
 
     @property
     def whole_dofs(self) -> int:
@@ -220,6 +246,14 @@ class Elements(ABC):
         """Return a function that writes operator times fields into other fields; its K is ``stiffness``.
 
         With ``entries`` the other blocks are assembled, too, as for a direct solve.
+        """
+
+    @abstractmethod
+    def linearised(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> Linearised:
+        """Return linear elasticity with the moduli of a ``law`` of large displacements; the ``stack`` frees it.
+
+        Raises:
+            SolveError: if it cannot be set up.
         """
 
     def levels(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> list[Level]:
@@ -276,6 +310,20 @@ class Elements(ABC):
         forms.set_law(self.elastic(law))
         return Release(self.body, line, forms, self._pressure(law), unit=self.unit(law))
 
+    def set_law(self, law: MaterialLaw) -> None:
+        """Set the parameters of the forms."""
+        self.displacements.forms.set_law(self.elastic(law))
+
+    def large_forms(self, law: MaterialLaw) -> HyperelasticForms:
+        """Return the forms of a law of large displacements; :meth:`set_law` sets their parameters."""
+        return HyperelasticForms(self.displacements.space, self.displacements.forms, law.names, self._pressure(law))
+
+    def weigh(self, residual: Fields) -> None:
+        """Change a ``residual`` from the unit of the forms' fields to that of these elements' fields."""
+
+    def weigh_blocks(self, blocks: Sequence[PETSc.Mat]) -> None:
+        """Do the same with the ``blocks`` of the tangent besides K: the coupling, and that of pressures."""
+
     def _pressure(self, law: MaterialLaw) -> tuple[Any, Any] | None:
         """Return the pressure of the forms and its compliance, or None."""
         return None
@@ -292,10 +340,14 @@ class Elements(ABC):
         """Copy ``fields`` to the fields of the forms."""
         self.displacements.set_displacement(fields[0])
 
+    def interpolate(self, coarse: "Elements") -> None:
+        """Interpolate the forms' fields of ``coarse`` to those of these elements."""
+        self.displacements.forms.displacement.interpolate(coarse.displacements.forms.displacement)
+
     def start_from(self, coarse: "Elements", unknown: Fields, prescribed: FloatArray) -> None:
         """Interpolate fields of ``coarse`` to the forms, and to ``unknown`` after subtracting ``prescribed`` (m)."""
+        self.interpolate(coarse)
         displacement, space = self.displacements.forms.displacement, self.displacements
-        displacement.interpolate(coarse.displacements.forms.displacement)
         unknown[0].array[:] = displacement.x.array[: space.owned] - prescribed[: space.owned]
         unknown[0].array[space.prescribed_owned] = 0.0
 

@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve.compiled import vector
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements.base import Column, Elements, Fields, HierarchicalEstimate, Solver, level_of
+from pipeline.solve.elements.base import Column, Elements, Fields, HierarchicalEstimate, Linearised, Solver, level_of
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import DIRECT_LIMIT
 from pipeline.solve.linear_solver import Level, LinearSolver
@@ -80,6 +80,10 @@ class DisplacementElements(Elements):
         """Return a function that writes K u into other fields."""
         return lambda fields, result: stiffness.mult(fields[0], result[0])
 
+    def linearised(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> "LinearisedDisplacement":
+        """Return linear elasticity with the moduli of a law of large displacements."""
+        return LinearisedDisplacement(self, law, stack, direct=direct)
+
     def finer(
         self, law: MaterialLaw, levels: list[Level], stack: ExitStack, below: LinearSolver | None = None
     ) -> tuple["DisplacementElements", LinearSolver]:
@@ -146,3 +150,25 @@ class DisplacementSolver(Solver):
             values.array[:] = solution + correction
             kept.append(Column(np.zeros(len(space.forms.displacement.x.array)), None, (), fields))
         return HierarchicalEstimate(finer, kept, iterations, decrements=decrements)
+
+
+class LinearisedDisplacement(Linearised):
+    """Linear elasticity of displacement elements in place of the tangent."""
+
+    preconditioner: LinearSolver
+
+    def __init__(self, elements: DisplacementElements, law: MaterialLaw, stack: ExitStack, *, direct: bool):
+        """Set up; the ``stack`` frees it."""
+        self._elements, self._law, self._stack = elements, law, stack
+        self._levels = elements.levels(law, stack, direct=direct)
+        self.preconditioner = stack.enter_context(LinearSolver(self._levels, direct=direct))
+
+    def finer(self) -> DisplacementElements:
+        """Return the elements of one degree more."""
+        finer, self._above = self._elements.finer(self._law, self._levels, self._stack)
+        return finer
+
+    def decrements(self, residuals: Sequence[Fields]) -> tuple[float, None, int]:
+        """Return an upper bound of the decrement that cannot vanish by chance, and the iterations."""
+        found, _, iterations = energy_decrements(self._above, [residual[0] for residual in residuals])
+        return float(np.sqrt(found[0, 0] * found[1, 1])), None, iterations

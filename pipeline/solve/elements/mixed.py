@@ -21,7 +21,7 @@ from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements.base import Column, Elements, Fields, HierarchicalEstimate, Solver
+from pipeline.solve.elements.base import Column, Elements, Fields, HierarchicalEstimate, Linearised, Solver
 from pipeline.solve.elements.pressures import Pressures
 from pipeline.solve.krylov import keep
 from pipeline.solve.linear_solver import Level
@@ -64,6 +64,11 @@ class MixedElements(Elements):
         return super().dofs + self.pressures.dofs
 
     @property
+    def unknowns(self) -> int:
+        """Number of dofs of this rank."""
+        return super().unknowns + self.pressures.owned
+
+    @property
     def whole_dofs(self) -> int:
         """Number of unknowns of the whole body."""
         return super().whole_dofs + self.pressures.whole_dofs
@@ -98,11 +103,16 @@ class MixedElements(Elements):
         super().set_fields(fields)
         self.pressures.set(fields[1])
 
+    def interpolate(self, coarse: Elements) -> None:
+        """Interpolate the forms' fields of ``coarse``; displacement elements have no pressure."""
+        super().interpolate(coarse)
+        if isinstance(coarse, MixedElements):
+            self.pressures.forms.pressure.interpolate(coarse.pressures.forms.pressure)
+
     def start_from(self, coarse: Elements, unknown: Fields, prescribed: FloatArray) -> None:
         """Interpolate the initial guess from ``coarse``; displacement elements give no pressure."""
         super().start_from(coarse, unknown, prescribed)
         if isinstance(coarse, MixedElements):
-            self.pressures.forms.pressure.interpolate(coarse.pressures.forms.pressure)
             unknown[1].array[:] = self.pressures.values
 
     def apply(self, result: Fields, law: MaterialLaw, *, checked: bool = True) -> None:
@@ -122,6 +132,15 @@ class MixedElements(Elements):
             self.pressures.dilate(column.right[1], checked=checked)
             column.right[1].scale(-1.0)
 
+    def weigh(self, residual: Fields) -> None:
+        """Change the unit of the residual of pressures."""
+        residual[1].scale(self.pressures.unit)
+
+    def weigh_blocks(self, blocks: Sequence[PETSc.Mat]) -> None:
+        """Change the unit of coupling and block of pressures."""
+        for power, block in enumerate(blocks, start=1):
+            block.scale(self.pressures.unit**power)
+
     def _pressure(self, law: MaterialLaw) -> tuple[Any, Any]:
         compliance = self.displacements.forms.by_region(SplitLaw.of(law).compliance)
         return self.pressures.forms.pressure, compliance
@@ -132,8 +151,7 @@ class MixedElements(Elements):
         Raises:
             SolveError: if λ <= μ everywhere, or the set-up fails.
         """
-        if not any(region.ratio > 1 for region in law.parameters):
-            raise SolveError("mixed elements need a Poisson's ratio above 0.25; use displacement elements")
+        _check_ratio(law)
         return MixedSolver(self, law, self._solver(self.elastic(law), direct=direct), is_exact=direct)
 
     def solver_on(
@@ -165,6 +183,15 @@ class MixedElements(Elements):
                 result[1].axpy(1.0, dilation)
 
         return multiply
+
+    def linearised(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> "LinearisedMixed":
+        """Return linear elasticity with the moduli of a law of large displacements.
+
+        Raises:
+            SolveError: if λ <= μ everywhere, or the set-up fails.
+        """
+        _check_ratio(law)
+        return LinearisedMixed(self, law, stack, direct=direct)
 
     def finer(self) -> "MixedElements":
         """Return the elements of one degree more, made at the first call."""
@@ -238,3 +265,40 @@ class MixedSolver(Solver):
             finer.lift(fine, self.law, checked=False)
         iterations = above.solve(found, _ESTIMATE_TOLERANCE)
         return HierarchicalEstimate(finer, found, iterations, unseen=above.first_energies)
+
+
+class LinearisedMixed(Linearised):
+    """Linear elasticity of mixed elements in place of the tangent."""
+
+    def __init__(self, elements: MixedElements, law: MaterialLaw, stack: ExitStack, *, direct: bool):
+        """Set up; the ``stack`` frees it."""
+        self._elements, self._law, self._stack = elements, law, stack
+        self._saddle = elements._solver(elements.elastic(law), direct=direct)
+        self.preconditioner = self._saddle.preconditioner(elements.compliance(law), stack)
+
+    def finer(self) -> MixedElements:
+        """Return the elements of one degree more."""
+        return self._elements.finer()
+
+    def decrements(self, residuals: Sequence[Fields]) -> tuple[float, float, int]:
+        """Return decrement, N and iterations."""
+        finer, law = self._elements.finer(), self._law
+        below = self._elements._solvers.get(False, (None, None))[0]
+        saddle = finer._solver(self._elements.elastic(law), direct=False, below=below)
+        fixed = np.zeros(len(finer.displacements.forms.displacement.x.array))
+        found = [Column(fixed, None, residual, self._stack.enter_context(finer.fields())) for residual in residuals]
+        iterations = MixedSolver(finer, law, saddle, is_exact=False).solve(found, _ESTIMATE_TOLERANCE)
+        unit = finer.unit(law)
+        unseen = unit * float(np.sqrt(np.prod(saddle.first_energies)))
+        # x₀·r₁ + x₁·r₀ − x₀·K x₁: its error is the product of both solutions' errors.
+        works = [
+            sum(x.dot(r) for x, r in zip(x_of.unknown, r_of.right, strict=True)) for x_of, r_of in (found, found[::-1])
+        ]
+        decrement = unit * float(sum(works)) - float(finer.products(law, found, checked=False).stationary[0, 1])
+        return decrement, unseen, iterations
+
+
+def _check_ratio(law: MaterialLaw) -> None:
+    """Raise an error if no λ₁ is positive."""
+    if not any(region.ratio > 1 for region in law.parameters):
+        raise SolveError("mixed elements need a Poisson's ratio above 0.25; use displacement elements")

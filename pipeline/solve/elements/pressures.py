@@ -29,8 +29,8 @@ class Pressures:
 
     Pressures are in units of ``unit`` × μ, with ``unit`` (1/m) about one over the element size. The blocks of the
     saddle point then have similar magnitude in any unit of length. B and M act cell by cell (:meth:`blocks`), and are
-    assembled where entries are needed. ``dofs`` and ``whole_dofs`` count those of the modelled part and of the whole
-    body.
+    assembled where entries are needed. ``owned``, ``dofs`` and ``whole_dofs`` count those of this rank, of the modelled
+    part and of the whole body.
     """
 
     def __init__(self, body: BodyMesh, displacements: ElasticSpace):
@@ -40,7 +40,7 @@ class Pressures:
         self._has_regions = body.regions is not None
         self.forms = MixedForms(displacements.forms.displacement, self.space)
         index_map = self.space.dofmap.index_map
-        self._owned, self.dofs = index_map.size_local, index_map.size_global
+        self.owned, self.dofs = index_map.size_local, index_map.size_global
         self.whole_dofs = whole_points(self.space, body)
         self._stack = ExitStack()
         with stage("assembly"):
@@ -64,7 +64,7 @@ class Pressures:
         if not entries:
             return coupling.getPythonContext().holding(held).matrix()
         coupling = coupling.copy()
-        _without_columns(coupling, held)
+        without_columns(coupling, held)
         return coupling
 
     def by_region(self, values: tuple[float, ...]) -> float | FloatArray:
@@ -74,7 +74,7 @@ class Pressures:
     @property
     def values(self) -> FloatArray:
         """The pressure of the forms, owned dofs."""
-        return np.asarray(self.forms.pressure.x.array[: self._owned] / self.unit)
+        return np.asarray(self.forms.pressure.x.array[: self.owned] / self.unit)
 
     def set(self, pressure: PETSc.Vec) -> None:
         """Set the pressure of the forms."""
@@ -113,7 +113,7 @@ class Pressures:
         coupling, mass = (
             keep(self._stack, compat.assemble_matrix(form, [], 1.0)) for form in (self.forms.coupling, self.forms.mass)
         )
-        _without_columns(coupling, self._displacements.prescribed_owned)
+        without_columns(coupling, self._displacements.prescribed_owned)
         coupling.scale(self.unit)
         mass.scale(self.unit**2)
         return coupling, mass
@@ -142,7 +142,7 @@ def region_wise_space(body: BodyMesh, degree: int) -> tuple[Any, Int32Array]:
     return renumbered, np.nonzero(has_copy[:owned])[1].astype(np.int32)
 
 
-def _without_columns(matrix: PETSc.Mat, dofs: Int32Array) -> None:
+def without_columns(matrix: PETSc.Mat, dofs: Int32Array) -> None:
     """Make the columns of owned ``dofs`` zero; collective."""
     free = matrix.createVecRight()
     free.set(1.0)

@@ -1,9 +1,10 @@
 """A law: its strain energy in two parts, of shape and of volume, and invariants for energies.
 
-    ψ(F) = shape(F) + κ/2 D(F)², or, with a pressure p = κ D as an unknown, shape(F) + p D(F) − p²/(2κ).
+    ψ(F) = shape(F) + κ/2 D(F)²
 
-D is the change of volume, J − 1. Without p, κ must be finite; with p, 1/κ may be 0: the tissue is incompressible. ψ is
-in J/m³ of undeformed volume. ``of`` has the parameters by name, numbers or UFL: ``lame_mu`` (Pa), the shear modulus at
+D is the change of volume, J − 1. In mixed elements λ = λ₀ + λ₁ is split: κ is then that of λ₀, and the pressure
+p = λ₁ D, an unknown, adds p D(F) − p²/(2λ₁). 1/λ₁ may be 0: the tissue is incompressible. ψ is in J/m³ of undeformed
+volume. ``of`` has the parameters by name, numbers or UFL: ``lame_mu`` (Pa), the shear modulus at
 small strain, ``lame_lambda`` (Pa), and those that the law names. To second order in F − I, ψ must be linear elasticity
 of these λ and μ.
 """
@@ -15,6 +16,8 @@ from typing import Any
 import ufl
 
 Of = Mapping[str, Any]
+# The pressure p, and its compliance 1/λ₁.
+Pressure = tuple[Any, Any]
 
 
 def bulk_modulus(of: Of) -> Any:
@@ -39,13 +42,14 @@ class Law:
     modulus: Callable[[Of], Any] = bulk_modulus
     dilation: Callable[[Any], Any] = dilation
 
-    def density(self, gradient: Any, of: Of) -> Any:
-        """Return ψ(F)."""
-        return self.shape(gradient, of) + self.modulus(of) / 2 * self.dilation(gradient) ** 2
-
-    def pressurised(self, gradient: Any, of: Of, pressure: Any, compliance: Any) -> Any:
-        """Return ψ(F, p), stationary in both; ``compliance`` is 1/κ."""
-        return self.shape(gradient, of) + pressure * self.dilation(gradient) - compliance * pressure**2 / 2
+    def energy(self, gradient: Any, of: Of, pressure: Pressure | None = None) -> Any:
+        """Return ψ(F), or with a ``pressure``, to which λ₁ belongs while ``of`` has λ₀, ψ(F, p)."""
+        change = self.dilation(gradient)
+        density = self.shape(gradient, of) + self.modulus(of) / 2 * change**2
+        if pressure is None:
+            return density
+        value, compliance = pressure
+        return density + value * change - compliance * value**2 / 2
 
 
 def isochoric(gradient: Any) -> tuple[Any, Any]:
