@@ -159,8 +159,9 @@ class MixedForms:
 class HyperelasticForms:
     """Derivatives of the energy, with coefficients and displacement u shared with the ``elastic`` forms.
 
-    ``laws`` are the names of the laws by region, or a single one. ``pressure`` of mixed elements is p, and the coefficient 1/λ₁ (see :mod:`pipeline.solve.elements.mixed`). Forms are
-    by field, u or (u, p); ``directions`` are the functions of ``products``.
+    ``laws`` are the names of the laws by region, or a single one. ``pressure`` of mixed elements is p, and the
+    coefficient 1/λ₁ (see :mod:`pipeline.solve.elements.mixed`). Forms are by field, u or (u, p); ``directions`` are the
+    functions of ``products``.
     """
 
     def __init__(self, space: Any, elastic: ElasticForms, laws: Sequence[str], pressure: Pressure | None = None):

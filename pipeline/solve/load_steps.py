@@ -44,7 +44,8 @@ class LoadPath:
     """A load path: how far a ``motion`` of the probe has proceeded in a body of a ``law``.
 
     ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part. ``state`` is that of the last
-    step: displacement, and in mixed elements pressure (owned dofs). The first step of the next depth is at most as long as the last one, ``step`` (m).
+    step: displacement, and in mixed elements pressure (owned dofs). The first step of the next depth is at most as long
+    as the last one, ``step`` (m).
     """
 
     law: MaterialLaw

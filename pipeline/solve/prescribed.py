@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve import SolveError
 from pipeline.solve.balance import MOST_ROUNDS, check_balance, rest, sums
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.elements.base import Column, Elements, Equilibrium, Products, Solver, close_far

@@ -318,9 +318,11 @@ class Elements(ABC):
         """Return the forms of a law of large displacements; :meth:`set_law` sets their parameters."""
         return HyperelasticForms(self.displacements.space, self.displacements.forms, law.names, self._pressure(law))
 
+    @abstractmethod
     def weigh(self, residual: Fields) -> None:
         """Change a ``residual`` from the unit of the forms' fields to that of these elements' fields."""
 
+    @abstractmethod
     def weigh_blocks(self, blocks: Sequence[PETSc.Mat]) -> None:
         """Do the same with the ``blocks`` of the tangent besides K: the coupling, and that of pressures."""
 

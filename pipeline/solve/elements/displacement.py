@@ -76,6 +76,12 @@ class DisplacementElements(Elements):
             earlier.close()
         return DisplacementSolver(self, law, levels, direct=direct)
 
+    def weigh(self, residual: Fields) -> None:
+        """Do nothing: both units are the same."""
+
+    def weigh_blocks(self, blocks: Sequence[PETSc.Mat]) -> None:
+        """Do nothing: K has no further blocks."""
+
     def operator(self, stiffness: PETSc.Mat, law: MaterialLaw, *, entries: bool) -> Callable[[Fields, Fields], None]:
         """Return a function that writes K u into other fields."""
         return lambda fields, result: stiffness.mult(fields[0], result[0])
