@@ -175,7 +175,7 @@ class HyperelasticForms:
         gradient = ufl.Identity(3) + ufl.grad(self._displacement)
         measures = measures_of(self._space, self._cells, more=_MORE)
         return sum(
-            LAWS[law].energy(gradient, self._coefficients, self._pressure) * each for law, each in measures.items()
+            LAWS[law].density(gradient, self._coefficients, self._pressure) * each for law, each in measures.items()
         )
 
     @cached_property

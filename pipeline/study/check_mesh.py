@@ -166,9 +166,8 @@ def check_locking(body: Body, material: Material, mesh: Mesh, problems: Problems
             problems.error(
                 key,
                 poisson,
-                f"displacement elements of degree {mesh.degree} lock: must be at most {allowed}{of_law}. Mixed elements "
-                "allow values "
-                'up to 0.5: use degree 2 or 3, and element = "auto"',
+                f"displacement elements of degree {mesh.degree} lock: must be at most {allowed}{of_law}. "
+                'Mixed elements allow values up to 0.5: use degree 2 or 3, and element = "auto"',
             )
         elif poisson > visible or poisson == most:
             problems.warn(

@@ -47,8 +47,12 @@ MISTAKES = {
         ['body.layer[1].law = "yeoh"', "in all regions, or in none"],
     ),
     "nu of a region": (
-        {"body": {"layer": [SKIN | {"poisson": 0.47}]}, "material": {"law": "neo-hookean"}},
-        ["body.layer[1].poisson = 0.47", "0.2 to 0.45"],
+        {"body": {"layer": [SKIN | {"poisson": 0.1}]}, "material": {"law": "neo-hookean"}},
+        ["body.layer[1].poisson = 0.1", "at least 0.2"],
+    ),
+    "displacement elements near incompressibility": (
+        {"material": {"law": "neo-hookean", "poisson": 0.46}, "mesh": {"element": "displacement"}},
+        ["material.poisson = 0.46", "lock", "at most 0.45 with a law of large displacements", 'element = "auto"'],
     ),
 }
 

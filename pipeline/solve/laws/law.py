@@ -42,14 +42,14 @@ class Law:
     modulus: Callable[[Of], Any] = bulk_modulus
     dilation: Callable[[Any], Any] = dilation
 
-    def energy(self, gradient: Any, of: Of, pressure: Pressure | None = None) -> Any:
+    def density(self, gradient: Any, of: Of, pressure: Pressure | None = None) -> Any:
         """Return ψ(F), or with a ``pressure``, to which λ₁ belongs while ``of`` has λ₀, ψ(F, p)."""
         change = self.dilation(gradient)
-        density = self.shape(gradient, of) + self.modulus(of) / 2 * change**2
+        energy = self.shape(gradient, of) + self.modulus(of) / 2 * change**2
         if pressure is None:
-            return density
+            return energy
         value, compliance = pressure
-        return density + value * change - compliance * value**2 / 2
+        return energy + value * change - compliance * value**2 / 2
 
 
 def isochoric(gradient: Any) -> tuple[Any, Any]:
