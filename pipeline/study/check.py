@@ -67,7 +67,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     check_features(sections, placed, problems)
     check_laws(bodies, materials, problems)
     problems.each(_check_softness, body=bodies, material=materials)
-    problems.each(check_locking, body=bodies, material=linear, mesh=meshes)
+    problems.each(check_locking, body=bodies, material=materials, mesh=meshes)
     check_reference(meshes, axes, problems)
     _check_times(probes, axes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
