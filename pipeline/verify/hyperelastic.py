@@ -11,8 +11,8 @@ from pipeline.verify.row import Row
 from pipeline.verify.sections import cylinder, disc, mesh, study
 
 # F over F of linear elasticity by (ν, depth over radius), cylinder R = H = 20 a / 3, from axisymmetric elements. At
-# ν = 0.3: linear elements with constant volume change, down to 0.002 a at the edge; elements of a fifth of that size give
-# the error. Others: Taylor–Hood elements of degrees 2 and 3, down to 0.003 a, without the split of λ.
+# ν = 0.3: linear elements with constant volume change, down to 0.002 a at the edge; elements of a fifth of that size
+# give the error. Others: Taylor–Hood elements of degrees 2 and 3, down to 0.003 a, without the split of λ.
 _RATIO = {
     (0.3, 0.1): 0.988,
     (0.3, 0.2): 0.976,
