@@ -17,6 +17,7 @@ _HEIGHT = 2.0  # inches of a panel
 _BESIDE = 1.6  # inches: what a figure takes besides its panels, above and below them
 _LONG = 30.0  # values that span more than this have a logarithmic axis
 _WORD, _LINE, _TITLE = 14, 36, 34  # letters: of a word's line at an axis, of all words there, of a panel's title
+_MARKED = 40  # points of a curve up to which each has a marker
 BARS = {"capsize": 2, "elinewidth": 0.8}
 
 
@@ -73,6 +74,7 @@ def draw(panel: Panel, facets: Facets) -> None:
         if not np.isfinite(y).any():
             continue
         style = look(position) | ({} if joins else {"linestyle": "none"})
+        style |= {"marker": "none"} if joins and len(x) > _MARKED else {}
         label = choices(panel.data, curve) or None
         beside = x if joins else x + 0.12 * (position - (len(facets.curves) - 1) / 2)
         if (error := f"{panel.quantity}_error") in line:
