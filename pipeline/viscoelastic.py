@@ -136,11 +136,14 @@ class Contact:
 
     ``depth`` (n,) is the depth at which elastic contact has the same area; 0 after contact is lost. ``others`` are
     weights of other interpolations of the elastic curve: linear, and by another continuation to depth 0.
+    ``dissipated`` (n, k) times the forces is the dissipated energy, NaN once contact shrinks: tractions of the single
+    terms then remain outside the contact, and the elastic forces do not tell their work.
     """
 
     weights: FloatArray
     others: tuple[FloatArray, FloatArray]
     depth: FloatArray
+    dissipated: FloatArray
 
 
 def follow(motion: Motion, terms: Terms, times: FloatArray, depths: FloatArray, exponent: float) -> Contact:
@@ -162,6 +165,9 @@ def follow(motion: Motion, terms: Terms, times: FloatArray, depths: FloatArray, 
     branches = [_branches(columns, np.diff(grid), tau) for _, tau in terms]
     rest = 1 - sum(share for share, _ in terms)
     whole, _ = respond(smooth, terms, times)
+    lost = np.zeros((len(grid), len(depths)))
+    for (share, tau), branch in zip(terms, branches, strict=True):
+        lost += share * _lost(branch[:, 1 : len(depths) + 1], np.diff(depth), np.diff(grid), tau)
     rows, contact = [], []
     for time, total in zip(times, whole, strict=True):
         # What the loading until each point of the grid gives at this time.
@@ -178,7 +184,10 @@ def follow(motion: Motion, terms: Terms, times: FloatArray, depths: FloatArray, 
     found[np.isnan(whole)] = np.nan
     count = len(depths)
     smooth_weights, *others = (found[:, part * count : (part + 1) * count] for part in range(len(bases)))
-    return Contact(smooth_weights, (others[0], others[1]), np.where(np.isnan(whole), np.nan, contact))
+    own = np.clip(np.searchsorted(grid, times), 0, len(grid) - 1)
+    dissipated = np.where((times <= peak)[:, None], lost[own], np.nan)
+    depth_of_contact = np.where(np.isnan(whole), np.nan, contact)
+    return Contact(smooth_weights, (others[0], others[1]), depth_of_contact, dissipated)
 
 
 def interpolation(
@@ -237,6 +246,26 @@ def _branches(values: FloatArray, steps: FloatArray, tau: float) -> FloatArray:
     kept, rise = np.exp(-steps / tau), -np.expm1(-steps / tau) * tau / steps
     for number, change in enumerate(np.diff(values, axis=0)):
         found[number + 1] = kept[number] * found[number] + rise[number] * change
+    return found
+
+
+def _lost(forces: FloatArray, rises: FloatArray, steps: FloatArray, tau: float) -> FloatArray:
+    """Return what one term dissipates (n, k) while contact grows, from its ``forces``, linear over ``steps`` of time.
+
+    Its energy E obeys E' = force * depth' - 2 E / tau.
+    """
+    ratio = 2 * steps / tau
+    kept = np.exp(-ratio)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        first = np.where(ratio < _SHORT, 0.5 - ratio / 3, (1 - kept * (1 + ratio)) / ratio**2)
+        second = np.where(ratio < _SHORT, 0.5 - ratio / 6, (ratio + np.expm1(-ratio)) / ratio**2)
+    work = rises[:, None] * (forces[:-1] + forces[1:]) / 2
+    gained = rises[:, None] * (first[:, None] * forces[:-1] + second[:, None] * forces[1:])
+    energy, found = np.zeros(forces.shape[1]), np.zeros_like(forces)
+    for number in range(len(steps)):
+        after = kept[number] * energy + gained[number]
+        found[number + 1] = found[number] + work[number] - (after - energy)
+        energy = after
     return found
 
 

@@ -144,6 +144,20 @@ def test_elastic_contact_follows_its_curve_both_ways():
     assert found.weights @ curve(DEPTHS) == pytest.approx(curve(TOUCH.at(times)), rel=1e-4)
 
 
+def test_growing_contact_dissipates_what_the_work_does_not_store():
+    """Of a force proportional to the depth as of prescribed contact; of others, the work of a slow ramp is stored."""
+    times = np.linspace(0, 4, 9)
+    found = follow(TOUCH, TERMS, times, DEPTHS, 1.0)
+    assert found.dissipated @ DEPTHS == pytest.approx(respond(TOUCH, TERMS, times)[1], rel=1e-5, abs=1e-12)
+    for duration in (1e-4, 1e5):
+        ramp = Motion((0.0, duration), (0.0, 1.0))
+        lost = follow(ramp, TERMS, np.array([duration]), DEPTHS, 1.5).dissipated @ curve(DEPTHS)
+        assert 0 < lost[0] < 1e-3
+    held = follow(Motion((0.0, 1e-4, 1e4), (0.0, 1.0, 1.0)), TERMS, np.array([1e4]), DEPTHS, 1.5)
+    energy = 1 / 2.5 + 0.3 / 3 + 0.1 / 3.5
+    assert (held.dissipated @ curve(DEPTHS))[0] == pytest.approx(0.6 * energy, rel=1e-3)
+
+
 def test_a_step_of_found_contact_relaxes_as_the_modulus_does():
     times = np.array([0.0, 1.0, 9.0])
     found = follow(Motion((0.0, 10.0), (1.0, 1.0)), TERMS, times, DEPTHS, 1.5)

@@ -31,15 +31,16 @@ class Course:
     """What a case does over time (n,), NaN after the end of its history.
 
     The force is ``weights`` (n, k) times the elastic forces of its k stages; ``others`` are those of other
-    interpolations, for the error bar. ``depth`` (m) is that of the tool, ``dissipated`` the energy in units of the
-    elastic one at the last stage, ``peak`` the largest depth over that of the last stage, ``contact`` (m) the depth of
-    elastic contact of equal area.
+    interpolations, for the error bar. ``depth`` (m) is that of the tool. The dissipated energy is ``dissipated`` times
+    the elastic energy of the last stage, plus ``spent`` (n, k) times the forces. ``peak`` is the largest depth over
+    that of the last stage, ``contact`` (m) the depth of elastic contact of equal area.
     """
 
     weights: FloatArray
     others: tuple[FloatArray, ...]
     depth: FloatArray
     dissipated: FloatArray
+    spent: FloatArray
     peak: float
     contact: FloatArray
 
@@ -68,11 +69,9 @@ def over_time(dataset: xr.Dataset, study: Study, cases: Sequence[Case]) -> xr.Da
     peaks = _variable(last, "force", dims, [np.array(course.peak) for course in courses])
     found |= {name: (last[name] * peaks).assign_attrs(last[name].attrs) for name in LARGEST if name in last}
     found["tool_depth"] = _variable(last, "tool_depth", dims, [course.depth for course in courses], "time")
-    lost = _variable(last, "dissipated_energy", dims, [course.dissipated for course in courses], "time")
-    found["dissipated_energy"] = (lost * last["energy"]).transpose(*dims, "time").assign_attrs(lost.attrs)
-    share = abs(last["force_error"] / last["force"])
-    found["dissipated_energy_error"] = (share * found["dissipated_energy"]).transpose(*dims, "time")
-    found["dissipated_energy_error"].attrs = attributes("dissipated_energy_error")
+    found |= _dissipated(dataset, last, dims, courses)
+    if "load_force" in last:
+        found |= _crept(last.assign(found), dims, whole, courses)
     coordinate = ("time", times, attributes("time"))
     return last.drop_vars(_STAGE, errors="ignore").assign(found).assign_coords(time=coordinate)
 
@@ -83,17 +82,18 @@ def course_of(case: Case, times: FloatArray, depths: tuple[float, ...]) -> Cours
     only_last = np.arange(len(depths)) == len(depths) - 1
     if history is None:
         ones = np.ones(len(times))
-        alone = np.outer(ones, only_last)
-        return Course(alone, (alone,), depth * ones, 0 * ones, 1.0, depth * ones)
+        alone = np.outer(ones, only_last).astype(float)
+        return Course(alone, (alone,), depth * ones, 0.0 * ones, 0.0 * alone, 1.0, depth * ones)
     motion, terms = history.motion(depth), case.relaxations[0]
     if case.probe.is_unilateral:
         contact = _follow(motion, terms, tuple(times), depths, case.probe.force_exponent or _POWER)
-        unknown = np.full(len(times), np.nan)
-        return Course(contact.weights, contact.others, motion.at(times), unknown, 1.0, contact.depth)
+        none = np.zeros(len(times))
+        return Course(contact.weights, contact.others, motion.at(times), none, contact.dissipated, 1.0, contact.depth)
     force, lost = respond(motion, terms, times)
     weights = np.outer(force / depth, only_last)
     # Energies are half of stiffness times depth squared.
-    return Course(weights, (weights,), motion.at(times), 2 * lost / depth**2, motion.largest / depth, motion.at(times))
+    at, scaled = motion.at(times), 2 * lost / depth**2
+    return Course(weights, (weights,), at, scaled, 0.0 * weights, motion.largest / depth, at)
 
 
 @lru_cache(_MANY)
@@ -118,6 +118,37 @@ def _transformed(dataset: xr.Dataset, name: str, dims: list[str], courses: Seque
         ]
     found = [np.moveaxis(one, 0, -1) for one in found]
     return _variable(dataset, name, dims, found, *more, "time")
+
+
+def _dissipated(
+    dataset: xr.Dataset, last: xr.Dataset, dims: list[str], courses: Sequence[Course]
+) -> dict[str, xr.DataArray]:
+    """Return the dissipated energy over time, and its error bar."""
+    forces, bars = (_table(dataset, name, dims) for name in ("force", "force_error"))
+    energies, shares = last["energy"].values.ravel(), abs(last["force_error"] / last["force"]).values.ravel()
+    lost, error = [], []
+    for course, force, bar, energy, share in zip(courses, forces, bars, energies, shares, strict=True):
+        lost.append(course.dissipated * energy + course.spent @ force)
+        error.append(share * course.dissipated * energy + abs(course.spent) @ bar)
+    return {
+        "dissipated_energy": _variable(last, "dissipated_energy", dims, lost, "time"),
+        "dissipated_energy_error": _variable(last, "dissipated_energy_error", dims, error, "time"),
+    }
+
+
+def _crept(
+    last: xr.Dataset, dims: list[str], cases: Sequence[Case], courses: Sequence[Course]
+) -> dict[str, xr.DataArray]:
+    """Return what loads do to relaxing tissue on which they have acted for long; their force does not change.
+
+    Its stresses are the elastic ones, and its displacements larger. Strains of loads and depth are then in no ratio.
+    """
+    shares = [sum(share for share, _ in case.relaxations[0]) for case in cases]
+    softer = 1 / (1 - _variable(last, "sag", dims, [np.array(share) for share in shares]))
+    peaks = _variable(last, "sag", dims, [np.array(course.peak) for course in courses])
+    found = {name: (softer * last[name]).assign_attrs(last[name].attrs) for name in ("sag", "load_energy")}
+    alone = ((softer == 1) & (peaks == 1)) | (last["load_energy"] == 0)
+    return found | {name: last[name].where(alone) for name in LARGEST if name in last}
 
 
 def _contact(

@@ -272,9 +272,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "must be the same for all layers and inclusions: otherwise, the stress moves to the regions that relax less, "
         "and F is not the elastic force times a function of time",
     ),
-    Refusal(
-        "relaxation", "loads", "under loads, relaxing tissue creeps: the surface sinks with time. Omit one of the two"
-    ),
     # Large strains.
     Refusal(
         "ν < 0.2",

@@ -104,6 +104,27 @@ def test_the_peak_is_that_of_each_case():
     assert (peak["force_elastic"] > peak["force"]).all()
 
 
+def test_loads_creep_and_their_force_does_not():
+    """Loads that have acted for long: the sag is that of tissue with the modulus that is left."""
+    load = {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}
+    changes = {"load": load, "probe": {"at": ["0 mm", "0 mm"]}, "mesh": {"epsilon": "full", "fine": "6 mm"}}
+    material = {"young": "10 kPa", "poisson": 0.3, "density": "1000 kg/m^3"}
+    relaxing = material | {"relaxation": [{"share": 0.4, "time": "2 s"}]}
+    found = []
+    for tissue, history in (
+        (relaxing, {"history": {"ramp": "1 s"}}),
+        (material, {}),
+        (material | {"young": "6 kPa"}, {}),
+    ):
+        plan = make_plan(study(**changes | {"material": tissue, "probe": changes["probe"] | history}))
+        found.append(build(plan, compute(plan, MPI.COMM_SELF)))
+    crept, stiff, soft = found
+    for name in ("sag", "load_energy", "load_force"):
+        assert float(crept[name]) == pytest.approx(float(soft[name]), rel=1e-6)
+    assert float(crept["force_elastic"]) == pytest.approx(float(stiff["force"]), rel=1e-9)
+    assert np.isnan(crept["max_strain"])
+
+
 SPHERE = {"shape": "sphere", "radius": "4 mm", "depth": "0.4 mm", "contact": "unilateral"}
 
 

@@ -134,14 +134,6 @@ MISTAKES = {
         {"material": {"law": "neo-hookean"}, "probe": {"history": {"ramp": "1 s"}}},
         ["probe.history", "F is not proportional to the depth"],
     ),
-    "relaxing tissue under gravity": (
-        {
-            "material": {"density": "1000 kg/m^3", "relaxation": [{"share": 0.4, "time": "2 s"}]},
-            "probe": {"history": {"ramp": "1 s"}},
-            "load": {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]},
-        },
-        ["material.relaxation", "relaxing tissue creeps"],
-    ),
     "a speed": ({"probe": {"speed": "1 mm/s"}}, ["probe.speed", "`ramp` in [probe.history]"]),
     "a radius beside an accuracy": (
         {
