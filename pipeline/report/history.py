@@ -10,6 +10,8 @@ import xarray as xr
 from pipeline.arrays import FloatArray
 from pipeline.quantities import LARGEST, attributes
 from pipeline.report.values import OVER_TIME, STATES
+from pipeline.shapes.indenter import Indenter
+from pipeline.shapes.probe import Probe
 from pipeline.study.sweep import Case, Study
 from pipeline.viscoelastic import Contact, Motion, Terms, follow, interpolation, respond
 
@@ -21,8 +23,8 @@ _TEXTS = ("message", "force_exact_message")
 _WORST = ("failed", "pending", "skipped", "lost", "ok")
 # Powers of the depth to which contact is proportional on a half-space and a ball.
 _CONTACT = {"contact_area": 1.0, "contact_radius": 0.5}
-# Power of the depth of a force that is no power on a half-space.
-_POWER = 1.5
+# Powers of the depth of forces that are no powers on a half-space.
+_OF_EDGE, _OF_TIP = 1.0, 1.5
 _STAGE, _MANY = "stage", 10_000
 
 
@@ -86,7 +88,7 @@ def course_of(case: Case, times: FloatArray, depths: tuple[float, ...]) -> Cours
         return Course(alone, (alone,), depth * ones, 0.0 * ones, 0.0 * alone, 1.0, depth * ones)
     motion, terms = history.motion(depth), case.relaxations[0]
     if case.probe.is_unilateral:
-        contact = _follow(motion, terms, tuple(times), depths, case.probe.force_exponent or _POWER)
+        contact = _follow(motion, terms, tuple(times), depths, _power(case.probe))
         none = np.zeros(len(times))
         return Course(contact.weights, contact.others, motion.at(times), none, contact.dissipated, 1.0, contact.depth)
     force, lost = respond(motion, terms, times)
@@ -94,6 +96,12 @@ def course_of(case: Case, times: FloatArray, depths: tuple[float, ...]) -> Cours
     # Energies are half of stiffness times depth squared.
     at, scaled = motion.at(times), 2 * lost / depth**2
     return Course(weights, (weights,), at, scaled, 0.0 * weights, motion.largest / depth, at)
+
+
+def _power(probe: Probe) -> float:
+    """Return the power of the depth in F: of a rounded tip, that of a ball; of a long edge, about 1."""
+    is_long = isinstance(probe, Indenter) and probe.half_length > 0
+    return probe.force_exponent or (_OF_EDGE if is_long else _OF_TIP)
 
 
 @lru_cache(_MANY)

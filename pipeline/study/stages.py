@@ -12,13 +12,38 @@ from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Axis
 from pipeline.units import canonical
 
-# Depths of the elastic curve, as shares of the largest: F is a power of the depth times a smooth function of its root,
-# which five Chebyshev points give to some 1e-4. Below the smallest share, F is below 4 % of the largest force.
-_COUNT, _LEAST = 5, 0.1
-_FROM = sqrt(_LEAST)
-SHARES = tuple(
-    canonical((_FROM + (1 - _FROM) * (1 - cos(pi * number / (_COUNT - 1))) / 2) ** 2) for number in range(_COUNT)
-)
+# Depths of the elastic curve: F is a power of the depth times a smooth function of its root, which five Chebyshev
+# points give to some 1e-4. Contact at the smallest depth is this share of the widest, but no deeper than that one.
+_COUNT, _NARROWEST = 5, 0.32
+_LEAST, _BISECTIONS = 0.1, 20
+
+
+def shares_of(probe: Probe, *, is_shared: bool) -> tuple[float, ...]:
+    """Return the depths of the stages, as shares of the probe's depth, from the smallest on.
+
+    ``is_shared``: on one mesh, whose elements are chosen for the widest contact.
+    """
+    first = sqrt(_least(probe) if is_shared else _LEAST)
+    roots = (first + (1 - first) * (1 - cos(pi * number / (_COUNT - 1))) / 2 for number in range(_COUNT))
+    return tuple(canonical(root**2) for root in roots)
+
+
+def _least(probe: Probe) -> float:
+    """Return the smallest share of the depth on one mesh."""
+    if not isinstance(probe, Indenter):
+        return _LEAST
+    low, high = _LEAST, 0.5
+    widest = probe.contact_width
+
+    def is_narrow(share: float) -> bool:
+        return probe.model_copy(update={"depth": share * probe.depth}).contact_width < _NARROWEST * widest
+
+    if not is_narrow(low):
+        return low
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if is_narrow(middle) else (low, middle)
+    return round(high, 3)
 
 
 def with_stages(
@@ -30,8 +55,13 @@ def with_stages(
         return sections, axes
     meshes = cast("tuple[Mesh, ...]", sections["mesh"])
     is_shared = all(mesh.accuracy is None for mesh in meshes)
-    staged = tuple(_at(probe, share, is_shared=is_shared) for probe in probes for share in SHARES)
-    return sections | {"probe": staged}, (*axes, Axis("probe", "stage", SHARES, "1", is_stage=True))
+    staged = tuple(
+        _at(probe, share, is_shared=is_shared) for probe in probes for share in shares_of(probe, is_shared=is_shared)
+    )
+    return sections | {"probe": staged}, (
+        *axes,
+        Axis("probe", "stage", tuple(range(1, _COUNT + 1)), "1", is_stage=True),
+    )
 
 
 def _at(probe: Probe, share: float, *, is_shared: bool) -> Probe:
@@ -41,7 +71,10 @@ def _at(probe: Probe, share: float, *, is_shared: bool) -> Probe:
     changes: dict[str, Any] = {"depth": canonical(share * probe.depth)}
     if is_shared and isinstance(probe, Indenter):
         least, largest = probe.depth_range or (probe.depth, probe.depth)
-        changes["depth_range"] = (min(canonical(_LEAST * probe.depth), least), max(probe.depth, largest))
+        changes["depth_range"] = (
+            min(canonical(shares_of(probe, is_shared=True)[0] * probe.depth), least),
+            max(probe.depth, largest),
+        )
     return probe.model_copy(update=changes)
 
 
