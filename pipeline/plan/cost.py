@@ -24,8 +24,8 @@ _PARALLEL = 0.8
 _MESH = (0.35, 0.66)
 _SOLVE = {1: (0.04, 0.75), 2: (0.165, 0.75), 3: (0.4, 0.8)}
 _BAR = {1: (0.03, 0.8), 2: (0.105, 0.8), 3: (0.3, 0.85)}
-# Large strains, all load steps and Newton iterations together; their error bar.
-_LARGE = {"solve": (9.7, 1.1), "bar": (0.48, 0.8)}
+# Large strains, all load steps and Newton iterations together; their error bar. Factor of mixed elements.
+_LARGE, _MIXED_LARGE = {"solve": (9.7, 1.1), "bar": (0.48, 0.8)}, 2.5
 # A body with _FOLDED times the curvature of a ball of its volume counts as folded: its surface mesh intersects itself
 # at first. A liver has 1.8, a folded brain 7; the bodies of this factor's timing had 9 to 31.
 _FOLDED, _OF_BALL = 5.0, 15.6
@@ -203,7 +203,8 @@ def _prior(stage: str, kind: str) -> _Numbers:
         return log(seconds * _MESHED.get(words[-1] if words else "", 1.0)), power, 0.0
     if element not in ("displacement", "mixed"):  # the name of a hyperelastic law
         seconds, power = _LARGE[stage]
-        return log(seconds), power, _LOCKING
+        is_mixed = element.endswith("-mixed")
+        return log(seconds * (_MIXED_LARGE if is_mixed else 1.0)), power, 0.0 if is_mixed else _LOCKING
     seconds, power = (_SOLVE if stage == "solve" else _BAR)[int(degree)]
     movements = next((int(word) for word in words if word.isdigit()), 1)
     seconds *= (1 + _MOVEMENT * (movements - 1)) * (_MIXED if element == "mixed" else 1.0)

@@ -13,8 +13,14 @@ _BYTES_PER_DOF = {
     "displacement": {1: 3000, 2: 700, 3: 420, 4: 420},
     "mixed": {2: 1450, 3: 1200, 4: 1200},
     "large": {1: 3000, 2: 1900, 3: 2000, 4: 2800},
+    "large-mixed": {2: 3600, 3: 3600, 4: 4400},
 }
-_OF_BAR = {"displacement": {2: 700, 3: 420, 4: 420}, "mixed": {3: 850, 4: 850}, "large": {2: 600, 3: 600, 4: 600}}
+_OF_BAR = {
+    "displacement": {2: 700, 3: 420, 4: 420},
+    "mixed": {3: 850, 4: 850},
+    "large": {2: 600, 3: 600, 4: 600},
+    "large-mixed": {3: 1000, 4: 1000},
+}
 _OF_FACTOR = {1: 9000, 2: 9000, 3: 10_000}
 # Further bytes per dof of a reduced basis: a multigrid hierarchy for its bound, and five vectors for each of some eight
 # solutions.
@@ -110,13 +116,19 @@ def solving_memory(dofs: float, degree: int, formulation: str = "displacement", 
     """Return the estimated bytes of a solve, all ranks together; ``formulation`` is that of its case."""
     if direct:  # the fill of a 3D factorisation grows like dofs^(4/3); _OF_FACTOR is for 50,000 dofs
         return _BASE + _OF_FACTOR[degree] * (dofs / 50_000) ** (1 / 3) * dofs
-    return _BASE + _BYTES_PER_DOF.get(formulation, _BYTES_PER_DOF["large"])[degree] * dofs
+    return _BASE + _BYTES_PER_DOF[_kind(formulation)][degree] * dofs
 
 
 def error_bar_memory(dofs: float, degree: int, formulation: str = "displacement") -> float:
     """Return the estimated bytes of an error bar: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
-    return _BASE + _OF_BAR.get(formulation, _OF_BAR["large"])[degree + 1] * growth * dofs
+    return _BASE + _OF_BAR[_kind(formulation)][degree + 1] * growth * dofs
+
+
+def _kind(formulation: str) -> str:
+    if formulation in _BYTES_PER_DOF:
+        return formulation
+    return "large-mixed" if formulation.endswith("-mixed") else "large"
 
 
 def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, reduced: bool = False) -> float:
