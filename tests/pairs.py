@@ -141,6 +141,7 @@ import sys, gmsh
 gmsh.initialize(); gmsh.option.setNumber("General.Terminal", 0)
 gmsh.model.occ.addBox(-20, -20, -20, 40, 40, 20); gmsh.model.occ.synchronize(); gmsh.write(sys.argv[1])
 """
+_FIBRES = {"direction": [1, 1, 0], "k1": 0.5, "k2": 2.0}
 _BLADE = {"shape": "blade", "length": "8 mm", "width": "2 mm"}
 _CUT = _BLADE | {"slice": "0.3 mm"}
 _SLIT = _BLADE | {"width": "1 mm", "incision": "8 mm", "ahead": "3 mm"}
@@ -158,6 +159,8 @@ FEATURES = (
     Feature("neo-hookean", "law", _update("material", law="neo-hookean")),
     Feature("mooney-rivlin", "law", _update("material", law="mooney-rivlin", c2=0.3)),
     Feature("yeoh", "law", _update("material", law="yeoh", c2=0.4)),
+    Feature("ogden", "law", _update("material", law="ogden", terms=[{"share": 0.7, "alpha": 2.0}, {"alpha": 9.0}])),
+    Feature("holzapfel", "law", _update("material", law="holzapfel", fibres=_FIBRES)),
     Feature("gent", "law", _update("material", law="gent", limit=3.0)),
     Feature("veronda-westmann", "law", _update("material", law="veronda-westmann", alpha=1.5)),
     Feature("ellipse", "probe", _probe(shape="ellipse", axes=["4 mm", "2.5 mm"])),

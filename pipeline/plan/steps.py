@@ -142,7 +142,12 @@ def _mesh_of(solve: Solve) -> Hashable:
 def _scene_of(solve: Solve) -> Hashable:
     """Return all that distinguishes solves of one operator, except the depth."""
     case = solve.case
-    return tuple(tissue.lame for tissue in case.tissues), case.load, case.densities, case.probe.at
+    return (
+        tuple((*tissue.lame, *tissue.further.values()) for tissue in case.tissues),
+        case.load,
+        case.densities,
+        case.probe.at,
+    )
 
 
 def _grouped(solves: Collection[Solve], key: Callable[[Solve], Hashable]) -> list[tuple[Solve, ...]]:

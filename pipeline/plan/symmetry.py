@@ -28,8 +28,9 @@ def movement_planes(case: Case) -> tuple[str, ...]:
 
 
 def model_planes(case: Case) -> tuple[str, ...]:
-    """Return the planes of symmetry of geometry, movement and loads: half or a quarter of the body is enough."""
-    return tuple(plane for plane in movement_planes(case) if case.load.is_mirrored(PLANES[plane]))
+    """Return the planes of symmetry of geometry, movement, loads and fibres: half or a quarter of the body does."""
+    tests = [case.load.is_mirrored, *(tissue.is_mirrored for tissue in case.tissues)]
+    return tuple(plane for plane in movement_planes(case) if all(test(PLANES[plane]) for test in tests))
 
 
 def is_round(case: Case) -> bool:

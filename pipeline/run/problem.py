@@ -15,6 +15,7 @@ from pipeline.run.memory import FreeMemory
 from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.probes._round import RoundIndenter
+from pipeline.shapes.tissue import FIBRE, Tissue
 from pipeline.solve import SolveError
 from pipeline.solve.conditions import Conditions, Front
 from pipeline.solve.contact.active_set import ContactError
@@ -153,11 +154,18 @@ def _moved(far: PointForce | BodyField, centre: Place) -> FarField:
 
 def law_of(case: Case) -> MaterialLaw:
     """Return laws and parameters of the body's regions."""
-    within = (
-        Parameters.of_moduli(each.young, each.poisson, each.law or "linear", each.further) for each in case.tissues
-    )
+    within = (_parameters(tissue, case.frame.turn) for tissue in case.tissues)
     beyond = (Parameters.of_moduli(each.young, each.poisson) for each in case.tissues if case.is_linear_beyond)
     return MaterialLaw((*within, *beyond))
+
+
+def _parameters(tissue: Tissue, turn: FloatArray | None) -> Parameters:
+    """Return the parameters of a tissue; the direction of fibres is that on the mesh, which ``turn`` rotates."""
+    further = tissue.further
+    if turn is not None and FIBRE[0] in further:
+        direction = turn @ np.array([further[name] for name in FIBRE])
+        further |= dict(zip(FIBRE, map(float, direction), strict=True))
+    return Parameters.of_moduli(tissue.young, tissue.poisson, tissue.law or "linear", further)
 
 
 def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case | None = None) -> Solution:

@@ -1,12 +1,13 @@
 """Material of a region of tissue."""
 
-from math import inf
+from math import hypot, inf
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
+from pipeline.shapes.frame import Vector
 from pipeline.shapes.section import Section, Words
 from pipeline.units import Density, Pressure, Time
 from pipeline.viscoelastic import Terms
@@ -49,13 +50,86 @@ LAWS = MappingProxyType(
         "neo-hookean": (),
         "mooney-rivlin": ("c2",),
         "yeoh": ("c2", "c3"),
+        "ogden": ("terms",),
         "gent": ("limit",),
+        "holzapfel": ("fibres",),
         "veronda-westmann": ("alpha",),
     }
 )
+# Names that solvers have for the direction of fibres.
+FIBRE = ("fibre_x", "fibre_y", "fibre_z")
+# Tolerance of directions and of a dispersion.
+_ALIGNED = 1e-9
+# Most terms of Ogden's law.
+MOST_TERMS = 3
 # Values of those that may be omitted.
 _DEFAULTS = {"c3": 0.0}
 _Tissue = TypeVar("_Tissue", bound="Tissue")
+
+
+class Term(Section):
+    """One term of Ogden's law."""
+
+    name: Annotated[
+        str,
+        Field(exclude=True, pattern=r"^([A-Za-z][A-Za-z0-9_-]*)?$"),
+        Words(
+            "Name of the term: letters, digits, _ and -. The dimension of a sweep begins with it: steep_alpha.",
+            '"steep"',
+            default="none: the dimension is share or alpha",
+        ),
+    ] = ""
+    share: Annotated[
+        float | None,
+        Field(gt=0, le=1),
+        Words("Share of the shear modulus. The shares of all terms add up to 1.", "0.3", default="the rest of 1"),
+    ] = None
+    alpha: Annotated[
+        float,
+        Field(ge=-50, le=50),
+        Words("Exponent of the stretches: 2 is a neo-Hookean term, -2 one of C2 in Mooney-Rivlin. Not 0.", "9.0"),
+    ]
+
+
+class Fibres(Section):
+    """Fibres of Holzapfel's law."""
+
+    direction: Annotated[
+        tuple[float, float, float],
+        Words("Direction of the fibres, in the coordinates of the body. Its length has no effect.", "[1, 0, 0]"),
+    ]
+    k1: Annotated[
+        float,
+        Field(ge=0, le=1000),
+        Words("Stiffness of the fibres, in units of young. The strain energy is k1/(2 k2) (exp(k2 E^2) - 1).", "0.5"),
+    ]
+    k2: Annotated[
+        float,
+        Field(ge=1e-3, le=1000),
+        Words("Exponent of the fibres: larger values stiffen at smaller strains.", "2.0"),
+    ]
+    dispersion: Annotated[
+        float,
+        Field(ge=0, le=1 / 3),
+        Words("Dispersion of the directions: 0 is a single direction, 1/3 is isotropic.", "0.1"),
+    ] = 0.0
+
+    @property
+    def unit(self) -> Vector:
+        """The unit vector of the direction."""
+        length = hypot(*self.direction)
+        x, y, z = (component / length for component in self.direction)
+        return x, y, z
+
+    def is_mirrored(self, normal: Vector) -> bool:
+        """Return whether they are their own image in a plane with that unit normal."""
+        along = abs(sum(a * b for a, b in zip(self.unit, normal, strict=True)))
+        return self.is_isotropic or along < _ALIGNED or along > 1 - _ALIGNED
+
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether their direction has no effect."""
+        return self.k1 == 0 or self.dispersion > 1 / 3 - _ALIGNED
 
 
 class Tissue(Section):
@@ -80,6 +154,17 @@ class Tissue(Section):
         ),
     ] = None
     c3: Annotated[float | None, Field(ge=0, le=1000), Words("yeoh: C3 / C1.", "0.1", default="0 with yeoh")] = None
+    terms: Annotated[
+        tuple[Term, ...],
+        Words("ogden: one to three terms of the strain energy.", "[{share = 0.7, alpha = 2.0}, {alpha = 9.0}]"),
+    ] = ()
+    fibres: Annotated[
+        Fibres | None,
+        Words(
+            "holzapfel: fibres in a neo-Hookean tissue of young and poisson. They bear tension alone.",
+            "{direction = [1, 0, 0], k1 = 0.5, k2 = 2.0}",
+        ),
+    ] = None
     limit: Annotated[
         float | None,
         Field(ge=0.01, le=1e6),
@@ -109,7 +194,7 @@ class Tissue(Section):
     ] = ()
 
     @property
-    def terms(self) -> Terms:
+    def prony(self) -> Terms:
         """Shares and times (s) of the relaxation, the shortest time first."""
         return tuple(sorted(((term.share, term.time) for term in self.relaxation), key=lambda term: term[1]))
 
@@ -119,24 +204,53 @@ class Tissue(Section):
         return self.law not in (None, "linear")
 
     @property
-    def further(self) -> dict[str, Any]:
-        """The parameters of its law besides young and poisson, by key; None if one is missing."""
-        return {key: _DEFAULTS.get(key) if getattr(self, key) is None else getattr(self, key) for key in self._reads}
+    def given(self) -> dict[str, Any]:
+        """What its law reads besides young and poisson, by key; None if it is missing."""
+        keys = LAWS[self.law] if self.law is not None else ()
+        return {key: _DEFAULTS.get(key) if getattr(self, key) in (None, ()) else getattr(self, key) for key in keys}
+
+    @property
+    def further(self) -> dict[str, float]:
+        """The parameters of its law besides λ and μ, by the names that solvers have for them."""
+        found = self.given
+        if "terms" in found:
+            return _of_terms(self.terms)
+        if (fibres := found.get("fibres")) is not None:
+            direction = dict(zip(FIBRE, fibres.unit, strict=True))
+            of_shear = 2 * (1 + self.poisson)  # young over μ
+            return {**direction, "k1": of_shear * fibres.k1, "k2": fibres.k2, "dispersion": fibres.dispersion}
+        return found
+
+    def is_mirrored(self, normal: Vector) -> bool:
+        """Return whether it is its own image in a plane with that unit normal."""
+        return not self.has_fibres or self.fibres is None or self.fibres.is_mirrored(normal)
+
+    @property
+    def has_fibres(self) -> bool:
+        """Whether its stiffness depends on the direction."""
+        return "fibres" in self.given and not (self.fibres and self.fibres.is_isotropic)
 
     def completed(self: _Tissue, material: "Tissue") -> _Tissue:
         """Return this tissue with the law of ``material``, and its parameters, if it has none of its own."""
         if self.law is not None or not material.is_large:
             return self
-        return self.model_copy(update={"law": material.law, **material.further})
-
-    @property
-    def _reads(self) -> tuple[str, ...]:
-        return LAWS[self.law] if self.law is not None else ()
+        return self.model_copy(update={"law": material.law, **material.given})
 
     @property
     def lame(self) -> tuple[float, float]:
         """Lamé's λ and μ (Pa); λ is infinite for an incompressible material."""
         return lame(self.young, self.poisson)
+
+
+def _of_terms(terms: tuple[Term, ...]) -> dict[str, float]:
+    """Return share and alpha of each of ``MOST_TERMS`` terms, by name; those that are not given have the share 0."""
+    rest = 1 - sum(term.share or 0.0 for term in terms)
+    found = {}
+    for number in range(MOST_TERMS):
+        term = terms[number] if number < len(terms) else None
+        found[f"share{number + 1}"] = 0.0 if term is None else rest if term.share is None else term.share
+        found[f"alpha{number + 1}"] = 2.0 if term is None else term.alpha
+    return found
 
 
 def lame(young: float, poisson: float) -> tuple[float, float]:

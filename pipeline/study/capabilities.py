@@ -104,8 +104,8 @@ def _is_flat(scene: Scene) -> bool:
 def _relaxations(scene: Scene) -> set[Terms]:
     """Return the different relaxations of a body's regions; of one without its own, the material's."""
     regions = scene.body.regions
-    main = regions[0].terms if scene.body.is_filled else scene.material.terms
-    return {main, *(region.terms or main for region in regions)}
+    main = regions[0].prony if scene.body.is_filled else scene.material.prony
+    return {main, *(region.prony or main for region in regions)}
 
 
 FEATURES: dict[str, Feature] = {
@@ -118,6 +118,7 @@ FEATURES: dict[str, Feature] = {
         "probe.history", lambda s: any(_relaxations(s)) and s.probe.history is None, ("body", "material")
     ),
     "regions that relax differently": Feature("material.relaxation", lambda s: len(_relaxations(s)) > 1, ("body",)),
+    "fibres": Feature("material.law", lambda s: any(t.has_fibres for t in (s.material, *s.body.regions)), ("body",)),
     "ν < 0.2": Feature("material.poisson", lambda s: s.material.poisson < Material.LEAST_OF_LARGE),
     "ν > 0.49": Feature("material.poisson", lambda s: s.material.poisson > MOST_OF_GREEN),
     "tool that is not flat": Feature("probe.shape", lambda s: isinstance(s.probe, Indenter)),
@@ -291,6 +292,7 @@ _PRESSED_ONLY = "real-time models are only for tools that press straight down"
 # Of each way that may be shorter, the features with which it is not taken, each with the reason.
 OBSTACLES: dict[str, dict[str, str]] = {
     "meridian": {
+        "fibres": "fibres have a direction, and are not axisymmetric",
         "large displacements": "large displacements are computed in three dimensions",
         "six motions": "most of the six motions are not axisymmetric",
         "half ball": "a half ball is coupled to its far field in three dimensions",
@@ -314,10 +316,12 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "loads": "their force is not proportional to modulus and depth",
     },
     "images": {
+        "fibres": "the direction of the fibres differs in a mirror image",
         "six motions": "the 6 × 6 stiffness differs in a mirror image",
         "loads": "loads break the symmetry",
     },
     "equivalent places": {
+        "fibres": "the direction of the fibres is fixed in the body",
         "inclusion": "the distance to the inclusion differs",
         "loads": "loads act on the whole body",
         "Green's function": "the Green's function of the body depends on the place",

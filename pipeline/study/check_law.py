@@ -5,12 +5,15 @@ from math import sqrt
 from typing import Any
 
 from pipeline.shapes.body import Body
-from pipeline.shapes.tissue import LAWS, Tissue
+from pipeline.shapes.probe import is_direction
+from pipeline.shapes.tissue import LAWS, MOST_TERMS, Term, Tissue
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
 from pipeline.study.schema import Material
 
 _OF_LAWS = tuple(dict.fromkeys(key for keys in LAWS.values() for key in keys))
+# Rounding of shares that add up to 1, and the least exponent.
+_SAME, _LEAST_ALPHA = 1e-9, 0.1
 _UNSTABLE = "the tissue would lose its stiffness at some strain"
 
 
@@ -48,11 +51,11 @@ def _check_tissues(body: Body, material: Material, problems: Problems) -> None:
 
 def _check_tissue(key: str, tissue: Tissue, problems: Problems) -> None:
     """Report missing parameters, and values with which the law is unstable."""
-    for name, value in tissue.further.items():
+    for name, value in tissue.given.items():
         if value is None:
             problems.error(f"{key}.{name}", None, f'is required with law = "{tissue.law}"')
             return
-    c2, c3 = tissue.c2, tissue.further.get("c3", 0.0)
+    c2, c3 = tissue.c2, tissue.given.get("c3", 0.0)
     if tissue.law == "mooney-rivlin" and c2 is not None and not 0 <= c2 <= 1:
         problems.error(f"{key}.c2", c2, f'must be 0 to 1 with law = "mooney-rivlin": elsewhere, {_UNSTABLE}')
     if tissue.law == "yeoh" and c2 is not None and c2 < -(least := sqrt(3 * c3)):
@@ -61,15 +64,37 @@ def _check_tissue(key: str, tissue: Tissue, problems: Problems) -> None:
             c2,
             f'must be at least {-least:.4g}, which is −√(3 c3), with law = "yeoh": below, {_UNSTABLE}',
         )
+    fibres = tissue.given.get("fibres")
+    if fibres is not None and not is_direction(fibres.direction):
+        found = list(fibres.direction)
+        problems.error(f"{key}.fibres.direction", found, "must be a vector of three finite numbers, not all zero")
+    if tissue.law == "ogden":
+        _check_terms(key, tissue.terms, problems)
+
+
+def _check_terms(key: str, terms: Sequence[Term], problems: Problems) -> None:
+    """Report shares that do not add up to 1, and exponents near 0, where terms of the energy nearly cancel."""
+    shares = [term.share for term in terms if term.share is not None]
+    total, left = sum(shares), len(terms) - len(shares)
+    if len(terms) > MOST_TERMS:
+        problems.error(f"{key}.terms", None, f"has {len(terms)} terms: at most {MOST_TERMS}")
+    elif left > 1 or (left == 1 and total >= 1 - _SAME):
+        problems.error(f"{key}.terms", None, f"one term may omit its share, if the others leave some of 1: {total:.6g}")
+    elif left == 0 and abs(total - 1) > _SAME:
+        problems.error(f"{key}.terms", None, f"shares must add up to 1, which makes mu the shear modulus: {total:.6g}")
+    for number, term in enumerate(terms, start=1):
+        if abs(term.alpha) < _LEAST_ALPHA:
+            allowed = f"must be at least {_LEAST_ALPHA}, or at most -{_LEAST_ALPHA}"
+            problems.error(f"{key}.terms[{number}].alpha", term.alpha, allowed)
 
 
 def _check_unread(given: Sequence[tuple[dict[str, Any], str, Tissue]], problems: Problems) -> None:
     """Report keys that are given and that no law of the sweep reads; ``given`` has tables, place and tissue."""
-    read = {(key, next(iter(about.values())).name, name) for about, key, tissue in given for name in tissue.further}
+    read = {(key, next(iter(about.values())).name, name) for about, key, tissue in given for name in tissue.given}
     for about, key, tissue in given:
-        for name in _OF_LAWS:
-            owner = next(iter(about.values())).name
-            if name in tissue.model_fields_set and (key, owner, name) not in read:
+        owner = next(iter(about.values())).name
+        for name in (name for name in _OF_LAWS if name in tissue.model_fields_set):
+            if (key, owner, name) not in read:
                 laws = " or ".join(f'"{law}"' for law, keys in LAWS.items() if name in keys)
                 with problems.about(**about):
                     problems.error(f"{key}.{name}", getattr(tissue, name), f"is read only with law = {laws}")

@@ -137,6 +137,7 @@ def _swept() -> Iterator[type[Section]]:
         if section not in SINGLE:
             yield from _models(section)
             yield from NESTED.get(section, {}).values()
+            yield from (model for model in TABLES.get(section, {}).values() if issubclass(model, Section))
 
 
 def _described(schema: Schema, model: type[BaseModel] | None, key: str) -> Schema:

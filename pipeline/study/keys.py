@@ -39,6 +39,10 @@ SECTION_TEXTS = {
     "layers fill the body.",
     "material.relaxation": "Relaxation over time: terms of a Prony series, one table each. `young` is then the "
     "instantaneous modulus. Optional; every value can be swept.",
+    "material.terms": "Terms of Ogden's law, one table each; those of a layer are [[body.layer.terms]]. Optional; "
+    "the values of a named term can be swept.",
+    "material.fibres": "Fibres of Holzapfel's law; those of a layer are [body.layer.fibres]. Optional; every value can "
+    "be swept.",
     "probe": "The tool, called probe in study files and datasets, and its motion.",
     "probe.path": "Several points of contact, instead of `at`. Give one of `line`, `circle`, `raster` and "
     "`points`. Optional.",

@@ -183,10 +183,9 @@ def _check_axes(axes: tuple[Axis, ...], problems: Problems) -> None:
                 f"its sweep would be a dimension {axis.name}, the name of a result of the dataset"
                 + (f": give {axis.owner} another name" if axis.owner else ""),
             )
-        elif axis.owner and names.count(axis.name) > 1:
-            problems.error(
-                axis.path, None, f"its sweep would be a second dimension {axis.name}: give {axis.owner} another name"
-            )
+        elif axis.piece and names.count(axis.name) > 1:
+            other = f"give {axis.owner} another name" if axis.owner else "give its table a `name`"
+            problems.error(axis.path, None, f"its sweep would be a second dimension {axis.name}: {other}")
 
 
 def _check_sweep(bodies: Sequence[Body], axes: tuple[Axis, ...], problems: Problems) -> None:

@@ -14,7 +14,7 @@ from pipeline.shapes.history import History
 from pipeline.shapes.regions import Inclusion, Layer
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import Section, Words
-from pipeline.shapes.tissue import LAWS, Relaxation, Tissue
+from pipeline.shapes.tissue import LAWS, Fibres, Relaxation, Term, Tissue
 from pipeline.study.loads import Load, Traction
 from pipeline.study.path import Path
 from pipeline.study.vocabulary import FIGURES, REDUCTIONS
@@ -56,7 +56,7 @@ class Material(Tissue):
 
 def material_of(tissue: Tissue) -> Material:
     """Return the material of a layer or an inclusion."""
-    own = {key: getattr(tissue, key) for key in ("young", "poisson", "density", "relaxation", *tissue.further)}
+    own = {key: getattr(tissue, key) for key in ("young", "poisson", "density", "relaxation", *tissue.given)}
     return Material.model_construct(**own, law=tissue.law or "linear")
 
 
@@ -284,10 +284,13 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
 # Arrays of tables within a section: pieces of it, each with keys that can be swept.
 NESTED: dict[str, dict[str, type[Section]]] = {
     "body": {"layer": Layer, "inclusion": Inclusion},
-    "material": {"relaxation": Relaxation},
+    "material": {"relaxation": Relaxation, "terms": Term},
     "load": {"traction": Traction},
 }
 # Sections that say how, not what: their lists are no sweeps.
 SINGLE = ("solve", "plan", "figure")
-# Tables within a section, which replace one of its keys.
-TABLES: dict[str, dict[str, type[BaseModel]]] = {"probe": {"path": Path, "history": History}}
+# Tables within a section.
+TABLES: dict[str, dict[str, type[BaseModel]]] = {
+    "probe": {"path": Path, "history": History},
+    "material": {"fibres": Fibres},
+}

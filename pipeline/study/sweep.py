@@ -146,7 +146,7 @@ class Case:
     @property
     def relaxations(self) -> tuple[Terms, ...]:
         """Terms of the relaxation of the regions of the body; where a region has none, the material's."""
-        return tuple(tissue.terms or self.material.terms for tissue in self.tissues)
+        return tuple(tissue.prony or self.material.prony for tissue in self.tissues)
 
     @property
     def densities(self) -> tuple[float | None, ...]:

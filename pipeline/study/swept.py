@@ -55,6 +55,8 @@ def axis_of(section: str, place: Place, raw: list[Any], parsed: list[Section], p
     """Return the axis of a sweep: its values as given, its unit, and the table that it is in."""
     *outer, key = place
     owners = [_at(item, outer) for item in parsed]
+    within = [_at(parsed[0], outer[: end + 1]) for end in range(len(outer))]
+    names = [one.name for one in within if isinstance(one, Section) and one.name]
     values = [getattr(owner, str(key)) for owner in owners]
     extra: Any = type(owners[0]).model_fields[str(key)].json_schema_extra or {}
     unit = extra.get("unit", "") or _unit_of(type(owners[0]), str(key))
@@ -71,7 +73,7 @@ def axis_of(section: str, place: Place, raw: list[Any], parsed: list[Section], p
         unit = "1"
     if not outer:
         return Axis(section, str(key), tuple(labels), unit)
-    return Axis(section, str(key), tuple(labels), unit, written(tuple(outer)), getattr(owners[0], "name", ""))
+    return Axis(section, str(key), tuple(labels), unit, written(tuple(outer)), "_".join(names))
 
 
 def _labelled(table: dict[str, Any]) -> str:

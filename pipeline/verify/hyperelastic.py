@@ -26,6 +26,11 @@ _RATIO_BAR = 1.5e-3
 _SMALL, _SHALLOW, _AGREE = 1e-3, 5e-3, 3e-3
 # Poisson's ratio where none is given, and the depth of a quick run.
 _NU, _QUICK = 0.3, 0.1
+# Keys of each law; with fibres in all directions, as others have a stiffness of their own at small strain.
+_KEYS = FURTHER | {
+    "ogden": {"terms": [{"share": 0.7, "alpha": 2.0}, {"share": 0.3, "alpha": 9.0}]},
+    "holzapfel": {"fibres": {"direction": [1, 0, 0], "k1": 0.5, "k2": 2.0, "dispersion": 1 / 3}},
+}
 
 
 def hyperelastic_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
@@ -77,4 +82,4 @@ def hyperelastic_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
 def _scene(law: str, depth: float, nu: float = _NU) -> dict[str, dict[str, object]]:
     """Return a disc of 3 mm on the cylinder, ``depth`` in units of its radius."""
     scene = study(nu, cylinder(), disc(3, 3 * depth))
-    return {**scene, "material": {**scene["material"], "law": law, **FURTHER.get(law, {})}}
+    return {**scene, "material": {**scene["material"], "law": law, **_KEYS.get(law, {})}}

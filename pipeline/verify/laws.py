@@ -11,6 +11,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 
 from pipeline.arrays import FloatArray
+from pipeline.shapes.tissue import MOST_TERMS
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.forms import ElasticForms, HyperelasticForms
 from pipeline.solve.physics import MaterialLaw
@@ -21,12 +22,14 @@ FURTHER: dict[str, dict[str, Any]] = {
     "neo-hookean": {},
     "mooney-rivlin": {"c2": 0.3},
     "yeoh": {"c2": 0.4, "c3": 0.1},
+    "ogden": {"share1": 0.5, "alpha1": 2.0, "share2": 0.3, "alpha2": 7.0, "share3": 0.2, "alpha3": -3.0},
     "gent": {"limit": 3.0},
+    "holzapfel": {"fibre_x": 0.0, "fibre_y": 0.0, "fibre_z": 1.0, "k1": 1.4, "k2": 2.0, "dispersion": 0.1},
     "veronda-westmann": {"alpha": 1.5},
 }
 YOUNG, POISSON = 10e3, 0.4
 _STRETCHES, _SHEAR = (0.7, 1.4), 0.5
-_ROUNDING = 1e-9
+_ROUNDING, _OF_ROOTS = 1e-9, 1e-7  # the second is that of principal stretches
 # Tolerance of coordinates on the unit cube.
 _ON_FACE = 1e-9
 
@@ -55,12 +58,18 @@ class Stress:
         if self.law == "neo-hookean":
             return self.mu / volume * (squares - 1) + (self.bulk - 2 / 3 * self.mu) * (volume - 1)
         b = volume ** (-2 / 3) * squares
-        first, second = self.derivatives(b.sum(), (1 / b).sum())
+        if self.law == "ogden":
+            terms = ((self.of[f"share{k}"], self.of[f"alpha{k}"]) for k in range(1, MOST_TERMS + 1))
+            shape = 2 * self.mu / volume * sum(share / alpha * b ** (alpha / 2) for share, alpha in terms)
+            return shape - shape.mean() + self.bulk * (volume - 1)
+        first, second = self.derivatives(b.sum(), b[2])
         shape = 2 * self.mu / volume * ((first + b.sum() * second) * b - second * b**2)
+        if self.law == "holzapfel":  # fibres are along the third principal direction
+            shape[2] += 2 * self.mu / volume * self.fibres(b.sum(), b[2]) * (1 - 3 * self.of["dispersion"]) * b[2]
         return shape - shape.mean() + self.bulk * (volume - 1)
 
-    def derivatives(self, first: float, _: float) -> tuple[float, float]:
-        """Return W₁ and W₂ for given Ī₁ and Ī₂."""
+    def derivatives(self, first: float, fourth: float) -> tuple[float, float]:
+        """Return W₁ and W₂ for given Ī₁ and Ī₄, the latter of fibres."""
         of, x = self.of, first - 3
         match self.law:
             case "mooney-rivlin":
@@ -71,6 +80,8 @@ class Stress:
                 return of["limit"] / (of["limit"] - x) / 2, 0.0
             case "veronda-westmann":
                 return float(np.exp(of["alpha"] * x)), -0.5
+            case "holzapfel":
+                return 0.5 + of["dispersion"] * self.fibres(first, fourth), 0.0
         return 0.5, 0.0
 
     def uniaxial(self, stretch: float) -> tuple[float, float]:
@@ -83,8 +94,25 @@ class Stress:
         return b, float(self.principal(np.array([b, b, stretch]))[2]) * b**2
 
     def shear(self, amount: float) -> float:
-        """Return the shear stress (Pa) in simple shear: 2μ (W₁ + W₂) γ, where Ī₁ = Ī₂ = 3 + γ²."""
-        return 2 * self.mu * sum(self.derivatives(3 + amount**2, 3 + amount**2)) * amount
+        """Return the shear stress (Pa) in simple shear: 2μ (W₁ + W₂) γ, where Ī₁ = Ī₂ = 3 + γ².
+
+        With principal stresses, it is (σ₁ − σ₂)/2 sin 2θ, where λ₁ − 1/λ₁ = γ and tan θ = 1/λ₁ for the first axis.
+        """
+        if self.law == "ogden":
+            stretch = amount / 2 + np.hypot(1, amount / 2)
+            stress = self.principal(np.array([stretch, 1.0, 1 / stretch]))
+            return float((stress[0] - stress[2]) / (stretch + 1 / stretch))
+        first, second = self.derivatives(3 + amount**2, 1 + amount**2)
+        along = 0.0
+        if self.law == "holzapfel":  # fibres are along z, and become (γ, 0, 1)
+            along = self.fibres(3 + amount**2, 1 + amount**2) * (1 - 3 * self.of["dispersion"])
+        return 2 * self.mu * (first + second + along) * amount
+
+    def fibres(self, first: float, fourth: float) -> float:
+        """Return ∂W/∂E of fibres for given Ī₁ and Ī₄: k₁ ⟨E⟩ exp(k₂ ⟨E⟩²)."""
+        kappa = self.of["dispersion"]
+        strain = max(kappa * first + (1 - 3 * kappa) * fourth - 1, 0.0)
+        return float(self.of["k1"] * strain * np.exp(self.of["k2"] * strain**2))
 
 
 class Cube:
@@ -124,10 +152,11 @@ def law_rows() -> Iterator[Row]:
         for stretch in _STRETCHES:
             lateral, nominal = stress.uniaxial(stretch)
             force, _ = cube.forces(np.diag([lateral, lateral, stretch]))
-            yield _row(f"cube, {law}, stretch {stretch:g}", nominal, force[2])
+            yield _row(law, f"stretch {stretch:g}", nominal, force[2])
         force, _ = cube.forces(np.eye(3) + _SHEAR * np.outer([1, 0, 0], [0, 0, 1]))
-        yield _row(f"cube, {law}, shear {_SHEAR:g}", stress.shear(_SHEAR), force[0])
+        yield _row(law, f"shear {_SHEAR:g}", stress.shear(_SHEAR), force[0])
 
 
-def _row(scene: str, reference: float, value: float) -> Row:
-    return Row(scene, "uniform", reference, "closed form of the stress", value, _ROUNDING)
+def _row(law: str, deformation: str, reference: float, value: float) -> Row:
+    bar = _OF_ROOTS if law == "ogden" else _ROUNDING
+    return Row(f"cube, {law}, {deformation}", "uniform", reference, "closed form of the stress", value, bar)

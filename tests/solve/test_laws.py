@@ -32,6 +32,11 @@ def density(law, gradient, of=None, pressure=None):
     return float(LAWS[law].density(ufl.as_matrix(np.asarray(gradient).tolist()), of, pressure))
 
 
+def rounding(law):
+    """Principal stretches are known to 1e-8 only."""
+    return 1e-7 if law == "ogden" else 1e-10
+
+
 def gradients(seed, size=0.25, count=5):
     found = np.eye(3) + size * np.random.default_rng(seed).standard_normal((count, 3, 3))
     return found[np.linalg.det(found) > 0.2]
@@ -40,7 +45,7 @@ def gradients(seed, size=0.25, count=5):
 def test_study_and_solver_name_the_same_laws_and_parameters():
     assert {*get_args(Material.model_fields["law"].annotation)} == {*LAWS} == {*tissue.LAWS} == {"linear", *LARGE}
     for name, law in LAWS.items():
-        assert law.parameters == tissue.LAWS[name]
+        assert {*law.parameters} == {*FURTHER.get(name, {})}
 
 
 @pytest.mark.parametrize("law", LARGE)
@@ -49,7 +54,8 @@ def test_an_energy_does_not_change_with_rotations(law):
         turn = Rotation.random(random_state=number).as_matrix()
         known = density(law, gradient)
         assert density(law, turn @ gradient) == pytest.approx(known, rel=1e-11)
-        assert density(law, gradient @ turn) == pytest.approx(known, rel=1e-11)  # isotropic
+        if law != "holzapfel":  # isotropic
+            assert density(law, gradient @ turn) == pytest.approx(known, rel=1e-11)
 
 
 @pytest.mark.parametrize("law", LARGE)
@@ -74,16 +80,18 @@ def test_uniaxial_stress_is_the_closed_form(law, stretch):
     cube, stress = Cube(law), Stress.of_law(law)
     lateral, nominal = stress.uniaxial(stretch) if stretch != 1 else (1.0, 0.0)
     force, inside = cube.forces(np.diag([lateral, lateral, stretch]))
-    assert force == pytest.approx([0, 0, nominal], rel=1e-10, abs=1e-9 * YOUNG)
+    assert force == pytest.approx([0, 0, nominal], rel=rounding(law), abs=rounding(law) * YOUNG)
     assert inside < 1e-12 * YOUNG
+    if law == "holzapfel":  # whose fibres are along z
+        return
     wide, _ = cube.forces(np.diag([stretch, lateral, lateral]))  # the same stress on other faces
-    assert wide == pytest.approx([0, 0, 0], abs=1e-9 * YOUNG)
+    assert wide == pytest.approx([0, 0, 0], abs=rounding(law) * YOUNG)
 
 
 @pytest.mark.parametrize("law", LARGE)
 def test_simple_shear_is_the_closed_form(law):
     force, inside = Cube(law).forces(np.eye(3) + 0.6 * np.outer([1, 0, 0], [0, 0, 1]))
-    assert force[0] == pytest.approx(Stress.of_law(law).shear(0.6), rel=1e-10)
+    assert force[0] == pytest.approx(Stress.of_law(law).shear(0.6), rel=rounding(law))
     assert inside < 1e-12 * YOUNG
 
 
@@ -105,7 +113,7 @@ def test_laws_are_linear_at_small_strains(law):
     stiffness, tangent = (compat.assemble_matrix(form, [], 1.0) for form in (elastic.stiffness, forms.tangents[0]))
     size = stiffness.norm()
     tangent.axpy(-1.0, stiffness)
-    assert tangent.norm() < 1e-10 * size
+    assert tangent.norm() < rounding(law) * size
 
 
 def test_regions_with_laws_of_their_own_add_up():
@@ -149,3 +157,54 @@ def test_layers_are_linear_at_small_depths():
     (linear,) = solve(body=BOX | {"layer": [SKIN]}, probe=probe).values()
     (large,) = solve(body=BOX | {"layer": [layer]}, material={"law": "neo-hookean"}, probe=probe).values()
     assert large.force == pytest.approx(linear.force, rel=1e-3)
+
+
+def test_terms_of_ogden_are_neo_hookean_and_mooney_rivlin():
+    """Exponents 2 and −2 are I₁ and I₂; double roots, as in uniaxial stretch and at rest, are no exception."""
+    of = {"share1": 0.7, "alpha1": 2.0, "share2": 0.3, "alpha2": -2.0, "share3": 0.0, "alpha3": 2.0}
+    samples = [*gradients(4), np.diag([1.3, 1.3, 0.6]), np.diag([0.9, 0.9, 1.4]), np.diag([1.001, 1.001, 0.998])]
+    for gradient in samples:
+        known = density("mooney-rivlin", gradient, {"c2": 0.3})
+        assert density("ogden", gradient, of) == pytest.approx(known, rel=1e-7)
+
+
+def test_fibres_in_all_directions_are_isotropic():
+    """With the dispersion 1/3 their direction has no effect, and without stiffness they are none."""
+    for number, gradient in enumerate(gradients(5)):
+        turn = Rotation.random(random_state=number).as_matrix()
+        of = {"dispersion": 1 / 3}
+        known = density("holzapfel", gradient, of)
+        assert density("holzapfel", gradient @ turn, of) == pytest.approx(known, rel=1e-10)
+        neo_hookean = density("yeoh", gradient, {"c2": 0.0, "c3": 0.0})
+        assert density("holzapfel", gradient, {"k1": 0.0}) == pytest.approx(neo_hookean, rel=1e-12)
+
+
+def test_fibres_bear_tension_alone():
+    along = np.diag([0.9**-0.5, 0.9**-0.5, 0.9])
+    neo_hookean = density("yeoh", along, {"c2": 0.0, "c3": 0.0})
+    assert density("holzapfel", along, {"dispersion": 0.0}) == pytest.approx(neo_hookean, rel=1e-12)
+    assert density("holzapfel", np.linalg.inv(along), {"dispersion": 0.0}) > 1.1 * neo_hookean
+
+
+def test_force_on_fibres():
+    """A quarter is the whole; with isotropic fibres, the direction has no effect; others stiffen."""
+    probe = {"depth": "0.3 mm"}
+    fibres = {"direction": [1, 0, 0], "k1": 0.5, "k2": 2.0}
+
+    def found(mesh=None, **changes):
+        material = {"law": "holzapfel", "fibres": fibres | changes}
+        (record,) = solve(material=material, probe=probe, mesh=mesh or {}).values()
+        assert record.status == "ok", record.message
+        return record
+
+    quarter, whole = found(), found({"model": "3d"})
+    assert (quarter.origin, whole.origin) == ("symmetric", "solved")
+    assert whole.force == pytest.approx(quarter.force, rel=1e-5)
+    assert found(direction=[0, 2, 0]).force == pytest.approx(
+        quarter.force, rel=2e-3
+    )  # on another mesh of the square box
+    (plain,) = solve(material={"law": "yeoh", "c2": 0.0}, probe=probe).values()
+    assert found(k1=0.0).force == pytest.approx(plain.force, rel=1e-8)
+    isotropic = [found(dispersion=1 / 3, direction=direction) for direction in ([1, 0, 0], [1, 2, 3])]
+    assert isotropic[0].force == pytest.approx(isotropic[1].force, rel=1e-8)
+    assert quarter.force > isotropic[0].force > plain.force

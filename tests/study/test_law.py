@@ -4,12 +4,14 @@ import pytest
 
 from pipeline.plan.key import case_key, mesh_key
 from pipeline.plan.plan import make_plan
+from pipeline.plan.symmetry import model_planes
 from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
 from tests.cases import raw, study
 
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}
 BALL = {"name": "tumour", "at": ["0 mm", "0 mm", "-10 mm"], "radius": "4 mm", "young": "50 kPa", "poisson": 0.4}
+FIBRES = {"direction": [1, 0, 0], "k1": 0.5, "k2": 2.0}
 YEOH = {"law": "yeoh", "c2": 0.4}
 
 # changes of the study -> parts of the message: key, value, what is allowed
@@ -33,6 +35,37 @@ MISTAKES = {
         {"material": {"law": "yeoh", "c2": [0.4, -0.6], "c3": 0.1}},
         ["material.c2 = -0.6", "at least -0.5477", "√(3 c3)"],
     ),
+    "shares of terms": (
+        {"material": {"law": "ogden", "terms": [{"share": 0.7, "alpha": 2.0}, {"share": 0.2, "alpha": 9.0}]}},
+        ["material.terms", "add up to 1", "0.9"],
+    ),
+    "nothing left for a share": (
+        {"material": {"law": "ogden", "terms": [{"share": 1.0, "alpha": 2.0}, {"alpha": 9.0}]}},
+        ["material.terms", "may omit its share"],
+    ),
+    "exponent of a term": (
+        {"material": {"law": "ogden", "terms": [{"alpha": 0.0}]}},
+        ["material.terms[1].alpha = 0.0", "at least 0.1, or at most -0.1"],
+    ),
+    "value of a term": (
+        {"material": {"law": "ogden", "terms": [{"share": -0.2, "alpha": 2.0}, {"alpha": 3.0}]}},
+        ["material.terms[1].share = -0.2", "greater than 0"],
+    ),
+    "too many terms": ({"material": {"law": "ogden", "terms": [{"alpha": 2.0}] * 4}}, ["material.terms", "at most 3"]),
+    "no terms": ({"material": {"law": "ogden"}}, ["material.terms", 'is required with law = "ogden"']),
+    "fibre of no length": (
+        {"material": {"law": "holzapfel", "fibres": {"direction": [0, 0, 0], "k1": 0.5, "k2": 2.0}}},
+        ["material.fibres.direction = [0.0, 0.0, 0.0]", "not all zero"],
+    ),
+    "dispersion": (
+        {"material": {"law": "holzapfel", "fibres": FIBRES | {"dispersion": 0.4}}},
+        ["material.fibres.dispersion = 0.4", "at most 0.333"],
+    ),
+    "key of fibres": (
+        {"material": {"law": "holzapfel", "fibres": FIBRES | {"angle": 0.4}}},
+        ["material.fibres.angle", "unknown key"],
+    ),
+    "no fibres": ({"material": {"law": "holzapfel"}}, ["material.fibres", 'is required with law = "holzapfel"']),
     "no limit": ({"material": {"law": "gent", "limit": 0.0}}, ["material.limit = 0.0", "at least 0.01"]),
     "small exponent": (
         {"material": {"law": "veronda-westmann", "alpha": 0.1}},
@@ -102,3 +135,40 @@ def test_a_region_without_a_law_has_that_of_the_material():
     filled = parse(content).case(())
     assert [tissue.law for tissue in filled.tissues] == ["yeoh"] * 3
     assert filled.formulation == "yeoh"
+
+
+def test_terms_are_swept():
+    """A term without a share has what the others leave; equal terms are one case."""
+    steep = {"name": "steep", "alpha": [7.0, 9.0]}
+    swept = study(material={"law": "ogden", "terms": [{"share": [0.6, 0.7], "alpha": 2.0}, steep]})
+    assert [(axis.name, axis.path) for axis in swept.axes] == [
+        ("share", "material.terms[1].share"),
+        ("steep_alpha", "material.terms[2].alpha"),
+    ]
+    cases = list(swept.cases())
+    assert cases[0].material.further["share2"] == pytest.approx(0.4)
+    given = study(material={"law": "ogden", "terms": [{"share": 0.75, "alpha": 2.0}, {"share": 0.25, "alpha": 7.0}]})
+    rest = study(material={"law": "ogden", "terms": [{"share": 0.75, "alpha": 2.0}, {"alpha": 7.0}]})
+    assert case_key(given.case(())) == case_key(rest.case(()))
+    layer = SKIN | {"law": "ogden", "terms": [{"alpha": [7.0, 9.0]}]}
+    assert [axis.name for axis in study(body={"layer": [layer]}, material=YEOH).axes] == ["skin_alpha"]
+    both = {"law": "ogden", "terms": [{"share": 0.5, "alpha": [2.0, 3.0]}, {"alpha": [7.0, 9.0]}]}
+    with pytest.raises(StudyError, match="second dimension alpha: give its table a `name`"):
+        parse(raw(material=both))
+
+
+def test_fibres_are_swept_and_break_symmetry():
+    swept = study(
+        material={"law": "holzapfel", "fibres": FIBRES | {"k1": [0.2, 0.5], "direction": [[1, 0, 0], [1, 1, 0]]}}
+    )
+    assert [(axis.name, axis.path) for axis in swept.axes] == [
+        ("direction", "material.fibres.direction"),
+        ("k1", "material.fibres.k1"),
+    ]
+    assert [model_planes(case) for case in swept.cases()] == [("x", "y")] * 2 + [()] * 2
+    layer = SKIN | {"law": "holzapfel", "fibres": FIBRES | {"k2": [1.0, 2.0]}}
+    assert [axis.name for axis in study(body={"layer": [layer]}, material=YEOH).axes] == ["skin_k2"]
+    inclined = {"law": "holzapfel", "fibres": FIBRES | {"direction": [0, 1, 1]}}
+    assert model_planes(study(material=inclined).case(())) == ("x",)
+    everywhere = {"law": "holzapfel", "fibres": FIBRES | {"direction": [1, 1, 0], "dispersion": 1 / 3}}
+    assert model_planes(study(material=everywhere).case(())) == ("x", "y")
