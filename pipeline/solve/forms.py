@@ -170,52 +170,50 @@ class HyperelasticForms:
         self._fields = (elastic.displacement, *(pressure or ())[:1])
         self.directions = tuple(fem.Function(field.function_space) for field in self._fields)
 
-    @property
-    def _energy(self) -> Any:
+    def _derivative(self, *directions: tuple[int, Any]) -> Any:
+        """Return the derivative of the energy along ``directions``, each with the number of its field."""
         gradient = ufl.Identity(3) + ufl.grad(self._displacement)
-        measures = measures_of(self._space, self._cells, more=_MORE)
-        return sum(
-            LAWS[law].density(gradient, self._coefficients, self._pressure) * each for law, each in measures.items()
-        )
+        measures, found = measures_of(self._space, self._cells, more=_MORE), []
+        for law, measure in measures.items():
+            energy = LAWS[law].density(gradient, self._coefficients, self._pressure)
+            for column, direction in directions:
+                energy = energy.derivative(self._fields[column], direction, of_shape=column == 0)
+            found.append(energy.value * measure)
+        return sum(found)
 
-    @cached_property
-    def _derivatives(self) -> list[Any]:
-        return [ufl.derivative(self._energy, field, ufl.TestFunction(field.function_space)) for field in self._fields]
+    def _test(self, row: int) -> tuple[int, Any]:
+        return row, ufl.TestFunction(self._fields[row].function_space)
 
     @cached_property
     def energy(self) -> Any:
         """Stored energy; NaN where J < 0 anywhere."""
-        return form(self._energy)
+        return form(self._derivative())
 
     @cached_property
     def residuals(self) -> tuple[Any, ...]:
         """First derivatives of the energy: nodal forces, and the residual of the pressure."""
-        return tuple(map(form, self._derivatives))
+        return tuple(form(self._derivative(self._test(row))) for row in range(len(self._fields)))
 
     @cached_property
     def tangents(self) -> tuple[Any, ...]:
         """Second derivatives of the energy: K, and in mixed elements the coupling B and the block of the pressures."""
-        forces, *others = self._derivatives
-        pairs = [(forces, 0), *((other, column) for other in others for column in range(2))]
-        return tuple(form(self._derivative(of, column, ufl.TrialFunction)) for of, column in pairs)
+        pairs = [(row, column) for row in range(len(self._fields)) for column in range(row + 1)]
+        trials = [ufl.TrialFunction(field.function_space) for field in self._fields]
+        return tuple(form(self._derivative(self._test(row), (column, trials[column]))) for row, column in pairs)
 
     @cached_property
     def products(self) -> tuple[Any, ...]:
         """Products of the tangent with the ``directions``."""
-        columns = range(len(self._fields))
+        columns = [*enumerate(self.directions)]
         return tuple(
-            form(sum(self._derivative(of, column, lambda _, at=column: self.directions[at]) for column in columns))
-            for of in self._derivatives
+            form(sum(self._derivative(self._test(row), column) for column in columns))
+            for row in range(len(self._fields))
         )
 
     def set_directions(self) -> None:
         """Copy the fields to the ``directions``."""
         for direction, field in zip(self.directions, self._fields, strict=True):
             direction.x.array[:] = field.x.array
-
-    def _derivative(self, of: Any, column: int, direction: Any) -> Any:
-        field = self._fields[column]
-        return ufl.derivative(of, field, direction(field.function_space))
 
 
 def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:

@@ -7,12 +7,11 @@ from typing import Any
 
 import ufl
 
-from pipeline.solve.laws.law import Law, Of, isochoric
+from pipeline.solve.laws.law import Law, Of, Shape
 
 
-def _shape(gradient: Any, of: Of) -> Any:
-    _, first = isochoric(gradient)
-    return -of["lame_mu"] / 2 * of["limit"] * ufl.ln(1 - (first - 3) / of["limit"])
+def _shape(shape: Shape, of: Of) -> Any:
+    return -of["lame_mu"] / 2 * of["limit"] * ufl.ln(1 - (shape.first - 3) / of["limit"])
 
 
 LAW = Law(_shape, ("limit",))

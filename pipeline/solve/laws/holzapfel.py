@@ -9,13 +9,12 @@ from typing import Any
 
 import ufl
 
-from pipeline.solve.laws.law import Law, Of, isochoric
+from pipeline.solve.laws.law import Law, Of, Shape
 
 
-def _shape(gradient: Any, of: Of) -> Any:
-    volume, first = isochoric(gradient)
-    along = gradient * ufl.as_vector([of["fibre_x"], of["fibre_y"], of["fibre_z"]])
-    fourth, dispersion = volume ** (-2 / 3) * ufl.inner(along, along), of["dispersion"]
+def _shape(shape: Shape, of: Of) -> Any:
+    first, dispersion = shape.first, of["dispersion"]
+    fourth = shape.fourth(ufl.as_vector([of["fibre_x"], of["fibre_y"], of["fibre_z"]]))
     strain = dispersion * first + (1 - 3 * dispersion) * fourth - 1
     tension = ufl.conditional(ufl.gt(strain, 0), strain, 0)
     fibres = of["k1"] / of["k2"] * (ufl.exp(of["k2"] * tension**2) - 1)

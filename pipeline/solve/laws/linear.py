@@ -4,12 +4,12 @@ from typing import Any
 
 import ufl
 
-from pipeline.solve.laws.law import Law, Of
+from pipeline.solve.laws.law import Law, Of, Shape
 
 
-def _shape(gradient: Any, of: Of) -> Any:
-    strain = ufl.sym(gradient) - ufl.Identity(gradient.ufl_shape[0])
+def _shape(shape: Shape, of: Of) -> Any:
+    strain = ufl.sym(shape.gradient) - ufl.Identity(shape.gradient.ufl_shape[0])
     return of["lame_mu"] * ufl.inner(strain, strain)
 
 
-LAW = Law(_shape, modulus=lambda of: of["lame_lambda"], dilation=lambda gradient: ufl.tr(gradient) - 3)
+LAW = Law(_shape, modulus=lambda of: of["lame_lambda"], dilation=lambda shape: ufl.tr(shape.gradient) - 3)

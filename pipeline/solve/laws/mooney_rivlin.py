@@ -5,13 +5,12 @@ M. Mooney, J. Appl. Phys. 11, 1940; R. S. Rivlin, Phil. Trans. R. Soc. A 241, 19
 
 from typing import Any
 
-from pipeline.solve.laws.law import Law, Of, isochoric, second_isochoric
+from pipeline.solve.laws.law import Law, Of, Shape
 
 
-def _shape(gradient: Any, of: Of) -> Any:
-    volume, first = isochoric(gradient)
+def _shape(shape: Shape, of: Of) -> Any:
     share = of["c2"]
-    return of["lame_mu"] / 2 * ((1 - share) * (first - 3) + share * (second_isochoric(gradient, volume) - 3))
+    return of["lame_mu"] / 2 * ((1 - share) * (shape.first - 3) + share * (shape.second - 3))
 
 
 LAW = Law(_shape, ("c2",))

@@ -7,12 +7,12 @@ from typing import Any
 
 import ufl
 
-from pipeline.solve.laws.law import Law, Of
+from pipeline.solve.laws.law import Law, Of, Shape
 
 
-def _shape(gradient: Any, of: Of) -> Any:
-    mu = of["lame_mu"]
+def _shape(shape: Shape, of: Of) -> Any:
+    gradient, mu = shape.gradient, of["lame_mu"]
     return mu / 2 * (ufl.inner(gradient, gradient) - 3) - mu * ufl.ln(ufl.det(gradient))
 
 
-LAW = Law(_shape, modulus=lambda of: of["lame_lambda"])
+LAW = Law(_shape, modulus=lambda of: of["lame_lambda"], dilation=lambda shape: ufl.det(shape.gradient) - 1)

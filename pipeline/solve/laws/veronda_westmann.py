@@ -7,14 +7,13 @@ from typing import Any
 
 import ufl
 
-from pipeline.solve.laws.law import Law, Of, isochoric, second_isochoric
+from pipeline.solve.laws.law import Law, Of, Shape
 
 
-def _shape(gradient: Any, of: Of) -> Any:
-    volume, first = isochoric(gradient)
+def _shape(shape: Shape, of: Of) -> Any:
     alpha = of["alpha"]
-    stiffening = (ufl.exp(alpha * (first - 3)) - 1) / alpha
-    return of["lame_mu"] * (stiffening - (second_isochoric(gradient, volume) - 3) / 2)
+    stiffening = (ufl.exp(alpha * (shape.first - 3)) - 1) / alpha
+    return of["lame_mu"] * (stiffening - (shape.second - 3) / 2)
 
 
 LAW = Law(_shape, ("alpha",))

@@ -5,12 +5,11 @@ O. H. Yeoh, Rubber Chem. Technol. 66, 1993.
 
 from typing import Any
 
-from pipeline.solve.laws.law import Law, Of, isochoric
+from pipeline.solve.laws.law import Law, Of, Shape
 
 
-def _shape(gradient: Any, of: Of) -> Any:
-    _, first = isochoric(gradient)
-    x = first - 3
+def _shape(shape: Shape, of: Of) -> Any:
+    x = shape.first - 3
     return of["lame_mu"] / 2 * x * (1 + x * (of["c2"] + of["c3"] * x))
 
 
