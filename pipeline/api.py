@@ -52,7 +52,7 @@ class RunnableStudy:
     @property
     def shape(self) -> dict[str, int]:
         """The dimensions of the dataset and their lengths."""
-        return {axis.name: len(axis) for axis in self.declared.axes}
+        return {axis.name: len(axis) for axis in self.declared.axes if not axis.is_stage}
 
     @property
     def warnings(self) -> tuple[str, ...]:

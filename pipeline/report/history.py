@@ -20,7 +20,7 @@ _SUMS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error",
 _LARGEST = ("dofs", "cells", "memory", "machine_load", "time_spread", "balance")
 _TEXTS = ("message", "force_exact_message")
 # States of a history, by those of its solves: the first that occurs.
-_WORST = ("failed", "pending", "skipped", "lost", "ok")
+_WORST = ("failed", "partial", "pending", "skipped", "lost", "ok")
 # Powers of the depth to which contact is proportional on a half-space and a ball.
 _CONTACT = {"contact_area": 1.0, "contact_radius": 0.5}
 # Powers of the depth of forces that are no powers on a half-space.

@@ -71,10 +71,11 @@ def _facts(fields: Fields) -> list[str]:
     """Return, in words, the case, its force and the size of its mesh."""
     case, count = str(fields.case), f"{len(fields.cells):,} elements"
     facts = [case] if fields.case.axes else []
+    of = "elastic " if fields.case.probe.history else ""
     if not isnan(fields.force):
         bar = "" if isnan(fields.force_error) else f" ± {100 * fields.force_error:.2g} %"
         where = ", on the meridian" if fields.on_meridian else ""
-        facts.append(f"F = {write('force', float(f'{fields.force:.4g}'))}{bar}{where}")
+        facts.append(f"{of}F = {write('force', float(f'{fields.force:.4g}'))}{bar}{where}")
     return [*facts, f"{count}, {fields.dofs:,} unknowns" if fields.dofs else count]
 
 

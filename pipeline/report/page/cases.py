@@ -1,6 +1,7 @@
 """The table of cases: columns in the units people read, rows in the order in which a reader needs them."""
 
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from markupsafe import Markup
 
 from pipeline.pages import json_in_page
 from pipeline.quantities import LARGEST, QUANTITIES
+from pipeline.report.table import study_of
 from pipeline.report.values import by_case, relative
 from pipeline.report.words import heading as title_of_axis
 from pipeline.report.words import is_numeric, lengths, number, scale, symbol
@@ -107,7 +109,11 @@ def case_table(dataset: xr.Dataset) -> Table:
     size = dataset["status"].size
     states = [str(state) for state in dataset["status"].values.ravel()]
     dataset = dataset.assign({_SHARE: relative(dataset, "force_error")})
-    numbers = Column("case", "case", list(range(size)), "the number by which `epsmesh plan` knows it")
+    study = study_of(dataset)
+    stages = prod(len(axis) for axis in (study.axes if study else ()) if axis.is_stage)  # the last axis of a plan
+    numbers = Column(
+        "case", "case", [stages * (n + 1) - 1 for n in range(size)], "the number by which `epsmesh plan` knows it"
+    )
     axes = [_axis(dataset, dim, position, dims) for position, dim in enumerate(dims)]
     quantities = [_quantity(by_case(dataset, name), name) for name in _QUANTITIES if name in dataset]
     status = _texts("status", states, QUANTITIES["status"].meaning, is_filter=True)
