@@ -34,6 +34,7 @@ SCENES = {
     },
     "mixed": {"material": {"poisson": 0.49}, "solve": {"method": "iterative"}},
     "large": {"material": {"law": "neo-hookean"}},
+    "large, mixed": {"material": {"law": "neo-hookean", "poisson": 0.5}},
 }
 _PROGRAM = """
 import json, os, sys

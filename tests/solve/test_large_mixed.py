@@ -120,6 +120,20 @@ def test_agrees_with_displacement_elements():
         assert apart < 0.03 * mixed.force
 
 
+@pytest.mark.parametrize("poisson", [0.2, 0.4])
+def test_layers_agree_with_displacement_elements(poisson):
+    """Each region has a split of its own, and pressures jump between regions."""
+    layers = {"layer": [{"name": "skin", "thickness": "3 mm", "young": "40 kPa", "poisson": poisson}]}
+    mixed, displacement = (
+        next(iter(solve(body=layers, material=soft(0.45), probe={"depth": "0.6 mm"}, mesh={"element": each}).values()))
+        for each in ("mixed", "displacement")
+    )
+    assert mixed.status == displacement.status == "ok"
+    apart = abs(mixed.force - displacement.force)
+    assert apart <= displacement.force_error * displacement.force
+    assert apart < 0.015 * mixed.force
+
+
 def test_the_limit_of_incompressible_tissue():
     """F at ν → ½ tends to that at ½, linearly in 1 - 2ν."""
     forces = [force(material=soft(poisson), probe={"depth": "0.6 mm"}) for poisson in (0.49998, 0.49999, 0.5)]
