@@ -102,6 +102,8 @@ def test_meshes_that_may_have_to_follow_are_counted():
 def test_large_displacements_are_expected_to_take_many_solves():
     linear, large = (CostModel().seconds("solve", f"{kind} 2", 1e4, 0.4) for kind in ("displacement", "neo-hookean"))
     assert 20 < large / linear < 80  # 27 to 60 of them, as measured; more at a third of the radius
+    linear, large = (CostModel().seconds("solve", f"{kind} 2", 1e4, 0.3) for kind in ("mixed", "neo-hookean-mixed"))
+    assert 50 < large / linear < 200
 
 
 def test_the_error_of_an_estimate_is_that_of_the_prior_for_work_of_another_kind():

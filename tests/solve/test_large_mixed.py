@@ -1,6 +1,5 @@
 """Large displacements of nearly and fully incompressible bodies, with mixed elements."""
 
-import re
 from math import inf
 
 import numpy as np
@@ -194,10 +193,12 @@ def test_depths_of_a_sweep_share_one_load_path(monkeypatch):
         assert record.force_error == pytest.approx(alone.force_error, rel=2e-2)
 
 
-def test_a_depth_that_is_not_reached_fails_and_says_where():
+def test_a_depth_that_is_not_reached_is_partial_and_says_where():
     (record,) = solve(material=soft(0.5), probe={"depth": "9 mm"}).values()
-    assert record.status == "failed"
-    assert re.search(r"reached [0-9.]+ mm of 9 mm, where F is [0-9.]+ N", record.message)
+    assert record.status == "partial"
+    assert np.isnan(record.force)
+    assert 0 < record.depth_reached < 9e-3
+    assert f"reached {record.depth_reached * 1e3:.3g} mm of 9 mm" in record.message
 
 
 def test_ranks_agree():
