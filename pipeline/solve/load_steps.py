@@ -11,6 +11,9 @@ that of v = ∂u/∂d under the tangent K,
 (r'·K⁻¹ r' · r·K⁻¹ r)^½ is an upper bound of it that cannot vanish by chance, and is used instead. K is replaced by the
 operator of linear elasticity. At moderate depths this agrees within a few per cent; at larger ones the tangent of one
 degree more is not positive definite at the probe's edge.
+
+In mixed elements, r'·K⁻¹ r itself is used, which may have either sign, and N as in linear elasticity: the root of the
+squared energy norms that the preconditioner sees in r and in r'.
 """
 
 from collections.abc import Sequence
