@@ -173,13 +173,17 @@ class HyperelasticForms:
     def _derivative(self, *directions: tuple[int, Any]) -> Any:
         """Return the derivative of the energy along ``directions``, each with the number of its field."""
         gradient = ufl.Identity(3) + ufl.grad(self._displacement)
-        measures, found = measures_of(self._space, self._cells, more=_MORE), []
-        for law, measure in measures.items():
+        found = []
+        for law, measure in self._measures.items():
             energy = LAWS[law].density(gradient, self._coefficients, self._pressure)
             for column, direction in directions:
                 energy = energy.derivative(self._fields[column], direction, of_shape=column == 0)
             found.append(energy.value * measure)
         return sum(found)
+
+    @cached_property
+    def _measures(self) -> dict[str, Any]:
+        return measures_of(self._space, self._cells, more=_MORE)
 
     def _test(self, row: int) -> tuple[int, Any]:
         return row, ufl.TestFunction(self._fields[row].function_space)
