@@ -12,6 +12,7 @@ import ufl
 
 from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.shapes.tissue import lame
+from pipeline.solve.laws import LAWS
 
 # Parameters of every law.
 COEFFICIENTS = ("lame_lambda", "lame_mu")
@@ -41,7 +42,9 @@ class Parameters:
         return Parameters(*lame(young, poisson), poisson, law, tuple(further.items()))
 
     def value(self, name: str) -> float | None:
-        """Return a parameter by its name, None if the law has no such parameter."""
+        """Return a parameter of a law by its name, None if this law has no such parameter."""
+        if name not in COEFFICIENTS and not any(name in law.parameters for law in LAWS.values()):
+            raise KeyError(name)
         return getattr(self, name) if name in COEFFICIENTS else dict(self.further).get(name)
 
     @property
@@ -104,6 +107,11 @@ class MaterialLaw:
     def lame_mu(self) -> tuple[float, ...]:
         """Lamé's μ (Pa) of each region."""
         return tuple(each.lame_mu for each in self.parameters)
+
+    @property
+    def plane_moduli(self) -> tuple[float, ...]:
+        """E / (1 - ν²) (Pa) of each region."""
+        return tuple(each.plane_modulus for each in self.parameters)
 
     def softened(self, ratio: float) -> "MaterialLaw":
         """Return linear elasticity of the same μ, with λ/μ of each region limited to ``ratio``."""

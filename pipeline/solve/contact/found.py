@@ -136,7 +136,7 @@ class FoundContact:
         """Return the contact area of the modelled part."""
         candidates, law = self.obstacle.candidates, self.sweep.law
         modulus = np.empty(len(candidates))
-        of_facets = of_regions(law.values("plane_modulus"), candidates.regions, len(candidates.facets))
+        of_facets = of_regions(law.plane_moduli, candidates.regions, len(candidates.facets))
         modulus[candidates.facets] = of_facets[:, None]
         return contact_area(self.obstacle, self.found.active, self.found.state, modulus, self._plug.body.mirrored)
 
