@@ -12,6 +12,8 @@ import numpy as np
 from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
 
+from pipeline.arrays import FloatArray
+from pipeline.shapes.distance import Distance
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.rounded import Rounded
 from pipeline.shapes.section import Problems, Words, in_mm
@@ -104,6 +106,13 @@ class Indenter(Probe):
     @abstractmethod
     def contact_width(self) -> float:
         """Half the expected width (m) of contact: that on an elastic half-space."""
+
+    @abstractmethod
+    def distance(self, points: FloatArray) -> Distance:
+        """Return the signed distance of ``points`` (n, 3), in m, to the tool: to all that is above its :meth:`profile`.
+
+        Points are in the tool's own coordinates, with heights from its lowest point.
+        """
 
     # ---- properties of the footprint --------------------------------------------------------------------
 

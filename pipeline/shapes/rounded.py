@@ -1,4 +1,4 @@
-"""Section of a tool of revolution or of an edge: a straight flank at an angle, with a rounded tip."""
+"""Section of a tool of revolution or of an edge: a straight flank at an angle, with a rounded or a flat tip."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,20 +19,22 @@ _WEDGE = 1 + log(2)
 class Rounded:
     """A flank at ``angle`` (rad) to the axis, tangent to a rounding of radius ``tip`` (m). Heights are above the tip.
 
-    With a zero angle it is a ball: the flank begins at the equator, where the ball ends.
+    With a zero angle it is a ball: the flank begins at the equator, where the ball ends. Up to the distance ``flat``
+    (m) from the axis it is flat, and the rounding begins there.
     """
 
     angle: float
     tip: float = 0.0
+    flat: float = 0.0
 
     @property
     def tangent(self) -> float:
         """Distance (m) from the axis at which the rounding ends."""
-        return self.tip * cos(self.angle)
+        return self.flat + self.tip * cos(self.angle)
 
     def height(self, distance: FloatArray) -> FloatArray:
         """Return heights (n,), in m, at distances (n,) from the axis, in m; infinite beyond a ball's equator."""
-        within = np.minimum(distance, self.tangent)
+        within = self._on_rounding(distance)
         # In this form R - (R² - r²)^½ has no cancellation near the lowest point.
         root = np.sqrt(np.maximum(self.tip**2 - within**2, 0.0))
         low = within**2 / np.maximum(self.tip + root, 1e-300)
@@ -43,11 +45,15 @@ class Rounded:
 
     def slope(self, distance: FloatArray) -> FloatArray:
         """Return the slopes (n,) at distances (n,) from the axis (m)."""
-        within = np.minimum(distance, self.tangent)
+        within = self._on_rounding(distance)
         rounding = within / np.maximum(np.sqrt(np.maximum(self.tip**2 - within**2, 0.0)), 1e-300)
         flank = 1 / tan(self.angle) if self.angle else inf
         slope: FloatArray = np.where(distance < self.tangent, rounding, flank)
         return slope
+
+    def _on_rounding(self, distance: FloatArray) -> FloatArray:
+        """Return the lengths (n,), in m, of the rounding between its beginning and distances (n,) from the axis."""
+        return np.clip(distance, self.flat, self.tangent) - self.flat
 
     def reach(self, depth: float) -> float:
         """Return the distance (m) from the axis at which it is ``depth`` (m) above its lowest point.
@@ -56,7 +62,8 @@ class Rounded:
         """
         end = self.tip * (1 - sin(self.angle))
         if depth < end or not self.angle:
-            return float(np.sqrt(max(2 * self.tip * depth - depth**2, 0.0))) if depth < self.tip else self.tip
+            within = float(np.sqrt(max(2 * self.tip * depth - depth**2, 0.0))) if depth < self.tip else self.tip
+            return self.flat + within
         return self.tangent + (depth - end) * tan(self.angle)
 
     def contact_radius(self, depth: float) -> float:

@@ -6,6 +6,8 @@ from math import pi
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
+from pipeline.shapes.contour import Contour
+from pipeline.shapes.distance import Distance, revolved
 from pipeline.shapes.indenter import CANDIDATES, Indenter
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes.disc import Disc
@@ -51,6 +53,10 @@ class RoundIndenter(Indenter):
         distance = np.hypot(points[:, 0], points[:, 1])
         height = self.section.height(np.minimum(distance, self.limit))
         return np.where(distance <= (1 + ON_EDGE) * self.limit, height, np.inf)
+
+    def distance(self, points: FloatArray) -> Distance:
+        """Return the distance to the tool and the shaft above it."""
+        return revolved(Contour(self.section, self.limit), points)
 
     def ends_at(self, points: FloatArray) -> BoolArray:
         """Return true if the footprint is as large as the tool."""

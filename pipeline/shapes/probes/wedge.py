@@ -6,6 +6,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
+from pipeline.shapes.contour import Contour
+from pipeline.shapes.distance import Distance, extruded, intersection, slab
 from pipeline.shapes.indenter import CANDIDATES, Indenter
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes.blade import Blade
@@ -83,6 +85,10 @@ class Wedge(Indenter):
         """Return the heights (m) of the tool, infinite beyond its ends."""
         height = self.section.height(np.abs(points[:, 1]))
         return np.where(np.abs(points[:, 0]) <= (1 + ON_EDGE) * self.length / 2, height, np.inf)
+
+    def distance(self, points: FloatArray) -> Distance:
+        """Return the distance to the tool and to what is above it between its ends."""
+        return intersection(extruded(Contour(self.section), points), slab(self.length / 2, points, axis=0))
 
     def ends_at(self, points: FloatArray) -> BoolArray:
         """Return a mask of points at its two ends."""

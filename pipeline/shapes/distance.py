@@ -1,0 +1,110 @@
+"""Signed distance to a tool, for contact at the deformed place.
+
+A tool is all that is above its profile: above the largest radius of its profile it goes on as a cylinder or a prism
+(a ball is the end of a rod of its own radius, a cone that of its shaft). This is a convex region, so its signed
+distance is the largest of the distances to all planes that touch it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.shapes.contour import Contour
+
+# Points are on the axis, or in the plane of an edge, within this share of their height.
+_ON_AXIS = 1e-9
+_DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@dataclass(frozen=True)
+class Distance:
+    """Signed distance of n points to a tool, with its derivatives.
+
+    ``gap`` (n,), in m, is > 0 outside the tool and < 0 inside. ``normal`` (n, 3) is its gradient: the tool's outward
+    unit normal at the nearest point of its surface. ``curvature`` (n, 3, 3), in 1/m, is its Hessian.
+
+    All are finite. Where the gradient is not unique - on the axis above a sharp tip, or above the centre of a rounded
+    one - the gap is the distance along the axis, and the normal is the axis. Deeper in a rounding than half its radius
+    the curvature is limited to twice that of the rounding. Sharp tips, edges and corners add no curvature: it would be
+    unbounded where they touch.
+    """
+
+    gap: FloatArray
+    normal: FloatArray
+    curvature: FloatArray
+
+
+def revolved(contour: Contour, points: FloatArray) -> Distance:
+    """Return the distance to the body of revolution of an ``contour``, from ``points`` (n, 3), in m."""
+    radius = np.hypot(points[:, 0], points[:, 1])
+    found = contour.distance(radius, points[:, 2])
+    outward = points[:, :2] / np.maximum(radius, 1e-300)[:, None]
+    aside, down = found.normal.T
+    normal = np.column_stack([aside[:, None] * outward, down])
+    slope = np.column_stack([-down[:, None] * outward, aside])
+    hoop = np.column_stack([-outward[:, 1], outward[:, 0], np.zeros_like(radius)])
+    # The radius at the nearest point of the surface; zero at a sharp tip.
+    foot = radius - found.gap * aside
+    around = np.where(foot > _ON_AXIS * radius, aside / np.maximum(np.maximum(radius, foot / 2), 1e-300), 0.0)
+    curvature = _outer(slope, found.curvature) + _outer(hoop, around)
+    return _along_axis(Distance(found.gap, normal, curvature), contour, radius, points[:, 2], np.diag([1.0, 1.0, 0.0]))
+
+
+def extruded(contour: Contour, points: FloatArray) -> Distance:
+    """Return the distance to an endless edge along the first coordinate, with ``contour`` on both of its sides."""
+    beside = np.abs(points[:, 1])
+    found = contour.distance(beside, points[:, 2])
+    side, none = np.where(points[:, 1] < 0, -1.0, 1.0), np.zeros_like(beside)
+    aside, down = found.normal.T
+    normal = np.column_stack([none, side * aside, down])
+    slope = np.column_stack([none, -down * side, aside])
+    distance = Distance(found.gap, normal, _outer(slope, found.curvature))
+    return _along_axis(distance, contour, beside, points[:, 2], np.diag([0.0, 1.0, 0.0]))
+
+
+def slab(half: float, points: FloatArray, axis: int) -> Distance:
+    """Return the distance to all that is within ``half`` (m) of zero in the coordinate ``axis``."""
+    normal = np.zeros_like(points)
+    normal[:, axis] = np.where(points[:, axis] < 0, -1.0, 1.0)
+    return Distance(np.abs(points[:, axis]) - half, normal, np.zeros((*points.shape, 3)))
+
+
+def intersection(first: Distance, second: Distance, rounding: float = 0.0) -> Distance:
+    """Return the distance to what is inside both, with the edge between them rounded to a radius (m).
+
+    Their normals must be at right angles to each other wherever the points are beyond both.
+    """
+    beyond = np.maximum(np.column_stack([first.gap, second.gap]) + rounding, 0.0)
+    both = (beyond > 0).all(axis=1)
+    length = np.where(both, np.hypot(*beyond.T), 1.0)
+    one, two = (beyond / length[:, None]).T
+    is_first = first.gap > second.gap
+    plain = np.where(is_first[:, None], first.normal, second.normal)
+    normal = np.where(both[:, None], one[:, None] * first.normal + two[:, None] * second.normal, plain)
+    curvature = np.where(is_first[:, None, None], first.curvature, second.curvature)
+    shared = one[:, None, None] * first.curvature + two[:, None, None] * second.curvature
+    if rounding:
+        across = two[:, None] * first.normal - one[:, None] * second.normal
+        shared += _outer(across, 1 / np.maximum(length, rounding / 2))
+    gap = np.where(both, length - rounding, np.maximum(first.gap, second.gap))
+    return Distance(gap, normal, np.where(both[:, None, None], shared, curvature))
+
+
+def _along_axis(
+    distance: Distance, contour: Contour, beside: FloatArray, height: FloatArray, across: FloatArray
+) -> Distance:
+    """Return the distance with its values on the axis replaced by those along it."""
+    on_axis = beside <= _ON_AXIS * np.abs(height)
+    curvature = contour.curvature_at_axis(height)[:, None, None] * across
+    return Distance(
+        np.where(on_axis, -height, distance.gap),
+        np.where(on_axis[:, None], _DOWN, distance.normal),
+        np.where(on_axis[:, None, None], curvature, distance.curvature),
+    )
+
+
+def _outer(vectors: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the products (n, 3, 3) of vectors (n, 3) with themselves, with weights (n,)."""
+    product: FloatArray = weights[:, None, None] * vectors[:, :, None] * vectors[:, None, :]
+    return product
