@@ -7,7 +7,16 @@ import dolfinx
 import gmsh
 from petsc4py import PETSc
 
-from pipeline.compat.code import EVERYWHERE, Code, compile_code, function_space, make_form, renumbered_space
+from pipeline.compat.code import (
+    EVERYWHERE,
+    Code,
+    coefficients_of,
+    compile_code,
+    function_space,
+    kernels_of,
+    make_form,
+    renumbered_space,
+)
 from pipeline.compat.elements import cell_dofs, degree, element, mixed_element, reference_element
 from pipeline.compat.matrices import add_from_ghosts, add_matrix, assemble_matrix, dirichletbc, ghosted_vector
 from pipeline.compat.meshes import (
@@ -28,6 +37,7 @@ __all__ = [
     "assemble_matrix",
     "cell_dofs",
     "cell_tags",
+    "coefficients_of",
     "compile_code",
     "create_mesh",
     "degree",
@@ -38,6 +48,7 @@ __all__ = [
     "ghosted_vector",
     "gmsh_session",
     "inside_face",
+    "kernels_of",
     "make_form",
     "mixed_element",
     "original_cells",

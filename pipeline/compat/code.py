@@ -81,7 +81,7 @@ def _form_of_code(expression: Any, mesh: Any, tags: Any, code: Code, _: dict[int
     if _IS_OLD:
         marked = {fem.IntegralType.cell: tags}
         return _wrapped(code, address, spaces, coefficients, constants, marked, mesh)
-    cells = {fem.IntegralType.cell: [(m, _cells(mesh, tags, m)) for m in sorted(_kernels(code)) if m != EVERYWHERE]}
+    cells = {fem.IntegralType.cell: [(m, _cells(mesh, tags, m)) for m in sorted(kernels_of(code)) if m != EVERYWHERE]}
     maps = _entity_maps()
     forms = [address] if isinstance(maps, list) else address  # since 0.10 one for each kind of cells
     return _wrapped(code, forms, spaces, coefficients, constants, cells, maps, mesh)
@@ -89,7 +89,8 @@ def _form_of_code(expression: Any, mesh: Any, tags: Any, code: Code, _: dict[int
 
 def _form_of_addresses(expression: Any, mesh: Any, tags: Any, code: Code, kernels: dict[int, int]) -> Any:
     """Make the C++ form of kernels: those of ``kernels``, and the generated ones for other marks."""
-    chosen = _kernels(code) | {mark: kernel for mark, kernel in kernels.items() if mark in _kernels(code)}
+    generated = kernels_of(code)
+    chosen = generated | {mark: kernel for mark, kernel in kernels.items() if mark in generated}
     spaces, constants, coefficients = _spaces(expression), _constants(expression), _coefficients(expression, code[0])
     if _IS_OLD:
         marked = {fem.IntegralType.cell: (list(chosen.items()), tags)}
@@ -113,7 +114,7 @@ def _wrapped(code: Code, *arguments: Any) -> Any:
     return made
 
 
-def _kernels(code: Code) -> dict[int, int]:
+def kernels_of(code: Code) -> dict[int, int]:
     """Return the addresses of the generated kernels for cells, by mark."""
     compiled, module, _ = code
     if hasattr(compiled, "form_integrals"):  # since 0.7; integrals over cells come first
@@ -139,12 +140,16 @@ def _spaces(expression: Any) -> list[Any]:
     return [argument.ufl_function_space()._cpp_object for argument in expression.arguments()]
 
 
-def _coefficients(expression: Any, compiled: Any) -> list[Any]:
-    """Return the functions of an expression, in the order in which its compiled code has them."""
+def coefficients_of(expression: Any, compiled: Any) -> list[Any]:
+    """Return the functions (UFL) of an expression, in the order in which its compiled code has them."""
     name = "original_coefficient_position"
     positions = getattr(compiled, name if _IS_OLD else name + "s")
     functions = expression.coefficients()
-    return [functions[positions[i]]._cpp_object for i in range(compiled.num_coefficients)]
+    return [functions[positions[i]] for i in range(compiled.num_coefficients)]
+
+
+def _coefficients(expression: Any, compiled: Any) -> list[Any]:
+    return [function._cpp_object for function in coefficients_of(expression, compiled)]
 
 
 def _constants(expression: Any) -> list[Any]:

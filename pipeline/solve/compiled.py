@@ -10,6 +10,7 @@ import hashlib
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,8 @@ from pipeline import compat
 from pipeline.arrays import FloatArray
 from pipeline.files import cache_folder
 
+# Integrands of large displacements are no polynomials: quadrature degrees added to those of linear elasticity.
+MORE = 2
 _known: dict[tuple[str, str], compat.Code] = {}
 
 
@@ -35,6 +38,28 @@ def form(expression: Any, kernels: dict[int, int] | None = None) -> Any:
     mesh = domain.ufl_cargo()
     code = _code(mesh.comm, expression, expression.signature())
     return compat.make_form(expression, mesh, tags.get("cell"), code, kernels or {})
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A compiled cell kernel: its ``address``, and the ``coefficients`` (UFL) whose dofs it reads, in this order.
+
+    ``code`` keeps it in memory.
+    """
+
+    address: int
+    coefficients: tuple[Any, ...]
+    code: compat.Code
+
+
+def kernel(comm: MPI.Comm, expression: Any) -> Kernel:
+    """Return the kernel of a form with one integral over cells, compiled at its first use; collective.
+
+    The form may have functions of UFL alone.
+    """
+    code = _code(comm, expression, expression.signature())
+    (address,) = compat.kernels_of(code).values()
+    return Kernel(address, tuple(compat.coefficients_of(expression, code[0])), code)
 
 
 def space(mesh: Any, element: Any) -> Any:
@@ -70,6 +95,11 @@ def quadrature_degree(degree: int) -> int:
     degree 4 has points at which the map is singular.
     """
     return max(6, 2 * degree)
+
+
+def hyperelastic_degree(degree: int) -> int:
+    """Return the degree of quadrature on straight cells at large displacements, whose integrands are no polynomials."""
+    return 2 * degree - 2 + MORE
 
 
 # ---- vectors ----------------------------------------------------------------------------------------

@@ -19,10 +19,11 @@ from pipeline.arrays import BoolArray, Int32Array
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
-from pipeline.solve.compiled import cellwise_space, form, quadrature_degree, scalar_space, vector_space
+from pipeline.solve.compiled import MORE, cellwise_space, form, quadrature_degree, scalar_space, vector_space
 from pipeline.solve.laws import LAWS
 from pipeline.solve.laws.law import Pressure
 from pipeline.solve.physics import COEFFICIENTS, MaterialLaw, of_regions, strain
+from pipeline.solve.point_law import PointLaw
 
 
 class CellKernel(Protocol):
@@ -35,8 +36,6 @@ class CellKernel(Protocol):
 _NEITHER, _STRAIGHT, _CURVED = 0, 1, 2
 _FLAT = 1e-9
 _curved: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
-# Integrands of large displacements are no polynomials: quadrature degrees added to those of linear elasticity.
-_MORE = 2
 
 
 class ElasticForms:
@@ -183,7 +182,7 @@ class HyperelasticForms:
 
     @cached_property
     def _measures(self) -> dict[str, Any]:
-        return measures_of(self._space, self._cells, more=_MORE)
+        return measures_of(self._space, self._cells, more=MORE)
 
     def _test(self, row: int) -> tuple[int, Any]:
         return row, ufl.TestFunction(self._fields[row].function_space)
@@ -197,13 +196,6 @@ class HyperelasticForms:
     def residuals(self) -> tuple[Any, ...]:
         """First derivatives of the energy: nodal forces, and the residual of the pressure."""
         return tuple(form(self._derivative(self._test(row))) for row in range(len(self._fields)))
-
-    @cached_property
-    def tangents(self) -> tuple[Any, ...]:
-        """Second derivatives of the energy: K, and in mixed elements the coupling B and the block of the pressures."""
-        pairs = [(row, column) for row in range(len(self._fields)) for column in range(row + 1)]
-        trials = [ufl.TrialFunction(field.function_space) for field in self._fields]
-        return tuple(form(self._derivative(self._test(row), (column, trials[column]))) for row, column in pairs)
 
     @cached_property
     def products(self) -> tuple[Any, ...]:
@@ -300,7 +292,9 @@ def compile_forms(
             large = HyperelasticForms(space, elastic, laws, pressure)
             _ = large.residuals, large.products
             if level == degree:
-                _ = large.energy, large.tangents
+                _ = large.energy
+                for law in sorted(set(laws)):
+                    PointLaw(mesh, law, is_mixed=mixed is not None).compile()
 
 
 def one_cell(*, straight: bool) -> MeshArrays:

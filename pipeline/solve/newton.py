@@ -1,8 +1,8 @@
 """Newton's method for the equilibrium of a hyperelastic body with prescribed displacements.
 
 PETSc's SNES with a line search. The linear systems are solved by conjugate gradients, in mixed elements by generalised
-conjugate residuals. The preconditioner is that of linear elasticity, which is set up once: at moderate strain the
-tangent is close to linear elasticity.
+conjugate residuals. The tangent is matrix-free. The preconditioner is that of linear elasticity, which is set up once:
+at moderate strain the tangent is close to linear elasticity.
 """
 
 from collections.abc import Callable, Iterator
@@ -11,16 +11,13 @@ from typing import Any, Protocol
 
 import numpy as np
 from dolfinx import fem
-from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline import compat
 from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import assemble
 from pipeline.solve.elements.base import Elements, Fields
-from pipeline.solve.elements.pressures import without_columns
 from pipeline.solve.krylov import INDEFINITE, SOLVERS, configure, explain, keep, solver_of
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
@@ -65,20 +62,11 @@ class HyperelasticBody:
         self._elements, self._solver = elements, solver
         self._space, self._unit = elements.displacements, elements.unit(law)
         self._held = self._space.prescribed_owned
-        self._forms = forms = elements.large_forms(law)
+        self._forms = elements.large_forms(law)
         self._stack = ExitStack()
-        self._blocks = [keep(self._stack, fem_petsc.create_matrix(tangent)) for tangent in forms.tangents]
-        stiffness, *others = self._blocks
-        stiffness.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        stiffness.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
-        self.tangent = stiffness
-        if others:
-            coupling, of_pressures = others
-            transpose = keep(self._stack, PETSc.Mat().createTranspose(coupling))
-            nest = PETSc.Mat().createNest([[stiffness, transpose], [coupling, of_pressures]], comm=self._space.comm)
-            self.tangent = keep(self._stack, nest)
-        start = 3 * self._space.space.dofmap.index_map.local_range[0]
-        self._rows = (self._held + start).astype(PETSc.IntType)
+        self._tangent = elements.tangent(law)
+        self._stack.callback(self._tangent.close)
+        self.tangent = self._tangent.matrix
         self.iterations = 0
 
     def close(self) -> None:
@@ -131,10 +119,8 @@ class HyperelasticBody:
         """
         with ExitStack() as stack, self.state() as load:
             self._assemble(state)
-            self.tangent.mult(prescribed, load)
-            load.scale(-1.0)
+            load.array[:] = -self._tangent.whole(prescribed.array[: self._space.owned])
             load.array[self._held] = prescribed.array[self._held]
-            self._hold()
             # Prescribed values are in the initial guess: the preconditioner may ignore these dofs.
             result.set(0.0)
             result.array[self._held] = prescribed.array[self._held]
@@ -164,7 +150,7 @@ class HyperelasticBody:
 
     @property
     def _is_mixed(self) -> bool:
-        return len(self._blocks) > 1
+        return len(self._forms.residuals) > 1
 
     def _kind(self, solver: str) -> str:
         return f"{solver}, mixed" if self._is_mixed else solver
@@ -183,21 +169,11 @@ class HyperelasticBody:
 
     def _jacobian(self, _: PETSc.SNES, state: PETSc.Vec, tangent: PETSc.Mat, __: PETSc.Mat) -> None:
         self._assemble(state)
-        self._hold()
 
     def _assemble(self, state: PETSc.Vec) -> None:
         self.show(state)
-        for tangent, block in zip(self._forms.tangents, self._blocks, strict=True):
-            compat.assemble_matrix(tangent, [], 1.0, block)
-        self._elements.weigh_blocks(self._blocks[1:])
+        self._tangent.update()
         self.tangent.assemble()
-
-    def _hold(self) -> None:
-        """Eliminate prescribed dofs."""
-        stiffness, *others = self._blocks
-        stiffness.zeroRowsColumns(self._rows, 1.0)
-        for coupling in others[:1]:
-            without_columns(coupling, self._held)
 
     def _shorten(self, here: PETSc.Vec, step: PETSc.Vec) -> bool:
         """Halve a ``step`` (which is subtracted) until no tissue is inside out after it, and less energy is stored.

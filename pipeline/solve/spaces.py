@@ -22,7 +22,7 @@ from pipeline.solve.compiled import assemble, fill, vector_space
 from pipeline.solve.conditions import Conditions, Front
 from pipeline.solve.forms import ElasticForms, curved_cells, has_curved_cells
 from pipeline.solve.kernels.assembly import StraightStiffness, cell_kernel
-from pipeline.solve.kernels.product import DEGREES, CellOperator, CellStiffness
+from pipeline.solve.kernels.product import DEGREES, CellStiffness
 from pipeline.solve.loads import Applied, apply_loads
 from pipeline.solve.movement import Loads, Motion
 from pipeline.solve.physics import MaterialLaw
@@ -111,7 +111,7 @@ class ElasticSpace:
 
     @stage("assembly")
     def _product(self, law: MaterialLaw) -> PETSc.Mat:
-        return CellOperator(self.cells, law).matrix()
+        return self.cells.operator(law).matrix()
 
     @stage("assembly")
     def _assemble(self, law: MaterialLaw, *, whole: bool) -> PETSc.Mat:
@@ -137,7 +137,7 @@ class ElasticSpace:
             self.forms.set_law(law)
             assemble(self.forms.action, result)
         else:
-            result.array[:] = CellOperator(self.cells, law).whole(self.forms.displacement.x.array[: self.owned])
+            result.array[:] = self.cells.operator(law).whole(self.forms.displacement.x.array[: self.owned])
 
     def residual_of(self, other: "ElasticSpace", law: MaterialLaw, result: PETSc.Vec) -> None:
         """Write -K u (N), zero at prescribed dofs, for the displacement u of an ``other`` space, into ``result``.

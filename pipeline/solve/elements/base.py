@@ -16,6 +16,7 @@ from pipeline.solve import SolveError
 from pipeline.solve.compiled import global_sum, vector
 from pipeline.solve.conditions import Conditions, Front
 from pipeline.solve.crack import Release
+from pipeline.solve.elements.tangent import Tangent
 from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.krylov import is_direct
 from pipeline.solve.linear_solver import Level
@@ -323,8 +324,8 @@ class Elements(ABC):
         """Change a ``residual`` from the unit of the forms' fields to that of these elements' fields."""
 
     @abstractmethod
-    def weigh_blocks(self, blocks: Sequence[PETSc.Mat]) -> None:
-        """Do the same with the ``blocks`` of the tangent besides K: the coupling, and that of pressures."""
+    def tangent(self, law: MaterialLaw) -> Tangent:
+        """Return the tangent of a law of large displacements; the caller closes it."""
 
     def _pressure(self, law: MaterialLaw) -> tuple[Any, Any] | None:
         """Return the pressure of the forms and its compliance, or None."""

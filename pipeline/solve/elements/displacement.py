@@ -10,6 +10,7 @@ from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve.compiled import vector
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.elements.base import Column, Elements, Fields, HierarchicalEstimate, Linearised, Solver, level_of
+from pipeline.solve.elements.tangent import Tangent
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import DIRECT_LIMIT
 from pipeline.solve.linear_solver import Level, LinearSolver
@@ -79,8 +80,9 @@ class DisplacementElements(Elements):
     def weigh(self, residual: Fields) -> None:
         """Do nothing: both units are the same."""
 
-    def weigh_blocks(self, blocks: Sequence[PETSc.Mat]) -> None:
-        """Do nothing: K has no further blocks."""
+    def tangent(self, law: MaterialLaw) -> Tangent:
+        """Return the tangent of a law of large displacements; the caller closes it."""
+        return Tangent(self.displacements, law)
 
     def operator(self, stiffness: PETSc.Mat, law: MaterialLaw, *, entries: bool) -> Callable[[Fields, Fields], None]:
         """Return a function that writes K u into other fields."""

@@ -23,6 +23,7 @@ from pipeline.solve.compiled import vector
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.elements.base import Column, Elements, Fields, HierarchicalEstimate, Linearised, Solver
 from pipeline.solve.elements.pressures import Pressures
+from pipeline.solve.elements.tangent import Tangent
 from pipeline.solve.krylov import keep
 from pipeline.solve.linear_solver import Level
 from pipeline.solve.movement import Movement
@@ -136,10 +137,9 @@ class MixedElements(Elements):
         """Change the unit of the residual of pressures."""
         residual[1].scale(self.pressures.unit)
 
-    def weigh_blocks(self, blocks: Sequence[PETSc.Mat]) -> None:
-        """Change the unit of coupling and block of pressures."""
-        for power, block in enumerate(blocks, start=1):
-            block.scale(self.pressures.unit**power)
+    def tangent(self, law: MaterialLaw) -> Tangent:
+        """Return the tangent of a law of large displacements; the caller closes it."""
+        return Tangent(self.displacements, law, self.pressures)
 
     def _pressure(self, law: MaterialLaw) -> tuple[Any, Any]:
         compliance = self.displacements.forms.by_region(SplitLaw.of(law).compliance)

@@ -44,8 +44,8 @@ class Pressures:
         self.whole_dofs = whole_points(self.space, body)
         self._stack = ExitStack()
         with stage("assembly"):
-            self._products = CellPressures(self.space, displacements.cells)
-            self.unit = self._products.unit
+            self.cells = CellPressures(self.space, displacements.cells)
+            self.unit = self.cells.unit
 
     def close(self) -> None:
         """Free the matrices."""
@@ -82,12 +82,12 @@ class Pressures:
 
     def weighed(self) -> FloatArray:
         """Return M p for the pressure of the forms, owned dofs."""
-        return self._products.weigh(self.values)
+        return self.cells.weigh(self.values)
 
     def pull(self, result: PETSc.Vec, *, checked: bool) -> None:
         """Add Bᵀ p, for all displacement dofs, to ``result``. ``checked``: see :meth:`ElasticSpace.apply`."""
         if not checked:
-            result.array[:] += self._products.pull(self.values, whole=True)
+            result.array[:] += self.cells.pull(self.values, whole=True)
             return
         with vector(self._displacements.space) as pull:
             assemble(self.forms.pull, pull)
@@ -97,14 +97,14 @@ class Pressures:
         """Write B u, for all displacement dofs, into ``result``. ``checked``: see :meth:`ElasticSpace.apply`."""
         if not checked:
             displacement = self._displacements.forms.displacement.x.array[: self._displacements.owned]
-            result.array[:] = self._products.dilation(displacement, whole=True)
+            result.array[:] = self.cells.dilation(displacement, whole=True)
             return
         assemble(self.forms.dilation, result)
         result.scale(self.unit)
 
     @cached_property
     def _shells(self) -> tuple[PETSc.Mat, PETSc.Mat]:
-        coupling, mass = (keep(self._stack, kind(self._products).matrix()) for kind in (Coupling, Mass))
+        coupling, mass = (keep(self._stack, kind(self.cells).matrix()) for kind in (Coupling, Mass))
         return coupling, mass
 
     @cached_property

@@ -54,20 +54,20 @@ class CurvedCells:
     def __init__(self, space: Any, which: Int32Array, dofs: Int32Array):
         """``which`` are the numbers of the curved cells, ``dofs`` (cells, points) the points of all local cells."""
         self.lanes, degree = Lanes(which, dofs), compat.degree(space)
-        self._quadrature = quadrature_degree(degree)
-        weights, _, of_geometry = reference(2, self._quadrature)
+        self.quadrature = quadrature_degree(degree)
+        weights, _, of_geometry = reference(2, self.quadrature)
         nodes = space.mesh.geometry.x[compat.geometry_dofs(space.mesh)[which]]
         self.roots = np.zeros((self.lanes.batches, len(weights), LANES))
         maps = np.zeros((self.lanes.batches, len(weights), 9, LANES))
         sizes = len(which), nodes.shape[1], len(weights)
-        call("map_curved", *sizes, nodes, _by_points(of_geometry), weights, maps, self.roots)
+        call("map_curved", *sizes, nodes, by_points(of_geometry), weights, maps, self.roots)
         self.maps = _in_both(maps)
         self.signs = _in_both(np.sign(weights))  # some weights are negative
-        self.gradients = _in_both(_by_points(reference(degree, self._quadrature)[2]))
+        self.gradients = _in_both(by_points(reference(degree, self.quadrature)[2]))
 
     def values(self, degree: int) -> FloatArray:
         """Return the shape functions of ``degree`` at the quadrature points, (quadrature, functions)."""
-        return np.ascontiguousarray(reference(degree, self._quadrature)[1])
+        return np.ascontiguousarray(reference(degree, self.quadrature)[1])
 
     @property
     def nbytes(self) -> int:
@@ -146,6 +146,15 @@ def corners(mesh: Any) -> FloatArray:
     return np.ascontiguousarray(mesh.geometry.x[compat.geometry_dofs(mesh)[:, :4]])
 
 
+def roots(points: FloatArray) -> FloatArray:
+    """Return the signed root of the volume ratio of the cells' maps, (n, 4, 3); its sign is the determinant's."""
+    first, second, third = (points[:, 1:] - points[:, :1]).transpose(1, 2, 0)
+    determinants = sum(
+        first[i] * (second[j] * third[k] - second[k] * third[j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+    )
+    return np.sign(determinants) * np.sqrt(np.abs(determinants))
+
+
 def reference(degree: int, quadrature: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return weights, values (q, i) and gradients (a, q, i) of the functions of ``degree`` on the reference cell.
 
@@ -169,6 +178,6 @@ def _in_both(values: FloatArray) -> dict[str, np.ndarray]:
     return {"float64": values, "float32": values.astype(np.float32)}
 
 
-def _by_points(gradients: FloatArray) -> FloatArray:
+def by_points(gradients: FloatArray) -> FloatArray:
     """Return gradients (a, q, i) as (q, i, a)."""
     return np.ascontiguousarray(gradients.transpose(1, 2, 0))

@@ -70,3 +70,22 @@ void restrict_to(int rows, const int* offsets, const int* points, const float* w
 double largest(int count, const double* x);
 void to_single(int count, double scale, const double* x, float* y);
 void to_double(int count, double scale, const float* x, double* y);
+
+/* tangent.c: the tangent at large displacements */
+void evaluate_moduli(int cells, int points, int quadrature, const int* dofs, const double* maps, const double* roots,
+                     int step, const double* factors, const double* gradients, const double* u, int count,
+                     const int* pressures, const double* values, const double* p, const int* region,
+                     const uint64_t* kernels, const int* positions, const double* constants, int most, int outputs,
+                     float* found);
+void add_tangent_diagonal(int points, int quadrature, int batches, const int* dofs, const double* maps, int step,
+                          const double* gradients, const float* moduli, float* diagonal);
+void add_tangent_dilation(int points, int quadrature, int batches, const int* dofs, const double* maps, int step,
+                          const double* gradients, const float* coupling, int count, const int* pressures,
+                          const double* values, const double* x, double* y);
+void add_tangent_pull(int points, int quadrature, int batches, const int* dofs, const double* maps, int step,
+                      const double* gradients, const float* coupling, int count, const int* pressures,
+                      const double* values, const double* x, double* y);
+void add_tangent(int points, int quadrature, int batches, const int* dofs, const float* maps, int step,
+                 const float* gradients, const float* moduli, const float* x, float* y);
+void add_tangent_double(int points, int quadrature, int batches, const int* dofs, const double* maps, int step,
+                        const double* gradients, const float* moduli, const double* x, double* y);

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array
-from pipeline.solve.kernels.cells import Ghosts, corners, owned_cells, reference
+from pipeline.solve.kernels.cells import Ghosts, corners, owned_cells, reference, roots
 from pipeline.solve.kernels.native import call
 from pipeline.solve.kernels.product import CellStiffness, bernstein
 
@@ -29,7 +29,7 @@ class CellPressures:
         self.comm, self.cells, self.degree = cells.comm, cells, compat.degree(pressures)
         self._prescribed = cells.prescribed
         self._dofs = cells.lanes.spread(dofs[cells.lanes.which])
-        self._roots = cells.lanes.spread(_roots(corners(pressures.mesh)[cells.lanes.which])[:, None])
+        self._roots = cells.lanes.spread(roots(corners(pressures.mesh)[cells.lanes.which])[:, None])
         weights, values, _ = reference(self.degree, 2 * self.degree)
         self._mass = np.ascontiguousarray(np.einsum("q,qi,qj->ij", weights, values, values))
         # The displacements' mass has a factor p²; a single gradient needs one p.
@@ -50,6 +50,11 @@ class CellPressures:
             parts.append((self._bent, squares.T @ curved.roots**2))
         found = sum(np.bincount(dofs.reshape(-1), values.reshape(-1), self.ghosts.local) for dofs, values in parts)
         return self.ghosts.folded(np.asarray(found), 1).copy()
+
+    @property
+    def lanes(self) -> list[Int32Array]:
+        """The points of straight cells, and of curved ones if there are any, (batches, points, lanes)."""
+        return [self._dofs] if self.cells.curved is None else [self._dofs, self._bent]
 
     def holding(self, dofs: Int32Array) -> "CellPressures":
         """Return a copy with owned displacement ``dofs`` (unrolled) prescribed, too; it shares everything else."""
@@ -113,7 +118,7 @@ class Coupling:
     def matrix(self) -> PETSc.Mat:
         """Return B as a PETSc matrix; the caller destroys it."""
         of = self._pressures
-        return _matrix(self, of.ghosts.owned, 3 * of.cells.ghosts.owned, of.comm)
+        return matrix_of(self, of.ghosts.owned, 3 * of.cells.ghosts.owned, of.comm)
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write B x into ``y``; PETSc calls this."""
@@ -137,7 +142,7 @@ class Mass:
     def matrix(self) -> PETSc.Mat:
         """Return M as a PETSc matrix; the caller destroys it."""
         of = self._pressures
-        return _matrix(self, of.ghosts.owned, of.ghosts.owned, of.comm)
+        return matrix_of(self, of.ghosts.owned, of.ghosts.owned, of.comm)
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write M x into ``y``; PETSc calls this."""
@@ -148,16 +153,8 @@ class Mass:
         y.array_w[:] = self._weight * self._pressures.diagonal
 
 
-def _matrix(context: Any, rows: int, columns: int, comm: Any) -> PETSc.Mat:
+def matrix_of(context: Any, rows: int, columns: int, comm: Any) -> PETSc.Mat:
+    """Return a PETSc matrix of owned ``rows`` and ``columns``, which the caller destroys; collective."""
     matrix = PETSc.Mat().createPython(((rows, None), (columns, None)), context, comm=comm)
     matrix.setUp()
     return matrix
-
-
-def _roots(points: FloatArray) -> FloatArray:
-    """Return the signed root of the volume ratio of the cells' maps, (n, 4, 3); its sign is the determinant's."""
-    first, second, third = (points[:, 1:] - points[:, :1]).transpose(1, 2, 0)
-    determinants = sum(
-        first[i] * (second[j] * third[k] - second[k] * third[j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-    )
-    return np.sign(determinants) * np.sqrt(np.abs(determinants))

@@ -9,10 +9,11 @@ from copy import copy
 from dataclasses import dataclass
 from functools import cache
 from math import factorial, prod
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import scipy.sparse as sp
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
@@ -90,7 +91,7 @@ class CellStiffness:
         """Lay out the cells; collective."""
         self.comm, self.degree, self.ghosts = space.mesh.comm, compat.degree(space), Ghosts(space)
         self.prescribed = prescribed[prescribed < 3 * self.ghosts.owned]
-        dofs, self._regions = owned_cells(space), regions
+        dofs, self.regions = owned_cells(space), regions
         self.lanes = Lanes(straight_cells(curved, len(dofs)), dofs)
         maps = np.zeros((self.lanes.batches, 9, LANES))
         call("map_cells", len(self.lanes.which), self.lanes.which, corners(space.mesh), maps)
@@ -98,10 +99,11 @@ class CellStiffness:
         bent = np.empty(0) if curved is None else np.flatnonzero(curved[: len(dofs)])
         self.curved = CurvedCells(space, bent.astype(np.int32), dofs) if len(bent) else None
 
-    def lame(self, law: MaterialLaw) -> list[FloatArray]:
-        """Return λ and μ (Pa) of straight cells, and of curved ones if there are any, in the layout of the lanes."""
+    def operator(self, law: MaterialLaw) -> "CellOperator":
+        """Return the stiffness of a material."""
         lanes = [self.lanes] if self.curved is None else [self.lanes, self.curved.lanes]
-        return [each.lame(law, self._regions) for each in lanes]
+        lame = [each.lame(law, self.regions) for each in lanes]
+        return CellOperator(self, {"float64": lame, "float32": [each.astype(np.float32) for each in lame]})
 
     @property
     def nbytes(self) -> int:
@@ -130,18 +132,35 @@ class CellStiffness:
         return blocks
 
 
+class Cells(Protocol):
+    """The cells of a rank, laid out for products with ``coefficients`` of each cell.
+
+    Products and diagonal blocks are contributions of this rank's cells only, without conditions.
+    """
+
+    comm: MPI.Comm
+    ghosts: Ghosts
+    prescribed: Int32Array
+
+    @property
+    def nbytes(self) -> int: ...  # noqa: D102
+
+    def add_product(self, coefficients: list[np.ndarray], x: np.ndarray, y: np.ndarray) -> None: ...  # noqa: D102
+
+    def diagonal(self, coefficients: list[np.ndarray]) -> Single: ...  # noqa: D102
+
+
 class CellOperator:
-    """The matrix-free stiffness of a material: a context for PETSc.
+    """A matrix-free stiffness or tangent, with the ``coefficients`` of cells by precision: a context for PETSc.
 
     Rows of prescribed dofs are the identity's. Products are in double precision, or by :meth:`multiply` in single
     precision. On several ranks each multiplies with its own cells, between two ghost exchanges: products and diagonals
     are collective.
     """
 
-    def __init__(self, cells: CellStiffness, law: MaterialLaw):
+    def __init__(self, cells: Cells, coefficients: dict[str, list[np.ndarray]]):
         self._cells, self.rows, self.prescribed, self.comm = cells, cells.ghosts.owned, cells.prescribed, cells.comm
-        self._lame: dict[str, list[np.ndarray]] = {"float64": cells.lame(law)}
-        self._lame["float32"] = [each.astype(np.float32) for each in self._lame["float64"]]
+        self._coefficients = coefficients
 
     def holding(self, dofs: Int32Array) -> "CellOperator":
         """Return the operator with ``dofs`` (unrolled) prescribed, too; it shares everything else."""
@@ -179,21 +198,21 @@ class CellOperator:
     @property
     def nbytes(self) -> int:
         """Bytes that a product reads."""
-        return self._cells.nbytes + sum(each.nbytes for kind in self._lame.values() for each in kind)
+        return self._cells.nbytes + sum(each.nbytes for kind in self._coefficients.values() for each in kind)
 
     def diagonal(self) -> Single:
         """Return the diagonal blocks (points, 9), without conditions."""
-        blocks = self._cells.diagonal(self._lame["float64"])
+        blocks = self._cells.diagonal(self._coefficients["float64"])
         return self._cells.ghosts.folded(blocks.reshape(-1), 9).reshape(-1, 9)
 
     def _write(self, x: np.ndarray, y: np.ndarray) -> None:
-        cells, lame = self._cells, self._lame[x.dtype.name]
+        cells, coefficients = self._cells, self._coefficients[x.dtype.name]
         if self.comm.size == 1:
             y[:] = 0.0
-            cells.add_product(lame, x, y)
+            cells.add_product(coefficients, x, y)
             return
         found = np.zeros(3 * cells.ghosts.local, dtype=x.dtype)
-        cells.add_product(lame, cells.ghosts.extended(x, 3), found)
+        cells.add_product(coefficients, cells.ghosts.extended(x, 3), found)
         y[:] = cells.ghosts.folded(found, 3)
 
 
