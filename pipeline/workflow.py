@@ -26,6 +26,7 @@ from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
 from pipeline.solve import CompilerError
 from pipeline.stages import stage
+from pipeline.states import SKIPPED
 from pipeline.study.sweep import Study
 
 # Seconds that the first rank has, when a parallel run is interrupted, to write what is finished.
@@ -193,7 +194,6 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
         return
     from pipeline.run.execute import execute  # noqa: PLC0415
     from pipeline.run.mesh_cache import MeshCache  # noqa: PLC0415
-    from pipeline.run.stop import SKIPPED  # noqa: PLC0415
 
     cache = MeshCache(opened.meshes) if opened.meshes else None
 

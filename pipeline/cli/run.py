@@ -33,6 +33,7 @@ from pipeline.cli.words import (
 )
 from pipeline.files import STORE_NAME, result_files
 from pipeline.printable import counted
+from pipeline.states import FAILED, FAILURES, PENDING, SKIPPED
 
 if TYPE_CHECKING:
     from pipeline.plan.plan import Plan
@@ -121,7 +122,7 @@ def run(
             seconds = time.monotonic() - start
             _conclude(plan, opened, outcome, seconds, part, quiet=as_json)
             found.append(_as_data(plan, opened, outcome, seconds))
-        failed = failed or outcome.counts["failed"] + outcome.counts.get("partial", 0) > 0
+        failed = failed or any(outcome.counts.get(state) for state in FAILURES)
         if outcome.interrupted:
             break
     ended = INTERRUPTED if outcome.interrupted else SOME_FAILED if failed else DONE
@@ -149,7 +150,7 @@ def _announce(plan: "Plan", opened: "Opened", *, quiet: bool, verbose: bool) -> 
         return
     study = plan.study
     warn(study)
-    print(f"{study.title}: {counted(len(plan.keys), 'case')}{axes_of(study)}")
+    print(f"{study.title}: {counted(len(plan.study), 'case')}{axes_of(study)}")
     for struck in plan.struck:
         print(f"  {struck.name:13} {struck.count:6}  {struck.reason}")
     if study.solve.timing:
@@ -170,11 +171,11 @@ def _as_data(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float)
     return {
         "study": plan.study.file,
         "warnings": list(plan.study.warnings),
-        "cases": len(plan.keys),
+        "cases": len(plan.study),
         **outcome.counts,
         "stored": _read_back(plan),
         "failures": [{"case": case, "message": message} for case, message in outcome.failures],
-        "skipped_because": list(_reasons(plan, opened, "skipped")),
+        "skipped_because": list(_reasons(plan, opened, SKIPPED)),
         "files": [str(file) for file in outcome.files],
         "seconds": round(seconds, 3),
         "interrupted": outcome.interrupted,
@@ -194,7 +195,7 @@ def _conclude(
         print(_line(plan, opened, outcome, seconds, shard), flush=True)
     if outcome.interrupted:
         cases = sum(outcome.counts.values())
-        done = cases - outcome.counts["pending"]
+        done = cases - outcome.counts[PENDING]
         again = f"`epsmesh run {file}{f' --shard {shard}' if shard else ''}` continues"
         error(f"interrupted: {done} of {cases} cases are stored; {again}")
 
@@ -205,15 +206,13 @@ def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, sh
 
     counts = []
     for state, count in outcome.counts.items():
-        if not count and state != "failed":
+        if not count and state != FAILED:
             continue
         reasons = _reasons(plan, opened, state)
         most = [shorten(text, _LONGEST_REASON, placeholder=" …") for text, _ in reasons.most_common(_MOST_REASONS)]
         why = "; ".join(dict.fromkeys(filter(None, most)))
         more = "; …" if len(reasons) > _MOST_REASONS else ""
-        counts.append(
-            f"{count} {state}{f' ({why}{more})' if why and state in ('failed', 'partial', 'skipped') else ''}"
-        )
+        counts.append(f"{count} {state}{f' ({why}{more})' if why and state in (*FAILURES, SKIPPED) else ''}")
     stored = _read_back(plan)
     read_back = f" ({stored} from the store)" if stored else ""
     found, name = ", ".join(counts), plan.study.file
@@ -236,7 +235,8 @@ def _print_stages(stream: TextIO) -> None:
 
 
 def _read_back(plan: "Plan") -> int:
-    return sum(key in plan.stored for key in plan.keys)
+    """Return the number of cases all of whose records are stored."""
+    return sum(plan.stored.issuperset(keys) for keys in plan.study.by_case(plan.keys))
 
 
 def _reasons(plan: "Plan", opened: "Opened", status: str) -> Counter[str]:

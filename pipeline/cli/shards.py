@@ -12,6 +12,7 @@ from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, of_results, re
 from pipeline.cli.words import CLUSTER, check_names, check_output, check_store, read_all
 from pipeline.files import result_files
 from pipeline.printable import counted
+from pipeline.states import FAILURES
 
 if TYPE_CHECKING:
     from pipeline.plan.plan import Plan
@@ -68,7 +69,7 @@ def merge_shards(
         for case, message in failed:
             error(f"failed: {case}: {message}")
         _print_pending(plan, missing, again)
-    raise typer.Exit(SOME_FAILED if problems or missing or counts["failed"] or counts.get("partial") else DONE)
+    raise typer.Exit(SOME_FAILED if problems or missing or any(counts.get(state) for state in FAILURES) else DONE)
 
 
 def _stores(study: "Study", given: list[Path] | None, output: Path) -> list[Path]:

@@ -22,6 +22,7 @@ from pipeline.cli.words import (
 )
 from pipeline.files import STORE_NAME
 from pipeline.printable import counted
+from pipeline.states import FAILED, LOST, OK, PARTIAL, PENDING, SKIPPED
 
 if TYPE_CHECKING:
     from pipeline.run.record import Record
@@ -122,11 +123,11 @@ def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) ->
             records, _ = known_of(path, plan)
     records |= skipped(plan, records)
     counts, failed = count_states(plan, records), failures(plan, records)
-    totals = f"{counts['ok']} ok, {counts['failed']} failed"
-    totals += "".join(f", {counts[state]} {state}" for state in ("partial", "skipped", "lost") if counts.get(state))
-    lines = [f"{file}: {totals}, {counts['pending']} pending{axes_of(study)}"]
+    totals = f"{counts[OK]} ok, {counts[FAILED]} failed"
+    totals += "".join(f", {counts[state]} {state}" for state in (PARTIAL, SKIPPED, LOST) if counts.get(state))
+    lines = [f"{file}: {totals}, {counts[PENDING]} pending{axes_of(study)}"]
     lines += [f"  failed: {case}: {message}" for case, message in failed]
-    if counts["pending"] and (shards := len(stores_of(output, study))):
+    if counts[PENDING] and (shards := len(stores_of(output, study))):
         lines.append(f"  {counted(shards, 'shard')} in {output / 'shards'} not counted: --merge merges them")
     say({"file": str(file), **counts, "failures": [{"case": c, "message": m} for c, m in failed]}, *lines)
 

@@ -169,7 +169,7 @@ def _why_no_files(folder: Path) -> str:
 
 def axes_of(study: "Study") -> str:
     """Return the study's axes and their lengths in brackets."""
-    text = " × ".join(f"{len(axis)} {axis.name}" for axis in study.axes)
+    text = " × ".join(f"{len(axis)} {axis.name}" for axis in study.axes if not axis.is_stage)
     return f" ({text})" if text else ""
 
 

@@ -48,7 +48,7 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
     return {
         "study": plan.study.file,
         "warnings": list(plan.study.warnings),
-        "cases": len(plan.keys),
+        "cases": len(plan.study),
         "meshes": len(steps),
         "operators": sum(step["operators"] for step in steps),
         "solves": len(plan.solves),

@@ -19,6 +19,7 @@ from pipeline.quantities import quantity_of, write
 from pipeline.report.parameters import Parameters, differing, parameters_of, varied
 from pipeline.report.table import DatasetError, study_of
 from pipeline.report.values import at_peak
+from pipeline.states import OK, PENDING, SKIPPED
 
 # Forces that agree to this share of them agree, whatever their bars: the tolerance of solvers.
 SAME = 1e-6
@@ -197,9 +198,9 @@ def _not_run(a: xr.Dataset, i: tuple[int, ...], b: xr.Dataset, j: tuple[int, ...
     """Return why a case has nothing to compare, or nothing."""
     states = [_text(data, "status", at) for data, at in ((a, i), (b, j))]
     for name, state in zip("AB", states, strict=True):
-        if state in ("pending", "skipped"):
+        if state in (PENDING, SKIPPED):
             return f"{state} in {name}"
-    return f"{states[0]} in both" if states[0] == states[1] != "ok" else ""
+    return f"{states[0]} in both" if states[0] == states[1] != OK else ""
 
 
 def _pairs(case: str, a: xr.Dataset, i: tuple[int, ...], b: xr.Dataset, j: tuple[int, ...]) -> Iterator[Pair]:

@@ -18,11 +18,12 @@ from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST, MESH_DIMENSIONS, RUN, attributes, quantity_of
 from pipeline.report.history import over_time
 from pipeline.report.values import at_full_order, with_flags
-from pipeline.run.outcome import LOST, without_contact
+from pipeline.run.outcome import without_contact
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.scanned import Scanned
+from pipeline.states import LOST, OK, PENDING
 from pipeline.study.sweep import Axis, Case, Study
 
 _SIZES = {"component": 3, "movement": 6, "conjugate": 6}
@@ -138,7 +139,7 @@ def _records_of(
 def _value(record: Record | None, case: Case, name: str, dims: Sequence[str]) -> Any:
     """Return what a record holds of a variable, not a number if nothing; what loads add that do not act is nought."""
     if name in _COUNTS:
-        return getattr(record, name) if record and record.status == "ok" else _MISSING
+        return getattr(record, name) if record and record.status == OK else _MISSING
     value, own = nan, name.replace("_exact", "")
     if record and name in _OF_LOADS and record.is_ok and not case.load.acts:
         value = 0.0
@@ -186,7 +187,7 @@ def _texts(
     """Return what is told in words of each case."""
     notices = ["; ".join(case.body.notices) if isinstance(case.body, FromFile) else "" for case in cases]
     texts = {
-        "status": [r.status if r else "pending" for r in flat],
+        "status": [r.status if r else PENDING for r in flat],
         "message": [r.message if r else "" for r in flat],
         "origin": [_origin(plan, key, record) for key, record in zip(plan.keys, flat, strict=True)],
         "force_exact_message": [r.message if r else "" for r in exact],
@@ -270,7 +271,7 @@ def _frame(case: Case) -> Frame | None:
 
 def _origin(plan: Plan, key: str, record: Record | None) -> str:
     """Return how the force was obtained, and whether that was in an earlier run."""
-    if record is None or record.status != "ok":
+    if record is None or record.status != OK:
         return ""
     return f"{record.origin}, stored" if key in plan.stored else record.origin
 

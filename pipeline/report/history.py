@@ -9,9 +9,10 @@ import xarray as xr
 
 from pipeline.arrays import FloatArray
 from pipeline.quantities import LARGEST, attributes
-from pipeline.report.values import OVER_TIME, STATES
+from pipeline.report.values import OVER_TIME
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
+from pipeline.states import worst
 from pipeline.study.sweep import Case, Study
 from pipeline.viscoelastic import Contact, Motion, Terms, follow, interpolation, respond
 
@@ -19,8 +20,6 @@ from pipeline.viscoelastic import Contact, Motion, Terms, follow, interpolation,
 _SUMS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total", "iterations")
 _LARGEST = ("dofs", "cells", "memory", "machine_load", "time_spread", "balance")
 _TEXTS = ("message", "force_exact_message")
-# States of a history, by those of its solves: the first that occurs.
-_WORST = ("failed", "partial", "pending", "skipped", "lost", "ok")
 # Powers of the depth to which contact is proportional on a half-space and a ball.
 _CONTACT = {"contact_area": 1.0, "contact_radius": 0.5}
 # Powers of the depth of forces that are no powers on a half-space.
@@ -206,7 +205,7 @@ def _first(texts: np.ndarray) -> str:
 
 
 def _worst(states: np.ndarray) -> str:
-    return next((state for state in _WORST if state in states), STATES[0])
+    return worst([str(state) for state in states])
 
 
 def _table(dataset: xr.Dataset, name: str, dims: list[str]) -> FloatArray:

@@ -13,6 +13,7 @@ import xarray as xr
 from pipeline.quantities import MESH_DIMENSIONS
 from pipeline.report.sinking import LOADS, PLACES, Sinking
 from pipeline.report.values import by_case, elastic, relative
+from pipeline.states import OK, PENDING, STATES
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_text
 from pipeline.study.sweep import Case, Study
@@ -178,8 +179,8 @@ def _reasons(status: np.ndarray, message: np.ndarray, bar: np.ndarray, exact: np
     told = np.where(message == "", "", ": " + message.astype(object))
     why[~np.isfinite(exact)] = "F_exact is not known"
     why[~(bar >= 0)] = ("no error bar" + told)[~(bar >= 0)]
-    reasons = {"failed": "failed", "partial": "partial", "skipped": "skipped", "pending": "not yet run", "lost": "lost"}
-    for state, text in reasons.items():
+    for state in (one for one in STATES if one != OK):
+        text = "not yet run" if state == PENDING else state
         why[status == state] = (text + told)[status == state]
     return why
 

@@ -3,6 +3,8 @@
 import numpy as np
 import xarray as xr
 
+from pipeline.states import STATES
+
 # Variables that are functions of time where a study has histories: they are proportional to it.
 OVER_TIME = (
     "force",
@@ -13,8 +15,6 @@ OVER_TIME = (
     "force_exact_error",
     "force_max",
 )
-# What became of a case, in the order of its flags in a file.
-STATES = ("ok", "failed", "skipped", "lost", "pending", "partial")
 
 
 def relative(dataset: xr.Dataset, error: str) -> xr.DataArray:

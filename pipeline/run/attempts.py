@@ -6,6 +6,7 @@ from math import isfinite, nan
 from pipeline.plan.steps import Solve
 from pipeline.run.measure import add_times
 from pipeline.run.record import Record
+from pipeline.states import FAILED
 
 # With a larger error bar the force is unknown: it may be more than twice the true one.
 _WORST_BAR = 1.0
@@ -41,7 +42,7 @@ class Attempts:
 
 def failed(record: Record, message: str) -> Record:
     """Return ``record`` with the status of a failure."""
-    return replace(record, status="failed", message=message)
+    return replace(record, status=FAILED, message=message)
 
 
 def _checked(solve: Solve, record: Record) -> Record:

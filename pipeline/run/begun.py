@@ -17,6 +17,7 @@ from types import TracebackType
 
 from pipeline.run.record import Record
 from pipeline.run.store import Store
+from pipeline.states import FAILED
 
 KILLED = "the process was killed while it computed this case: usually out of memory, else a crash in a library"
 # The state of a file whose process still runs.
@@ -86,7 +87,7 @@ def fail_begun(store: Store, keys: Collection[str]) -> dict[str, Record]:
             continue
         known = store.get(begun) if why else {}
         for key in begun if why else ():
-            failed[key] = Record(key, "failed", why)
+            failed[key] = Record(key, FAILED, why)
             if key not in known or not known[key].is_ok:
                 store.put(failed[key])
         path.unlink(missing_ok=True)

@@ -17,7 +17,8 @@ from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
 from pipeline.run.runner import StepRunner
-from pipeline.run.stop import SKIPPED, reason_to_skip, waves
+from pipeline.run.stop import reason_to_skip, waves
+from pipeline.states import SKIPPED
 
 Keep = Callable[[Record], None]
 

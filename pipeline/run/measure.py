@@ -18,6 +18,7 @@ from pipeline.shapes.indenter import Indenter
 from pipeline.solve.estimate import is_graded
 from pipeline.solve.response import Contact
 from pipeline.solve.solution import Solution
+from pipeline.states import OK
 from pipeline.study.sweep import Case
 
 _ROUNDING = 1e-9
@@ -51,7 +52,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     turn, force, bar = case.frame.turn, solution.reaction[2], solution.reaction_bars[2]
     return Record(
         key=solve.key,
-        status="ok",
+        status=OK,
         origin="axisymmetric" if solve.axisymmetric else "symmetric" if solve.mirrors else "solved",
         young=case.scale.stress,
         depth=case.scale.length,

@@ -5,11 +5,9 @@ from collections.abc import Iterator, Mapping
 from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST
 from pipeline.run.record import Record
-from pipeline.run.stop import SKIPPED
+from pipeline.states import FAILED, LOST, OK, PARTIAL, PENDING, SKIPPED, worst
 from pipeline.study.place import CLEAR
 from pipeline.study.sweep import Case
-
-LOST = "lost"
 
 
 def without_contact(case: Case) -> Record | None:
@@ -40,10 +38,19 @@ def without_contact(case: Case) -> Record | None:
 
 
 def count_states(plan: Plan, records: Mapping[str, Record]) -> dict[str, int]:
-    """Return the number of a plan's cases in each state; for a shard, only its own cases count."""
-    states = [_status(records.get(key) or without_contact(case)) for key, case in _cases(plan)]
-    counts = {state: states.count(state) for state in ("ok", "skipped", "failed", "pending")}
-    return counts | {state: states.count(state) for state in ("partial", LOST) if state in states}
+    """Return the number of a plan's cases in each state; for a shard, only its own cases count.
+
+    The stages of a history are one case.
+    """
+    own = [None if plan.part is not None and key not in plan.part else key for key in plan.keys]
+    each = [
+        None if key is None else _status(records.get(key) or without_contact(case))
+        for key, case in zip(own, plan.study.cases(), strict=True)
+    ]
+    grouped = [[state for state in stages if state is not None] for stages in plan.study.by_case(each)]
+    states = [worst(found) for found in grouped if found]
+    counts = {state: states.count(state) for state in (OK, SKIPPED, FAILED, PENDING)}
+    return counts | {state: states.count(state) for state in (PARTIAL, LOST) if state in states}
 
 
 def failures(plan: Plan, records: Mapping[str, Record]) -> tuple[tuple[str, str], ...]:
@@ -56,7 +63,7 @@ def failures(plan: Plan, records: Mapping[str, Record]) -> tuple[tuple[str, str]
 
 
 def _status(record: Record | None) -> str:
-    return record.status if record else "pending"
+    return record.status if record else PENDING
 
 
 def _cases(plan: Plan) -> Iterator[tuple[str, Case]]:

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter
 
 from pipeline.plan.cost import Observation, speed_up
 from pipeline.quantities import STRESSES
+from pipeline.states import FAILURES, OK, PARTIAL
 from pipeline.study.sweep import Scale
 
 # The prefix of the message of an unexpected failure.
@@ -101,12 +102,12 @@ class Record:
     @property
     def has_failed(self) -> bool:
         """Whether the case was computed, without a force at its depth."""
-        return self.status in ("failed", "partial")
+        return self.status in FAILURES
 
     @property
     def is_ok(self) -> bool:
         """Whether the record has a valid force."""
-        return self.status == "ok" and isfinite(self.force)
+        return self.status == OK and isfinite(self.force)
 
     @property
     def max_strain(self) -> float:
@@ -135,7 +136,7 @@ class Record:
     def scaled(self, scale: Scale) -> "Record":
         """Return the record of a case that differs only in its ``scale``."""
         young, depth = scale.stress, scale.length
-        if (young, depth) == (self.young, self.depth) or not (isfinite(self.force) or self.status == "partial"):
+        if (young, depth) == (self.young, self.depth) or not (isfinite(self.force) or self.status == PARTIAL):
             return self
         stiffer, deeper = young / self.young, depth / self.depth
         scaled = {name: _times(getattr(self, name), stiffer * deeper**power) for name, power in _POWERS.items()}

@@ -42,6 +42,7 @@ from pipeline.solve.contact.sweep import NEAR
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.stages import Times, recorded
+from pipeline.states import FAILED, PARTIAL
 
 T = TypeVar("T")
 Keep = Callable[[Record], None]
@@ -257,7 +258,7 @@ class StepRunner:
 
     def _fail(self, solves: Sequence[Solve], failure: Failure) -> None:
         for solve in solves:
-            record = Record(solve.key, "failed", failure.message, provenance=self._provenance)
+            record = Record(solve.key, FAILED, failure.message, provenance=self._provenance)
             self._finish(solve, record if failure.reached is None else _partial(solve, record, *failure.reached))
 
     def _finish(self, solve: Solve, record: Record) -> None:
@@ -311,4 +312,4 @@ def _with_own_bars(sweep: tuple[Solve, ...]) -> tuple[Solve, ...]:
 def _partial(solve: Solve, record: Record, depth: float, force: float) -> Record:
     """Return ``record`` of a solve whose load steps ended at a ``depth`` (m) and ``force`` (N)."""
     young, asked = solve.case.scale.stress, solve.case.scale.length
-    return replace(record, status="partial", young=young, depth=asked, depth_reached=depth, force_reached=force)
+    return replace(record, status=PARTIAL, young=young, depth=asked, depth_reached=depth, force_reached=force)

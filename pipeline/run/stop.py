@@ -9,9 +9,9 @@ from pipeline.plan.plan import Plan
 from pipeline.plan.steps import Solve
 from pipeline.quantities import write
 from pipeline.run.record import Record
+from pipeline.states import SKIPPED
 from pipeline.study.sweep import Case
 
-SKIPPED = "skipped"
 # F stays close to F_exact if it is close at this many values of ε in a row.
 _IN_A_ROW = 2
 

@@ -2,10 +2,8 @@
 
 from typing import Annotated
 
-from pydantic import Field
-
 from pipeline.shapes.ovoid import Ovoid
-from pipeline.shapes.section import Words
+from pipeline.shapes.section import Name, Words
 from pipeline.shapes.tissue import Tissue
 from pipeline.units import Coordinate, Length
 
@@ -14,8 +12,7 @@ class Region(Tissue):
     """A region of a body with a material of its own; the ``name`` is the prefix of its sweeps."""
 
     name: Annotated[
-        str,
-        Field(exclude=True, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$"),
+        Name,
         Words(
             "Name of the layer or inclusion: letters, digits, _ and -. The dimension of a sweep "
             "begins with it: skin_young.",

@@ -20,6 +20,12 @@ class Words:
     takes: str = ""
 
 
+_LETTERS = r"[A-Za-z][A-Za-z0-9_-]*"
+# Names of the parts of a section; they begin the dimensions of sweeps. The first may be empty.
+OptionalName = Annotated[str, Field(exclude=True, pattern=rf"^({_LETTERS})?$")]
+Name = Annotated[str, Field(exclude=True, pattern=rf"^{_LETTERS}$")]
+
+
 class Section(BaseModel):
     """A section of a study file: strict, frozen; lengths in metres, pressures in pascal."""
 

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.frame import Vector
-from pipeline.shapes.section import Section, Words
+from pipeline.shapes.section import OptionalName, Section, Words
 from pipeline.units import Density, Pressure, Time
 from pipeline.viscoelastic import Terms
 
@@ -17,8 +17,7 @@ class Relaxation(Section):
     """A term of a Prony series: a share of the instantaneous modulus, which decays exponentially."""
 
     name: Annotated[
-        str,
-        Field(exclude=True, pattern=r"^([A-Za-z][A-Za-z0-9_-]*)?$"),
+        OptionalName,
         Words(
             "Name of the term: letters, digits, _ and -. The dimension of a sweep begins with it: fast_time.",
             '"fast"',
@@ -71,8 +70,7 @@ class Term(Section):
     """One term of Ogden's law."""
 
     name: Annotated[
-        str,
-        Field(exclude=True, pattern=r"^([A-Za-z][A-Za-z0-9_-]*)?$"),
+        OptionalName,
         Words(
             "Name of the term: letters, digits, _ and -. The dimension of a sweep begins with it: steep_alpha.",
             '"steep"',

@@ -7,7 +7,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.frame import Vector
-from pipeline.shapes.section import Section, Words
+from pipeline.shapes.section import OptionalName, Section, Words
 from pipeline.units import Acceleration, Coordinate, Length, Stress
 
 # All of the boundary without support and probe.
@@ -45,8 +45,7 @@ class Traction(Section):
     """A traction on part of the boundary: a vector, or a pressure against the outward normal."""
 
     name: Annotated[
-        str,
-        Field(exclude=True, pattern=r"^([A-Za-z][A-Za-z0-9_-]*)?$"),
+        OptionalName,
         Words(
             "Name of the traction: letters, digits, _ and -. The dimension of a sweep begins with it: "
             "retractor_pressure.",

@@ -1,11 +1,11 @@
 """Sweeps: lists and arrays of tables in a study file become axes, and axes become cases."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf
-from typing import Any
+from math import inf, prod
+from typing import Any, TypeVar
 
 from pipeline.quantities import write
 from pipeline.shapes.body import Body
@@ -27,6 +27,7 @@ _AMBIGUOUS = ("radius", "shape", "accuracy", "axis")
 # Thickness over reach up to which a body without support below the probe is a plate (docs/accuracy.md).
 _PLATE = 0.1
 _PARTS = ("body", "material", "probe", "mesh", "solve", "load")
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -272,6 +273,10 @@ class Study:
         """Lengths of the axes."""
         return tuple(len(axis) for axis in self.axes)
 
+    def __len__(self) -> int:
+        """Number of cases of the dataset: the stages of a history are one case."""
+        return prod(len(axis) for axis in self.axes if not axis.is_stage)
+
     @cached_property
     def solve(self) -> Solving:
         """The solver section, which is not swept."""
@@ -302,6 +307,14 @@ class Study:
         """Yield every case, the last axis fastest."""
         for index in itertools.product(*(range(n) for n in self.shape)):
             yield self.case(index)
+
+    def by_case(self, values: Sequence[Value]) -> list[list[Value]]:
+        """Return ``values``, one for each case and stage, as one list for each case of the dataset."""
+        found: dict[tuple[int, ...], list[Value]] = {}
+        for index, value in zip(itertools.product(*(range(n) for n in self.shape)), values, strict=True):
+            own = tuple(i for i, axis in zip(index, self.axes, strict=True) if not axis.is_stage)
+            found.setdefault(own, []).append(value)
+        return list(found.values())
 
     def whole_cases(self) -> Iterator[tuple[tuple[int, ...], Case]]:
         """Yield the cases of the dataset, each with its index there: those at the last stage of a history."""

@@ -6,6 +6,8 @@ import xarray as xr
 from mpi4py import MPI
 
 import pipeline.report.accessor  # noqa: F401
+from pipeline.cli.words import axes_of
+from pipeline.plan.describe import summary
 from pipeline.plan.plan import make_plan
 from pipeline.report.compare import compare
 from pipeline.report.dataset import build, write
@@ -15,6 +17,8 @@ from pipeline.report.page import render
 from pipeline.report.read import read_file
 from pipeline.report.values import at_peak, elastic
 from pipeline.run.execute import compute
+from pipeline.run.outcome import count_states
+from pipeline.run.record import Record
 from tests.cases import study
 from tests.report.synthetic import dataset
 
@@ -150,6 +154,17 @@ def test_depths_of_found_contact_share_one_mesh_among_all_speeds():
     assert len(plan.solves) == 5
     assert len(plan.meshes) == 1
     assert [case.probe.depth for _, case in plan.study.whole_cases()] == [0.4e-3, 0.4e-3]
+
+
+def test_the_stages_of_a_history_count_as_one_case():
+    plan = make_plan(study(probe=SPHERE | {"history": {"ramp": ["1 s", "3 s"]}}, mesh={"epsilon": "8 mm"}))
+    assert summary(plan)["cases"] == len(plan.study) == 2
+    assert axes_of(plan.study) == " (2 ramp)"
+    done = {solve.key: Record(solve.key, "ok") for solve in plan.solves}
+    assert count_states(plan, {}) == {"ok": 0, "skipped": 0, "failed": 0, "pending": 2}
+    assert count_states(plan, done)["ok"] == 2
+    last = plan.solves[-1].key
+    assert count_states(plan, done | {last: Record(last, "partial")})["partial"] == 2
 
 
 def test_a_failed_stage_fails_the_history():

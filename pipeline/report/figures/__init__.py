@@ -22,6 +22,7 @@ from pipeline.report.figures.style import STYLE, add_note, save
 from pipeline.report.table import study_of, warnings_of
 from pipeline.report.values import at_peak
 from pipeline.report.words import is_numeric
+from pipeline.states import FAILED, LOST, PARTIAL, PENDING, SKIPPED
 from pipeline.study.vocabulary import FIGURES
 
 __all__ = ["KINDS", "STYLE", "choose", "describe", "draw", "figure", "files", "lacks", "save"]
@@ -158,11 +159,11 @@ def _known(dataset: xr.Dataset, name: str) -> bool:
 def _missing(dataset: xr.Dataset) -> str:
     """Say which cases have no force, and what error bars leave out."""
     words = {
-        "failed": "failed (×)",
-        "partial": "ended before the depth (×)",
-        "skipped": "skipped",
-        "pending": "not yet run",
-        "lost": "contact lost",
+        FAILED: "failed (×)",
+        PARTIAL: "ended before the depth (×)",
+        SKIPPED: "skipped",
+        PENDING: "not yet run",
+        LOST: "contact lost",
     }
     counts = {word: int((dataset["status"] == state).sum()) for state, word in words.items()}
     text = ", ".join(f"{count} {word}" for word, count in counts.items() if count)

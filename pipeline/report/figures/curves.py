@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.facets import Facets
 from pipeline.report.figures.style import FAILED, LEGEND, WIDTH, log_scale, look, new_figure
 from pipeline.report.words import choices, heading, is_numeric, lengths, scale
+from pipeline.states import FAILURES
 
 _HEIGHT = 2.0  # inches of a panel
 _BESIDE = 1.6  # inches: what a figure takes besides its panels, above and below them
@@ -82,7 +83,7 @@ def draw(panel: Panel, facets: Facets) -> None:
             panel.ax.errorbar(beside, y, bars, label=label, **BARS, **style)
         else:
             panel.ax.plot(beside, y, label=label, **style)
-        failed = np.isin(line["status"].values.astype(str), ("failed", "partial"))
+        failed = np.isin(line["status"].values.astype(str), FAILURES)
         place = {"transform": panel.ax.get_xaxis_transform(), "zorder": 6}
         panel.ax.plot(x[failed], np.full(failed.sum(), 0.04), "x", color=FAILED, **place)
     write_ticks(panel.ax, panel.data[facets.x])

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.facets import arrange
 from pipeline.report.figures.style import CLAIM, FAILED, LINE, finish, look, new_figure
 from pipeline.report.words import choices, heading, scale
+from pipeline.states import FAILURES, LOST, OK, PENDING, SKIPPED
 
 PLACES = ("x", "y")
 _MOST_PANELS = 3
@@ -52,8 +53,8 @@ def draw_map(ax: Axes, part: xr.Dataset, values: np.ndarray, **look: Any) -> Any
     x, y = (factor * part[name].values for name in PLACES)
     drawn = ax.pcolormesh(x, y, np.ma.masked_invalid(values), shading="nearest", **{"cmap": _COLOURS} | look)
     for state, marker, colour, label in (
-        (["lost"], "o", LINE, "contact lost"),
-        (["failed", "partial", "skipped", "pending"], "x", FAILED, "no force"),
+        ([LOST], "o", LINE, "contact lost"),
+        ([*FAILURES, SKIPPED, PENDING], "x", FAILED, "no force"),
     ):
         rows, columns = np.nonzero(np.isin(part["status"].values.astype(str), state))
         if rows.size:
@@ -79,7 +80,7 @@ def draw_excess(ax: Axes, excess: xr.DataArray, bar: xr.DataArray, point: tuple[
         return None
     seen = excess.transpose("y", "x")
     beyond = (excess > bar).transpose("y", "x")
-    status = xr.where(np.isfinite(seen), "ok", "failed").rename("status")
+    status = xr.where(np.isfinite(seen), OK, FAILURES[0]).rename("status")
     drawn = draw_map(ax, xr.Dataset({"status": status}), 100 * seen.values)
     rows, columns = np.nonzero(beyond.values)
     x, y = 1e3 * seen["x"].values, 1e3 * seen["y"].values

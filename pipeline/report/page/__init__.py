@@ -30,6 +30,7 @@ from pipeline.report.page.facts import (
 from pipeline.report.page.inline import inline_svg
 from pipeline.report.table import warnings_of
 from pipeline.report.values import at_peak
+from pipeline.states import FAILURES, SKIPPED
 
 # What the answer says of times, and the headlines need not say again.
 _TOLD = "speed-ups"
@@ -71,7 +72,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         scene=scene,
         scene_scripts=_SCRIPT.findall(scene)[:2],
         facts=[fact for fact in facts(dataset) if not (guide and fact[0] == _TOLD)],
-        failures=by_status(dataset, "failed") + by_status(dataset, "partial"),
+        failures=[line for state in FAILURES for line in by_status(dataset, state)],
         without_exact=without_exact(dataset),
         warnings=warnings_of(dataset),
         figures=_figures(over_time),
@@ -83,7 +84,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         first_rows=FIRST_ROWS,
         struck=struck(dataset),
         origins=origins(dataset),
-        skipped=by_status(dataset, "skipped"),
+        skipped=by_status(dataset, SKIPPED),
         study=study,
         study_link=f"data:text/plain;charset=utf-8,{quote(study)}",
         provenance=provenance(dataset),

@@ -14,10 +14,10 @@ from pipeline.report.table import study_of
 from pipeline.report.values import by_case, relative
 from pipeline.report.words import heading as title_of_axis
 from pipeline.report.words import is_numeric, lengths, number, scale, symbol
+from pipeline.states import WORST_FIRST
 
 # Rows of a page of the table.
 FIRST_ROWS = 50
-_STATES = ("failed", "partial", "pending", "skipped", "lost", "ok")  # the order of the rows
 # The columns of numbers; some are shown only when asked for.
 _QUANTITIES = (
     "force",
@@ -127,7 +127,7 @@ def case_table(dataset: xr.Dataset) -> Table:
     message = _texts("message", by_case(dataset, "message").values.ravel(), "why there is no force")
     known = [column for column in quantities if any(value is not None for value in column.values)]
     told = [column for column in (origin, message) if any(column.words or ())]
-    rank = {state: position for position, state in enumerate(_STATES)}
+    rank = {state: position for position, state in enumerate(WORST_FIRST)}
     order = sorted(range(size), key=lambda row: rank.get(states[row], 0))
     return Table([numbers, status, *axes, *known, *told], order)
 

@@ -14,18 +14,19 @@ from pipeline.quantities import write
 from pipeline.report.times import doubts
 from pipeline.report.values import by_case, relative
 from pipeline.report.words import choices
+from pipeline.states import FAILED, LOST, OK, PARTIAL, PENDING, SKIPPED
 
 # Of git, with a sign for changes that were not committed.
 _COMMIT = re.compile(r"[0-9a-f]{7,64}\+?")
 # Cases that a message names; the table shows all of them.
 _MOST_NAMED = 5
 _STATES = {
-    "ok": "with a force",
-    "failed": "failed",
-    "partial": "ended before the depth",
-    "skipped": "skipped",
-    "lost": "without contact",
-    "pending": "not yet run",
+    OK: "with a force",
+    FAILED: "failed",
+    PARTIAL: "ended before the depth",
+    SKIPPED: "skipped",
+    LOST: "without contact",
+    PENDING: "not yet run",
 }
 
 _ORIGINS = {
