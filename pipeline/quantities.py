@@ -108,11 +108,11 @@ def readable(name: str, unit: str | None = None) -> tuple[float, str]:
 
 
 def write(name: str, value: Value, unit: str | None = None) -> str:
-    """Write a value as people read it: ``10 mm``, ``12 kPa``, ``5 %``, ``full``, ``coarse``; "" for what is unknown."""
+    """Write a value as people read it: ``10 mm``, ``12 kPa``, ``5 %``, ``full``, ``stick``; "" for what is unknown."""
     if isinstance(value, str):
         return value
     if value == inf:
-        return "full"
+        return "stick" if name == "friction" else "full"
     factor, word = readable(name, unit)
     return "" if isnan(value) else f"{value * factor:.6g} {word}".rstrip()
 

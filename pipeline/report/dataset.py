@@ -55,6 +55,7 @@ _PARTS = (
         ("contact_area", "contact_area_error", "contact_radius", "contact_radius_error"),
         of=lambda case: case.probe.is_unilateral,
     ),
+    _Part(("slip_area",), of=lambda case: case.probe.friction > 0),
     _Part(("depth_reached", "force_reached"), of=lambda case: case.material.is_large),
     _Part(("surface_deviation",), of=lambda case: isinstance(case.body, Scanned)),
     _Part((*LARGEST, *_COUNTS)),

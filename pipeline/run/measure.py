@@ -88,7 +88,8 @@ def _of_contact(contact: Contact | None) -> dict[str, Any]:
     if contact is None:
         return {}
     bars = {"contact_area_error": contact.bar, "contact_radius_error": contact.bar / 2}
-    return {"contact_area": contact.area, "contact_radius": contact.radius, **bars}
+    areas = {"contact_area": contact.area, "slip_area": contact.slip_area}
+    return {**areas, "contact_radius": contact.radius, **bars}
 
 
 def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:

@@ -34,6 +34,7 @@ def without_contact(case: Case) -> Record | None:
         contact_radius=0.0,
         contact_area_error=0.0,
         contact_radius_error=0.0,
+        slip_area=0.0,
     )
 
 

@@ -56,6 +56,7 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:
     """Return the estimated bytes of a solve of ``case`` with ``dofs`` unknowns, and of its error bar."""
     degree, direct = case.mesh.degree, is_direct(case.solve.method, dofs, DIRECT_LIMIT[case.mesh.degree])
+    direct = direct or case.probe.friction > 0
     return (
         estimate.solving_memory(dofs, degree, case.formulation, direct=direct),
         estimate.error_bar_memory(dofs, degree, case.formulation),
@@ -91,7 +92,7 @@ def tool_of(case: Case) -> Tool:
         return (0.0 if probe.has_singular_edge else probe.profile(local[:, :2])) - local[:, 2]
 
     *_, first = first_touch(case.body, probe, case.frame)
-    return Tool(height, lambda points: probe.ends_at(frame.local(points)[:, :2]), first)
+    return Tool(height, lambda points: probe.ends_at(frame.local(points)[:, :2]), first, probe.friction)
 
 
 def _fronts_of(case: Case) -> tuple[Front | None, Front | None]:

@@ -40,7 +40,8 @@ class Record:
     - ``depth_reached`` (m), ``force_reached`` (N): where load steps ended before the depth, and the force there; such
       a record is "partial".
     - ``stiffness``: of all six rigid motions, with the error bars ``stiffness_error``; empty without `motion = "all"`.
-    - ``contact_area`` (m²), ``contact_radius`` (m): of unilateral contact, with relative error bars.
+    - ``contact_area`` (m²), ``contact_radius`` (m): of unilateral contact, with relative error bars;
+      ``slip_area`` (m²): the part that slides, of contact with friction.
     - ``largest``: the largest values of cells away from the probe's edge, by their names in the dataset.
     - ``energy_release`` (J/m²): the mean along a slit's front, with its relative 95 % error bar.
     - ``load_force`` (N), with the error bar ``load_force_error`` (N), and ``load_force_vector`` (N): what loads add to
@@ -75,6 +76,7 @@ class Record:
     contact_radius: float = nan
     contact_area_error: float = nan
     contact_radius_error: float = nan
+    slip_area: float = nan
     load_force: float = nan
     load_force_error: float = nan
     load_force_vector: tuple[float, float, float] = (nan, nan, nan)

@@ -63,7 +63,7 @@ class Indenter(Probe):
     PROPORTIONAL_TO = ()
     # Without a singularity, on meshes graded to the edge of contact, the error is at most a disc's.
     EXPECTED_ERROR = 1.0
-    NOT_DRAWN: ClassVar[tuple[str, ...]] = ("action", "contact", "motion")
+    NOT_DRAWN: ClassVar[tuple[str, ...]] = ("action", "contact", "friction", "motion")
     SWEPT = ("depth_range",)
 
     depth: Annotated[

@@ -5,7 +5,7 @@ from functools import lru_cache
 from math import hypot, inf
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, BeforeValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from pipeline.arrays import BoolArray, FloatArray
@@ -22,6 +22,8 @@ _ALIGNED = 1e-12
 _MANY = 200_000  # cached pairs of body and probe, enough for a large study
 
 Contact = Literal["bonded", "frictionless", "unilateral"]
+# The word for friction without limit, and the largest coefficient besides.
+STICK, MOST_FRICTION = "stick", 2.0
 ON_EDGE = 1e-6  # a point is on the edge of a footprint within this share
 
 
@@ -29,6 +31,20 @@ def _two_or_three(at: tuple[float, ...]) -> tuple[float, ...]:
     if len(at) not in (2, 3):
         raise PydanticCustomError("not_supported", "must be a list of 2 or 3 values")
     return at
+
+
+def _coefficient(value: Any) -> float:
+    """Return a coefficient of friction; infinity for tissue that sticks."""
+    if value == STICK:
+        return inf
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (is_number and 0 <= value <= MOST_FRICTION):
+        raise PydanticCustomError("not_supported", f'must be a number from 0 to {MOST_FRICTION:g}, or "{STICK}"')
+    return float(value)
+
+
+_NUMBER_OR_WORD = {"anyOf": [{"type": "number", "minimum": 0, "maximum": MOST_FRICTION}, {"const": STICK}]}
+Friction = Annotated[float, BeforeValidator(_coefficient), WithJsonSchema(_NUMBER_OR_WORD)]
 
 
 class Probe(Section, ABC):
@@ -82,6 +98,14 @@ class Probe(Section, ABC):
             '"bonded"',
         ),
     ] = "bonded"
+    friction: Annotated[
+        Friction,
+        Words(
+            "Coulomb's coefficient of friction of unilateral contact, or stick: tissue that touches the tool does not "
+            "slide. The dataset writes stick as infinity.",
+            '[0.0, 0.3, "stick"]',
+        ),
+    ] = 0.0
     motion: Annotated[
         Literal["press", "all"],
         Words(
@@ -299,6 +323,13 @@ class Probe(Section, ABC):
 
     def check(self, problems: Problems) -> None:
         """Report keys that contradict each other; annotations check each key alone."""
+        if self.friction and not self.is_unilateral:
+            problems.error(
+                "probe.friction",
+                STICK if self.friction == inf else self.friction,
+                'is for contact that is found: use contact = "unilateral". Bonded tissue sticks, frictionless tissue '
+                "slides",
+            )
 
 
 @lru_cache(_MANY)

@@ -35,11 +35,13 @@ _SAME = 1e-9
 class Contact:
     """Unilateral contact: its area (m²), with a relative 95 % bar if requested.
 
-    ``sag`` (m) is the displacement of the first touch by loads, ``load_energy`` (J) their strain energy without probe.
+    ``slip_area`` (m²) is the part of it that slides along the tool, NaN without friction. ``sag`` (m) is the
+    displacement of the first touch by loads, ``load_energy`` (J) their strain energy without probe.
     """
 
     area: float
     bar: float = nan
+    slip_area: float = nan
     sag: float = nan
     load_energy: float = nan
 

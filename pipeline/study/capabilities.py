@@ -8,15 +8,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
-from math import isfinite
+from math import inf, isfinite
 from types import SimpleNamespace
 from typing import Any, Protocol, cast
 
 from pipeline.shapes.body import Body, Layered
-from pipeline.shapes.contact import is_flat, is_level
+from pipeline.shapes.contact import first_touch, is_flat, is_level
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
-from pipeline.shapes.probe import Probe
+from pipeline.shapes.probe import STICK, Probe
 from pipeline.shapes.section import Section, in_mm
 from pipeline.study.loads import Load
 from pipeline.study.problems import Problems
@@ -88,6 +88,11 @@ def _is_column(scene: Scene) -> bool:
     return not scene.mesh.is_closed and isfinite(scene.mesh.column(scene.body.reach(scene.probe.frame_on(scene.body))))
 
 
+def _touches_beside(scene: Scene) -> bool:
+    x, y, _ = first_touch(scene.body, scene.probe, scene.probe.frame_on(scene.body))
+    return isinstance(scene.probe, Indenter) and (x, y) != (0.0, 0.0)
+
+
 def _is_level(scene: Scene) -> bool:
     return is_level(scene.body, scene.probe.frame_on(scene.body))
 
@@ -108,6 +113,10 @@ def _relaxations(scene: Scene) -> set[Terms]:
     return {main, *(region.prony or main for region in regions)}
 
 
+def _coefficient(friction: float) -> float | str:
+    return STICK if friction == inf else friction
+
+
 FEATURES: dict[str, Feature] = {
     "layers": Feature("body.layer", lambda s: isinstance(s.body, Layered) and bool(s.body.layer)),
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
@@ -124,6 +133,8 @@ FEATURES: dict[str, Feature] = {
     "tool that is not flat": Feature("probe.shape", lambda s: isinstance(s.probe, Indenter)),
     "unilateral contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
     "frictionless contact": Feature("probe.contact", lambda s: s.probe.contact == "frictionless"),
+    "friction": Feature("probe.friction", lambda s: s.probe.friction > 0, write=_coefficient),
+    "touch beside the axis": Feature("probe.axis", _touches_beside, ("body",), list),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
     "bent surface": Feature("load", lambda s: s.load.acts and s.probe.is_unilateral, ("probe",)),
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),
@@ -226,6 +237,21 @@ REFUSALS: tuple[Refusal, ...] = (
         "frictionless contact",
         'a frictionless blade slides without force: use contact = "bonded"',
     ),
+    Refusal("friction", "half ball", f"the far field is known only for forces along the tool's axis: {_COARSE}"),
+    Refusal("friction", "accuracy", "meshes for an accuracy are chosen without friction: omit one of the two"),
+    Refusal("friction", "bent surface", "the path of the tissue under loads is not known: omit [load], or friction"),
+    Refusal(
+        "friction",
+        "history",
+        f"friction depends on the path, and F is not the elastic force times a function of time: {_STATIC}",
+    ),
+    Refusal("friction", "large displacements", f"is not computed {_OF_LAW}: omit it"),
+    Refusal(
+        "friction",
+        "touch beside the axis",
+        "the tool touches beside its axis, where its surface is inclined: friction is computed about the axis. Turn "
+        "the axis to the surface's normal, or omit friction",
+    ),
     Refusal("slit", "no flat top", "a slit needs the flat top of a box or a cylinder, and goes straight down"),
     Refusal(
         "oblique slit",
@@ -295,6 +321,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "fibres": "fibres have a direction, and are not axisymmetric",
         "large displacements": "large displacements are computed in three dimensions",
         "six motions": "most of the six motions are not axisymmetric",
+        "friction": "friction is computed in three dimensions",
         "half ball": "a half ball is coupled to its far field in three dimensions",
         "loads": "loads are computed in three dimensions",
     },
@@ -302,6 +329,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     "meridian, in a comparison": {
         "large displacements": "all cases of the comparison are solved in three dimensions",
         "half ball": "all cases of the comparison are solved in three dimensions",
+        "friction": "all cases of the comparison are solved in three dimensions",
     },
     "reduced basis": {
         "layers": "a body of several materials has more than one parameter",
@@ -331,9 +359,11 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "large displacements": "F is not proportional to the depth",
     },
     "F_exact": {
+        "friction": "with friction, F_exact would not be more accurate than F on a fine mesh",
         "large displacements": "at large displacements, F_exact would not be more accurate than F on a fine mesh",
     },
     "real-time model": {
+        "friction": "probe.friction: real-time models have no friction. Omit it and export the frictionless force",
         "loads": "[load]: gravity and tractions have no real-time model",
         "large displacements": "material.law: large displacements have no real-time model",
         "relaxation": "material.relaxation: real-time models are elastic, and have no time. Omit it and export the "

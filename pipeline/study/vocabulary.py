@@ -26,7 +26,6 @@ OTHER_NAMES = {
 
 # Keys of features that are not computed. A message says so, instead of suggesting a similar key.
 NOT_COMPUTED = {
-    "friction": 'friction is not computed: tissue sticks to the tool (contact = "bonded") or slides ("frictionless")',
     "adhesion": 'adhesion is not computed; with contact = "bonded", the tool pulls as well as it presses',
     "velocity": "the speed of the tool is given by `ramp` in [probe.history]; inertia is not computed",
     "speed": "the speed of the tool is given by `ramp` in [probe.history]; inertia is not computed",

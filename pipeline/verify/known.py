@@ -53,6 +53,8 @@ CYLINDER_BALL = (1.640007, 2e-6)
 SNEDDON = "I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965)"
 SPENCE = "D. A. Spence, Proc. R. Soc. A 305, 55 (1968)"
 GALIN = "L. A. Galin, Contact Problems (1961)"
+# Quadrature of tissue that sticks: points, and the end of the integral, whose integrand falls like exp(-2 x).
+_POINTS, _FARTHEST = 200, 20.0
 
 
 def half_space_disc(young: float, poisson: float, radius: float, depth: float, contact: str) -> tuple[float, str]:
@@ -97,6 +99,21 @@ def half_space_ball(young: float, poisson: float, radius: float, depth: float) -
 def half_space_cone(young: float, poisson: float, angle: float, depth: float) -> float:
     """Return F of a frictionless cone, its half angle to the axis ``angle``, on a half-space (Sneddon)."""
     return 2 / pi * young / (1 - poisson**2) * tan(angle) * depth**2
+
+
+def stick_ratio(poisson: float, power: float) -> float:
+    """Return F of a round tool to which tissue sticks, over F without friction, at one depth, on a half-space.
+
+    The tool's section is that ``power`` of the radius: 2 for a ball, 1 for a cone. Tissue keeps the place at which it
+    met the tool. A step of the depth then adds the solution of a bonded punch: F = n / (n + 1) S a d with its stiffness
+    S a, and a^n / d is n I times that without friction (V. I. Mossakovskii, PMM 27, 418, 1963; D. A. Spence, Proc. R.
+    Soc. A 305, 55, 1968; F. M. Borodich and L. M. Keer, Int. J. Solids Struct. 41, 2479, 2004).
+    """
+    stiffness = (1 - poisson) * log(3 - 4 * poisson) / (1 - 2 * poisson)
+    nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
+    x = _FARTHEST / 2 * (nodes + 1)
+    integrand = np.tanh(x) ** (power - 1) * np.cos(log(3 - 4 * poisson) / pi * x) / np.cosh(x) ** 2
+    return stiffness * float(power * _FARTHEST / 2 * weights @ integrand) ** (1 / power)
 
 
 def half_space_contact(young: float, poisson: float, slope: Callable[[FloatArray], FloatArray], radius: float) -> float:

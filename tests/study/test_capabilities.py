@@ -18,6 +18,7 @@ TISSUE = {"young": "20 kPa", "poisson": 0.3, "density": "1 g/cm^3"}
 HAVING = {
     "unilateral contact": {"probe": SPHERE},
     "tool that is not flat": {"probe": SPHERE},
+    "friction": {"probe": SPHERE | {"friction": 0.3}},
     "six motions": {"probe": {"motion": "all"}},
     "slice": {"probe": BLADE | {"slice": "0.1 mm"}},
     "slit": {"probe": BLADE | {"incision": "6 mm"}},

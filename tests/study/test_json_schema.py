@@ -35,7 +35,7 @@ def test_every_study_fits_the_schema(validator, path):
     [
         ("probe", "radius", 2),
         ("probe", "shape", "disk"),
-        ("probe", "friction", 0.3),
+        ("probe", "friction", 2.3),
         ("solve", "tolerance", 1e-8),
         ("material", "poisson", 0.7),
         ("material", "poison", 0.3),

@@ -62,7 +62,7 @@ MISTAKES = {
     "word for a radius": ({"mesh": {"epsilon": "Full"}}, ['mesh.epsilon = "Full"', 'or "full"']),
     "number for a radius": ({"mesh": {"epsilon": float("inf")}}, ['or "full"']),
     "a loose solver": ({"solve": {"energy_tolerance": 1e-3}}, ["solve.energy_tolerance = 0.001", "at most 1e-06"]),
-    "friction": ({"probe": {"friction": 0.3}}, ["probe.friction = 0.3", "friction is not computed", "bonded"]),
+    "friction": ({"probe": {"friction": 0.3}}, ["probe.friction = 0.3", 'use contact = "unilateral"']),
     "relaxation without a history": (
         {"material": {"relaxation": [{"share": 0.4, "time": "2 s"}]}},
         ["probe.history", "is required with relaxation", 'ramp = "1 s"'],

@@ -141,6 +141,7 @@ class Blade(Punch):
 
     def check(self, problems: Problems) -> None:
         """Report a slice or an incision that is not allowed."""
+        super().check(problems)
         if self.slit:
             self._check_slit(self.slit, problems)
         else:

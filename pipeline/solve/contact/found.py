@@ -15,11 +15,11 @@ from math import nan
 
 import numpy as np
 
-from pipeline.arrays import Int32Array
+from pipeline.arrays import BoolArray, Int32Array
 from pipeline.solve.cell_values import plain_share
 from pipeline.solve.compiled import global_sum, vector
 from pipeline.solve.contact.active_set import Found, Obstacle, find_set
-from pipeline.solve.contact.elements import ContactElements, FreeResponse
+from pipeline.solve.contact.elements import ContactElements, FreeResponse, State
 from pipeline.solve.contact.geometry import Area, contact_area
 from pipeline.solve.contact.levels import HeldOperator, normal_dofs
 from pipeline.solve.contact.surface import CONDITIONS
@@ -135,10 +135,15 @@ class FoundContact:
     def _area(self) -> Area:
         """Return the contact area of the modelled part."""
         candidates, law = self.obstacle.candidates, self.sweep.law
+        active, state = self._touching()
         modulus = np.empty(len(candidates))
         of_facets = of_regions(law.plane_moduli, candidates.regions, len(candidates.facets))
         modulus[candidates.facets] = of_facets[:, None]
-        return contact_area(self.obstacle, self.found.active, self.found.state, modulus, self._plug.body.mirrored)
+        return contact_area(self.obstacle, active, state, modulus, self._plug.body.mirrored)
+
+    def _touching(self) -> tuple[BoolArray, State]:
+        """Return the active set, displacements and reactions of the contact."""
+        return self.found.active, self.found.state
 
 
 def _force(found: Found) -> float:

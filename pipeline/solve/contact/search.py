@@ -9,7 +9,7 @@ along the axis.
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
@@ -21,6 +21,7 @@ from pipeline.solve.contact.active_set import ContactError, Found, Obstacle, fin
 from pipeline.solve.contact.condensed import CondensedElements, suits
 from pipeline.solve.contact.elements import ContactElements, FarShare, FreeResponse
 from pipeline.solve.contact.found import FoundContact
+from pipeline.solve.contact.frictional import rub
 from pipeline.solve.contact.geometry import Touch
 from pipeline.solve.contact.levels import Numbering, Surface
 from pipeline.solve.contact.surface import Candidates
@@ -47,12 +48,13 @@ class Tool:
     ``height`` gives the initial height of the probe above points (n, 3) of the undeformed surface (m), infinite where
     there is no probe. ``ends_at`` is a mask of points (n, 3) on the edge of the candidates: true where the probe itself
     ends. Elsewhere contact must not reach that edge. ``first`` (m) is the smallest height; None if the probe touches on
-    its axis first.
+    its axis first. ``friction`` is Coulomb's coefficient, infinite for tissue that sticks.
     """
 
     height: Callable[[FloatArray], FloatArray]
     ends_at: Callable[[FloatArray], BoolArray]
     first: float = 0.0
+    friction: float = 0.0
 
 
 class ContactSearch:
@@ -110,6 +112,10 @@ class ContactSearch:
             loaded=loaded,
             obstacle_above=lambda: self._obstacle(self._surface.of(self._elements.degree + 1), depth, loaded),
         )
+        if self._tool.friction:
+            self.contact = contact = rub(contact, self._tool.friction, unknowns, stack)
+            self._elements.put(columns[0], contact.rubbed, depth)
+            found = replace(found, sets=found.sets + contact.pressed.iterations)
         response = contact.response(columns[0], movement)
         check_balance(response.balance)
         if self._reuse:

@@ -175,6 +175,13 @@ class Candidates:
         pairs = [np.column_stack([self.facets[:, i], higher.facets[:, j]]) for i, j in near]
         return np.unique(np.concatenate(pairs), axis=0)
 
+    def beside_corners(self, nodes: IntArray) -> IntArray:
+        """Return pairs (k, 2) of a corner and a node next to it, as positions in ``nodes`` that contain both."""
+        position = np.full(len(self), -1)
+        position[nodes] = np.arange(len(nodes))
+        pairs = position[self._beside_corners]
+        return np.asarray(pairs[(pairs >= 0).all(axis=1)])
+
     @cached_property
     def _beside_corners(self) -> IntArray:
         near = np.argwhere(self.shape.distances(self.shape)[:FACET_CORNERS] < 0.5 + 1e-9)

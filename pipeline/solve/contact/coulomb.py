@@ -1,0 +1,86 @@
+"""Coulomb's law at the nodes of a contact: which of them stick, and the traction of those that slide.
+
+With λ the normal reaction, R its tangential part and s the slip since a reference, the trial traction is T = R − c s. A
+node sticks (s = 0) if |T| ≤ μ λ; otherwise it slides, with R = μ λ T/|T|. Both are equations for any c > 0, which
+Newton's method solves with the tangents of the last iterate (P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng.
+92, 353, 1991). Tissue that "sticks" has infinite friction.
+
+The sign of a corner's reaction means nothing (:mod:`pipeline.solve.contact.active_set`), nor does its trial traction:
+corners slide where most of their neighbours do, in the mean direction of these.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray, IntArray
+
+# Nodes change between sticking and sliding beyond this share of the largest friction.
+_SLACK = 1e-6
+_TINY = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Corners of facets: a mask ``is_corner`` (n), and pairs ``beside`` (k, 2) of a corner and a node next to it."""
+
+    is_corner: BoolArray
+    beside: IntArray
+
+    def enclosed(self, active: BoolArray) -> BoolArray:
+        """Return a mask (n) of corners whose neighbours are all active."""
+        corner, beside = self.beside.T
+        has = np.bincount(corner, minlength=len(active)) > 0
+        return np.asarray(has & (np.bincount(corner, ~active[beside], len(active)) == 0))
+
+    def majority(self, chosen: BoolArray) -> BoolArray:
+        """Return ``chosen`` (n), at corners the choice of most neighbours."""
+        corner, beside = self.beside.T
+        votes = np.bincount(corner, np.where(chosen[beside], 1.0, -1.0), len(chosen))
+        return np.where(self.is_corner, votes > 0, chosen)
+
+    def mean(self, vectors: FloatArray, chosen: BoolArray) -> FloatArray:
+        """Return ``vectors`` (n, t), at corners the sum of those of the ``chosen`` neighbours."""
+        corner, beside = self.beside.T
+        found = vectors.copy()
+        for axis, values in enumerate(vectors.T):
+            total = np.bincount(corner, np.where(chosen[beside], values[beside], 0.0), len(vectors))
+            found[self.is_corner, axis] = total[self.is_corner]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Slide:
+    """Nodes that slide (n), and their trial tractions (n, t) in N."""
+
+    sliding: BoolArray
+    trial: FloatArray
+
+    @property
+    def directions(self) -> FloatArray:
+        """Unit vectors (n, t) of the friction on the tissue."""
+        return self.trial / np.maximum(self.sizes, _TINY)[:, None]
+
+    @property
+    def sizes(self) -> FloatArray:
+        """Sizes (n) of the trial tractions (N)."""
+        return np.asarray(np.linalg.norm(self.trial, axis=1))
+
+    def turning(self, most: FloatArray) -> FloatArray:
+        """Return (n, t, t), the change of the unit vector with the trial traction, times ``most`` (n), the friction."""
+        along = self.directions
+        across = np.eye(along.shape[1]) - along[:, :, None] * along[:, None, :]
+        share = np.clip(most / np.maximum(self.sizes, _TINY), 0.0, 1.0)
+        return np.asarray(share[:, None, None] * across)
+
+    def following(self, trial: FloatArray, most: FloatArray, active: BoolArray, neighbours: Neighbours) -> "Slide":
+        """Return the next guess, from ``trial`` tractions (n, t) and the largest friction ``most`` (n).
+
+        A node whose trial traction reverses would slide back and forth: it sticks.
+        """
+        size = np.linalg.norm(trial, axis=1)
+        reverses = np.einsum("nt,nt->n", trial, self.trial) < 0
+        stays = (size > (1 - _SLACK) * most) & ~reverses
+        sliding = np.where(self.sliding, stays, size > (1 + _SLACK) * most) & active
+        sliding = neighbours.majority(sliding) & active
+        return Slide(sliding, neighbours.mean(trial, sliding))

@@ -1,0 +1,130 @@
+"""Friction of found contact: limits in the coefficient, closed forms for tissue that sticks, Coulomb's law at nodes."""
+
+import json
+from math import inf, log
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.run.meshing import mesh_case
+from pipeline.run.problem import law_of, movement_of, tool_of
+from pipeline.solve.contact.surface import CONDITIONS
+from pipeline.solve.quasi_static import QuasiStaticProblem
+from pipeline.solve.spaces import Spaces
+from pipeline.study.problems import StudyError
+from pipeline.verify import known
+from tests.cases import solve, study
+
+BODY = {"shape": "cylinder", "radius": "60 mm", "height": "60 mm"}
+SPHERE = {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"}
+DISC = {"shape": "disc", "radius": "1 mm", "depth": "0.1 mm", "contact": "unilateral"}
+MESH = {"fine": "20 mm", "coarse": "20 mm", "rim": "0.3 mm", "growth": 0.5}
+KNOWN = {}
+
+
+def record(friction=0.0, probe=SPHERE, mesh=None, poisson=0.3, comm=MPI.COMM_SELF, **changes):
+    """Solve a scene, once for all tests."""
+    scene = {"body": BODY, "mesh": MESH | (mesh or {}), "probe": probe | {"friction": friction}} | changes
+    scene["material"] = {"poisson": poisson}
+    key = comm.size, json.dumps(scene, sort_keys=True)
+    if key not in KNOWN:
+        (found,) = solve(comm, **scene).values()
+        assert found.status == "ok", found.message
+        KNOWN[key] = found
+    return KNOWN[key]
+
+
+def test_without_friction_it_is_the_frictionless_contact():
+    slippery, smooth = record(1e-9), record()
+    assert slippery.force == pytest.approx(smooth.force, rel=1e-6)
+    assert slippery.slip_area == pytest.approx(slippery.contact_area)
+    assert np.isnan(smooth.slip_area)
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3])
+def test_a_ball_to_which_tissue_sticks_needs_the_force_of_the_closed_form(poisson):
+    """The ratio to the frictionless force, in which mesh errors cancel; load steps err by the bar's first part."""
+    ratio = record("stick", poisson=poisson).force / record(poisson=poisson).force
+    assert ratio == pytest.approx(known.stick_ratio(poisson, 2), abs=0.003)
+
+
+def test_friction_adds_nothing_to_incompressible_tissue():
+    assert record("stick", poisson=0.499).force == pytest.approx(record(poisson=0.499).force, rel=5e-4)
+
+
+def test_more_friction_needs_more_force_and_slides_less():
+    found = [record(friction) for friction in (0.0, 0.05, 0.2, 0.8, "stick")]
+    forces, slips = [r.force for r in found], [r.slip_area for r in found[1:]]
+    assert (np.diff(forces) > -1e-4 * forces[0]).all()
+    assert forces[2] > 1.005 * forces[0]
+    assert slips[0] > slips[1] > max(slips[2:])
+    assert slips[-1] == 0.0
+    assert found[2].energy < found[2].force * 0.1e-3 / 2
+
+
+def test_a_flat_punch_that_sticks_is_the_bonded_one():
+    bonded, smooth = (record(probe=DISC | {"contact": contact}) for contact in ("bonded", "frictionless"))
+    sticks, rubs = record("stick", DISC), record(0.3, DISC)
+    assert sticks.force == pytest.approx(bonded.force, rel=1e-6)
+    assert smooth.force < rubs.force < sticks.force
+    assert 0 < rubs.slip_area < rubs.contact_area
+
+
+def test_tractions_obey_coulomb():
+    (case,) = study(body=BODY, probe=SPHERE | {"friction": 0.2}, mesh=MESH).cases()
+    with Spaces(mesh_case(case, ("x", "y"), MPI.COMM_SELF)) as spaces:
+        problem = QuasiStaticProblem(spaces, 2, CONDITIONS, case.element, tool=tool_of(case))
+        solution = problem.solve(law_of(case), movement_of(case))
+        contact = problem.constraint.contact
+    step, corner = contact.pressed, contact.obstacle.candidates.is_corner
+    normal, tangential = step.reactions[:, 0], np.linalg.norm(step.reactions[:, 1:], axis=1)
+    touching, sliding = step.active & ~corner, step.slide.sliding & ~corner
+    assert solution.balance < 1e-6
+    assert (normal[touching] > 0).all()
+    assert (tangential[touching] <= 0.2 * normal[touching] + 1e-6 * normal.max()).all()
+    assert tangential[sliding] == pytest.approx(0.2 * normal[sliding], abs=1e-6 * normal.max())
+    assert np.abs(step.reactions[~step.active]).max() == 0.0
+    through = -contact.obstacle.bounds - step.moved[:, 0]
+    assert np.abs(through[step.active]).max() < 1e-9 * 0.1e-3
+    assert through.max() < 1e-5 * 0.1e-3
+
+
+def test_half_a_body_and_a_quarter_agree():
+    """Nodes in the planes of symmetry slide along them."""
+    forces = []
+    for planes in (("x", "y"), ("y",)):
+        (case,) = study(body=BODY, probe=SPHERE | {"friction": 0.2}, mesh=MESH).cases()
+        with Spaces(mesh_case(case, planes, MPI.COMM_SELF)) as spaces:
+            problem = QuasiStaticProblem(spaces, 2, CONDITIONS, case.element, tool=tool_of(case))
+            solution = problem.solve(law_of(case), movement_of(case))
+            forces.append(solution.reaction)
+    assert forces[1][2] == pytest.approx(forces[0][2], rel=1e-4)
+    assert abs(forces[1][0]) < 1e-4 * forces[1][2]
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"probe": SPHERE | {"friction": 2.5}}, 'a number from 0 to 2, or "stick"'),
+        ({"probe": SPHERE | {"friction": "rough"}}, 'a number from 0 to 2, or "stick"'),
+        ({"probe": DISC | {"contact": "bonded", "friction": 0.3}}, 'use contact = "unilateral"'),
+        ({"probe": SPHERE | {"friction": 0.3}, "material": {"law": "neo-hookean"}}, "law of large displacements"),
+    ],
+)
+def test_what_friction_is_not_for(changes, reason):
+    with pytest.raises(StudyError, match=reason):
+        study(**changes)
+
+
+def test_a_sweep_may_hold_numbers_and_the_word():
+    probes = study(body=BODY, mesh=MESH, probe=SPHERE | {"friction": [0, 0.3, "stick"]})
+    assert [case.probe.friction for case in probes.cases()] == [0.0, 0.3, inf]
+    assert [case.words["friction"] for case in probes.cases()] == ["0", "0.3", "stick"]
+
+
+def test_closed_form_is_that_of_a_flat_punch_with_the_depth_of_a_ball():
+    """ν → 1/2: no effect; ν = 0: ln 3 of the flat punch, times the effect of the wider contact."""
+    assert known.stick_ratio(0.4999, 2) == pytest.approx(1.0, abs=1e-5)
+    assert known.stick_ratio(0.0, 2) == pytest.approx(1.0529, abs=1e-3)
+    assert known.stick_ratio(0.0, 2) < log(3)
