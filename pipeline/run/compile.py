@@ -26,6 +26,7 @@ class _Forms:
     degree: int = 0
     of_regions: bool = False
     of_slit: bool = False
+    of_contact: bool = False
 
 
 # The forms of a Green's function, which do not depend on a case's elements.
@@ -70,6 +71,7 @@ def _forms(solve: Solve) -> _Forms:
         mesh.degree,
         of_regions=bool(body.regions) or solve.case.is_linear_beyond,
         of_slit=has_slit,
+        of_contact=solve.case.probe.is_unilateral and solve.case.material.is_large,
     )
 
 
@@ -83,7 +85,7 @@ def _compile(forms: _Forms) -> None:
         return
     laws = ("linear",) if element in ("displacement", "mixed") else element.removesuffix("-mixed").split("+")
     element = "mixed" if element.endswith("mixed") else "displacement"
-    compile_forms(degree, element, laws, straight=degree == 1, of_regions=of_regions)
+    compile_forms(degree, element, laws, straight=degree == 1, of_regions=of_regions, of_contact=forms.of_contact)
     compile_cell_values(degree, straight=degree == 1)
     if forms.of_slit:
         compile_release(degree, mixed=element == "mixed", of_regions=of_regions)

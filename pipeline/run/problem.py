@@ -14,6 +14,8 @@ from pipeline.run.loads import loads_of
 from pipeline.run.memory import FreeMemory
 from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.contact import first_touch
+from pipeline.shapes.distance import Distance
+from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.shapes.tissue import FIBRE, Tissue
 from pipeline.solve import SolveError
@@ -91,8 +93,12 @@ def tool_of(case: Case) -> Tool:
         # The whole footprint of a flat tool is below its face, despite rounding of the nodes on the edge.
         return (0.0 if probe.has_singular_edge else probe.profile(local[:, :2])) - local[:, 2]
 
+    def distance(points: FloatArray, depth: float) -> Distance:
+        assert isinstance(probe, Indenter)
+        return probe.distance(frame.local(points) + np.array([0.0, 0.0, first + depth])).turned(frame.axes)
+
     *_, first = first_touch(case.body, probe, case.frame)
-    return Tool(height, lambda points: probe.ends_at(frame.local(points)[:, :2]), first, probe.friction)
+    return Tool(height, lambda points: probe.ends_at(frame.local(points)[:, :2]), first, probe.friction, distance)
 
 
 def _fronts_of(case: Case) -> tuple[Front | None, Front | None]:

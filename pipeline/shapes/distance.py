@@ -34,6 +34,10 @@ class Distance:
     normal: FloatArray
     curvature: FloatArray
 
+    def turned(self, axes: FloatArray) -> "Distance":
+        """Return it from coordinates with the unit vectors ``axes``, in rows (3, 3), in those of these vectors."""
+        return Distance(self.gap, self.normal @ axes, axes.T @ self.curvature @ axes)
+
 
 def revolved(contour: Contour, points: FloatArray) -> Distance:
     """Return the distance to the body of revolution of an ``contour``, from ``points`` (n, 3), in m."""

@@ -165,11 +165,16 @@ class Frame:
     def local(self, points: FloatArray) -> FloatArray:
         """Return points (n, 3), in m, in the probe's own coordinates."""
         offset = points - np.array(self.point)
-        return np.column_stack([offset @ np.array(unit) for unit in (self.along, self.across, self.outward)])
+        return np.column_stack([offset @ unit for unit in self.axes])
+
+    @property
+    def axes(self) -> FloatArray:
+        """Unit vectors of the probe's own coordinates, in rows (3, 3)."""
+        return np.array([self.along, self.across, self.outward])
 
     def world(self, points: FloatArray) -> FloatArray:
         """Return points (n, 3), in m, from the probe's own coordinates in those of the body."""
-        return np.array(self.point) + points @ np.array([self.along, self.across, self.outward])
+        return np.array(self.point) + points @ self.axes
 
     def in_plane(self, points: FloatArray) -> FloatArray:
         """Return points (n, 2), in m, of the probe's own plane in the body's coordinates, (n, 3)."""

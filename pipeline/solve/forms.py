@@ -198,6 +198,13 @@ class HyperelasticForms:
         return tuple(form(self._derivative(self._test(row))) for row in range(len(self._fields)))
 
     @cached_property
+    def tangents(self) -> tuple[Any, ...]:
+        """Second derivatives of the energy: K, and in mixed elements the coupling B and the block of the pressures."""
+        pairs = [(row, column) for row in range(len(self._fields)) for column in range(row + 1)]
+        trials = [ufl.TrialFunction(field.function_space) for field in self._fields]
+        return tuple(form(self._derivative(self._test(row), (column, trials[column]))) for row, column in pairs)
+
+    @cached_property
     def products(self) -> tuple[Any, ...]:
         """Products of the tangent with the ``directions``."""
         columns = [*enumerate(self.directions)]
@@ -276,8 +283,12 @@ def compile_forms(
     *,
     straight: bool = False,
     of_regions: bool = False,
+    of_contact: bool = False,
 ) -> None:
-    """Compile the forms for elements of ``degree``, for all lower degrees, and for the next one (error bar)."""
+    """Compile the forms for elements of ``degree``, for all lower degrees, and for the next one (error bar).
+
+    ``of_contact``: with those of contact at large displacements.
+    """
     regions = np.zeros(1, dtype=np.int32) if of_regions else None
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
     for level in range(1, degree + 2):
@@ -291,6 +302,8 @@ def compile_forms(
             pressure = (mixed.pressure, elastic.by_region((1.0,))) if mixed is not None else None
             large = HyperelasticForms(space, elastic, laws, pressure)
             _ = large.residuals, large.products
+            if of_contact:
+                _ = large.energy, large.tangents
             if level == degree:
                 _ = large.energy
                 for law in sorted(set(laws)):

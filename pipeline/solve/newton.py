@@ -57,8 +57,8 @@ class HyperelasticBody:
     Its state is one vector of owned dofs: displacement, and in mixed elements pressure.
     """
 
-    def __init__(self, elements: Elements, law: MaterialLaw, solver: Preconditioner):
-        """Set up; collective. ``solver`` is a preconditioner of linear elasticity."""
+    def __init__(self, elements: Elements, law: MaterialLaw, solver: Preconditioner | None = None):
+        """Set up; collective. ``solver`` is a preconditioner, which :meth:`move` and :meth:`settle` need."""
         self._elements, self._solver = elements, solver
         self._space, self._unit = elements.displacements, elements.unit(law)
         self._held = self._space.prescribed_owned
@@ -207,7 +207,7 @@ class HyperelasticBody:
         """
         try:
             self._counted(solver, solve)
-            if ksp.getConvergedReason() == INDEFINITE and self._solver.refine_eigenvalues():
+            if ksp.getConvergedReason() == INDEFINITE and self._solver and self._solver.refine_eigenvalues():
                 self._counted(solver, solve)
         except PETSc.Error as error:
             raise LargeError(explain(error)) from error

@@ -132,6 +132,9 @@ FEATURES: dict[str, Feature] = {
     "ν > 0.49": Feature("material.poisson", lambda s: s.material.poisson > MOST_OF_GREEN),
     "tool that is not flat": Feature("probe.shape", lambda s: isinstance(s.probe, Indenter)),
     "unilateral contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
+    "flat tool that may lift off": Feature(
+        "probe.contact", lambda s: s.probe.is_unilateral and not isinstance(s.probe, Indenter)
+    ),
     "frictionless contact": Feature("probe.contact", lambda s: s.probe.contact == "frictionless"),
     "friction": Feature("probe.friction", lambda s: s.probe.friction > 0, write=_coefficient),
     "touch beside the axis": Feature("probe.axis", _touches_beside, ("body",), list),
@@ -305,7 +308,11 @@ REFUSALS: tuple[Refusal, ...] = (
         "large displacements",
         f"must be at least {Material.LEAST_OF_LARGE} {_OF_LAW}: below, F depends on the elements at the tool's edge",
     ),
-    Refusal("unilateral contact", "large displacements", f'must be "bonded" {_OF_LAW}'),
+    Refusal(
+        "flat tool that may lift off",
+        "large displacements",
+        f'must be "bonded" {_OF_LAW}: at a sharp edge the direction of the contact force has no limit',
+    ),
     Refusal("frictionless contact", "large displacements", f'must be "bonded" {_OF_LAW}'),
     Refusal("six motions", "large displacements", f'must be "press" {_OF_LAW}: there is no single stiffness'),
     Refusal("slit", "large displacements", _LINEAR),

@@ -1,6 +1,7 @@
 """Multigrid operators in which candidate nodes are fixed along the probe's axis, different ones for each active set."""
 
 from contextlib import ExitStack
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ class Surface:
 class Numbering:
     """Positions of the candidates among the local dofs of a space, and transfer of values from there to all ranks.
 
-    ``local`` (n) are the blocks of this rank, −1 where it has none.
+    ``local`` (n) are the blocks of this rank, −1 where it has none; ``is_owned`` (n) are those that it owns.
     """
 
     def __init__(self, space: Any, numbers: IntArray):
@@ -61,23 +62,41 @@ class Numbering:
         place = np.searchsorted(known, numbers, sorter=order)
         at = np.append(order, -1)[place]
         self.local = np.where(np.append(known, -2)[at] == numbers, at, -1)
-        self._is_owned = (self.local >= 0) & (self.local < index_map.size_local)
+        self.is_owned = (self.local >= 0) & (self.local < index_map.size_local)
 
     def normal_dofs(self, chosen: BoolArray, *, owned: bool = False) -> Int32Array:
         """Return the local dofs (unrolled) along z of the ``chosen`` (n): all on this rank, or owned ones only."""
-        here = chosen & self._is_owned if owned else chosen & (self.local >= 0)
+        here = chosen & self.is_owned if owned else chosen & (self.local >= 0)
         return np.sort(3 * self.local[here] + 2).astype(np.int32)
 
     def put(self, into: FloatArray, values: FloatArray, chosen: BoolArray) -> None:
         """Write ``values`` (n) of the ``chosen`` (n) along z into an array of owned dofs (unrolled)."""
-        here = chosen & self._is_owned
+        here = chosen & self.is_owned
         into[3 * self.local[here] + 2] = values[here]
 
     def gather(self, values: FloatArray) -> FloatArray:
         """Return the entries along z, (n), of ``values`` on owned dofs (unrolled), on every rank; collective."""
         found = np.zeros(len(self.local))
-        found[self._is_owned] = values[3 * self.local[self._is_owned] + 2]
+        found[self.is_owned] = values[3 * self.local[self.is_owned] + 2]
         return global_sum(self._comm, found)
+
+    def gather_vectors(self, values: FloatArray) -> FloatArray:
+        """Return all entries, (n, 3), of ``values`` on owned dofs (unrolled), on every rank; collective."""
+        found = np.zeros((len(self.local), 3))
+        found[self.is_owned] = values.reshape(-1, 3)[self.local[self.is_owned]]
+        return global_sum(self._comm, found)
+
+    def put_vectors(self, into: FloatArray, values: FloatArray) -> None:
+        """Write ``values`` (n, 3) into an array that begins with the owned dofs (unrolled)."""
+        into[self._unrolled] = values[self.is_owned]
+
+    def add_vectors(self, into: FloatArray, values: FloatArray) -> None:
+        """Add ``values`` (n, 3) to such an array."""
+        into[self._unrolled] += values[self.is_owned]
+
+    @cached_property
+    def _unrolled(self) -> Int32Array:
+        return np.asarray(3 * self.local[self.is_owned][:, None] + np.arange(3))
 
 
 class Hierarchy:

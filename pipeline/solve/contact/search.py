@@ -19,10 +19,12 @@ from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance
 from pipeline.solve.contact.active_set import ContactError, Found, Obstacle, find_set
 from pipeline.solve.contact.condensed import CondensedElements, suits
+from pipeline.solve.contact.deformed import Distance
 from pipeline.solve.contact.elements import ContactElements, FarShare, FreeResponse
 from pipeline.solve.contact.found import FoundContact
 from pipeline.solve.contact.frictional import rub
 from pipeline.solve.contact.geometry import Touch
+from pipeline.solve.contact.large import LargeContact
 from pipeline.solve.contact.levels import Numbering, Surface
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.sweep import Sweep
@@ -48,13 +50,15 @@ class Tool:
     ``height`` gives the initial height of the probe above points (n, 3) of the undeformed surface (m), infinite where
     there is no probe. ``ends_at`` is a mask of points (n, 3) on the edge of the candidates: true where the probe itself
     ends. Elsewhere contact must not reach that edge. ``first`` (m) is the smallest height; None if the probe touches on
-    its axis first. ``friction`` is Coulomb's coefficient, infinite for tissue that sticks.
+    its axis first. ``friction`` is Coulomb's coefficient, infinite for tissue that sticks. ``distance`` is that of
+    points (n, 3) to the probe pressed in by a depth (m) from the first touch, for contact at large displacements.
     """
 
     height: Callable[[FloatArray], FloatArray]
     ends_at: Callable[[FloatArray], BoolArray]
     first: float = 0.0
     friction: float = 0.0
+    distance: Callable[[FloatArray, float], Distance] | None = None
 
 
 class ContactSearch:
@@ -73,10 +77,11 @@ class ContactSearch:
         self.contact: FoundContact | None = None
         self._reuse, self._condense = reuse or condense, condense
         self._sweep: Sweep | None = None  # kept from depth to depth of one material
+        self._large: LargeContact | None = None
 
     def close(self) -> None:
         """Free what is kept between solves."""
-        self.contact = None
+        self.contact = self._large = None
         if self._sweep is not None:
             self._sweep.close()
             self._sweep = None
@@ -90,6 +95,8 @@ class ContactSearch:
             ContactError: if the contact does not settle, reaches the support, or reaches the candidates' edge where
                 the probe does not end.
         """
+        if not asked.law.is_linear:
+            return self._solve_large(asked, stack)
         law, movement, strict = asked.law, asked.movement, _STRICTER * asked.tolerance
         columns = self._elements.columns(movement, stack)
         sweep = self._sweep_of(law, asked.method, stack)
@@ -123,6 +130,13 @@ class ContactSearch:
         sag = nan if loaded is None else self._touch.sag(self.candidates, loaded)
         iterations = first + found.sets
         return Equilibrium(contact, columns, movement, iterations, response, contact=contact.summary(sag))
+
+    def _solve_large(self, asked: Request, stack: ExitStack) -> Equilibrium:
+        """Find contact at large displacements: see :class:`LargeContact`."""
+        assert self._tool.distance is not None
+        if self._large is None or not (self._reuse and self._large.can_reach(asked)):
+            self._large = LargeContact(self._surface, self._elements, self._tool.distance, asked.law)
+        return self._large.solve(asked, stack)
 
     # ---- far field ------------------------------------------------------------------------------------
 

@@ -1,0 +1,192 @@
+"""Unilateral contact at large displacements: one Newton loop for the law and the active set together.
+
+With the tissue's nodal forces R(w), and the tool's signed distance g and outward normal n at the deformed nodes,
+
+    R(w) = λ n,    g >= 0,    λ >= 0,    λ g = 0    at the nodes that the tool may touch.
+
+A step holds the normal displacement of active nodes at -g, and takes the turn of the normals into account: the tangent
+is K - Σ λ H with H = ∂n/∂x. An active node whose predicted reaction pulls leaves the set, a node that penetrates enters
+it. This is a semismooth Newton method (M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 865, 2002).
+
+The loop knows only nodes of a surface: a body in three dimensions and one in the half plane have the same interface.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
+from pipeline.solve.contact.active_set import SLACK
+from pipeline.solve.contact.turned import turned_frames
+from pipeline.solve.newton import LargeError
+
+# Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
+_LEFT, _CLOSED = 1e-8, 1e-8
+# Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
+_MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
+
+
+class Distance(Protocol):
+    """Signed distance of n points to a tool: ``gap`` (n), m, ``normal`` (n, d), ``curvature`` (n, d, d), 1/m.
+
+    The normal is the tool's outward one, the gradient of the gap; the curvature is its Hessian.
+    """
+
+    @property
+    def gap(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def normal(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def curvature(self) -> FloatArray: ...  # noqa: D102
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """Constraint of one Newton step at n nodes, in d coordinates.
+
+    ``frames`` (n, d, d) have the tangents and, in the last column, the tool's normal. ``held`` (n, d) are the slots of
+    the frames whose displacement is prescribed, to ``values`` (n, d), m. ``turning`` (n, d, d), N/m, is λ H, which is
+    subtracted from the tangent. ``forces`` (n, d), N, act on the nodes besides the reactions.
+    """
+
+    frames: FloatArray
+    held: BoolArray
+    values: FloatArray
+    turning: FloatArray
+    forces: FloatArray
+
+
+class Tissue(Protocol):
+    """A body seen from n nodes of its surface, at its current ``state``. Methods are collective.
+
+    ``fixed`` (n, d) marks prescribed components; ``state`` are the unknowns of this rank; ``is_sound`` says that J > 0.
+    """
+
+    fixed: BoolArray
+    state: FloatArray
+
+    @property
+    def is_sound(self) -> bool: ...  # noqa: D102
+
+    def positions(self) -> FloatArray:
+        """Return the nodes' deformed positions (n, d), in m."""
+
+    def forces(self) -> FloatArray:
+        """Return the nodal forces (n, d), N, that hold the nodes; zero at prescribed components."""
+
+    def unbalanced(self) -> float:
+        """Return the norm (N) of the residual at all other free dofs."""
+
+    def linearise(self, constraint: Constraint) -> FloatArray:
+        """Find the increment under a ``constraint``; return the nodal forces (n, d), N, that it predicts.
+
+        Raises:
+            SolveError: if the linear solver fails.
+        """
+
+    def advance(self, share: float) -> bool:
+        """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedTool:
+    """The tool at one ``depth`` (m): its ``distance`` from points (n, d).
+
+    ``complete`` returns an active set that nodes may have: without those of the support, and with corners whose
+    reactions mean nothing only where all their neighbours are active.
+    """
+
+    distance: Callable[[FloatArray], Distance]
+    complete: Callable[[BoolArray], BoolArray]
+    depth: float
+
+
+@dataclass(frozen=True, eq=False)
+class Touched:
+    """Contact at equilibrium: the ``active`` nodes (n), forces of the tool on the nodes (n, d), N, and gaps (n), m."""
+
+    active: BoolArray
+    forces: FloatArray
+    gap: FloatArray
+    iterations: int
+
+
+def first_set(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> BoolArray:
+    """Return an initial active set: ``active`` nodes and all that the tool penetrates; collective."""
+    through = tool.distance(tissue.positions()).gap < -SLACK * tool.depth
+    return tool.complete(active | through)
+
+
+def settle(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> Touched:
+    """Find equilibrium and contact from the tissue's state and an initial ``active`` set (n); collective.
+
+    Raises:
+        LargeError: if the loop does not converge.
+        SolveError: if a linear solver fails.
+    """
+    seen, reactions = Counter[bytes](), np.full(len(active), np.inf)
+    for iteration in range(_MOST + 1):
+        place = tool.distance(tissue.positions())
+        normal = _within_planes(place.normal, tissue.fixed)
+        forces = tissue.forces()
+        following = _next_set(tool, active, reactions, place.gap)
+        if not following.any():
+            raise LargeError("the probe does not touch a single node: use smaller elements below it")
+        pressed = np.where(active, np.einsum("ni,ni->n", forces, normal), 0.0)
+        is_same, active = np.array_equal(following, active), following
+        if is_same and _is_settled(tissue, tool, active, place.gap, forces - pressed[:, None] * normal, pressed):
+            return Touched(active, pressed[:, None] * normal, place.gap, iteration)
+        if not is_same:
+            seen[active.tobytes()] += 1
+            if seen[active.tobytes()] >= _MOST_REPEATS:
+                raise LargeError("active sets repeat")
+        predicted = tissue.linearise(_constraint(place, normal, np.where(active, pressed, 0.0), active))
+        reactions = np.einsum("ni,ni->n", predicted, normal)
+        _advance(tissue)
+    raise LargeError(f"no equilibrium after {_MOST} iterations")
+
+
+def _constraint(place: Distance, normal: FloatArray, pressed: FloatArray, active: BoolArray) -> Constraint:
+    held = np.zeros(normal.shape, dtype=bool)
+    held[:, -1] = active
+    values = np.zeros(normal.shape)
+    values[active, -1] = -place.gap[active]
+    turning = np.maximum(pressed, 0.0)[:, None, None] * place.curvature
+    return Constraint(turned_frames(normal, active), held, values, turning, np.zeros(normal.shape))
+
+
+def _next_set(tool: PlacedTool, active: BoolArray, reactions: FloatArray, gap: FloatArray) -> BoolArray:
+    """Return active nodes under pressure, and inactive nodes that penetrate the tool."""
+    pull = -SLACK * float(np.abs(reactions[active]).mean()) if active.any() else 0.0
+    following = np.where(active, reactions > pull, gap < -SLACK * tool.depth)
+    return tool.complete(following)
+
+
+def _is_settled(
+    tissue: Tissue, tool: PlacedTool, active: BoolArray, gap: FloatArray, free: FloatArray, pressed: FloatArray
+) -> bool:
+    left = float(np.hypot(tissue.unbalanced(), np.linalg.norm(free)))
+    return bool(
+        left <= _LEFT * np.linalg.norm(pressed) and np.abs(gap[active]).max(initial=0.0) <= _CLOSED * tool.depth
+    )
+
+
+def _advance(tissue: Tissue) -> None:
+    """Take the longest step, by halves, that leaves no tissue inside out.
+
+    Raises:
+        LargeError: if there is none.
+    """
+    for halvings in range(_HALVINGS):
+        if tissue.advance(0.5**halvings):
+            return
+    raise LargeError("tissue is turned inside out")
+
+
+def _within_planes(normal: FloatArray, fixed: BoolArray) -> FloatArray:
+    """Return unit normals without their components across planes of symmetry, which are zero but for rounding."""
+    normal = np.where(fixed, 0.0, normal)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None])

@@ -1,0 +1,210 @@
+"""Contact at large displacements: equilibrium, force, checks and error bar of one depth after another.
+
+The force is the sum of the reactions. Three checks are independent of the loop: the support carries the same force,
+the work of the reactions in a small change of the displacement is the change of the stored energy, and J > 0.
+
+The error bar comes from one degree more, from the same state on and with contact found again: the contact area is the
+larger part of the error.
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from math import nan
+
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
+from pipeline.solve.balance import check_balance
+from pipeline.solve.compiled import global_sum
+from pipeline.solve.contact.active_set import ContactError, Obstacle
+from pipeline.solve.contact.contact_steps import ContactPath, Stage, press
+from pipeline.solve.contact.deformed import Distance, PlacedTool, Touched, first_set, settle
+from pipeline.solve.contact.elements import State
+from pipeline.solve.contact.geometry import Area, contact_area
+from pipeline.solve.contact.levels import Surface
+from pipeline.solve.contact.tissue import DeformedBody
+from pipeline.solve.elements.base import Column, Elements, Equilibrium, HierarchicalEstimate
+from pipeline.solve.estimate import found_again_bar
+from pipeline.solve.movement import Movement
+from pipeline.solve.newton import LargeError
+from pipeline.solve.physics import MaterialLaw, of_regions
+from pipeline.solve.response import Contact, Response, reaction
+from pipeline.solve.solution import Request
+from pipeline.stages import stage
+
+# Change of the displacement for the check of the work, and the largest relative difference of work and energy.
+_SMALL, _WORK = 1e-4, 1e-5
+
+
+class LargeContact:
+    """Contact of a tool with a hyperelastic body of one ``law``; a load path continues to ever larger depths."""
+
+    def __init__(
+        self,
+        surface: Surface,
+        elements: Elements,
+        distance: Callable[[FloatArray, float], Distance],
+        law: MaterialLaw,
+    ):
+        """Prepare; ``distance`` is that of points to the tool at a depth."""
+        self._surface, self._elements, self._distance, self._law = surface, elements, distance, law
+        self._path = ContactPath(Stage(0.0, np.zeros(elements.unknowns)))
+
+    def can_reach(self, asked: Request) -> bool:
+        """Return whether the load path can be continued to a request."""
+        return asked.law == self._law and self._path.last.depth <= asked.movement.amounts[0]
+
+    def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
+        """Find equilibrium and contact at the depth of the movement; the ``stack`` frees what is made; collective.
+
+        Raises:
+            LargeError: if the load steps end before the depth, or the solution fails a check.
+            ContactError: if contact reaches the support or the edge of the candidates.
+        """
+        movement, elements = asked.movement, self._elements
+        (depth,) = movement.amounts
+        body = DeformedBody(elements, self._surface.of(elements.degree), self._law, stack)
+        try:
+            iterations = press(body, lambda there: placed_tool(body, self._distance, there), self._path, depth)
+        except LargeError as error:
+            raise self._stopped(body, depth, error) from error
+        touched = self._path.last.touched
+        assert touched is not None
+        body.state = self._path.last.state
+        columns = elements.columns(movement, stack)
+        elements.put(columns[0], body.split(), depth)
+        found = LargeTouch(self._surface, body, self._distance, touched, depth)
+        found.check()
+        return Equilibrium(
+            found, columns, movement, iterations, found.response(movement), contact=Contact(found.whole_area)
+        )
+
+    def _stopped(self, body: DeformedBody, depth: float, why: LargeError) -> LargeError:
+        """Return the error of a path that ends before ``depth`` (m)."""
+        last, whole = self._path.last, 2.0 ** len(self._elements.body.mirrored)
+        force = 0.0 if last.touched is None else -whole * float(last.touched.forces[:, 2].sum())
+        message = (
+            f"load steps reached {last.depth * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {force:.4g} N "
+            f"(Newton's method: {why}); the tissue becomes unstable, or elements are flattened; "
+            "use a smaller depth, or smaller elements below the probe"
+        )
+        return LargeError(message, (last.depth, force) if last.depth else None)
+
+
+def placed_tool(body: DeformedBody, distance: Callable[[FloatArray, float], Distance], depth: float) -> PlacedTool:
+    """Return the tool at a ``depth`` (m) above the candidates of a body."""
+    candidates, on_support = body.candidates, body.fixed.all(axis=1)
+
+    def complete(active: BoolArray) -> BoolArray:
+        inner = active & ~candidates.is_corner
+        return np.asarray((inner | candidates.enclosed(inner)) & ~on_support)
+
+    return PlacedTool(lambda points: distance(points, depth), complete, depth)
+
+
+@dataclass(frozen=True, eq=False)
+class LargeTouch:
+    """Contact at a ``depth`` (m) with the state of a ``body``; methods are collective."""
+
+    surface: Surface
+    body: DeformedBody
+    distance: Callable[[FloatArray, float], Distance]
+    touched: Touched
+    depth: float
+
+    @property
+    def stored(self) -> float:
+        """The energy (J) of the modelled part."""
+        return self.body.energy
+
+    @property
+    def force(self) -> float:
+        """The force (N) on the modelled part of the tool, along its axis."""
+        return -float(self.touched.forces[:, 2].sum())
+
+    @property
+    def whole_area(self) -> float:
+        """The contact area (m²) of the whole body, normal to the axis."""
+        return float(2.0 ** len(self.body.elements.body.mirrored) * self._area().value)
+
+    def check(self) -> None:
+        """Check the work, and that contact ends within the candidates.
+
+        Raises:
+            LargeError: if the work of the reactions is not the change of the energy.
+            ContactError: if contact reaches the support or the edge of the candidates.
+        """
+        body, candidates = self.body, self.body.candidates
+        if np.any(self.touched.gap[body.fixed.all(axis=1)] < 0):
+            raise ContactError("the probe reaches the fixed part of the body: no displacement satisfies both")
+        if np.any(self.touched.active & candidates.is_edge):
+            raise ContactError(
+                "the contact reaches the edge of the surface region that is searched for contact: use a smaller depth"
+            )
+        state, work = body.state, float((self.touched.forces * (body.positions() - candidates.points)).sum())
+        energies = []
+        for change in (_SMALL, -_SMALL):
+            body.state = (1 + change) * state
+            energies.append(body.energy)
+        body.state = state
+        wrong = abs((energies[0] - energies[1]) / (2 * _SMALL * work) - 1)
+        if not wrong <= _WORK:
+            raise LargeError(f"the force is not the derivative of the energy: they differ by {wrong:.1e}")
+
+    def response(self, movement: Movement) -> Response:
+        """Return the force at this depth as a stiffness, F/d."""
+        space = self.body.elements.displacements
+        local = self.body.residual().reshape(-1, 3)[space.fixed_owned, 2].sum()
+        support = float(global_sum(space.comm, np.array([local]))[0])
+        balance = abs(support / self.force - 1)
+        check_balance(balance)
+        on_probe = self.touched.forces.sum(axis=0)[None] / self.depth
+        return reaction(movement, -on_probe[:, 2:], on_probe, self.body.elements.body.mirrored, balance)
+
+    def hierarchical_estimate(
+        self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
+    ) -> HierarchicalEstimate:
+        """Return the change of the force in one degree more, where contact is found again, and its bar.
+
+        Raises:
+            LargeError: if the next degree does not converge.
+        """
+        finer = self._found_again(stack)
+        share, at_edge = 1 - finer.force / self.force, self._area().bar
+        taken, bar = found_again_bar(share, at_edge)
+        return HierarchicalEstimate(
+            finer.body.elements,
+            [],
+            finer.touched.iterations,
+            decrements=np.array([[taken * self.force / self.depth]]),
+            relative=np.array([bar]),
+            area_bar=at_edge + bar,
+        )
+
+    @stage("contact sets")
+    def _found_again(self, stack: ExitStack) -> "LargeTouch":
+        coarse, degree = self.body.elements, self.body.elements.degree + 1
+        finer = self.surface.elements(degree, coarse.element, stack)
+        body = DeformedBody(finer, self.surface.of(degree), self.body.law, stack)
+        self.body.show()
+        body.interpolate(coarse)
+        tool = placed_tool(body, self.distance, self.depth)
+        active = self.body.candidates.raised(self.touched.active, body.candidates)
+        try:
+            if not body.is_sound:
+                raise LargeError("tissue is turned inside out")
+            touched = settle(body, tool, first_set(body, tool, active))
+        except LargeError as error:
+            raise LargeError(f"no error bar: elements of degree {degree} fail ({error})") from error
+        return replace(self, body=body, touched=touched)
+
+    def _area(self) -> Area:
+        """Return the contact area of the modelled part, at the deformed place and normal to the axis."""
+        candidates, law = self.body.candidates, self.body.law
+        moved = replace(candidates, points=self.body.positions())
+        modulus = np.empty(len(candidates))
+        modulus[candidates.facets] = of_regions(law.plane_moduli, candidates.regions, len(candidates.facets))[:, None]
+        obstacle = Obstacle(moved, self.touched.gap, self.depth)
+        state = State(np.zeros(len(moved)), self.touched.forces[:, 2], nan)
+        return contact_area(obstacle, self.touched.active, state, modulus, self.body.elements.body.mirrored)

@@ -1,0 +1,103 @@
+"""Contact at large displacements: the limit of small depths, equilibrium at the deformed place, and the energy."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.run.meshing import mesh_case
+from pipeline.run.problem import law_of, movement_of, tool_of
+from pipeline.solve.contact import contact_steps
+from pipeline.solve.contact.deformed import settle
+from pipeline.solve.contact.large import LargeTouch
+from pipeline.solve.contact.surface import CONDITIONS
+from pipeline.solve.contact.turned import turned_frames
+from pipeline.solve.newton import LargeError
+from pipeline.solve.quasi_static import QuasiStaticProblem
+from pipeline.solve.spaces import Spaces
+from tests.cases import force, solve, study
+
+SPHERE = {"shape": "sphere", "radius": "4 mm", "depth": "2 mm"}
+TISSUE = {"law": "neo-hookean", "poisson": 0.4}
+COARSE = {"rim": "1 mm", "fine": "4 mm", "coarse": "6 mm", "growth": 1.5}
+
+
+def touched(depth, model=("x", "y"), base=SPHERE, **changes):
+    """Return a solution, and its contact."""
+    (case,) = study(**{"material": TISSUE, "probe": base | {"depth": depth}, "mesh": COARSE} | changes).cases()
+    with Spaces(mesh_case(case, model, MPI.COMM_SELF)) as spaces:
+        problem = QuasiStaticProblem(spaces, 2, CONDITIONS, case.element, tool=tool_of(case))
+        found = {}
+        check = LargeTouch.check
+
+        def look(contact):
+            found["forces"], found["gap"] = contact.touched.forces, contact.touched.gap
+            found["active"], found["edge"] = contact.touched.active, contact.body.candidates.is_corner
+            found["points"] = contact.body.positions()
+            check(contact)
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(LargeTouch, "check", look)
+            solution = problem.solve(law_of(case), movement_of(case))
+    return solution, found
+
+
+def test_small_depths_are_linear():
+    probe, mesh = SPHERE | {"depth": "0.02 mm"}, COARSE | {"rim": "0.25 mm"}
+    linear = force(material={"poisson": 0.4}, probe=probe, mesh=mesh)
+    assert force(material=TISSUE, probe=probe, mesh=mesh) == pytest.approx(linear, rel=3e-3)
+
+
+@pytest.mark.parametrize("element", ["displacement", "mixed"])
+def test_nodes_touch_the_ball_at_their_deformed_place_and_nothing_pulls(element):
+    solution, found = touched("2 mm", mesh=COARSE | {"element": element})
+    from_centre = found["points"] - [0.0, 0.0, 2e-3]
+    distance = np.linalg.norm(from_centre, axis=1)
+    active, forces = found["active"], found["forces"]
+    assert distance[active] == pytest.approx(4e-3, rel=1e-9)
+    assert distance[~active & ~found["edge"]].min() > 4e-3 * (1 - 1e-6)
+    along_normal = (forces * from_centre).sum(axis=1) / distance
+    assert (along_normal[active & ~found["edge"]] > 0).all()
+    assert forces == pytest.approx(along_normal[:, None] * from_centre / distance[:, None], abs=1e-9 * forces.max())
+    assert solution.reaction[2] == pytest.approx(-4 * forces[:, 2].sum())
+    assert solution.balance < 1e-6
+
+
+def test_force_is_the_derivative_of_the_energy():
+    probe = SPHERE | {"depth_range": ["1.98 mm", "2.02 mm"]}
+    deep, deeper = (touched(f"{depth} mm", base=probe)[0] for depth in (1.98, 2.02))
+    mean = (deep.reaction[2] + deeper.reaction[2]) / 2
+    assert (deeper.energy - deep.energy) / 0.04e-3 == pytest.approx(mean, rel=1e-3)
+
+
+def test_the_whole_is_the_quarter():
+    quarter, _ = touched("2 mm")
+    half, _ = touched("2 mm", ("y",))
+    assert half.reaction[2] == pytest.approx(quarter.reaction[2], rel=0.02)  # another mesh
+    assert np.abs(half.reaction[:2]).max() < 0.01 * half.reaction[2]
+
+
+def test_a_depth_that_is_not_reached_is_partial_and_says_where(monkeypatch):
+    def fails_beyond(tissue, tool, active):
+        if tool.depth > 1.5e-3:
+            raise LargeError("it is told to")
+        return settle(tissue, tool, active)
+
+    monkeypatch.setattr(contact_steps, "settle", fails_beyond)
+    (record,) = solve(material=TISSUE, probe=SPHERE | {"depth": "2 mm"}, mesh=COARSE).values()
+    assert record.status == "partial"
+    assert 1.4e-3 < record.depth_reached <= 1.5e-3
+    assert record.force_reached > 0
+    assert f"reached {record.depth_reached * 1e3:.3g} mm of 2 mm" in record.message
+
+
+def test_frames_keep_planes_of_symmetry():
+    """A normal in the plane x = 0 leaves the x axis a tangent, and so for y; all frames are orthonormal."""
+    generator = np.random.default_rng(5)
+    normal = generator.normal(size=(50, 3))
+    normal[:10, 0] = normal[10:20, 1] = 0.0
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    frames = turned_frames(normal, np.ones(50, dtype=bool))
+    assert frames.swapaxes(1, 2) @ frames == pytest.approx(np.broadcast_to(np.eye(3), frames.shape), abs=1e-14)
+    assert frames[:, :, 2] == pytest.approx(normal)
+    assert frames[:10, :, 0] == pytest.approx(np.tile([1.0, 0.0, 0.0], (10, 1)))
+    assert np.abs(frames[10:20, :, 1]) == pytest.approx(np.tile([0.0, 1.0, 0.0], (10, 1)))
