@@ -36,6 +36,8 @@ _MESHED = {"curved": 2.5, "folded": 18.0}
 _MERIDIAN, _MERIDIAN_BYTES = 0.27, 3.8e8
 # A meridian with contact to find takes _TRIALS times as long.
 _FOUND, _TRIALS = "meridian contact", 1.7
+# At large displacements, load steps and Newton iterations on a few meshes.
+_STEPS, _ITERATIONS = "meridian large", 9.0
 # Share of first meshes whose error bar exceeds the accuracy: 5 of 60 scenes, 9 of 48 slicing blades.
 _MISSED, _MISSED_BY_SEVERAL = 0.08, 0.19
 # Exponent of 1 - 2ν: growth of the iterations towards incompressibility.
@@ -141,7 +143,8 @@ def features(solve: Solve) -> tuple[str, float, float]:
     """
     case = solve.case
     if solve.axisymmetric:
-        return _FOUND if case.probe.is_unilateral else "meridian", 1.0, 0.0
+        found = _FOUND if case.probe.is_unilateral else "meridian"
+        return _STEPS if case.material.is_large else found, 1.0, 0.0
     words = [case.formulation, str(case.mesh.degree)]
     words += [str(case.movements)] if case.movements > 1 else []
     words += ["found"] if case.probe.is_unilateral else []
@@ -195,8 +198,8 @@ def _poisson(case: Case) -> float:
 
 
 def _prior(stage: str, kind: str) -> _Numbers:
-    if kind in ("meridian", _FOUND):
-        return log(_MERIDIAN * (_TRIALS if kind == _FOUND else 1.0)), 0.0, 0.0
+    if kind.startswith("meridian"):
+        return log(_MERIDIAN * {_FOUND: _TRIALS, _STEPS: _ITERATIONS}.get(kind, 1.0)), 0.0, 0.0
     element, degree, *words = kind.split()
     if stage == "mesh":
         seconds, power = _MESH

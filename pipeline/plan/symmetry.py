@@ -34,10 +34,7 @@ def model_planes(case: Case) -> tuple[str, ...]:
 
 
 def is_round(case: Case) -> bool:
-    """Return whether the scene is axisymmetric: body, support, probe and movement, and no loads.
-
-    Scenes at large displacements are not: there are no elements for them on the meridian.
-    """
+    """Return whether the scene is axisymmetric: body, support, probe and movement, and no loads."""
     body, probe, frame = case.body, case.probe, case.frame
     half_plane = body.half_plane()
     if half_plane is None or obstacle("meridian", case):

@@ -13,6 +13,7 @@ from pipeline.solve.crack import compile_release
 from pipeline.solve.forms import compile_forms
 from pipeline.solve.greens_function import compile_regular
 from pipeline.solve.kernels import native
+from pipeline.solve.meridian.large import DEGREE as LARGE_DEGREE
 from pipeline.solve.meridian.problem import compile_axisymmetric
 from pipeline.solve.meridian.punch import TRIAL_DEGREE
 from pipeline.stages import stage
@@ -24,6 +25,7 @@ class _Forms:
 
     element: str
     degree: int = 0
+    laws: tuple[str, ...] = ("linear",)
     of_regions: bool = False
     of_slit: bool = False
     of_contact: bool = False
@@ -64,6 +66,8 @@ def _forms(solve: Solve) -> _Forms:
     if solve.axisymmetric:
         half_plane = body.half_plane()
         kind = "elliptic" if half_plane and half_plane.is_curved else "axisymmetric"
+        if solve.case.material.is_large:
+            return _Forms(kind, LARGE_DEGREE, tuple(sorted({str(tissue.law) for tissue in solve.case.tissues})))
         return _Forms(kind, TRIAL_DEGREE if solve.case.probe.is_unilateral else 0)
     has_slit = solve.case.probe.slit is not None
     return _Forms(
@@ -78,7 +82,11 @@ def _forms(solve: Solve) -> _Forms:
 def _compile(forms: _Forms) -> None:
     element, degree, of_regions = forms.element, forms.degree, forms.of_regions
     if element in ("axisymmetric", "elliptic"):
-        compile_axisymmetric(curved=element == "elliptic", lowest=degree)
+        curved = element == "elliptic"
+        if forms.laws != ("linear",):
+            compile_axisymmetric(degree, curved=curved, laws=forms.laws)
+            return
+        compile_axisymmetric(curved=curved, lowest=degree)
         return
     if forms == _REGULAR:
         compile_regular()

@@ -25,6 +25,7 @@ from pipeline.solve.contact.search import Tool
 from pipeline.solve.far_field import BodyField, PointForce
 from pipeline.solve.krylov import DIRECT_LIMIT, is_direct
 from pipeline.solve.meridian.contact import MeridianContact
+from pipeline.solve.meridian.large import LargeMeridian
 from pipeline.solve.meridian.problem import MeridianProblem
 from pipeline.solve.meridian.punch import RoundTool
 from pipeline.solve.movement import FarField, Movement, Place
@@ -73,6 +74,8 @@ def memory_of_basis(case: Case, dofs: int) -> float:
 
 def meridian_problem(case: Case) -> Problem:
     """Return the problem of an axisymmetric ``case`` without loads, on its meridian."""
+    if case.material.is_large:
+        return LargeMeridian(meridian_of(case), conditions_of(case))
     if case.probe.is_unilateral:
         return MeridianContact(meridian_of(case), round_tool_of(case))
     return MeridianProblem(meridian_of(case), conditions_of(case))

@@ -165,6 +165,12 @@ def axisymmetric_strain(u: Any, r: Any) -> Any:
     return ufl.as_tensor([[u[0].dx(0), 0, slide], [0, u[0] / r, 0], [slide, 0, u[1].dx(1)]])
 
 
+def axisymmetric_gradient(u: Any, r: Any) -> Any:
+    """Return the deformation gradient F (r, θ, z) of a displacement (u_r, u_z) in the half plane with radius r."""
+    rows = [[u[0].dx(0), 0, u[0].dx(1)], [0, u[0] / r, 0], [u[1].dx(0), 0, u[1].dx(1)]]
+    return ufl.Identity(3) + ufl.as_tensor(rows)
+
+
 def small_strain(strain: Any, lame_lambda: Any, lame_mu: Any) -> Any:
     """Linear elasticity: λ/2 (tr ε)² + μ ε : ε."""
     return lame_lambda / 2 * ufl.tr(strain) ** 2 + lame_mu * ufl.inner(strain, strain)

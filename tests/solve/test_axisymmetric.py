@@ -92,7 +92,7 @@ def test_displacement_and_mixed_elements_agree(monkeypatch):
     meridian = Meridian(4, 3, 1, -1.0)
     forces = []
     for threshold in (0.3, 0.5):
-        monkeypatch.setattr("pipeline.solve.meridian.forms.MIXED_FROM", threshold)
+        monkeypatch.setattr("pipeline.solve.meridian.region.MIXED_FROM", threshold)
         forces.append(solve_axisymmetric(meridian, 0.4, True).reaction[2])
     assert forces[0] == pytest.approx(forces[1], rel=1e-7)
 

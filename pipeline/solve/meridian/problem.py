@@ -5,9 +5,10 @@ force is the reaction, times 2π. Meshes are refined until the error bar is smal
 """
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import nan, pi
+from itertools import product
+from math import isnan, nan, pi
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading, Meridian, meridian_mesh
 from pipeline.solve import SolveError
 from pipeline.solve.conditions import Conditions
+from pipeline.solve.laws import LAWS
 from pipeline.solve.meridian.forms import MeridianForms
 from pipeline.solve.meridian.system import HalfPlane, Pressed, System, Unbalanced, max_strain, meshes_of
 from pipeline.solve.physics import MaterialLaw
@@ -33,8 +35,8 @@ _WORST_ERROR = 1e-3
 class Answer:
     """Result of one mesh at a depth: F/d from the energy and from the reaction, in units of μ a, and the solution.
 
-    ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²) and the strain energy, in
-    units of μ a times m².
+    ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²). The strain energy, in units
+    of μ a times m², is half of F d if it is not given.
     """
 
     stiffness: float
@@ -97,7 +99,7 @@ class MeridianSolver(Problem):
             iterations=found.iterations,
             times=times,
             bars=found.error * stiffness,
-            contact=None if found.energy is None else Contact(found.area, found.error),
+            contact=None if isnan(found.area) else Contact(found.area, found.error),
             stored=None if found.energy is None else scale * found.energy,
         )
 
@@ -187,13 +189,16 @@ class MeridianProblem(MeridianSolver):
         )
 
 
-def compile_axisymmetric(degree: int = DEGREE, *, curved: bool = False, lowest: int = 0) -> None:
-    """Compile every form of a :class:`MeridianProblem`, on this process; call it within ``compiling()``.
+def compile_axisymmetric(
+    degree: int = DEGREE, *, curved: bool = False, lowest: int = 0, laws: Sequence[str] = ("linear",)
+) -> None:
+    """Compile every form of a meridian with these laws, on this process; call it within ``compiling()``.
 
     If ``lowest`` is given, degrees from there on are compiled.
     """
     example: HalfPlane = EllipticMeridian(2.0, 2.0, 1.0, 0.0) if curved else Meridian(2.0, 1.0, 1.0)
     mesh = meridian_mesh(example.mesh(Grading(1.0)))
-    for poisson in (0.0, 0.5):
+    for law, poisson in product(laws, (0.0, 0.5)):
+        further = dict.fromkeys(LAWS[law].parameters, 1.0)
         for p in range(lowest or degree - 1, degree + 1):
-            MeridianForms({0: mesh}, p, MaterialLaw.of_moduli(1.0, poisson))
+            MeridianForms({0: mesh}, p, MaterialLaw.of_moduli(1.0, poisson, law, **further))

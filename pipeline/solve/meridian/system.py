@@ -3,9 +3,11 @@
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf, pi
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -50,34 +52,44 @@ class Pressed:
 class System:
     """Elements of a half plane with conditions on support, axis and tool; ``radii`` (n) are those of the tool's nodes.
 
-    ``probe`` and ``slide`` (n) are the dofs there of u_z and u_r, from the axis outwards.
+    ``probe`` and ``slide`` (n) are the dofs there of u_z and u_r, from the axis outwards; ``support`` those of u_z on
+    the support; ``free`` are all dofs but those that are zero.
     """
 
     def __init__(self, meshes: Meshes, degree: int, law: MaterialLaw, *, bonded: bool = False):
         """Assemble; tissue that is not ``bonded`` slides along the tool."""
         self.forms = MeridianForms(meshes, degree, law)
-        self._stiffness = self.forms.stiffness()
         dofs, places = self.forms.on(PROBE)
         order = np.argsort(places[:, 0], kind="stable")
         self.radii = places[order, 0]
-        slide, self.probe = dofs[order].T
+        self.slide, self.probe = dofs[order].T
         fixed, axis = self.forms.on(FIXED)[0], self.forms.on(AXIS)[0]
-        self._support = fixed[:, 1]
-        zero = np.concatenate([fixed.ravel(), axis[:, 0], slide if bonded else slide[:0]])
-        self._free = np.setdiff1d(np.arange(self.forms.dofs), zero)
+        self.support = fixed[:, 1]
+        zero = np.concatenate([fixed.ravel(), axis[:, 0], self.slide if bonded else self.slide[:0]])
+        self.free = np.setdiff1d(np.arange(self.forms.dofs), zero)
+
+    @cached_property
+    def _stiffness(self) -> sp.csr_matrix:
+        return self.forms.stiffness()
 
     @contextmanager
     def factors(self, held: IntArray) -> Iterator[Callable[[FloatArray], Pressed]]:
         """Factorise with the dofs ``held`` of u_z below the tool fixed; lend the solver for their values."""
-        free = np.setdiff1d(self._free, held)
+        free = np.setdiff1d(self.free, held)
         unknown = self._stiffness[free][:, free]
+        with self.inverse(unknown, is_definite=self.forms.is_definite) as solve, stage("solve"):
+            yield lambda values: self._refined(solve, free, held, values)
+
+    @contextmanager
+    def inverse(self, unknown: sp.csr_matrix, *, is_definite: bool) -> Iterator[Callable[[FloatArray], FloatArray]]:
+        """Factorise a symmetric matrix; lend the solver for a right-hand side."""
         unknown.sort_indices()
         csr = unknown.indptr.astype(PETSc.IntType), unknown.indices.astype(PETSc.IntType), unknown.data
         with ExitStack() as stack, explained():
             with stage("set-up"):
                 operator = keep(stack, PETSc.Mat().createAIJ(unknown.shape, csr=csr, comm=MPI.COMM_SELF))
                 operator.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-                if self.forms.is_definite:
+                if is_definite:
                     operator.setOption(PETSc.Mat.Option.SPD, True)
                 ksp = factorised(operator, stack)
                 right, left = (keep(stack, vector) for vector in operator.createVecs())
@@ -88,8 +100,7 @@ class System:
                 check_converged(ksp)
                 return np.array(right.array)
 
-            with stage("solve"):
-                yield lambda values: self._refined(solve, free, held, values)
+            yield solve
 
     def _refined(
         self, solve: Callable[[FloatArray], FloatArray], free: IntArray, held: IntArray, values: FloatArray
@@ -111,7 +122,7 @@ class System:
         for step in range(1, _MOST_REFINEMENTS + 1):  # noqa: B007
             solution[free] -= solve(residual[free])
             residual, before = self.forms.residual(solution), balance
-            on_probe, on_support = (float(residual[dofs].sum()) for dofs in (held, self._support))
+            on_probe, on_support = (float(residual[dofs].sum()) for dofs in (held, self.support))
             twice_energy, work = float(solution @ residual), float(values @ residual[held])
             if not 0 < twice_energy < inf:
                 raise SolveError(f"the solution is not finite or has no energy (2U = {2 * pi * twice_energy:g})")

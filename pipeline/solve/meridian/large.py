@@ -1,0 +1,200 @@
+"""Large displacements in the half plane (r, z): a bonded disc presses on a body of any isotropic law.
+
+Newton's method with direct solves. The path to the depth has the steps of :mod:`pipeline.solve.load_steps` and its
+check of the work, in elements of degree p - 1; those of degree p begin at its end.
+
+At the disc's edge tissue folds, the sooner the smaller its elements are. Meshes are refined at the edge until the error
+bar is small enough, or until a finer mesh does not reach the depth.
+
+Lengths are in units of the disc's radius a, stresses in units of μ of region 0.
+"""
+
+from math import pi
+
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.meridian import Grading, MeridianArrays
+from pipeline.solve import SolveError
+from pipeline.solve.balance import check_balance
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.load_steps import check_path
+from pipeline.solve.meridian.problem import Answer, MeridianSolver, error_bar
+from pipeline.solve.meridian.system import HalfPlane, System, max_strain, meshes_of
+from pipeline.solve.newton import LargeError
+from pipeline.solve.physics import MaterialLaw
+from pipeline.stages import stage
+
+DEGREE = 4
+# Meshes, tried in this order until the error bar is below the required accuracy.
+GRADINGS = tuple(Grading(floor, 1.0, 4.0) for floor in (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3))
+# Tolerance on the residual, relative to the forces at the probe; most Newton iterations, and halvings of one.
+_LEFT, _MOST_ITERATIONS, _HALVINGS = 1e-9, 14, 6
+# Fewest load steps, and the shortest one as a share of the depth.
+_FEWEST, _SHORTEST = 3, 1 / 50
+# Steps of a mesh after the first, which must reach the depth with ease, are halved once at most.
+_SHORTEST_OF_FINER = 1 / 7
+# The bar is this many times the difference from the mesh before; or, for the first mesh, that of the degrees.
+_BETWEEN_MESHES, _FIRST_MESH = 2.0, 2.5
+# Largest error bar of a result.
+_WORST_ERROR = 2e-2
+_ROUNDING = 1e-13
+
+
+class LargeSystem(System):
+    """A system of laws of large displacements; ``iterations`` counts linear solves.
+
+    A state is the vector of all dofs, with the values prescribed at the probe.
+    """
+
+    iterations = 0
+
+    def forces(self, state: FloatArray) -> tuple[float, float, float]:
+        """Return F of the tissue on the probe and on the support, and the strain energy of a ``state``."""
+        residual = self.forms.residual(state)
+        on_probe, on_support = (2 * pi * float(residual[dofs].sum()) for dofs in (self.probe, self.support))
+        return on_probe, on_support, 2 * pi * self.forms.energy(state)
+
+    def press(self, depth: float, shortest: float) -> tuple[FloatArray, FloatArray]:
+        """Return the state at a ``depth``, and the path to it: depth, force and energy of each step.
+
+        The ``shortest`` step is in units of the depth.
+
+        Raises:
+            LargeError: if a step becomes too short; ``reached`` are the depth and force of the last one.
+        """
+        state, path = np.zeros(self.forms.dofs), [(0.0, 0.0, 0.0)]
+        longest = step = depth / _FEWEST
+        while (reached := path[-1][0]) < depth:
+            there = depth if step > 0.99 * (depth - reached) else reached + step
+            try:
+                state = self.settle(state, there)
+            except LargeError as error:
+                step = (there - reached) / 2
+                if step < shortest * depth:
+                    raise LargeError(str(error), path[-1][:2] if reached else None) from error
+                continue
+            on_probe, _, energy = self.forces(state)
+            path.append((there, -on_probe, energy))
+            step = min(1.5 * step, longest)
+        return state, np.array(path)
+
+    def settle(self, state: FloatArray, depth: float) -> FloatArray:
+        """Return the equilibrium with the probe at a ``depth``, from an initial guess ``state``.
+
+        Raises:
+            LargeError: if Newton's method does not converge.
+        """
+        unknown = np.setdiff1d(self.free, self.probe)
+        residual = self.forms.residual(state)
+        for _ in range(_MOST_ITERATIONS):
+            change = self._newton(state, residual, unknown, -depth - state[self.probe])
+            share = self._share(state, change)
+            state = state + share * change
+            residual = self.forms.residual(state)
+            left = np.linalg.norm(residual[unknown]) / np.linalg.norm(residual[self.probe])
+            if share == 1.0 and left < _LEFT:
+                return state
+        raise LargeError(f"Newton's method did not converge in {_MOST_ITERATIONS} iterations")
+
+    def _newton(self, state: FloatArray, residual: FloatArray, unknown: IntArray, moved: FloatArray) -> FloatArray:
+        """Return Newton's change of a ``state`` with a ``residual``, whose probe is ``moved``."""
+        with stage("assembly"):
+            rows = self.forms.stiffness(state)[unknown]
+        change = np.zeros_like(state)
+        change[self.probe] = moved
+        with self.inverse(rows[:, unknown], is_definite=False) as solve, stage("solve"):
+            change[unknown] = -solve(residual[unknown] + rows @ change)
+        self.iterations += 1
+        return change
+
+    def _share(self, state: FloatArray, change: FloatArray) -> float:
+        """Return the share of a ``change`` that turns no tissue inside out."""
+        for halvings in range(_HALVINGS):
+            if np.isfinite(self.forms.energy(state + 0.5**halvings * change)):
+                return 0.5**halvings
+        raise LargeError("tissue is turned inside out")
+
+
+class LargeMeridian(MeridianSolver):
+    """The meridian of a body of a law of large displacements, under a bonded disc."""
+
+    def __init__(self, meridian: HalfPlane, conditions: Conditions, *, accuracy: float = 1e-4, degree: int = DEGREE):
+        """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least."""
+        super().__init__(meridian, accuracy=accuracy, degree=degree)
+        self._bonded = conditions.bonded
+
+    def _answer(self, law: MaterialLaw, depth: float) -> Answer:
+        best: Answer | None = None
+        for grading in GRADINGS:
+            try:
+                found = self._solve_on(grading, law, depth, best)
+            except SolveError:
+                if best is None:
+                    raise
+                break
+            if best is None or found.error < best.error:
+                best = found
+            if best.error <= self._accuracy:
+                break
+        assert best is not None
+        if best.error > _WORST_ERROR:
+            raise SolveError(f"the error bar of the force is {best.error:.0e}, allowed {_WORST_ERROR:.0e}")
+        return best
+
+    def _solve_on(self, grading: Grading, law: MaterialLaw, depth: float, before: Answer | None) -> Answer:
+        """Return the result on a mesh; ``before`` is that of a coarser one.
+
+        Raises:
+            SolveError: if the depth is not reached, or the result fails a check.
+        """
+        with stage("meshing"):
+            arrays = self._meridian.mesh(grading)
+            meshes = meshes_of(arrays)
+        deep = depth / arrays.unit
+        with stage("assembly"):
+            coarse, fine = (
+                LargeSystem(meshes, degree, law, bonded=self._bonded) for degree in (self._degree - 1, self._degree)
+            )
+        try:
+            state, path = coarse.press(deep, _SHORTEST if before is None else _SHORTEST_OF_FINER)
+        except LargeError as stop:
+            raise _stopped(stop, arrays, law, depth) from stop
+        check_path(path, _ROUNDING * arrays.points.ptp(axis=0).prod())
+        state = fine.settle(fine.forms.interpolate(coarse.forms, state), deep)
+        on_probe, on_support, energy = fine.forces(state)
+        balance = abs(on_probe + on_support) / abs(on_probe)
+        check_balance(balance)
+        coarse_force, coarse_energy = path[-1, 1:]
+        error = max(
+            error_bar(coarse_force, -on_probe, self._degree, balance),
+            error_bar(coarse_energy, energy, self._degree, balance),
+        )
+        if before is None:
+            error *= _FIRST_MESH
+        else:
+            error = max(error, _BETWEEN_MESHES * abs(before.on_probe * deep / on_probe - 1))
+        return Answer(
+            stiffness=-on_probe / deep,
+            on_probe=on_probe / deep,
+            balance=balance,
+            error=error,
+            unit=arrays.unit,
+            max_strain=max_strain(fine.forms, arrays),
+            dofs=fine.forms.dofs,
+            cells=len(arrays.cells),
+            iterations=coarse.iterations + fine.iterations,
+            energy=energy * arrays.unit**2,
+        )
+
+
+def _stopped(error: LargeError, arrays: MeridianArrays, law: MaterialLaw, depth: float) -> LargeError:
+    """Return the error of a path that ends before ``depth`` (m), in N and metres."""
+    if error.reached is None:
+        return error
+    reached, force = error.reached[0] * arrays.unit, error.reached[1] * law.lame_mu[0] * arrays.unit**2
+    message = (
+        f"load steps reached {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {force:.4g} N (Newton's "
+        f"method: {error}); the tissue becomes unstable, or folds at the probe's edge; use a smaller depth"
+    )
+    return LargeError(message, (reached, force))

@@ -1,0 +1,178 @@
+"""One material of a half plane (r, z): space, energy, residual, tangent and strains on its own mesh.
+
+The energy of a law is integrated over r dr dz. A linear law has the axisymmetric strain of
+:mod:`pipeline.solve.physics`; others have the deformation gradient (r, θ, z) with the hoop stretch 1 + u_r/r.
+"""
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import ufl
+from dolfinx import fem
+
+from pipeline import compat
+from pipeline.arrays import FloatArray, Int32Array, IntArray
+from pipeline.mesh.meridian import mesh_order
+from pipeline.solve.compiled import cellwise_space, form, taylor_hood_space, vector_space
+from pipeline.solve.laws import LAWS
+from pipeline.solve.laws.law import Energy
+from pipeline.solve.physics import (
+    MaterialLaw,
+    Parameters,
+    SplitLaw,
+    axisymmetric_gradient,
+    axisymmetric_strain,
+    pressurised,
+    small_strain,
+)
+
+# A larger Poisson's ratio than in three dimensions (Mesh.MIXED_FROM, 0.45): elements of degree 5 lock later than those
+# of degree 2. On three scenes displacement elements differ from mixed ones by 5e-9 to 1e-8 at ν = 0.45 and by 2e-8 at
+# 0.49. They take half the time (0.3 s, not 0.65), and have bars of 3e-6 at most, where 1e-5 is needed.
+MIXED_FROM = 0.49
+# At large displacements.
+LARGE_MIXED_FROM = 0.45
+# Integrands of large displacements are no polynomials: quadrature degrees added to those of linear elasticity.
+_MORE = 2
+# Quadrature degree of the points where tissue must not be inside out: many more than carry the energy, since an element
+# at the probe's edge may fold between those.
+_INSIDE = 20
+
+
+class Region:
+    """Elements of one ``degree`` on a mesh of one ``material``, with moduli in units of ``unit`` (Pa)."""
+
+    def __init__(self, mesh: Any, facets: dict[str, Int32Array], degree: int, material: Parameters, unit: float):
+        self._mesh, self._facets = mesh, facets
+        self._material, self._unit, self._degree = material, unit, degree
+        self.is_linear = material.law == "linear"
+        self.is_mixed = material.poisson >= (MIXED_FROM if self.is_linear else LARGE_MIXED_FROM)
+        self._displacements = vector_space(mesh, degree)
+        self._space = taylor_hood_space(mesh, degree) if self.is_mixed else self._displacements
+        self._solution = fem.Function(self._space)
+        self.dofs = len(self._solution.x.array)
+        self._r = ufl.SpatialCoordinate(mesh)[0]
+        self._u: Any = self._solution
+        if self.is_mixed:
+            self._u, self._p = ufl.split(self._solution)
+        # Only u_r v_r/r is no polynomial on straight cells; the other integrands have degree 2p at most.
+        exact = 2 * degree + mesh_order(mesh)
+        self._dx = ufl.dx(metadata={"quadrature_degree": exact if self.is_linear else exact + _MORE})
+        self._density = self._linear() if self.is_linear else self._hyperelastic()
+        first = self._density.derivative(self._solution, ufl.TestFunction(self._space))
+        second = first.derivative(self._solution, ufl.TrialFunction(self._space))
+        self._action, self._stiffness = (form(each.value * self._r * self._dx) for each in (first, second))
+        _ = self._strains, self._areas, self.is_linear or self._energies  # all forms are compiled now
+
+    def _linear(self) -> Energy:
+        material, unit, mesh = self._material, self._unit, self._mesh
+        strain, mu = axisymmetric_strain(self._u, self._r), fem.Constant(mesh, material.lame_mu / unit)
+        if self.is_mixed:
+            compliance = fem.Constant(mesh, unit / material.lame_lambda)
+            energy = pressurised(strain, 0, mu, self._p, compliance)
+        else:
+            energy = small_strain(strain, fem.Constant(mesh, material.ratio * material.lame_mu / unit), mu)
+        return Energy(((energy, None),), {})
+
+    def _hyperelastic(self) -> Energy:
+        material, mesh = self._material, self._mesh
+        share, (split,) = material.lame_mu / self._unit, [SplitLaw.of(MaterialLaw((material,)))]
+        volume = split.elastic.parameters[0].lame_lambda if self.is_mixed else material.ratio
+        of = {name: fem.Constant(mesh, value) for name, value in material.further}
+        of |= {"lame_mu": fem.Constant(mesh, share), "lame_lambda": fem.Constant(mesh, volume * share)}
+        gradient = axisymmetric_gradient(self._u, self._r)
+        if not self.is_mixed:
+            return LAWS[material.law].density(gradient, of)
+        pressure, compliance = ufl.variable(self._p), fem.Constant(mesh, split.compliance[0] / share)
+        energy = LAWS[material.law].density(gradient, of, (pressure, compliance))
+        # One function has displacement and pressure: what its derivative reads of an energy by parts is a part, too.
+        return replace(energy, parts={**energy.parts, pressure: self._p}) if energy.parts else energy
+
+    def on(self, name: str) -> tuple[IntArray, FloatArray]:
+        """Return the dofs (n, 2) of u_r and u_z on a group of facets, and their coordinates (n, 2)."""
+        if name not in self._facets:
+            return np.empty((0, 2), dtype=np.int64), np.empty((0, 2))
+        blocks = np.asarray(fem.locate_dofs_topological(self._displacements, 1, self._facets[name]), dtype=np.int64)
+        places: FloatArray = self._displacements.tabulate_dof_coordinates()[blocks, :2]
+        return self._numbers[blocks], places
+
+    @cached_property
+    def _numbers(self) -> IntArray:
+        """Return the dofs (n, 2) of u_r and u_z at each node of the space of displacements."""
+        if not self.is_mixed:
+            return np.arange(self.dofs).reshape(-1, 2)
+        nodes = compat.cell_dofs(self._displacements)
+        numbers = np.empty((nodes.max() + 1, 2), dtype=np.int64)
+        numbers[nodes] = compat.cell_dofs(self._space.sub(0)).reshape(*nodes.shape, 2)
+        return numbers
+
+    def stiffness(self, solution: FloatArray) -> sp.csr_matrix:
+        """Assemble the operator; of a law that is not linear, the tangent at the ``solution``."""
+        self._solution.x.array[:] = solution
+        matrix = compat.assemble_matrix(self._stiffness, [], 1.0)
+        rows, columns, values = matrix.getValuesCSR()
+        matrix.destroy()
+        return sp.csr_matrix((values, columns, rows), shape=(self.dofs, self.dofs))
+
+    def residual(self, solution: FloatArray) -> FloatArray:
+        """Return the derivative of the energy at ``solution``, by way of its strains."""
+        self._solution.x.array[:] = solution
+        return np.array(fem.assemble_vector(self._action).array)
+
+    def energy(self, solution: FloatArray) -> float:
+        """Return the energy of a ``solution``, NaN if tissue is inside out at a point of quadrature."""
+        self._solution.x.array[:] = solution
+        return sum(float(fem.assemble_scalar(each)) for each in self._energies)
+
+    @cached_property
+    def _energies(self) -> list[Any]:
+        """Forms of the energy, and of one that is NaN if tissue is inside out.
+
+        Next to the axis the hoop stretch and the area's change may both be negative, and J positive: Newton's method
+        converges then to F wrong by 0.2 to 0.4 %. Both have a sign of their own in a logarithm.
+        """
+        forms = [form(self._density.value * self._r * self._dx)]
+        if not self.is_linear:
+            gradient, zero = axisymmetric_gradient(self._u, self._r), fem.Constant(self._mesh, 0.0)
+            inside = ufl.dx(metadata={"quadrature_degree": _INSIDE})
+            area = gradient[0, 0] * gradient[2, 2] - gradient[0, 2] * gradient[2, 0]
+            forms.append(form(zero * (ufl.ln(area) + ufl.ln(gradient[1, 1])) * inside))
+        return forms
+
+    def interpolate(self, coarse: "Region", solution: FloatArray) -> FloatArray:
+        """Return the ``solution`` of elements of a lower degree on the same mesh, in these elements."""
+        coarse._solution.x.array[:] = solution
+        if self.is_mixed:
+            for part in range(2):
+                self._solution.sub(part).interpolate(coarse._solution.sub(part))
+        else:
+            self._solution.interpolate(coarse._solution)
+        return np.array(self._solution.x.array)
+
+    def mean_strains(self) -> tuple[FloatArray, FloatArray]:
+        """Return the largest principal strain of each cell's mean strain, and its corners (m, 3, 2)."""
+        corners = self._mesh.geometry.x[compat.geometry_dofs(self._mesh)[:, :3], :2]
+        area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
+        if self._areas is not None:
+            area = np.array(fem.assemble_vector(self._areas).array)
+        rr, rz, zr, zz, tt = (np.asarray(fem.assemble_vector(self._strains).array).reshape(-1, 5) / area[:, None]).T
+        if self.is_linear:
+            in_plane = np.abs(rr + zz) / 2 + np.hypot((rr - zz) / 2, (rz + zr) / 2)
+        else:
+            gradient = np.eye(2) + np.stack([rr, rz, zr, zz], axis=-1).reshape(-1, 2, 2)
+            in_plane = np.abs(np.linalg.svd(gradient, compute_uv=False) - 1).max(axis=1)
+        return np.maximum(in_plane, np.abs(tt)), corners
+
+    @cached_property
+    def _strains(self) -> Any:
+        u, test = self._u, ufl.TestFunction(cellwise_space(self._mesh, (5,)))
+        parts = ufl.as_vector([u[0].dx(0), u[0].dx(1), u[1].dx(0), u[1].dx(1), u[0] / self._r])
+        return form(ufl.inner(parts, test) * self._dx)
+
+    @cached_property
+    def _areas(self) -> Any:
+        test = ufl.TestFunction(cellwise_space(self._mesh, ()))
+        return form(test * self._dx) if mesh_order(self._mesh) > 1 else None
