@@ -1,5 +1,6 @@
 """The plan of a study: the steps that compute its cases, and what each reduction struck out, and why."""
 
+from collections import Counter
 from collections.abc import Collection
 from dataclasses import replace
 
@@ -20,7 +21,6 @@ __all__ = ["EXACT", "Plan", "Struck", "ask_for_exact", "declare", "first_attempt
 EXACT, _EXACT_SHARE = 1e-3, 0.3
 # A slit has many edges: an error of 1e-3 would need three times the cells and ten times the time.
 EXACT_OF_SLIT = 3e-3
-_NO_EXACT = "F_exact is not computed at large displacements: no solve there is more accurate than the error bars."
 _LOST = "Places where the tool does not touch the body need no solve."
 
 
@@ -84,14 +84,14 @@ def ask_for_exact(plan: Plan) -> Plan:
     accuracy = min([EXACT, *(solve.goal * _EXACT_SHARE for solve in plan.solves if solve.goal)])
     found: dict[str, Solve] = {}
     unasked: dict[str, Solve] = {}
-    keys, large = [], 0
+    keys, without = [], Counter[str]()
     for case in plan.study.cases():
         if case.lost_contact:
             keys.append(NO_RECORD)
             continue
-        if obstacle("F_exact", case):
+        if reason := obstacle("F_exact", case):
             keys.append(NO_RECORD)
-            large += 1
+            without[reason] += 1
             continue
         if (image := plan.equivalent.get(case.index)) and image.of_scene:
             case = plan.study.case(image.of)  # noqa: PLW2901
@@ -104,7 +104,9 @@ def ask_for_exact(plan: Plan) -> Plan:
         keys.append(key if is_wanted else NO_RECORD)
         if key not in wanted:
             wanted[key] = _reference(key, case, enough)
-    plan = replace(plan.struck_by("exact", large, _NO_EXACT), unasked=tuple(unasked.values()))
+    for reason, count in without.items():
+        plan = plan.struck_by("exact", count, f"F_exact is not computed: {reason}.")
+    plan = replace(plan, unasked=tuple(unasked.values()))
     if not any(keys):
         return plan
     return replace(plan, solves=(*plan.solves, *found.values()), reference_keys=tuple(keys))

@@ -18,6 +18,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from pipeline.verify.elements import element_rows  # noqa: PLC0415
     from pipeline.verify.far_fields import far_field_rows  # noqa: PLC0415
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
+    from pipeline.verify.friction import friction_rows  # noqa: PLC0415
     from pipeline.verify.hyperelastic import hyperelastic_rows  # noqa: PLC0415
     from pipeline.verify.laws import law_rows  # noqa: PLC0415
     from pipeline.verify.loads import load_rows  # noqa: PLC0415
@@ -37,6 +38,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from body_rows(comm, quick=quick)
     yield from compliance_rows(comm, quick=quick)
     yield from contact_rows(comm, quick=quick)
+    yield from friction_rows(comm, quick=quick)
     yield from wedge_rows(comm, quick=quick)
     yield from slit_rows(comm, quick=quick)
     yield from far_field_rows(comm, quick=quick)

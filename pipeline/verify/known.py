@@ -51,6 +51,7 @@ BOX_BLADE = (4.02343, 5e-5)
 CYLINDER_BALL = (1.640007, 2e-6)
 
 SNEDDON = "I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965)"
+STICKING = "F. M. Borodich, L. M. Keer, Int. J. Solids Struct. 41, 2479 (2004)"
 SPENCE = "D. A. Spence, Proc. R. Soc. A 305, 55 (1968)"
 GALIN = "L. A. Galin, Contact Problems (1961)"
 # Quadrature of tissue that sticks: points, and the end of the integral, whose integrand falls like exp(-2 x).

@@ -3,12 +3,14 @@
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipeline.quantities import write
 from pipeline.report.figures.facets import Facets
 from pipeline.report.figures.style import FAILED, LEGEND, WIDTH, log_scale, look, new_figure
 from pipeline.report.words import choices, heading, is_numeric, lengths, scale
@@ -103,7 +105,7 @@ def positions(coordinate: xr.DataArray) -> np.ndarray:
 
 
 def write_ticks(ax: Axes, coordinate: xr.DataArray) -> None:
-    """Write words at an axis, or numbers, and "full" for the full order."""
+    """Write words at an axis, or numbers, and the word for infinity: "full" for the full order."""
     x, values = positions(coordinate), coordinate.values
     if not is_numeric(coordinate):
         words = [lengths(coordinate, str(value)) for value in values]
@@ -125,7 +127,7 @@ def write_ticks(ax: Axes, coordinate: xr.DataArray) -> None:
     ticks = [tick for tick in ax.get_xticks() if low - 1e-9 <= tick <= high] if finite.size else []
     full = x[~np.isfinite(values)][0]
     ticks = [tick for tick in ticks if full - tick > 0.12 * (full - low)]
-    ax.set_xticks([*ticks, full], [*(f"{tick:g}" for tick in ticks), "full"])
+    ax.set_xticks([*ticks, full], [*(f"{tick:g}" for tick in ticks), write(str(coordinate.name), inf)])
 
 
 def _is_long(finite: np.ndarray) -> bool:

@@ -33,11 +33,11 @@ class Neighbours:
         has = np.bincount(corner, minlength=len(active)) > 0
         return np.asarray(has & (np.bincount(corner, ~active[beside], len(active)) == 0))
 
-    def majority(self, chosen: BoolArray) -> BoolArray:
-        """Return ``chosen`` (n), at corners the choice of most neighbours."""
+    def majority(self, chosen: BoolArray, active: BoolArray) -> BoolArray:
+        """Return ``chosen`` (n), at corners the choice of most of their ``active`` neighbours, true if it is even."""
         corner, beside = self.beside.T
-        votes = np.bincount(corner, np.where(chosen[beside], 1.0, -1.0), len(chosen))
-        return np.where(self.is_corner, votes > 0, chosen)
+        votes = np.bincount(corner, np.where(chosen[beside], 1.0, -1.0) * active[beside], len(chosen))
+        return np.where(self.is_corner, votes >= 0, chosen)
 
     def mean(self, vectors: FloatArray, chosen: BoolArray) -> FloatArray:
         """Return ``vectors`` (n, t), at corners the sum of those of the ``chosen`` neighbours."""
@@ -73,6 +73,11 @@ class Slide:
         share = np.clip(most / np.maximum(self.sizes, _TINY), 0.0, 1.0)
         return np.asarray(share[:, None, None] * across)
 
+    def towards(self, other: "Slide", share: float) -> "Slide":
+        """Return ``other`` with directions a ``share`` of the way from these: for directions that swing to and fro."""
+        middle = (1 - share) * self.directions + share * other.directions
+        return Slide(other.sliding, other.sizes[:, None] * np.where(self.sliding[:, None], middle, other.directions))
+
     def following(self, trial: FloatArray, most: FloatArray, active: BoolArray, neighbours: Neighbours) -> "Slide":
         """Return the next guess, from ``trial`` tractions (n, t) and the largest friction ``most`` (n).
 
@@ -82,5 +87,5 @@ class Slide:
         reverses = np.einsum("nt,nt->n", trial, self.trial) < 0
         stays = (size > (1 - _SLACK) * most) & ~reverses
         sliding = np.where(self.sliding, stays, size > (1 + _SLACK) * most) & active
-        sliding = neighbours.majority(sliding) & active
+        sliding = neighbours.majority(sliding, active) & active
         return Slide(sliding, neighbours.mean(trial, sliding))

@@ -25,6 +25,8 @@ STEPS, _BEFORE = 16, (0.25, 0.5, 0.75)
 _MOST_ITERATIONS = 60
 # Changes of a node's state after which it is simplified, and the iterations from which they count.
 _CHANGES, _PATIENCE = 3, 4
+# Iterations after which changes of the direction of slip are halved, again and again.
+_SWINGING = 12
 # Largest share of the force on simplified nodes: friction then changes by about as much, half of the bar on it.
 _SIMPLIFIED = 0.1
 # Tolerance on the friction of sliding nodes, in units of the mean normal reaction.
@@ -157,7 +159,7 @@ def _settled(
             break
         if iteration > _PATIENCE:
             simple = simple.counting(moves, turns)
-        step = after
+        step = replace(after, slide=step.slide.towards(after.slide, 0.5 ** (iteration // _SWINGING)))
     raise Unsettled("contact with friction does not settle: use smaller elements below the probe, or less friction")
 
 
