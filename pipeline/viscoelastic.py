@@ -89,10 +89,36 @@ def _branch(motion: Motion, tau: float, times: FloatArray) -> tuple[FloatArray, 
 
 def _linear(state: FloatArray, steady: FloatArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return q and the integral of q^2 after ``time`` at a constant rate, in units of tau; ``steady`` is rate * tau."""
+    decayed, (own, crossed, steadies) = -np.expm1(-time), _heat(time)
+    return state + (steady - state) * decayed, own * state**2 + 2 * crossed * state * steady + steadies * steady**2
+
+
+def _heat(time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the integrals of e^2, e (1 - e), (1 - e)^2 with e = exp(-t), from 0 to ``time``."""
     decayed = -np.expm1(-time)
-    own = np.where(time < _SHORT, time**3 * (1 / 3 - time / 4 + 7 * time**2 / 60), time - decayed - decayed**2 / 2)
-    spent = state**2 * decayed * (2 - decayed) / 2 + state * steady * decayed**2 + steady**2 * own
-    return state + (steady - state) * decayed, spent
+    last = np.where(time < _SHORT, time**3 * (1 / 3 - time / 4 + 7 * time**2 / 60), time - decayed - decayed**2 / 2)
+    return decayed * (2 - decayed) / 2, decayed**2 / 2, last
+
+
+def kept_of(time: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return what is left of q after ``time``, in units of tau, and of a rise at a constant rate; both 1 at once."""
+    kept = np.exp(-time)
+    return kept, np.divide(-np.expm1(-time), time, out=np.ones_like(kept), where=time > 0)
+
+
+def heat_of(time: FloatArray, one: tuple[FloatArray, FloatArray], other: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Return the integral of the product of two q over ``time`` > 0, in units of tau.
+
+    Each is given by its value at the beginning, and the rise of what it follows, which is at a constant rate.
+    """
+    own, crossed, last = _heat(time)
+    (state, rise), (of_other, rise_of_other) = one, other
+    steady, steady_of_other = rise / time, rise_of_other / time
+    return (
+        own * state * of_other
+        + crossed * (state * steady_of_other + steady * of_other)
+        + last * steady * steady_of_other
+    )
 
 
 def _sine(

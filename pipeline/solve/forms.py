@@ -54,7 +54,7 @@ class ElasticForms:
     def set_law(self, law: MaterialLaw) -> None:
         """Set the parameters of ``law`` for the next assembly."""
         for name, coefficient in self.coefficients.items():
-            self._put(coefficient, law.values(name))
+            self.put(coefficient, law.values(name))
 
     def coefficients_of(self, laws: Iterable[str]) -> dict[str, Any]:
         """Return the coefficients of these laws by name; the next :meth:`set_law` sets new ones."""
@@ -71,7 +71,7 @@ class ElasticForms:
     def by_region(self, values: tuple[float, ...]) -> Any:
         """Return a coefficient with the given ``values`` by region: a constant, or a function."""
         result = self._coefficient()
-        self._put(result, values)
+        self.put(result, values)
         return result
 
     def _coefficient(self) -> Any:
@@ -83,9 +83,10 @@ class ElasticForms:
     def _cellwise(self) -> Any:
         return cellwise_space(self._space.mesh, ())
 
-    def _put(self, coefficient: Any, values: tuple[float, ...]) -> None:
+    def put(self, coefficient: Any, values: tuple[float, ...]) -> None:
+        """Set the values of a ``coefficient`` by region; a single one applies to all."""
         if self._regions is None:
-            (coefficient.value,) = values
+            (coefficient.value,) = set(values)
         else:
             coefficient.x.array[compat.cell_dofs(coefficient.function_space).reshape(-1)] = of_regions(
                 values, self._regions, len(self._regions)
@@ -163,8 +164,18 @@ class HyperelasticForms:
     functions of ``products``.
     """
 
-    def __init__(self, space: Any, elastic: ElasticForms, laws: Sequence[str], pressure: Pressure | None = None):
+    def __init__(
+        self,
+        space: Any,
+        elastic: ElasticForms,
+        laws: Sequence[str],
+        pressure: Pressure | None = None,
+        *,
+        scaled: bool = False,
+    ):
+        """With ``scaled`` the energy has a factor, which :meth:`set_factors` sets for each region."""
         self._space, self._cells, self._pressure = space, elastic.cells_of(laws), pressure
+        self._elastic, self._factor = elastic, elastic.by_region((1.0,)) if scaled else None
         self._displacement, self._coefficients = elastic.displacement, elastic.coefficients_of(laws)
         self._fields = (elastic.displacement, *(pressure or ())[:1])
         self.directions = tuple(fem.Function(field.function_space) for field in self._fields)
@@ -177,8 +188,13 @@ class HyperelasticForms:
             energy = LAWS[law].density(gradient, self._coefficients, self._pressure)
             for column, direction in directions:
                 energy = energy.derivative(self._fields[column], direction, of_shape=column == 0)
-            found.append(energy.value * measure)
+            value = energy.value if self._factor is None else self._factor * energy.value
+            found.append(value * measure)
         return sum(found)
+
+    def set_factors(self, values: tuple[float, ...]) -> None:
+        """Set the factor of the energy in each region, of forms made with one."""
+        self._elastic.put(self._factor, values)
 
     @cached_property
     def _measures(self) -> dict[str, Any]:

@@ -18,8 +18,11 @@ from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import assemble
 from pipeline.solve.elements.base import Elements, Fields
+from pipeline.solve.elements.tangent import Prestress, Tangent
+from pipeline.solve.kernels.tangent import TangentCells
 from pipeline.solve.krylov import INDEFINITE, SOLVERS, configure, explain, keep, solver_of
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.spaces import ElasticSpace
 from pipeline.stages import stage
 
 # Tolerance on the residual, relative to the forces at prescribed dofs, and most Newton iterations.
@@ -51,18 +54,51 @@ class LargeError(SolveError):
         self.reached = reached
 
 
+class Imposed:
+    """The work H : E of a prestress, E Green's strain, or ε in regions of a linear law.
+
+    It is ½ (x + u)·K (x + u) − ½ x·K x, with K its part of the tangent; in linear regions the force is K x.
+    """
+
+    def __init__(self, space: ElasticSpace, tangent: Tangent, stress: list[FloatArray]):
+        """Set up; collective. ``moduli`` are its part of the tangent."""
+        whole = tangent.cells.geometric(stress)
+        self.moduli = tangent.of_large_strain(whole)
+        self._stiffness = tangent.operator(self.moduli)
+        self._constant = tangent.operator(whole).whole(space.places)
+
+    def forces(self, u: FloatArray) -> FloatArray:
+        """Return the nodal forces at a displacement u, owned dofs; collective."""
+        return self._constant + self._stiffness.whole(u)
+
+    def energy(self, u: FloatArray) -> float:
+        """Return this rank's part of the work; collective."""
+        return float(u @ self._constant) + float(u @ self._stiffness.whole(u)) / 2
+
+
 class HyperelasticBody:
     """A hyperelastic body on the elements of linear elasticity, and Newton's method for it; ``close`` frees it.
 
     Its state is one vector of owned dofs: displacement, and in mixed elements pressure.
     """
 
-    def __init__(self, elements: Elements, law: MaterialLaw, solver: Preconditioner | None = None):
-        """Set up; collective. ``solver`` is a preconditioner, which :meth:`move` and :meth:`settle` need."""
+    def __init__(
+        self,
+        elements: Elements,
+        law: MaterialLaw,
+        solver: Preconditioner | None = None,
+        *,
+        prestressed: bool = False,
+    ):
+        """Set up; collective. ``solver`` is a preconditioner, which :meth:`move` and :meth:`settle` need.
+
+        ``prestressed``: :meth:`impose` may change the energy.
+        """
         self._elements, self._solver = elements, solver
         self._space, self._unit = elements.displacements, elements.unit(law)
         self._held = self._space.prescribed_owned
-        self._forms = elements.large_forms(law)
+        self._forms = elements.large_forms(law, scaled=prestressed)
+        self._imposed: Imposed | None = None
         self._stack = ExitStack()
         self._tangent = elements.tangent(law)
         self._stack.callback(self._tangent.close)
@@ -98,7 +134,38 @@ class HyperelasticBody:
     def energy(self, state: PETSc.Vec) -> float:
         """Return the stored energy (J) of the modelled part, NaN if tissue is inside out; collective."""
         self.show(state)
-        return self._unit * float(self._space.comm.allreduce(fem.assemble_scalar(self._forms.energy), op=MPI.SUM))
+        own = fem.assemble_scalar(self._forms.energy)
+        if self._imposed is not None:
+            own += self._imposed.energy(state.array_r[: self._space.owned])
+        return self._unit * float(self._space.comm.allreduce(own, op=MPI.SUM))
+
+    def impose(self, prestress: Prestress | None, factors: tuple[float, ...] = ()) -> None:
+        """Change the energy from now on; None leaves only ``factors``, by region; collective."""
+        self._forms.set_factors(factors if prestress is None else prestress.factors)
+        self._imposed = None
+        if prestress is not None:
+            self._imposed = Imposed(self._space, self._tangent, prestress.stress)
+            self._tangent.impose(prestress.factors, self._imposed.moduli)
+
+    def stresses(self, state: PETSc.Vec) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Return stress (of the unchanged energy, in the law's unit) and strain: see ``Tangent``; collective."""
+        self.show(state)
+        return self._tangent.stresses()
+
+    def force_of(self, stress: list[FloatArray], state: PETSc.Vec, direction: FloatArray) -> float:
+        """Return the work (J) that a change of the prestress by ``stress`` does in a ``direction`` (owned dofs)."""
+        forces = Imposed(self._space, self._tangent, stress).forces(state.array_r[: self._space.owned])
+        return self._unit * float(self._space.comm.allreduce(float(forces @ direction), op=MPI.SUM))
+
+    @property
+    def cells(self) -> TangentCells:
+        """The cells, laid out for values at quadrature points."""
+        return self._tangent.cells
+
+    @property
+    def unit(self) -> float:
+        """The unit of stresses (Pa)."""
+        return self._unit
 
     def forces(self, state: PETSc.Vec, result: PETSc.Vec) -> None:
         """Write the residual (N), nodal forces at prescribed dofs included, into ``result``; collective."""
@@ -160,6 +227,8 @@ class HyperelasticBody:
         with self._elements.fields() as parts:
             for residual, part in zip(self._forms.residuals, parts, strict=True):
                 assemble(residual, part)
+            if self._imposed is not None:
+                parts[0].array[:] += self._imposed.forces(state.array_r[: self._space.owned])
             self._elements.weigh(parts)
             result.array[:] = np.concatenate([part.array for part in parts])
 

@@ -13,6 +13,7 @@ import ufl
 from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.shapes.tissue import lame
 from pipeline.solve.laws import LAWS
+from pipeline.viscoelastic import Terms
 
 # Parameters of every law.
 COEFFICIENTS = ("lame_lambda", "lame_mu")
@@ -24,7 +25,8 @@ _LEAST_REST = 0.25
 class Parameters:
     """Material of one region. Lamé's λ and μ (Pa) are those of small strain; λ is infinite if incompressible.
 
-    ``law`` is one of :data:`pipeline.solve.laws.LAWS`, ``further`` its parameters besides λ and μ, by name.
+    ``law`` is one of :data:`pipeline.solve.laws.LAWS`, ``further`` its parameters besides λ and μ, by name,
+    ``relaxation`` its Prony series, which time steps read.
     ``given_poisson`` is Poisson's ratio as given, None if λ and μ were given.
     """
 
@@ -33,6 +35,7 @@ class Parameters:
     given_poisson: float | None = field(default=None, compare=False)
     law: str = "linear"
     further: tuple[tuple[str, float], ...] = ()
+    relaxation: Terms = ()
 
     @staticmethod
     def of_moduli(

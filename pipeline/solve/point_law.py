@@ -1,4 +1,4 @@
-"""Moduli of a law at one material point, ∂²ψ/∂F² and with a pressure ∂²ψ/∂p∂F, compiled from the law's UFL.
+"""A law at one material point, compiled from its UFL: moduli ∂²ψ/∂F², with a pressure ∂²ψ/∂p∂F, stress and strain.
 
 The form compiler makes the code: F and p are functions that are constant on a reference cell of one quadrature point.
 The same code then serves every cell, region and degree.
@@ -17,6 +17,8 @@ from pipeline.solve.compiled import Kernel, kernel
 from pipeline.solve.laws import LAWS
 from pipeline.solve.physics import COEFFICIENTS, Parameters
 
+# Rows and columns of the components of symmetric tensors.
+SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 # Volume of the reference cell: integrals over it, divided by this, are values.
 _VOLUME = 1 / 6
 
@@ -46,10 +48,13 @@ class PointLaw:
         self._compliance = ufl.Constant(domain)
         pressure = (self._fields[1], self._compliance) if is_mixed else None
         self._energy = LAWS[law].density(self._fields[0], self._constants, pressure)
+        self._is_small = law == "linear"
 
-    def compile(self) -> None:
-        """Compile all derivatives."""
+    def compile(self, *, relaxes: bool = False) -> None:
+        """Compile all derivatives, and stress and strain of tissue that ``relaxes``."""
         _ = self._moduli
+        if relaxes:
+            _ = self._stress, self._strain
         if len(self._fields) > 1:
             _ = self._coupling
 
@@ -60,6 +65,37 @@ class PointLaw:
     def coupling(self, law: Parameters) -> PointKernel:
         """Return ∂²ψ/∂p∂F, (9,), with the parameters of a region."""
         return self._bound(self._coupling, law)
+
+    def stress(self, law: Parameters) -> PointKernel:
+        """Return the second Piola–Kirchhoff stress, the symmetric components of ``SYMMETRIC``; of linear laws, σ."""
+        return self._bound(self._stress, law)
+
+    def strain(self, law: Parameters) -> PointKernel:
+        """Return Green's strain in the same components; of linear laws, ε."""
+        return self._bound(self._strain, law)
+
+    @cached_property
+    def _stress(self) -> tuple[Any, Kernel]:
+        change = self._test_tensor()
+        gradient = self._fields[0]
+        # S : T = P : (F^-T T)
+        direction = change if self._is_small else ufl.inv(gradient).T * change
+        return self._compile(self._energy.derivative(gradient, direction).value)
+
+    @cached_property
+    def _strain(self) -> tuple[Any, Kernel]:
+        gradient, identity = self._fields[0], ufl.Identity(3)
+        strain = ufl.sym(gradient) - identity if self._is_small else (gradient.T * gradient - identity) / 2
+        return self._compile(ufl.inner(strain, self._test_tensor()))
+
+    def _test_tensor(self) -> Any:
+        """Return the symmetric tensor whose product with another one gives its components of ``SYMMETRIC``."""
+        domain = self._mesh.ufl_domain()
+        test = ufl.TestFunction(ufl.FunctionSpace(domain, compat.element(self._mesh, "DG", 0, (len(SYMMETRIC),))))
+        rows: list[list[Any]] = [[0.0] * 3 for _ in range(3)]
+        for number, (row, column) in enumerate(SYMMETRIC):
+            rows[row][column] = rows[column][row] = test[number] / (1 if row == column else 2)
+        return ufl.as_tensor(rows)
 
     @cached_property
     def _moduli(self) -> tuple[Any, Kernel]:
@@ -73,8 +109,11 @@ class PointLaw:
         test, trial = ufl.TestFunction(self._spaces[row]), ufl.TrialFunction(self._spaces[column])
         energy = self._energy.derivative(self._fields[row], test, of_shape=row == 0)
         energy = energy.derivative(self._fields[column], trial, of_shape=column == 0)
+        return self._compile(energy.value)
+
+    def _compile(self, value: Any) -> tuple[Any, Kernel]:
         measure = ufl.dx(domain=self._mesh.ufl_domain(), metadata={"quadrature_degree": 0})
-        expression = energy.value / _VOLUME * measure
+        expression = value / _VOLUME * measure
         return expression, kernel(self._mesh.comm, expression)
 
     def _bound(self, compiled: tuple[Any, Kernel], law: Parameters) -> PointKernel:

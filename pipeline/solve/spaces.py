@@ -174,6 +174,13 @@ class ElasticSpace:
         rhs.array[:] += factor * applied.forces
         rhs.array[self.prescribed_owned] = 0.0
 
+    @cached_property
+    def places(self) -> FloatArray:
+        """The displacement that is the place x (m) itself, owned dofs."""
+        function = fem.Function(self.space)
+        function.interpolate(lambda x: x)
+        return np.array(function.x.array[: self.owned])
+
     def set_displacement(self, values: PETSc.Vec, factor: float = 1.0) -> None:
         """Set the displacement of the forms to ``factor`` times ``values``; collective."""
         fill(self.forms.displacement, values, factor)

@@ -315,9 +315,13 @@ class Elements(ABC):
         """Set the parameters of the forms."""
         self.displacements.forms.set_law(self.elastic(law))
 
-    def large_forms(self, law: MaterialLaw) -> HyperelasticForms:
-        """Return the forms of a law of large displacements; :meth:`set_law` sets their parameters."""
-        return HyperelasticForms(self.displacements.space, self.displacements.forms, law.names, self._pressure(law))
+    def large_forms(self, law: MaterialLaw, *, scaled: bool = False) -> HyperelasticForms:
+        """Return the forms of a law of large displacements; :meth:`set_law` sets their parameters.
+
+        ``scaled``: with a factor for each region.
+        """
+        space = self.displacements
+        return HyperelasticForms(space.space, space.forms, law.names, self._pressure(law), scaled=scaled)
 
     @abstractmethod
     def weigh(self, residual: Fields) -> None:

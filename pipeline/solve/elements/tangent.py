@@ -12,11 +12,12 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.solve.compiled import hyperelastic_degree
 from pipeline.solve.elements.pressures import Pressures
+from pipeline.solve.kernels.native import Single
 from pipeline.solve.kernels.product import CellOperator
 from pipeline.solve.kernels.tangent import Pressed, TangentCells, TangentCoupling
 from pipeline.solve.krylov import keep
 from pipeline.solve.physics import MaterialLaw, SplitLaw
-from pipeline.solve.point_law import PointKernel, PointLaw
+from pipeline.solve.point_law import SYMMETRIC, PointKernel, PointLaw
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.stages import stage
 
@@ -28,6 +29,17 @@ class _Mixed:
     pressures: Pressures
     coupling: TangentCoupling
     kernels: list[PointKernel]
+
+
+@dataclass(frozen=True, eq=False)
+class Prestress:
+    """A change of an energy: ψ times the ``factors`` (by region), plus H : E.
+
+    H, ``stress`` (batches, quadrature, 6, lanes) by part, are second Piola–Kirchhoff stresses in the unit of the law.
+    """
+
+    factors: tuple[float, ...]
+    stress: list[FloatArray]
 
 
 class Tangent:
@@ -44,13 +56,16 @@ class Tangent:
         mesh, is_mixed = space.space.mesh, pressures is not None
         points = {name: PointLaw(mesh, name, is_mixed=is_mixed) for name in sorted(set(law.names))}
         self._kernels = [points[each.law].moduli(each) for each in law.parameters]
-        self._cells = TangentCells(space.space, space.cells, hyperelastic_degree(space.degree))
+        self.cells = TangentCells(space.space, space.cells, hyperelastic_degree(space.degree))
+        self._law, self._points = law, points
         self._moduli: dict[str, list[np.ndarray]] = {}
-        self.stiffness = CellOperator(self._cells, self._moduli)
+        self.stiffness = CellOperator(self.cells, self._moduli)
         self.matrix = keep(self._stack, self.stiffness.matrix())
         self._mixed: _Mixed | None = None
+        self._factors: list[FloatArray] = []
+        self._further: list[Single] = []
         if pressures is not None and split is not None:
-            coupling = TangentCoupling(self._cells, pressures.cells, space.prescribed_owned)
+            coupling = TangentCoupling(self.cells, pressures.cells, space.prescribed_owned)
             kernels = [points[each.law].coupling(each) for each in law.parameters]
             self._mixed = _Mixed(pressures, coupling, kernels)
             self.matrix = self._saddle(coupling, pressures, split)
@@ -59,8 +74,9 @@ class Tangent:
         block = keep(self._stack, coupling.matrix())
         transpose = keep(self._stack, PETSc.Mat().createTranspose(block))
         _, mass = pressures.blocks(entries=False)
-        rest = -pressures.by_region(split.compliance)
-        weighted = keep(self._stack, mass.getPythonContext().weighted(rest).matrix())
+        self._compliance = split.compliance
+        self._mass = mass.getPythonContext().weighted(-pressures.by_region(split.compliance))
+        weighted = keep(self._stack, self._mass.matrix())
         blocks = [[self.matrix, transpose], [block, weighted]]
         return keep(self._stack, PETSc.Mat().createNest(blocks, comm=self._space.comm))
 
@@ -71,13 +87,50 @@ class Tangent:
     @stage("assembly")
     def update(self) -> None:
         """Evaluate the moduli at the fields of the forms."""
-        u, mixed = self._space.forms.displacement.x.array, self._mixed
-        at = None
-        if mixed is not None:
-            at = Pressed(mixed.pressures.cells, mixed.pressures.forms.pressure.x.array)
-            mixed.coupling.factors = self._cells.coupling(mixed.kernels, u, at)
-        found = self._cells.moduli(self._kernels, u, at)
+        u, mixed, at = self._space.forms.displacement.x.array, self._mixed, self._pressed
+        if mixed is not None and at is not None:
+            mixed.coupling.factors = self._scaled(self.cells.coupling(mixed.kernels, u, at))
+        found = self._scaled(self.cells.moduli(self._kernels, u, at))
+        for moduli, more in zip(found, self._further, strict=False):
+            np.add(moduli, more, out=moduli)
         self._moduli |= {"float32": found, "float64": found}
+
+    def impose(self, factors: tuple[float, ...], moduli: list[Single]) -> None:
+        """Change the energy of which this is the tangent: by ``factors`` of regions, and by further ``moduli``."""
+        self._factors, self._further = self.cells.by_region(factors), moduli
+        if self._mixed is not None:
+            weights = [-each * factor for each, factor in zip(self._compliance, factors, strict=True)]
+            self._mass.weight = self._mixed.pressures.by_region(tuple(weights))
+
+    def of_large_strain(self, moduli: list[Single]) -> list[Single]:
+        """Return ``moduli`` with zeros in regions of a linear law, whose strain is linear in u."""
+        is_large = self.cells.by_region([float(name != "linear") for name in self._law.names])
+        return [part * large[:, :, None].astype(np.float32) for part, large in zip(moduli, is_large, strict=True)]
+
+    def operator(self, moduli: list[Single]) -> CellOperator:
+        """Return the operator of ``moduli`` at the quadrature points."""
+        return CellOperator(self.cells, {"float64": moduli, "float32": moduli})
+
+    def stresses(self) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Return stress and strain of the law at the fields of the forms: see :class:`Prestress`."""
+        u, at, size = self._space.forms.displacement.x.array, self._pressed, len(SYMMETRIC)
+        laws = [(self._points[each.law], each) for each in self._law.parameters]
+        stress = self.cells.values([point.stress(each) for point, each in laws], u, at, size)
+        return stress, self.cells.values([point.strain(each) for point, each in laws], u, at, size)
+
+    @property
+    def _pressed(self) -> Pressed | None:
+        if self._mixed is None:
+            return None
+        return Pressed(self._mixed.pressures.cells, self._mixed.pressures.forms.pressure.x.array)
+
+    def _scaled(self, found: list[Single]) -> list[Single]:
+        """Return values of the energy with its factors."""
+        if not self._factors:
+            return found
+        return [
+            values * factor[:, :, None].astype(np.float32) for values, factor in zip(found, self._factors, strict=True)
+        ]
 
     def whole(self, u: FloatArray) -> FloatArray:
         """Return the product with owned displacements u, prescribed ones included, and pressures 0; all rows."""

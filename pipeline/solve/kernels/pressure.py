@@ -133,7 +133,7 @@ class Mass:
     """The mass M, each row times its ``weight``: a context for PETSc."""
 
     def __init__(self, pressures: CellPressures, weight: float | FloatArray = 1.0):
-        self._pressures, self._weight = pressures, weight
+        self._pressures, self.weight = pressures, weight
 
     def weighted(self, weight: float | FloatArray) -> "Mass":
         """Return the mass with other weights."""
@@ -146,11 +146,11 @@ class Mass:
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write M x into ``y``; PETSc calls this."""
-        y.array_w[:] = self._weight * self._pressures.weigh(x.array_r)
+        y.array_w[:] = self.weight * self._pressures.weigh(x.array_r)
 
     def getDiagonal(self, _: PETSc.Mat, y: PETSc.Vec) -> None:
         """Write the diagonal into ``y``; PETSc calls this."""
-        y.array_w[:] = self._weight * self._pressures.diagonal
+        y.array_w[:] = self.weight * self._pressures.diagonal
 
 
 def matrix_of(context: Any, rows: int, columns: int, comm: Any) -> PETSc.Mat:

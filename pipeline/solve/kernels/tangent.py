@@ -17,11 +17,16 @@ from pipeline.solve.kernels.cells import LANES, Lanes, by_points, corners, refer
 from pipeline.solve.kernels.native import Single, call
 from pipeline.solve.kernels.pressure import CellPressures, matrix_of
 from pipeline.solve.kernels.product import CellStiffness
-from pipeline.solve.point_law import PointKernel
+from pipeline.solve.point_law import SYMMETRIC, PointKernel
 
 # Numbers of a symmetric (9, 9) array, and of a (3, 3) one.
 MODULI, _COUPLING = 45, 9
 _STEP = 9 * LANES
+# Places of S_JL in the upper triangle of δ_ik S_JL, rows (i, J), columns (k, L).
+_GEOMETRIC = {
+    (j, k): [n * 9 - n * (n - 1) // 2 + m - n for n, m in ((3 * i + j, 3 * i + k) for i in range(3))]
+    for j, k in SYMMETRIC
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +93,36 @@ class TangentCells:
     def coupling(self, laws: Sequence[PointKernel], u: FloatArray, at: Pressed) -> list[Single]:
         """Return ∂²ψ/∂p∂F at local displacements u and local pressures."""
         return self._evaluated(laws, u, at, _COUPLING)
+
+    def values(self, laws: Sequence[PointKernel], u: FloatArray, at: Pressed | None, size: int) -> list[FloatArray]:
+        """Return ``size`` values of the laws at the quadrature points, (batches, quadrature, size, lanes) by part."""
+        found = []
+        for part, values in zip(self._parts, self._evaluated(laws, u, at, size), strict=True):
+            factor = part.factors[:, None] * part.roots
+            factor = np.where(factor == 0, 1.0, factor)  # of padding
+            found.append(values / factor[:, :, None, :])
+        return found
+
+    def weights(self) -> list[FloatArray]:
+        """Return the volumes (m³) of the quadrature points, (batches, quadrature, lanes) by part; 0 of padding."""
+        return [part.factors[:, None] * part.roots**2 for part in self._parts]
+
+    def by_region(self, values: Sequence[float]) -> list[FloatArray]:
+        """Return the value of each cell's region, (batches, 1, lanes) by part."""
+        regions = [part.lanes.spread(self._region_of(part, len(values))[:, None]) for part in self._parts]
+        return [np.array(values, dtype=float)[of] for of in regions]
+
+    def geometric(self, stress: Sequence[FloatArray]) -> list[Single]:
+        """Return the moduli of S : Fᵀδ F for symmetric stresses S at the quadrature points, by part."""
+        found = []
+        for part, values in zip(self._parts, stress, strict=True):
+            batches, quadrature, _, lanes = values.shape
+            moduli = np.zeros((batches, quadrature, MODULI, lanes), dtype=np.float32)
+            for number, (row, column) in enumerate(SYMMETRIC):
+                for place in _GEOMETRIC[row, column]:
+                    moduli[:, :, place] = part.factors[:, None] * values[:, :, number]
+            found.append(moduli)
+        return found
 
     def add_product(self, coefficients: list[np.ndarray], x: np.ndarray, y: np.ndarray) -> None:
         """Add the product with ``x``, on local points, to ``y``; both in one precision. ``coefficients`` are moduli."""

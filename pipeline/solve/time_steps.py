@@ -1,0 +1,188 @@
+"""Time steps of relaxing tissue, each solved by Newton's method: see :mod:`pipeline.solve.relaxing`.
+
+The elastic stress is taken to be linear in time over a step. Its error falls with the square of the step. A second set
+of history variables follows every other time: the work of the difference of both stresses in the displacement gives
+what that changes of the force, about four times the error.
+"""
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.solve.balance import sums
+from pipeline.solve.compiled import global_sum
+from pipeline.solve.elements.base import Elements, Linearised
+from pipeline.solve.history import Course, History, between
+from pipeline.solve.movement import Movement
+from pipeline.solve.newton import HyperelasticBody, LargeError
+from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.relaxing import HistoryVariables
+from pipeline.solve.response import whole_force
+from pipeline.stages import stage
+
+# Largest step as a share of the movement, and the smallest part of a step.
+_LONGEST, _SMALLEST = 1 / 3, 1 / 64
+# Of the difference between steps and double steps, a third is the error of the steps; the bar is twice that.
+_OF_DIFFERENCE = 2 / 3
+
+
+@dataclass
+class _Place:
+    """How far the steps have come: time (s), share of the movement, its last change, and energies (J)."""
+
+    time: float = 0.0
+    share: float = 0.0
+    changed: float = 0.0
+    rate: float = 0.0  # work per share
+    work: float = 0.0
+    has_moved: bool = False
+
+
+class TimeSteps:
+    """Time steps of a ``movement`` in a body of a ``law`` whose regions may relax. Methods are collective."""
+
+    def __init__(
+        self, elements: Elements, law: MaterialLaw, linearised: Linearised, movement: Movement, stack: ExitStack
+    ):
+        """Set up; what is made is freed with the ``stack``."""
+        self._elements, self._law, self._movement = elements, law, movement
+        self._space, self._place = elements.displacements, _Place()
+        self._body = HyperelasticBody(elements, law, linearised.preconditioner, prestressed=True)
+        stack.callback(self._body.close)
+        self._variables = HistoryVariables(self._body.cells, [each.relaxation for each in law.parameters])
+        self._state, self._before, self._forces, self._unit = (
+            stack.enter_context(self._body.state()) for _ in range(4)
+        )
+        owned = self._space.owned
+        for motion, amount in zip(movement.motions, movement.amounts, strict=True):
+            self._unit.array[:owned] += amount * self._space.held(motion)[:owned]
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the linear solver so far."""
+        return self._body.iterations
+
+    @stage("time steps")
+    def follow(self, course: Course) -> History:
+        """Return the history of a course.
+
+        Raises:
+            LargeError: if Newton's method does not converge; it has the depth and the force that were reached.
+        """
+        self._elements.set_law(self._law)
+        halves, errors = course.halves(), dict[int, float]()
+        forces, heat, imbalance = [], [], []
+        for number, (time, share) in enumerate(zip(course.times, course.shares, strict=True)):
+            self._reach(time, share, course)
+            if number in halves:
+                errors[number] = self._step_error()
+            forces.append(self._force())
+            dissipated, stored = self._energies()
+            heat.append(dissipated)
+            imbalance.append(self._place.work - stored - dissipated)
+        whole = 2.0 ** len(self._elements.body.mirrored)
+        return History(
+            times=np.array(course.times),
+            forces=np.array(forces),
+            bars=_OF_DIFFERENCE * whole * between(errors, len(forces)),
+            dissipated=whole * np.array(heat),
+            imbalance=whole * np.array(imbalance),
+        )
+
+    def _reach(self, time: float, share: float, course: Course) -> None:
+        """Continue to a time and a share of the movement; a step is halved where Newton's method does not converge."""
+        place = self._place
+        while place.time < time or place.share != share:
+            rise = abs(share - place.share)
+            part = 1.0 if rise <= _LONGEST * (1 + 1e-9) else _LONGEST / rise
+            while True:
+                is_last = part == 1.0
+                then = time if is_last else place.time + part * (time - place.time)
+                there = share if is_last else place.share + part * (share - place.share)
+                try:
+                    self._step(then, there)
+                    break
+                except LargeError as error:
+                    part /= 2
+                    place.changed = 0.0  # the tangent is a better guess than the last step
+                    if part < _SMALLEST:
+                        raise self._stopped(course, error) from error
+
+    def _step(self, time: float, share: float) -> None:
+        """Find the equilibrium at a later time (s) and share of the movement.
+
+        Raises:
+            LargeError: if Newton's method does not converge.
+        """
+        place, body = self._place, self._body
+        step, change = time - place.time, share - place.share
+        if not (place.has_moved or share):  # at rest
+            place.time = time
+            return
+        prestress = self._variables.prestress(step)
+        body.impose(prestress)
+        with body.state() as trial:
+            trial.array[:] = self._state.array
+            if change:
+                trial.array[:] += change * self._rate()
+            trial.array[self._space.prescribed_owned] = share * self._unit.array[self._space.prescribed_owned]
+            if not np.isfinite(body.energy(trial)):
+                raise LargeError("tissue is turned inside out")
+            body.forces(trial, self._forces)
+            body.settle(trial, body.norm_on_held(self._forces))
+            self._before.array[:] = self._state.array
+            self._state.array[:] = trial.array
+        body.forces(self._state, self._forces)
+        rate = self._forces.dot(self._unit)
+        place.work += change * (place.rate + rate) / 2
+        self._variables.advance(step, *body.stresses(self._state))
+        place.time, place.share, place.rate, place.has_moved = time, share, rate, True
+        place.changed = change or place.changed
+        if not change:
+            self._before.array[:] = self._state.array
+            place.changed = 0.0
+
+    def _rate(self) -> FloatArray:
+        """Return the change of the state per share of the movement: that of the last step, or by the tangent."""
+        if self._place.changed:
+            return np.asarray((self._state.array - self._before.array) / self._place.changed)
+        with self._body.state() as rate:
+            self._body.move(self._state, self._unit, rate)
+            return np.array(rate.array)
+
+    def _step_error(self) -> float:
+        """Return the change (N) of the modelled part's force along the first motion by steps of twice the length."""
+        stress = self._variables.advance_coarse()
+        if not self._place.share:
+            return 0.0
+        direction = self._state.array[: self._space.owned] / self._place.share
+        return abs(self._body.force_of(stress, self._state, direction) / self._movement.amounts[0])
+
+    def _force(self) -> FloatArray:
+        """Return the force (N) of the tissue on the probe, of the whole body."""
+        residual = self._forces.array[: self._space.owned]
+        (on_probe,) = sums(self._space, [residual], [self._unit.array[: self._space.owned]]).on_probe
+        return -whole_force(on_probe, self._elements.body.mirrored)
+
+    def _energies(self) -> tuple[float, float]:
+        """Return what is dissipated and what is stored (J) of the modelled part."""
+        if not self._place.has_moved:
+            return 0.0, 0.0
+        self._body.impose(None, self._variables.rest)
+        elastic = self._body.energy(self._state)
+        own = np.array([self._variables.heat, self._variables.stored])
+        heat, stored = self._body.unit * global_sum(self._space.comm, own)
+        return float(heat), elastic + float(stored)
+
+    def _stopped(self, course: Course, why: LargeError) -> LargeError:
+        """Return the error of steps that end before the end of the course."""
+        place, (*_, force) = self._place, self._force()
+        depth = place.share * self._movement.amounts[0]
+        message = (
+            f"time steps reached {place.time:.3g} s of {course.times[-1]:.3g} s, at a depth of {depth * 1e3:.3g} mm, "
+            f"where F is {force:.4g} N (Newton's method: {why}); the tissue becomes unstable, or elements at the "
+            "probe's edge are flattened; use a smaller depth, or a larger rim"
+        )
+        return LargeError(message, (depth, float(force)) if place.has_moved else None)
