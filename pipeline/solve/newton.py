@@ -185,7 +185,7 @@ class HyperelasticBody:
             LargeError: if the tangent is not positive definite: the tissue is unstable.
         """
         with ExitStack() as stack, self.state() as load:
-            self._assemble(state)
+            self.assemble(state)
             load.array[:] = -self._tangent.whole(prescribed.array[: self._space.owned])
             load.array[self._held] = prescribed.array[self._held]
             # Prescribed values are in the initial guess: the preconditioner may ignore these dofs.
@@ -237,9 +237,10 @@ class HyperelasticBody:
         result.array[self._held] = 0.0
 
     def _jacobian(self, _: PETSc.SNES, state: PETSc.Vec, tangent: PETSc.Mat, __: PETSc.Mat) -> None:
-        self._assemble(state)
+        self.assemble(state)
 
-    def _assemble(self, state: PETSc.Vec) -> None:
+    def assemble(self, state: PETSc.Vec) -> None:
+        """Evaluate the tangent at a state; collective."""
         self.show(state)
         self._tangent.update()
         self.tangent.assemble()

@@ -64,7 +64,7 @@ class LargeContact:
         """
         movement, elements = asked.movement, self._elements
         (depth,) = movement.amounts
-        body = DeformedBody(elements, self._surface.of(elements.degree), self._law, stack)
+        body = DeformedBody(elements, self._surface, self._law, asked.method, stack)
         try:
             iterations = press(body, lambda there: placed_tool(body, self._distance, there), self._path, depth)
         except LargeError as error:
@@ -186,7 +186,7 @@ class LargeTouch:
     def _found_again(self, stack: ExitStack) -> "LargeTouch":
         coarse, degree = self.body.elements, self.body.elements.degree + 1
         finer = self.surface.elements(degree, coarse.element, stack)
-        body = DeformedBody(finer, self.surface.of(degree), self.body.law, stack)
+        body = DeformedBody(finer, self.surface, self.body.law, self.body.method, stack)
         self.body.show()
         body.interpolate(coarse)
         tool = placed_tool(body, self.distance, self.depth)

@@ -6,18 +6,15 @@ Linear systems are solved in turned frames, in which the normal displacement of 
 from contextlib import ExitStack
 
 import numpy as np
-from petsc4py import PETSc
 
-from pipeline.arrays import FloatArray, Int32Array
+from pipeline.arrays import FloatArray
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.deformed import Constraint
-from pipeline.solve.contact.levels import Numbering
+from pipeline.solve.contact.levels import Numbering, Surface
 from pipeline.solve.contact.surface import Candidates
-from pipeline.solve.elements.assembled import AssembledTangent
+from pipeline.solve.contact.turned_tangent import FactorisedTangent, IteratedTangent, TurnedTangent
 from pipeline.solve.elements.base import Elements
 from pipeline.solve.elements.mixed import MixedElements
-from pipeline.solve.elements.pressures import without_columns
-from pipeline.solve.krylov import explained, factorised, keep
 from pipeline.solve.newton import HyperelasticBody
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
@@ -30,16 +27,25 @@ class DeformedBody:
     stack.
     """
 
-    def __init__(self, elements: Elements, candidates: Candidates, law: MaterialLaw, stack: ExitStack):
-        """Set up; collective."""
-        self.elements, self.candidates, self.law = elements, candidates, law
+    def __init__(self, elements: Elements, surface: Surface, law: MaterialLaw, method: str, stack: ExitStack):
+        """Set up; collective. ``method`` is the requested solver.
+
+        Raises:
+            SolveError: if the preconditioner cannot be set up.
+        """
+        self.elements, self.law, self.method = elements, law, method
+        self.candidates: Candidates = surface.of(elements.degree)
         space = self._space = elements.displacements
         self._body = HyperelasticBody(elements, law)
-        self._tangent = AssembledTangent(elements, law, stack)
-        elements.set_law(law)
         stack.callback(self._body.close)
         self._unit = elements.unit(law)
-        self._numbering = Numbering(space.space, candidates.numbers)
+        self._numbering = Numbering(space.space, self.candidates.numbers)
+        self._tangent: TurnedTangent
+        if elements.is_direct(method):
+            self._tangent = FactorisedTangent(elements, law, self._body, self._numbering, stack)
+        else:
+            self._tangent = IteratedTangent(elements, law, self._body, self._numbering, surface, stack)
+        elements.set_law(law)
         self._now, self._residual, self._change = (stack.enter_context(self._body.state()) for _ in range(3))
         self._from = self._now.array.copy()
         is_fixed = np.zeros(space.owned)
@@ -82,19 +88,15 @@ class DeformedBody:
         Raises:
             SolveError: if the linear solver fails.
         """
-        self._body.show(self._now)
-        self._tangent.update()
         self._from = self.state
-        self._turn_normals(constraint)
-        with ExitStack() as stack, self._body.state() as right, explained():
-            turn = keep(stack, self._turn(constraint))
-            held = self._slots(constraint)
-            self._prescribe(constraint, turn, held)
-            self._tangent.matrix.mult(self._change, right)
+        self._tangent.update(self._now, constraint)
+        self._prescribe(constraint)
+        with self._body.state() as right:
+            self._tangent.multiply(self._change, right)
             right.array[:] = -right.array - self._forces() / self._unit
             self._numbering.add_vectors(right.array, constraint.forces / self._unit)
-            self._turned_solve(turn, held, right, stack)
-            self._tangent.matrix.mult(self._change, right)
+            self._tangent.solve(constraint, right, self._change)
+            self._tangent.multiply(self._change, right)
             moved = self._numbering.gather_vectors(self._change.array[: self._space.owned])
             change = self._numbering.gather_vectors(self._unit * right.array[: self._space.owned])
         self.iterations += 1
@@ -147,81 +149,8 @@ class DeformedBody:
             self._is_current = True
         return np.asarray(self._residual.array)
 
-    def _turn_normals(self, constraint: Constraint) -> None:
-        """Subtract the change of the contact forces' directions from K."""
-        stiffness, index_map = self._tangent.blocks[0], self._space.space.dofmap.index_map
-        for number in np.flatnonzero(self._numbering.is_owned & constraint.turning.any(axis=(1, 2))):
-            rows = 3 * (index_map.local_range[0] + self._numbering.local[number]) + np.arange(3)
-            rows = rows.astype(PETSc.IntType)
-            stiffness.setValues(rows, rows, -constraint.turning[number] / self._unit, PETSc.InsertMode.ADD_VALUES)
-        self._tangent.matrix.assemble()
-
-    def _turn(self, constraint: Constraint) -> PETSc.Mat:
-        """Return the orthogonal matrix Q of the frames, on displacements."""
-        space, blocks = self._space, self._space.owned // 3
-        frames = np.broadcast_to(np.eye(3), (blocks, 3, 3)).copy()
-        here = self._numbering.is_owned
-        frames[self._numbering.local[here]] = constraint.frames[here]
-        first = space.space.dofmap.index_map.local_range[0]
-        columns = 3 * (first + np.arange(blocks))[:, None, None] + np.arange(3)
-        columns = np.broadcast_to(columns, (blocks, 3, 3)).astype(PETSc.IntType).ravel()
-        rows = np.arange(0, len(columns) + 1, 3, dtype=PETSc.IntType)
-        size = (space.owned, space.size)
-        return PETSc.Mat().createAIJ((size, size), csr=(rows, columns, frames.ravel()), comm=space.comm)
-
-    def _slots(self, constraint: Constraint) -> Int32Array:
-        """Return the owned dofs that are held in the turned frames: of the constraint, and prescribed ones."""
-        held = np.zeros(self._space.owned)
-        self._numbering.put_vectors(held, constraint.held.astype(float))
-        held[self._space.prescribed_owned] = 1.0
-        return np.flatnonzero(held).astype(np.int32)
-
-    def _prescribe(self, constraint: Constraint, turn: PETSc.Mat, held: Int32Array) -> None:
+    def _prescribe(self, constraint: Constraint) -> None:
         """Write the prescribed increment into the change."""
         moved = np.einsum("nij,nj->ni", constraint.frames, np.where(constraint.held, constraint.values, 0.0))
         self._change.set(0.0)
         self._numbering.put_vectors(self._change.array, np.where(self.fixed, 0.0, moved))
-
-    def _turned_solve(self, turn: PETSc.Mat, held: Int32Array, right: PETSc.Vec, stack: ExitStack) -> None:
-        """Add the free part of the increment to the change: a factorisation in the turned frames."""
-        owned = self._space.owned
-        matrix = keep(stack, self._turned(turn, held, stack))
-        load, found = (keep(stack, vector) for vector in matrix.createVecs())
-        whole, turned = (keep(stack, vector) for vector in turn.createVecs())
-        whole.array[:] = right.array[:owned]
-        turn.multTranspose(whole, turned)
-        load.array[:owned], load.array[owned:] = turned.array, right.array[owned:]
-        load.array[held] = 0.0
-        factorised(matrix, stack).solve(load, found)
-        turned.array[:] = found.array[:owned]
-        turn.mult(turned, whole)
-        self._change.array[:owned] += whole.array
-        self._change.array[owned:] += found.array[owned:]
-
-    def _turned(self, turn: PETSc.Mat, held: Int32Array, stack: ExitStack) -> PETSc.Mat:
-        """Return the tangent in the turned frames, with the ``held`` slots eliminated, assembled."""
-        stiffness, *others = self._tangent.blocks
-        turned = stiffness.ptap(turn)
-        first, _ = turned.getOwnershipRange()
-        turned.zeroRowsColumns((first + held).astype(PETSc.IntType), 1.0)
-        if others:
-            keep(stack, turned)
-            coupling, of_pressures = others
-            turned = self._nested(turned, coupling, of_pressures, turn, held, stack)
-        turned.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        return turned
-
-    @staticmethod
-    def _nested(
-        stiffness: PETSc.Mat,
-        coupling: PETSc.Mat,
-        of_pressures: PETSc.Mat,
-        turn: PETSc.Mat,
-        held: Int32Array,
-        stack: ExitStack,
-    ) -> PETSc.Mat:
-        coupled = keep(stack, coupling.matMult(turn))
-        without_columns(coupled, held)
-        transpose = keep(stack, coupled.transpose(PETSc.Mat()))
-        nest = keep(stack, PETSc.Mat().createNest([[stiffness, transpose], [coupled, of_pressures]], comm=turn.comm))
-        return nest.convert("aij", PETSc.Mat())
