@@ -27,6 +27,8 @@ from pipeline.solve.newton import LargeError
 _LEFT, _CLOSED = 1e-8, 1e-8
 # Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
 _MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
+# A set that is solved so often ends changes of many nodes at once.
+_CAREFUL = 3
 
 
 class Distance(Protocol):
@@ -127,7 +129,7 @@ def settle(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> Touched:
         LargeError: if the loop does not converge.
         SolveError: if a linear solver fails.
     """
-    seen, reactions = Counter[bytes](), np.full(len(active), np.inf)
+    careful, seen, reactions = False, Counter[bytes](), np.full(len(active), np.inf)
     for iteration in range(_MOST + 1):
         place = tool.distance(tissue.positions())
         normal = _within_planes(place.normal, tissue.fixed)
@@ -136,11 +138,14 @@ def settle(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> Touched:
         if not following.any():
             raise LargeError("the probe does not touch a single node: use smaller elements below it")
         pressed = np.where(active, np.einsum("ni,ni->n", forces, normal), 0.0)
+        if careful:
+            following = tool.complete(_first_change(active, following))
         is_same, active = np.array_equal(following, active), following
         if is_same and _is_settled(tissue, tool, active, place.gap, forces - pressed[:, None] * normal, pressed):
             return Touched(active, pressed[:, None] * normal, place.gap, iteration)
         if not is_same:
             seen[active.tobytes()] += 1
+            careful = careful or seen[active.tobytes()] >= _CAREFUL
             if seen[active.tobytes()] >= _MOST_REPEATS:
                 raise LargeError("active sets repeat")
         predicted = tissue.linearise(_constraint(place, normal, np.where(active, pressed, 0.0), active))
@@ -163,6 +168,17 @@ def _next_set(tool: PlacedTool, active: BoolArray, reactions: FloatArray, gap: F
     pull = -SLACK * float(np.abs(reactions[active]).mean()) if active.any() else 0.0
     following = np.where(active, reactions > pull, gap < -SLACK * tool.depth)
     return tool.complete(following)
+
+
+def _first_change(active: BoolArray, following: BoolArray) -> BoolArray:
+    """Return the active set with a single change, the first one: such sets cannot repeat in a linear problem.
+
+    K. G. Murty, Opsearch 11, 42, 1974.
+    """
+    changes = np.flatnonzero(active != following)[:1]
+    found = active.copy()
+    found[changes] = following[changes]
+    return found
 
 
 def _is_settled(
