@@ -26,6 +26,7 @@ from pipeline.solve.far_field import BodyField, PointForce
 from pipeline.solve.krylov import DIRECT_LIMIT, is_direct
 from pipeline.solve.meridian.contact import MeridianContact
 from pipeline.solve.meridian.large import LargeMeridian
+from pipeline.solve.meridian.large_contact import LargeMeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem
 from pipeline.solve.meridian.punch import RoundTool
 from pipeline.solve.movement import FarField, Movement, Place
@@ -74,6 +75,8 @@ def memory_of_basis(case: Case, dofs: int) -> float:
 
 def meridian_problem(case: Case) -> Problem:
     """Return the problem of an axisymmetric ``case`` without loads, on its meridian."""
+    if case.material.is_large and case.probe.is_unilateral:
+        return LargeMeridianContact(meridian_of(case), round_tool_of(case))
     if case.material.is_large:
         return LargeMeridian(meridian_of(case), conditions_of(case))
     if case.probe.is_unilateral:
@@ -128,8 +131,12 @@ def round_tool_of(case: Case) -> RoundTool:
     def gap(radii: FloatArray) -> FloatArray:
         return np.asarray(probe.profile(np.column_stack([radii, np.zeros_like(radii)])) + body.fall(radii))
 
+    def distance(points: FloatArray, depth: float) -> Distance:
+        assert isinstance(probe, Indenter)
+        return probe.distance(points + np.array([0.0, 0.0, depth]))
+
     if isinstance(probe, RoundIndenter):
-        return RoundTool(gap, probe.limit, probe.kinks)
+        return RoundTool(gap, probe.limit, probe.kinks, distance)
     return RoundTool(gap, probe.circumradius)
 
 

@@ -160,9 +160,6 @@ FEATURES: dict[str, Feature] = {
     "fixed column": Feature("mesh.outside", lambda s: s.mesh.outside == "fixed" and _is_column(s), _PLACE),
     "half ball": Feature("mesh.outside", _is_ball, _PLACE),
     "Green's function": Feature("mesh.outside", lambda s: s.mesh.outside == "green" and _is_ball(s), _PLACE),
-    "contact at large displacements": Feature(
-        "material.law", lambda s: s.material.is_large and s.probe.is_unilateral, ("probe",)
-    ),
     "linear outside": Feature("mesh.outside", lambda s: s.mesh.outside == "linear" and isfinite(s.mesh.epsilon)),
     "truncated body": Feature("mesh.outside", lambda s: not s.mesh.keeps_all and isfinite(s.mesh.epsilon)),
     "degree 1": Feature("mesh.degree", lambda s: s.mesh.degree == 1, write=int),
@@ -330,7 +327,6 @@ _PRESSED_ONLY = "real-time models are only for tools that press straight down"
 OBSTACLES: dict[str, dict[str, str]] = {
     "meridian": {
         "fibres": "fibres have a direction, and are not axisymmetric",
-        "contact at large displacements": "contact at large displacements is computed in three dimensions",
         "linear outside": "the boundary of the linear part is a sphere, and no line of the mesh of the meridian",
         "six motions": "most of the six motions are not axisymmetric",
         "friction": "friction is computed in three dimensions",
@@ -339,7 +335,6 @@ OBSTACLES: dict[str, dict[str, str]] = {
     },
     # Taken if no case of the study is in the way: what is compared is computed alike.
     "meridian, in a comparison": {
-        "contact at large displacements": "all cases of the comparison are solved in three dimensions",
         "linear outside": "all cases of the comparison are solved in three dimensions",
         "half ball": "all cases of the comparison are solved in three dimensions",
         "friction": "all cases of the comparison are solved in three dimensions",

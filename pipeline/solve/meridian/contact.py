@@ -23,7 +23,7 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
 from pipeline.solve import SolveError
 from pipeline.solve.meridian.problem import DEGREE, Answer, MeridianSolver, error_bar
-from pipeline.solve.meridian.punch import STEP, Punches, Rings, RoundTool
+from pipeline.solve.meridian.punch import POWERS, Punches, Rings, RoundTool
 from pipeline.solve.meridian.signs import LiftsOff, check_signs
 from pipeline.solve.meridian.system import HalfPlane, max_strain
 from pipeline.solve.physics import MaterialLaw
@@ -31,8 +31,6 @@ from pipeline.stages import stage
 
 # Tolerance on the depth of a trial radius (F errs by its square), and most trials.
 _NEAR, _MOST_TRIALS = 3e-4, 12
-# Range of the exponent of the radius in the depth: 1 for a cone, 2 for a ball, more for flat tools with round edges.
-_POWERS = (0.5, 8.0)
 # Largest contact radius, as a share of the modelled body's: beyond it contact has no edge.
 _WIDEST = 0.999
 # Nodes along the radius for the search for rings that lift off, and between two of them the second time.
@@ -95,7 +93,7 @@ class _Search:
 
     def find(self, depth: float) -> _Patch:
         """Return the contact area without rings."""
-        radius, power = self._on_half_space(depth)
+        radius, power = self._tool.on_half_space(depth, self._limit)
         low, high, before = 0.0, self._limit, None
         for _ in range(_MOST_TRIALS):
             punch = self.punches.at(radius)
@@ -108,7 +106,7 @@ class _Search:
             miss = log(punch.depth / depth)
             if before is not None:
                 power = (miss - before[1]) / log(radius / before[0])
-                power = min(max(power, _POWERS[0]), _POWERS[1])
+                power = min(max(power, POWERS[0]), POWERS[1])
             if abs(miss) < _NEAR:
                 return _Patch(radius, power)
             low, high = (radius, high) if miss < 0 else (low, radius)
@@ -187,16 +185,3 @@ class _Search:
             area=patch.area(radius),
             energy=pi * float(solution @ residual),
         )
-
-    def _on_half_space(self, depth: float) -> tuple[float, float]:
-        """Return the radius on an elastic half-space, and its exponent in the depth."""
-        tool = self._tool
-        if tool.indentation((1 - STEP) * self._limit) <= depth:
-            return self._limit, 2.0
-        low, high = 0.0, self._limit
-        for _ in range(50):
-            middle = (low + high) / 2
-            low, high = (middle, high) if tool.indentation(middle) < depth else (low, middle)
-        wider = 1.01 * low
-        power = log(tool.indentation(min(wider, self._limit)) / depth) / log(min(wider, self._limit) / low)
-        return low, min(max(power, _POWERS[0]), _POWERS[1])

@@ -9,7 +9,9 @@ bar is small enough, or until a finer mesh does not reach the depth.
 Lengths are in units of the disc's radius a, stresses in units of μ of region 0.
 """
 
+from abc import abstractmethod
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -116,17 +118,18 @@ class LargeSystem(System):
         raise LargeError("tissue is turned inside out")
 
 
-class LargeMeridian(MeridianSolver):
-    """The meridian of a body of a law of large displacements, under a bonded disc."""
+class LargeSolver(MeridianSolver):
+    """The meridian of a body of a law of large displacements; meshes are tried in the order of ``gradings``."""
 
-    def __init__(self, meridian: HalfPlane, conditions: Conditions, *, accuracy: float = 1e-4, degree: int = DEGREE):
+    gradings: tuple[Grading, ...]
+
+    def __init__(self, meridian: HalfPlane, *, accuracy: float = 1e-4, degree: int = DEGREE):
         """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least."""
         super().__init__(meridian, accuracy=accuracy, degree=degree)
-        self._bonded = conditions.bonded
 
     def _answer(self, law: MaterialLaw, depth: float) -> Answer:
         best: Answer | None = None
-        for grading in GRADINGS:
+        for grading in self.gradings:
             try:
                 found = self._solve_on(grading, law, depth, best)
             except SolveError:
@@ -142,12 +145,26 @@ class LargeMeridian(MeridianSolver):
             raise SolveError(f"the error bar of the force is {best.error:.0e}, allowed {_WORST_ERROR:.0e}")
         return best
 
+    @abstractmethod
     def _solve_on(self, grading: Grading, law: MaterialLaw, depth: float, before: Answer | None) -> Answer:
-        """Return the result on a mesh; ``before`` is that of a coarser one.
+        """Return the result on a mesh; ``before`` is the best one of coarser meshes.
 
         Raises:
             SolveError: if the depth is not reached, or the result fails a check.
         """
+
+
+class LargeMeridian(LargeSolver):
+    """The meridian of a body of a law of large displacements, under a bonded disc."""
+
+    gradings = GRADINGS
+
+    def __init__(self, meridian: HalfPlane, conditions: Conditions, **how: Any):
+        """Prepare, as :class:`LargeSolver`; ``how`` are its ``accuracy`` and ``degree``."""
+        super().__init__(meridian, **how)
+        self._bonded = conditions.bonded
+
+    def _solve_on(self, grading: Grading, law: MaterialLaw, depth: float, before: Answer | None) -> Answer:
         with stage("meshing"):
             arrays = self._meridian.mesh(grading)
             meshes = meshes_of(arrays)
@@ -159,7 +176,7 @@ class LargeMeridian(MeridianSolver):
         try:
             state, path = coarse.press(deep, _SHORTEST if before is None else _SHORTEST_OF_FINER)
         except LargeError as stop:
-            raise _stopped(stop, arrays, law, depth) from stop
+            raise stopped(stop, arrays, law, depth) from stop
         check_path(path, _ROUNDING * arrays.points.ptp(axis=0).prod())
         state = fine.settle(fine.forms.interpolate(coarse.forms, state), deep)
         on_probe, on_support, energy = fine.forces(state)
@@ -188,7 +205,7 @@ class LargeMeridian(MeridianSolver):
         )
 
 
-def _stopped(error: LargeError, arrays: MeridianArrays, law: MaterialLaw, depth: float) -> LargeError:
+def stopped(error: LargeError, arrays: MeridianArrays, law: MaterialLaw, depth: float) -> LargeError:
     """Return the error of a path that ends before ``depth`` (m), in N and metres."""
     if error.reached is None:
         return error

@@ -35,7 +35,8 @@ _WORST_ERROR = 1e-3
 class Answer:
     """Result of one mesh at a depth: F/d from the energy and from the reaction, in units of μ a, and the solution.
 
-    ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²). The strain energy, in units
+    ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²), and at large
+    displacements the radius (m) at rest of its ``edge``. The strain energy, in units
     of μ a times m², is half of F d if it is not given.
     """
 
@@ -49,6 +50,7 @@ class Answer:
     cells: int
     iterations: int
     area: float = nan
+    edge: float = nan
     energy: float | None = None
 
 

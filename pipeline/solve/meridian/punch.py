@@ -7,7 +7,7 @@ region 0, displacements in metres.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from math import pi
+from math import log, pi
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading, MeridianArrays
 from pipeline.solve import SolveError
+from pipeline.solve.contact.deformed import Distance
 from pipeline.solve.meridian.forms import MeridianForms, Meshes
 from pipeline.solve.meridian.system import HalfPlane, System, meshes_of
 from pipeline.solve.physics import MaterialLaw
@@ -26,6 +27,8 @@ _TRIAL = Grading(1e-4, 1.0, 4.0)
 # A kink closer to an edge of contact than this, in units of a, lies within the small elements there.
 _APART = 1e-2
 _POINTS, STEP = 48, 1e-5
+# Range of the exponent of the radius in the depth: 1 for a cone, 2 for a ball, more for flat tools with round edges.
+POWERS = (0.5, 8.0)
 _MOST_SETS, _SLACK = 40, 1e-6
 
 
@@ -38,12 +41,14 @@ class RoundTool:
     """An axisymmetric tool, above the surface that it touches.
 
     ``gap`` returns the initial distance (n,) along the axis (m) between tool and surface, at radii (n,) up to ``limit``
-    (m), where the tool ends. ``kinks`` are the radii (m) at which the gap is not smooth.
+    (m), where the tool ends. ``kinks`` are the radii (m) at which the gap is not smooth. ``distance`` is that of points
+    (n, 3), in m from the first touch, to the tool at a depth (m), for contact at large displacements.
     """
 
     gap: Callable[[FloatArray], FloatArray]
     limit: float
     kinks: tuple[float, ...] = ()
+    distance: Callable[[FloatArray, float], Distance] | None = None
 
     def is_flat(self, radius: float) -> bool:
         """Return whether the gap is zero all the way to a ``radius`` (m)."""
@@ -55,6 +60,18 @@ class RoundTool:
         at = radius * sine
         slope = (self.gap(at) - self.gap((1 - STEP) * at)) / (STEP * at)
         return radius * float(weights @ slope)
+
+    def on_half_space(self, depth: float, limit: float) -> tuple[float, float]:
+        """Return the contact radius on an elastic half-space, up to a ``limit`` (m), and its exponent in the depth."""
+        if self.indentation((1 - STEP) * limit) <= depth:
+            return limit, 2.0
+        low, high = 0.0, limit
+        for _ in range(50):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self.indentation(middle) < depth else (low, middle)
+        wider = min(1.01 * low, limit)
+        power = log(self.indentation(wider) / depth) / log(wider / low)
+        return low, min(max(power, POWERS[0]), POWERS[1])
 
 
 @cache

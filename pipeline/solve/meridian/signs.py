@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.meridian import MeridianArrays
 from pipeline.scene.model import FREE, PROBE
 from pipeline.solve import SolveError
@@ -59,9 +59,7 @@ def check_signs(
             'of the mean pressure; use model = "3d"'
         )
     dofs, places = forms.on(FREE)
-    # Surface seen along the axis: the top of a cylinder, the upper half of an ellipsoid.
-    top = -_LEVEL if arrays.order == 1 else arrays.points[:, 1].min() / 2
-    beside = (places[:, 1] > top) & (places[:, 0] * arrays.unit < tool.limit)
+    beside = seen_from_above(arrays, places) & (places[:, 0] * arrays.unit < tool.limit)
     clear = tool.gap(places[beside, 0] * arrays.unit) - depth - solution[dofs[beside, 1]]
     if (through := -clear.min(initial=0.0) / depth) > _PENETRATION:
         at = places[beside, 0][np.argmin(clear)] * arrays.unit
@@ -69,6 +67,11 @@ def check_signs(
             f"contact is not {shape}: {1e3 * at:.3g} mm from the axis the tool penetrates the surface "
             f'by {through:.1%} of its depth; use model = "3d"'
         )
+
+
+def seen_from_above(arrays: MeridianArrays, places: FloatArray) -> BoolArray:
+    """Return which places (n, 2) are on the top of a cylinder, or on the upper half of an ellipsoid."""
+    return np.asarray(places[:, 1] > (-_LEVEL if arrays.order == 1 else arrays.points[:, 1].min() / 2))
 
 
 def _rings(arrays: MeridianArrays) -> list[FloatArray]:
