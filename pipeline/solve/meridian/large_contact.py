@@ -34,7 +34,7 @@ from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
-# Bar: this many times the difference of the degrees.
+# Bar: this many times the difference of the degrees, and the square of the distance of nodes at the edge.
 _BETWEEN_DEGREES = 2.0
 # Change of the displacement for the check of the work, and the largest relative difference of work and energy.
 _SMALL, _WORK = 1e-3, 1e-5
@@ -72,7 +72,7 @@ class LargeMeridianContact(LargeSolver):
             stiffness=force / deep,
             on_probe=-force / deep,
             balance=balance,
-            error=_BETWEEN_DEGREES * abs(coarse.force / force - 1) + 3 * balance,
+            error=_BETWEEN_DEGREES * abs(coarse.force / force - 1) + coarse.resolution**2 + 3 * balance,
             unit=arrays.unit,
             max_strain=max_strain(fine.tissue.system.forms, arrays),
             dofs=fine.tissue.system.forms.dofs,
@@ -186,6 +186,12 @@ class _Touch:
             raise SolveError("contact reaches the edge of the modelled part of the body")
         radii, last = self.tissue.places[:, 0], int(np.flatnonzero(self._contact.active)[-1])
         return float(radii[last] + radii[last + 1]) / 2
+
+    @property
+    def resolution(self) -> float:
+        """The distance of the two nodes between which contact ends, relative to its radius."""
+        radii, last = self.tissue.places[:, 0], int(np.flatnonzero(self._contact.active)[-1])
+        return float(radii[last + 1] - radii[last]) / self.edge
 
     @property
     def area(self) -> float:
