@@ -129,6 +129,16 @@ def _relaxation(study: Study) -> None:
     _history(study)
 
 
+def _relaxing_regions(study: Study) -> None:
+    """Tissue of which an inclusion, or each layer, relaxes in its own way."""
+    _relaxation(study)
+    body = study["body"]
+    if not (body.get("layer") or body.get("inclusion")):
+        _inclusion(study)
+    for piece in (*body.get("layer", ()), *body.get("inclusion", ())):
+        piece["relaxation"] = [{"share": 0.3, "time": "1 s"}]
+
+
 def _accuracy(study: Study) -> None:
     mesh = study["mesh"]
     kept = ("epsilon",) if mesh["outside"] != "coarse" else ()
@@ -176,6 +186,7 @@ FEATURES = (
     Feature("friction", "contact", _update("probe", contact="unilateral", friction=0.3)),
     Feature("history", "history", _history),
     Feature("relaxation", "relaxation", _relaxation),
+    Feature("relaxing regions", "relaxation", _relaxing_regions),
     Feature("gravity", "gravity", _update("load", gravity=["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"])),
     Feature("traction", "traction", _traction),
     Feature("free", "outside", _update("mesh", outside="free")),

@@ -15,7 +15,7 @@ _SAMPLE = random.Random(32).sample(_QUICK, 60)
 
 
 # Features that make no other case of a study, or none of one with a tool that finds its contact anyway.
-_SAME_CASE = {"history", "relaxation", "F_exact", "model 3d", "swept E", "unilateral"}
+_SAME_CASE = {"history", "relaxation", "relaxing regions", "F_exact", "model 3d", "swept E", "unilateral"}
 
 
 @pytest.fixture(scope="module")

@@ -46,6 +46,8 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     ]
     if case.load.acts:
         parts.append(_load_text(case.load, case.densities))
+    if case.is_stepped:
+        parts.append(_time_text(case))
     if case.solve.timing:
         parts += [str(case.labels), str(case.solve.repeats)]
     return digest("\n".join(parts))
@@ -153,6 +155,14 @@ def _tissue_content(tissue: Tissue) -> dict[str, Any]:
     """Return what the law of a tissue reads, with defaults; densities are written with the loads."""
     law = {"law": tissue.law} if tissue.is_large else {}
     return {"young": tissue.young, "poisson": tissue.poisson, **law, **tissue.further}
+
+
+def _time_text(case: Case) -> str:
+    """Return the course of the depth, its steps, and the relaxation of all regions, in canonical form."""
+    history = case.probe.history
+    assert history is not None
+    motion = history.motion(case.probe.depth)
+    return _text({"motion": vars(motion), "times": history.times().tolist(), "relaxation": case.relaxations})
 
 
 @lru_cache(_MANY)

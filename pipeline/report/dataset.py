@@ -105,7 +105,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if "stiffness" in variables:
         coordinates |= _motions()
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
-    dataset = over_time(dataset, study, cases)
+    dataset = over_time(dataset, study, cases, flat)
     if any(case.is_closed for case in cases if not case.lost_contact):
         dataset["force_error"].attrs["comment"] = _OF_CLOSURE
     for name in of_scene:
@@ -257,7 +257,11 @@ def _imaged(record: Record | None, image: EquivalentPlace | None) -> Record | No
     if record is None or image is None or not record.is_ok:
         return record
     vector, bars = image.vector(record.force_vector), image.bars(record.force_vector_error)
-    return replace(record, origin="image", force_vector=vector, force_vector_error=bars)
+    course = dict(record.course)
+    if course:
+        moved = [image.vector(one) for one in zip(*(course[name] for name in "xyz"), strict=True)]
+        course |= dict(zip("xyz", zip(*moved, strict=True), strict=True))
+    return replace(record, origin="image", force_vector=vector, force_vector_error=bars, course=course)
 
 
 def _frame(case: Case) -> Frame | None:

@@ -1,4 +1,4 @@
-"""Forces over time: they follow from elastic forces, the history of the depth and relaxation, without a solve."""
+"""Forces over time: from elastic forces, the history of the depth and relaxation, or from the records of time steps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,9 @@ import xarray as xr
 
 from pipeline.arrays import FloatArray
 from pipeline.quantities import LARGEST, attributes
+from pipeline.report.stepped import stepped_values
 from pipeline.report.values import OVER_TIME
+from pipeline.run.record import Record
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.states import worst
@@ -46,8 +48,11 @@ class Course:
     contact: FloatArray
 
 
-def over_time(dataset: xr.Dataset, study: Study, cases: Sequence[Case]) -> xr.Dataset:
-    """Return the dataset of a study with time in place of the stages of its histories; a static one as it is."""
+def over_time(dataset: xr.Dataset, study: Study, cases: Sequence[Case], records: Sequence[Record | None]) -> xr.Dataset:
+    """Return the dataset of a study with time in place of the stages of its histories; a static one as it is.
+
+    ``records`` are those of the cases.
+    """
     histories = {history for case in cases if (history := case.probe.history) is not None}
     if not histories:
         return dataset
@@ -71,6 +76,9 @@ def over_time(dataset: xr.Dataset, study: Study, cases: Sequence[Case]) -> xr.Da
     found |= {name: (last[name] * peaks).assign_attrs(last[name].attrs) for name in LARGEST if name in last}
     found["tool_depth"] = _variable(last, "tool_depth", dims, [course.depth for course in courses], "time")
     found |= _dissipated(dataset, last, dims, courses)
+    own = [records[-1] for records in study.by_case(records)]
+    stepped = [record if case.is_stepped else None for case, record in zip(whole, own, strict=True)]
+    found |= stepped_values(found, dims, stepped, times)
     if "load_force" in last:
         found |= _crept(last.assign(found), dims, whole, courses)
     coordinate = ("time", times, attributes("time"))
@@ -86,6 +94,10 @@ def course_of(case: Case, times: FloatArray, depths: tuple[float, ...]) -> Cours
         alone = np.outer(ones, only_last).astype(float)
         return Course(alone, (alone,), depth * ones, 0.0 * ones, 0.0 * alone, 1.0, depth * ones)
     motion, terms = history.motion(depth), case.relaxations[0]
+    if case.is_stepped:  # the record has the values
+        unknown = np.full(len(times), np.nan)
+        weights = np.outer(unknown, only_last)
+        return Course(weights, (weights,), motion.at(times), unknown, weights, np.nan, unknown)
     if case.probe.is_unilateral:
         contact = _follow(motion, terms, tuple(times), depths, _power(case.probe))
         none = np.zeros(len(times))

@@ -29,6 +29,7 @@ class _Forms:
     of_regions: bool = False
     of_slit: bool = False
     of_contact: bool = False
+    of_steps: bool = False
 
 
 # The forms of a Green's function, which do not depend on a case's elements.
@@ -76,6 +77,7 @@ def _forms(solve: Solve) -> _Forms:
         of_regions=bool(body.regions) or solve.case.is_linear_beyond,
         of_slit=has_slit,
         of_contact=solve.case.probe.is_unilateral and solve.case.material.is_large,
+        of_steps=solve.case.is_stepped,
     )
 
 
@@ -93,7 +95,15 @@ def _compile(forms: _Forms) -> None:
         return
     laws = ("linear",) if element in ("displacement", "mixed") else element.removesuffix("-mixed").split("+")
     element = "mixed" if element.endswith("mixed") else "displacement"
-    compile_forms(degree, element, laws, straight=degree == 1, of_regions=of_regions, of_contact=forms.of_contact)
+    compile_forms(
+        degree,
+        element,
+        laws,
+        straight=degree == 1,
+        of_regions=of_regions,
+        of_contact=forms.of_contact,
+        of_steps=forms.of_steps,
+    )
     compile_cell_values(degree, straight=degree == 1)
     if forms.of_slit:
         compile_release(degree, mixed=element == "mixed", of_regions=of_regions)

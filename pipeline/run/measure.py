@@ -16,6 +16,7 @@ from pipeline.shapes.contact import first_touch
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.indenter import Indenter
 from pipeline.solve.estimate import is_graded
+from pipeline.solve.history import History
 from pipeline.solve.response import Contact
 from pipeline.solve.solution import Solution
 from pipeline.states import OK
@@ -69,6 +70,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         **_of_contact(solution.contact),
         **_of_loads(case, solution),
         balance=solution.balance,
+        course=_course(case, solution.history),
         dofs=solution.dofs,
         cells=solution.cells * 2 ** len(solve.mirrors),
         iterations=solution.iterations,
@@ -81,6 +83,22 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         planned_cells=planned_cells,
         poisson=poisson,
     )
+
+
+def _course(case: Case, history: History | None) -> dict[str, tuple[float, ...]]:
+    """Return what a case does over time, by the names of ``COURSE``; nothing for a case without time steps."""
+    if history is None:
+        return {}
+    vectors = [turned_back(case.frame.turn, _known_of(case, (x, y, z))) for x, y, z in history.forces.tolist()]
+    found: dict[str, Any] = {
+        "time": history.times,
+        "force": history.forces[:, 2],
+        "step_error": history.bars,
+        **dict(zip("xyz", np.array(vectors).T, strict=True)),
+        "dissipated": history.dissipated,
+        "dissipated_error": np.abs(history.imbalance),
+    }
+    return {name: tuple(map(float, values)) for name, values in found.items()}
 
 
 def _of_contact(contact: Contact | None) -> dict[str, Any]:

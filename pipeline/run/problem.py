@@ -23,6 +23,7 @@ from pipeline.solve.conditions import Conditions, Front
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.search import Tool
 from pipeline.solve.far_field import BodyField, PointForce
+from pipeline.solve.history import Course
 from pipeline.solve.krylov import DIRECT_LIMIT, is_direct
 from pipeline.solve.meridian.contact import MeridianContact
 from pipeline.solve.meridian.large import LargeMeridian
@@ -30,11 +31,13 @@ from pipeline.solve.meridian.large_contact import LargeMeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem
 from pipeline.solve.meridian.punch import RoundTool
 from pipeline.solve.movement import FarField, Movement, Place
+from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case
+from pipeline.units import canonical
 
 # Largest number of unknowns for a direct solve if iterations do not converge.
 _MOST_DIRECT = 100_000
@@ -170,10 +173,25 @@ def _moved(far: PointForce | BodyField, centre: Place) -> FarField:
 
 
 def law_of(case: Case) -> MaterialLaw:
-    """Return laws and parameters of the body's regions."""
-    within = (_parameters(tissue, case.frame.turn) for tissue in case.tissues)
-    beyond = (Parameters.of_moduli(each.young, each.poisson) for each in case.tissues if case.is_linear_beyond)
-    return MaterialLaw((*within, *beyond))
+    """Return laws and parameters of the body's regions; with their relaxation where time steps need it."""
+    within = [_parameters(tissue, case.frame.turn) for tissue in case.tissues]
+    beyond = [Parameters.of_moduli(each.young, each.poisson) for each in case.tissues if case.is_linear_beyond]
+    found = (*within, *beyond)
+    if case.is_stepped:
+        terms = case.relaxations * (2 if beyond else 1)
+        found = tuple(replace(each, relaxation=own) for each, own in zip(found, terms, strict=True))
+    return MaterialLaw(found)
+
+
+def course_of(case: Case) -> Course | None:
+    """Return the movement of ``case`` over time, as shares of that to its depth; None if it needs no time steps."""
+    history = case.probe.history
+    if history is None or not case.is_stepped:
+        return None
+    motion, times = history.motion(case.probe.depth), history.times()
+    shares = motion.at(times) / case.probe.depth
+    breaks = np.flatnonzero(np.isin(times, [canonical(time) for time in motion.times]))
+    return Course(tuple(times.tolist()), tuple(shares.tolist()), frozenset(breaks.tolist()))
 
 
 def _parameters(tissue: Tissue, turn: FloatArray | None) -> Parameters:
@@ -194,10 +212,10 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case 
         SolveError: if this fails, too, or if the solution is impossible.
     """
     law, movement = law_of(case), movement_of(case, meshed)
-    asked = Request(law, movement, case.solve.method, case.solve.energy_tolerance, estimate)
+    asked = Request(law, movement, case.solve.method, case.solve.energy_tolerance, estimate, course_of(case))
     try:
         solution = problem.answer(asked)
-    except ContactError:
+    except (ContactError, LargeError):
         raise
     except SolveError:
         if asked.method != "auto" or not law.is_linear or not 0 < problem.dofs <= _MOST_DIRECT:

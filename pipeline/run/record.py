@@ -28,6 +28,10 @@ _POWERS = {
     "energy_release": 2,
 }
 
+# What the course of a case has by time, each with the power of the depth that it is proportional to: time (s), force
+# against the advance, its error from the steps, its components (N), dissipated energy and its error (J).
+COURSE = {"time": 0, "force": 1, "step_error": 1, "x": 1, "y": 1, "z": 1, "dissipated": 2, "dissipated_error": 2}
+
 
 @dataclass(frozen=True)
 class Record:
@@ -47,6 +51,7 @@ class Record:
     - ``load_force`` (N), with the error bar ``load_force_error`` (N), and ``load_force_vector`` (N): what loads add to
       the force if the probe is held. ``load_energy`` (J): their strain energy. ``sag`` (m): their displacement of a
       probe that is free along its axis.
+    - ``course``: what a case in time steps does over time: see ``COURSE``; empty for any other case.
     - ``surface_deviation`` (m): distance of the mesh from the surface in the body's file.
     - ``kind``, ``planned_cells``, ``poisson``: inputs of the cost model (:mod:`pipeline.plan.cost`).
     - ``group``: the number of ranks that computed the case.
@@ -83,6 +88,7 @@ class Record:
     load_energy: float = nan
     sag: float = nan
     balance: float = nan
+    course: dict[str, tuple[float, ...]] = field(default_factory=dict)
     surface_deviation: float = nan
     dofs: int = 0
     cells: int = 0
@@ -144,7 +150,11 @@ class Record:
         scaled = {name: _times(getattr(self, name), stiffer * deeper**power) for name, power in _POWERS.items()}
         largest = {name: deeper * value for name, value in self.largest.items()}
         largest |= {name: stiffer * deeper * self.largest[name] for name in STRESSES if name in largest}
-        return replace(self, origin="scaled", young=young, depth=depth, largest=largest, **scaled)
+        course = {
+            name: values if name == "time" else _times(values, stiffer * deeper ** COURSE[name])
+            for name, values in self.course.items()
+        }
+        return replace(self, origin="scaled", young=young, depth=depth, largest=largest, course=course, **scaled)
 
     def to_json(self) -> str:
         """Return the record as JSON text."""

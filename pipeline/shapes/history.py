@@ -83,7 +83,8 @@ class History(BaseModel):
         Field(ge=1, le=1000),
         Words(
             "Number of time steps of the dataset: in the ramp, in the hold, in each period of the sine, or in the "
-            "whole table, whose own times are added. Forces do not depend on it.",
+            "whole table, whose own times are added. Forces depend on it only where they are computed in time steps; "
+            "`force_error` has that error.",
             "20",
         ),
     ] = 20

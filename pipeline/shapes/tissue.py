@@ -185,7 +185,7 @@ class Tissue(Section):
         AfterValidator(_below_one),
         Words(
             "Relaxation over time, as a Prony series: `young` is then the instantaneous modulus, and Poisson's ratio "
-            "is constant. It needs [probe.history].",
+            "is constant. It needs [probe.history]. Regions that relax differently are computed in time steps.",
             '[{share = 0.4, time = "2 s"}, {share = 0.2, time = "30 s"}]',
             default="none: elastic; of regions, the material's",
         ),

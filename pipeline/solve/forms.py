@@ -300,10 +300,11 @@ def compile_forms(
     straight: bool = False,
     of_regions: bool = False,
     of_contact: bool = False,
+    of_steps: bool = False,
 ) -> None:
     """Compile the forms for elements of ``degree``, for all lower degrees, and for the next one (error bar).
 
-    ``of_contact``: with those of contact at large displacements.
+    ``of_contact``: with those of contact at large displacements; ``of_steps``: with those of time steps.
     """
     regions = np.zeros(1, dtype=np.int32) if of_regions else None
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
@@ -324,6 +325,12 @@ def compile_forms(
                 _ = large.energy
                 for law in sorted(set(laws)):
                     PointLaw(mesh, law, is_mixed=mixed is not None).compile()
+        if of_steps and level == degree:
+            pressure = (mixed.pressure, elastic.by_region((1.0,))) if mixed is not None else None
+            large = HyperelasticForms(space, elastic, laws, pressure, scaled=True)
+            _ = large.residuals, large.energy
+            for law in sorted(set(laws)):
+                PointLaw(mesh, law, is_mixed=mixed is not None).compile(relaxes=True)
 
 
 def one_cell(*, straight: bool) -> MeshArrays:

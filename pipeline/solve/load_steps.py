@@ -26,7 +26,7 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.compiled import assemble, global_sum
-from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate, Products, Solver
+from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate, Linearised, Products, Solver
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.newton import HyperelasticBody, LargeError
 from pipeline.solve.physics import MaterialLaw
@@ -85,6 +85,11 @@ class LoadSteps(Solver):
         self._linear = elements.linearised(self._law, stack, direct=direct)
         self._body = HyperelasticBody(elements, self._law, self._linear.preconditioner)
         stack.callback(self._body.close)
+
+    @property
+    def linearised(self) -> Linearised:
+        """Linear elasticity in place of the tangent."""
+        return self._linear
 
     def lift(self, columns: Sequence[Column]) -> None:
         """Do nothing: each load step prescribes its own displacement."""

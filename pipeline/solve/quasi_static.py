@@ -26,12 +26,14 @@ from pipeline.solve.elements.base import Column, Elements, Equilibrium
 from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.estimate import error_bar, stiffness_bars
 from pipeline.solve.linear_solver import LinearSolver
+from pipeline.solve.load_steps import LoadSteps
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.prescribed import PrescribedMotion, respond
 from pipeline.solve.response import LoadResponse, Response, shares
 from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Spaces
+from pipeline.solve.time_steps import TimeSteps
 from pipeline.stages import recorded, stage
 
 
@@ -126,8 +128,26 @@ class QuasiStaticProblem(Problem):
             )
             if asked.estimate:
                 solution = self._estimated(solution, found, law)
-                self.elements.show(found.columns)
+            if asked.course is not None:
+                solution = self._followed(solution, found, asked, stack)
+            self.elements.show(found.columns)
         return solution
+
+    def _followed(self, solution: Solution, found: Equilibrium, asked: Request, stack: ExitStack) -> Solution:
+        """Return the ``solution`` with the history of the course; collective.
+
+        Raises:
+            LargeError: if the time steps do not reach its end.
+        """
+        assert asked.course is not None
+        solver, direct = found.solver, self.elements.is_direct(asked.method)
+        if isinstance(solver, LoadSteps):
+            linear = solver.linearised
+        else:
+            linear = self.elements.linearised(asked.law, stack, direct=direct)
+        steps = TimeSteps(self.elements, asked.law, linear, found.movement, stack)
+        history = steps.follow(asked.course)
+        return replace(solution, history=history, iterations=solution.iterations + steps.iterations)
 
     @stage("error bar")
     def _estimated(self, solution: Solution, found: Equilibrium, law: MaterialLaw) -> Solution:

@@ -11,6 +11,7 @@ from pipeline.arrays import FloatArray
 from pipeline.solve.balance import TOLERANCE
 from pipeline.solve.crack import Advance
 from pipeline.solve.estimate import extrapolate, extrapolate_found
+from pipeline.solve.history import Course, History
 from pipeline.solve.movement import Movement, Vector
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Contact, LoadResponse, Response, load_bars
@@ -44,6 +45,8 @@ class Solution:
     estimate_iterations: int = 0
 
     contact: Contact | None = None  # unilateral contact only
+
+    history: History | None = None  # over the course of a request
 
     # Energy released (pipeline.solve.crack) by a slit's front, and by the tip of a blade that slides in it.
     front: Advance | None = None
@@ -203,7 +206,7 @@ class Request:
     """Request to a problem: material ``law``, and ``movement`` of the probe with its loads.
 
     ``method`` is "auto", "direct" or "iterative"; ``tolerance`` is the relative energy norm of the solver's error.
-    ``estimate`` requests error bars.
+    ``estimate`` requests error bars. With a ``course`` the movement is also followed over time.
     """
 
     law: MaterialLaw
@@ -211,6 +214,7 @@ class Request:
     method: str = "auto"
     tolerance: float = TOLERANCE
     estimate: bool = False
+    course: Course | None = None
 
 
 class Problem(ABC):

@@ -117,6 +117,11 @@ def _coefficient(friction: float) -> float | str:
     return STICK if friction == inf else friction
 
 
+def needs_time_steps(scene: Scene) -> bool:
+    """Return whether the force over time is no elastic force times a function of time."""
+    return scene.probe.history is not None and (scene.material.is_large or len(_relaxations(scene)) > 1)
+
+
 FEATURES: dict[str, Feature] = {
     "layers": Feature("body.layer", lambda s: isinstance(s.body, Layered) and bool(s.body.layer)),
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
@@ -126,7 +131,7 @@ FEATURES: dict[str, Feature] = {
     "static relaxing tissue": Feature(
         "probe.history", lambda s: any(_relaxations(s)) and s.probe.history is None, ("body", "material")
     ),
-    "regions that relax differently": Feature("material.relaxation", lambda s: len(_relaxations(s)) > 1, ("body",)),
+    "time steps": Feature("probe.history", needs_time_steps, ("body", "material")),
     "fibres": Feature("material.law", lambda s: any(t.has_fibres for t in (s.material, *s.body.regions)), ("body",)),
     "ν < 0.2": Feature("material.poisson", lambda s: s.material.poisson < Material.LEAST_OF_LARGE),
     "ν > 0.49": Feature("material.poisson", lambda s: s.material.poisson > MOST_OF_GREEN),
@@ -173,6 +178,7 @@ _ONE_MATERIAL = f"the far field is known only for one material: {_COARSE}"
 _PRESSES = f"the far field is known only for a tool that presses: {_COARSE}"
 _HOLDS = 'a tool that slides along the tissue has no lateral stiffness: use contact = "bonded"'
 _STATIC = "omit [probe.history] and relaxation"
+_IN_STEPS = "with this law or relaxation the force over time is computed in time steps"
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
 _OF_LAW = "with a law of large displacements"
 
@@ -291,18 +297,16 @@ REFUSALS: tuple[Refusal, ...] = (
         "slit",
         f"the opening of the slit has no history, and the energy release rate depends on the front's speed: {_STATIC}",
     ),
-    Refusal("history", "large displacements", f"F is not proportional to the depth {_OF_LAW}: {_STATIC}"),
     Refusal(
-        "relaxation",
-        "large displacements",
-        f"stresses then depend on the whole history of each point {_OF_LAW}: omit relaxation",
+        "time steps",
+        "unilateral contact",
+        f'{_IN_STEPS}, and the contact area is not followed over them: use contact = "bonded", or a linear law and the '
+        "same relaxation in all regions",
     ),
-    Refusal(
-        "regions that relax differently",
-        "history",
-        "must be the same for all layers and inclusions: otherwise, the stress moves to the regions that relax less, "
-        "and F is not the elastic force times a function of time",
-    ),
+    Refusal("time steps", "six motions", f'{_IN_STEPS}, of one movement: use motion = "press"'),
+    Refusal("time steps", "loads", f"{_IN_STEPS}, and the tissue has crept under the loads before: omit [load]"),
+    Refusal("time steps", "accuracy", f"{_IN_STEPS}, which meshes for an accuracy do not cover: give sizes"),
+    Refusal("time steps", "half ball", f"{_IN_STEPS}, and the far field has none: {_COARSE}"),
     # Large strains.
     Refusal(
         "ν < 0.2",
@@ -326,6 +330,7 @@ _PRESSED_ONLY = "real-time models are only for tools that press straight down"
 # Of each way that may be shorter, the features with which it is not taken, each with the reason.
 OBSTACLES: dict[str, dict[str, str]] = {
     "meridian": {
+        "time steps": "time steps are computed in three dimensions",
         "fibres": "fibres have a direction, and are not axisymmetric",
         "linear outside": "the boundary of the linear part is a sphere, and no line of the mesh of the meridian",
         "six motions": "most of the six motions are not axisymmetric",
@@ -335,6 +340,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     },
     # Taken if no case of the study is in the way: what is compared is computed alike.
     "meridian, in a comparison": {
+        "time steps": "all cases of the comparison are solved in three dimensions",
         "linear outside": "all cases of the comparison are solved in three dimensions",
         "half ball": "all cases of the comparison are solved in three dimensions",
         "friction": "all cases of the comparison are solved in three dimensions",
@@ -347,6 +353,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "large displacements": "the problem is nonlinear",
         "slit": "a slit has results besides F",
         "loads": "loads have results besides F",
+        "time steps": "a history in time steps is no static solution",
     },
     "scaling": {
         "loads": "their force is not proportional to modulus and depth",
@@ -367,6 +374,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "large displacements": "F is not proportional to the depth",
     },
     "F_exact": {
+        "time steps": "F_exact is static, and these forces are no multiples of static ones",
         "friction": "with friction, F_exact would not be more accurate than F on a fine mesh",
         "large displacements": "at large displacements, F_exact would not be more accurate than F on a fine mesh",
     },

@@ -14,7 +14,7 @@ from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.shapes.tissue import Tissue
-from pipeline.study.capabilities import features_of, obstacle
+from pipeline.study.capabilities import features_of, needs_time_steps, obstacle
 from pipeline.study.closure import FarRegion
 from pipeline.study.loads import Load
 from pipeline.study.place import CLEAR, is_clear, place_error
@@ -150,6 +150,11 @@ class Case:
         return tuple(tissue.prony or self.material.prony for tissue in self.tissues)
 
     @property
+    def is_stepped(self) -> bool:
+        """Whether its history is computed in time steps."""
+        return needs_time_steps(self)
+
+    @property
     def densities(self) -> tuple[float | None, ...]:
         """Densities (kg/m³) of the regions of the body, in the order of their numbers; None where there is none."""
         return tuple(tissue.density if tissue.density is not None else self.material.density for tissue in self.tissues)
@@ -170,7 +175,7 @@ class Case:
     @property
     def moves_in_proportion(self) -> tuple[str, ...]:
         """The keys of the probe that F is proportional to: none where displacements are large."""
-        return () if self.material.is_large else self.probe.proportional_to
+        return () if self.material.is_large or self.is_stepped else self.probe.proportional_to
 
     @property
     def scale(self) -> Scale:

@@ -119,7 +119,9 @@ def _attempt(
         check_memory(FreeMemory(comm), needed, "solving")
         room = bar and not lacks_memory(FreeMemory(comm), with_bar, "")
         note(f"solving for {problem.dofs} unknowns")
-        solution = solve_problem(case, problem, estimate=room or solve.goal is not None, meshed=meshed)
+        # Of a history, fields are those of the elastic body.
+        still = replace(case, probe=case.probe.model_copy(update={"history": None}))
+        solution = solve_problem(still, problem, estimate=room or solve.goal is not None, meshed=meshed)
         points = comm.bcast(len(arrays.points) if arrays is not None else 0)
         displacement, strain = _gathered(mesh, problem, points)
         if case.frame.turn is not None:

@@ -156,6 +156,31 @@ def test_depths_of_found_contact_share_one_mesh_among_all_speeds():
     assert [case.probe.depth for _, case in plan.study.whole_cases()] == [0.4e-3, 0.4e-3]
 
 
+def test_a_history_in_time_steps_is_in_the_dataset_like_any_other():
+    """Two speeds on one mesh; at once and after a long time F is that of the moduli at these times."""
+    probe = {"depth": "0.3 mm", "history": {"ramp": ["0 s", "1 s"], "hold": "60 s", "steps": 4}}
+    material = RELAXING | {"law": "neo-hookean"}
+    plan = make_plan(study(material=material, probe=probe))
+    data = build(plan, compute(plan, MPI.COMM_SELF))
+    assert (len(plan.solves), len(plan.meshes)) == (2, 1)
+    assert data["force"].dims == ("ramp", "time")
+    assert list(data["status"].values) == ["ok", "ok"]
+    elastic_force = data["force_elastic"]
+    jump, slow = data["force"].sel(ramp=0.0), data["force"].sel(ramp=1.0)
+    assert float(jump[0]) == pytest.approx(float(elastic_force[0]), rel=1e-6)
+    for force, end in ((jump, 60.0), (slow, 61.0)):
+        assert float(force.sel(time=end)) == pytest.approx(0.6 * float(elastic_force[0]), rel=1e-6)
+    assert np.isnan(jump.sel(time=61.0))
+    assert (data["force_error"].sel(ramp=1.0, time=61.0) > 0).all()
+    heat = data["dissipated_energy"].sel(ramp=1.0)
+    assert (heat.diff("time") > -1e-6 * heat.max()).all()
+    assert np.isnan(data["max_strain"]).all()
+    stiffer = make_plan(study(material=material | {"young": "20 kPa"}, probe=probe))
+    assert {one.key for one in stiffer.solves} == {one.key for one in plan.solves}
+    twice = build(stiffer, compute(plan, MPI.COMM_SELF))
+    assert twice["force"].values == pytest.approx(2 * data["force"].values, rel=1e-12, nan_ok=True)
+
+
 def test_the_stages_of_a_history_count_as_one_case():
     plan = make_plan(study(probe=SPHERE | {"history": {"ramp": ["1 s", "3 s"]}}, mesh={"epsilon": "8 mm"}))
     assert summary(plan)["cases"] == len(plan.study) == 2

@@ -23,6 +23,7 @@ HAVING = {
     "slice": {"probe": BLADE | {"slice": "0.1 mm"}},
     "slit": {"probe": BLADE | {"incision": "6 mm"}},
     "large displacements": {"material": {"law": "neo-hookean"}},
+    "time steps": {"material": {"law": "neo-hookean"}, "probe": {"history": {"ramp": "1 s"}}},
     "loads": {"load": {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}, "material": {"density": "1 g/cm^3"}},
     "column": {"mesh": {"epsilon": "9 mm", "outside": "free"}},
     "half ball": {"mesh": {"epsilon": "9 mm", "outside": "halfspace"}},
