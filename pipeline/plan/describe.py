@@ -84,6 +84,7 @@ def _of_place(case: Case) -> list[str]:
 def _of_large_displacements(plan: Plan) -> list[str]:
     """Return the largest depth to expect with large displacements, and the number of cases beyond it."""
     large = [solve.case for solve in plan.solves if solve.case.material.is_large]
+    large = [case for case in large if not case.probe.is_unilateral]
     if not large:
         return []
     ends = sorted({_FOLDS * case.probe.half_width for case in large})

@@ -82,6 +82,19 @@ _FOUND = (
     Recipe(2, 0.08, 0.17, 2.8e-4),
     Recipe(2, 0.06, 0.14, 1.8e-4),
 )
+# At large displacements, elements of degree 3, and very small ones, fold at the probe's edge.
+_LARGE = (
+    *LADDER[:4],
+    Recipe(2, 0.15, 0.45, 1.5e-3),
+    Recipe(2, 0.1, 0.4, 1.0e-3),
+    Recipe(2, 0.07, 0.35, 6.5e-4),
+    Recipe(2, 0.05, 0.3, 4.4e-4),
+)
+# Error bars at large displacements, in units of those of linear elasticity: at small depths, and their growth with the
+# depth in units of the half width.
+_OF_LARGE, _BY_DEPTH = 1.8, 6.0
+# The same for found contact, at any depth: F is not extrapolated there.
+_FOUND_LARGE = 3.0
 # Error bars grow by 1 + 10 a/H with the probe's half width a over the body's thickness H, measured up to _THINNEST.
 _THICKNESS, _THINNEST = 10.0, 0.15
 # Error bars of mixed elements, in units of those of displacement elements at ν = 0.3, by degree: if the probe's edge
@@ -127,6 +140,8 @@ def _ladder(case: Case) -> tuple[Recipe, ...]:
     """Return the recipes for a probe, cheapest first."""
     if isinstance(case.probe, Indenter):
         return _FOUND
+    if case.material.is_large:
+        return _LARGE
     if case.probe.is_unilateral:
         return _FLAT
     if case.is_plain:
@@ -149,6 +164,9 @@ def _expected(case: Case, recipe: Recipe) -> float:
     is_even = case.is_plain and not case.probe.is_unilateral
     if is_even:
         shape *= _near(case) * (_SEVERAL if case.element == "mixed" and case.movements > 1 else 1.0)
+    if case.material.is_large:
+        deeper = 0.0 if case.probe.is_unilateral else _BY_DEPTH * case.probe.depth / half_width_of(case)
+        shape *= (_FOUND_LARGE if case.probe.is_unilateral else _OF_LARGE) * (1 + deeper)
     thickness = 1 + _THICKNESS * min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
     if case.element == "mixed":
         return recipe.bar * shape * thickness * (_MIXED_EVEN if is_even else _MIXED)[recipe.degree]
@@ -193,7 +211,7 @@ def _mesh(case: Case, recipe: Recipe) -> Mesh:
     chosen.setdefault("fine", given.fine)
     if "rim" in chosen:
         chosen["rim"] = min(chosen["rim"], chosen["fine"])
-    if not case.is_truncated:
+    if not (case.is_truncated or case.is_linear_beyond):
         chosen["epsilon"] = probe.circumradius + thickness
         chosen["outside"] = "coarse"
     return given.model_copy(update=chosen | {"accuracy": None})

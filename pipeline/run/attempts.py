@@ -24,7 +24,9 @@ class Attempts:
         record = _checked(solve, record)
         if solve.goal is None:
             return record
-        if record.is_ok and record.force_error > solve.goal and solve.later:
+        # A meridian has chosen among its own meshes.
+        has_next = bool(solve.later) and not solve.axisymmetric
+        if record.is_ok and record.force_error > solve.goal and has_next:
             self._earlier.setdefault(solve.key, []).append(record)
             self._again[solve.key] = solve.again(record.force_error)
             return None
@@ -80,7 +82,8 @@ def _concluded(solve: Solve, last: Record, earlier: list[Record]) -> Record:
     assert solve.goal is not None
     known = [record for record in (*earlier, last) if record.is_ok]
     if not known:
-        return last
+        unmet = f"the accuracy {_percent(solve.goal)} is not reached: {last.message}"
+        return replace(last, message=unmet) if last.status == "partial" else last
     best = min(known, key=lambda record: record.force_error)
     # The time of several meshes must not enter the cost model.
     record = replace(add_times(best, [r for r in known if r is not best]), kind="")
@@ -89,5 +92,9 @@ def _concluded(solve: Solve, last: Record, earlier: list[Record]) -> Record:
     if solve.is_reference and best.force_error <= _WORST_BAR:
         return record
     why = last.message or "this is the finest mesh tried"
-    bar, goal = (f"{100 * share:.2g} %" for share in (best.force_error, solve.goal))
+    bar, goal = _percent(best.force_error), _percent(solve.goal)
     return failed(record, f"error bar {bar} exceeds the accuracy {goal}: {why}")
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"

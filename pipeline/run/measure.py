@@ -47,7 +47,11 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     kind, planned_cells, poisson = features(solve)
     if solve.goal is not None and not solve.axisymmetric:
         solution = solution.extrapolated(
-            case.mesh.degree, case.element, graded=is_graded_to_contact(case), elsewhere=not case.is_plain
+            case.mesh.degree,
+            case.element,
+            graded=is_graded_to_contact(case),
+            elsewhere=not case.is_plain,
+            large=case.material.is_large,
         )
     # The solution is in the frame where the probe presses along -z; the record is in the body's coordinates.
     turn, force, bar = case.frame.turn, solution.reaction[2], solution.reaction_bars[2]

@@ -167,14 +167,17 @@ class Solution:
         motions = self.response.movement.motions
         return any(g < 0 for g, motion in zip(self.front.gains, motions, strict=False) if any(motion.opening))
 
-    def extrapolated(self, degree: int, element: str, *, graded: bool = True, elsewhere: bool = False) -> "Solution":
+    def extrapolated(
+        self, degree: int, element: str, *, graded: bool = True, elsewhere: bool = False, large: bool = False
+    ) -> "Solution":
         """Return the limit of the sequence of degrees, on a mesh ``graded`` to the edge or not; unchanged without bars.
 
-        ``elsewhere`` says that F has errors from other places than the probe's edge.
+        ``elsewhere`` says that F has errors from other places than the probe's edge, ``large`` that displacements are
+        large.
         """
-        if self.decrements is None or self.bars is None:
-            return self
-        if self.stored is not None:
+        if self.decrements is None or self.bars is None or (large and self.contact is not None):
+            return self  # found contact at large displacements has no known limit: F and its bar stay
+        if self.contact is not None:
             stiffness, bars = extrapolate_found(
                 self.stiffness, self.decrements, self.bars, graded=graded, elsewhere=elsewhere
             )
@@ -188,6 +191,7 @@ class Solution:
             plain=self.plain,
             graded=graded,
             elsewhere=elsewhere,
+            large=large,
             unseen=self.unseen,
         )
         best = replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)

@@ -322,7 +322,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("six motions", "large displacements", f'must be "press" {_OF_LAW}: there is no single stiffness'),
     Refusal("slit", "large displacements", _LINEAR),
     Refusal("slice", "large displacements", f"must be 0 mm {_OF_LAW}: the blade only presses"),
-    Refusal("accuracy", "large displacements", f"{_LINEAR}, and give sizes"),
     Refusal("half ball", "large displacements", f'must be "coarse", "free" or "fixed" {_OF_LAW}'),
 )
 

@@ -49,10 +49,14 @@ def check_linear(material: Material, mesh: Mesh, problems: Problems) -> None:
 
 
 def check_chosen(meshes: Sequence[Mesh], problems: Problems) -> None:
-    """Report an ε without effect: with `accuracy`, and without a cut at ε, all sizes are chosen."""
-    if not all(mesh.accuracy is not None and mesh.keeps_all for mesh in meshes):
+    """Report an ε without effect: with `accuracy`, and the same body on both sides of ε, all sizes are chosen."""
+    chosen = [mesh for mesh in meshes if mesh.accuracy is not None]
+    for mesh in chosen:
+        if mesh.outside == "linear" and "epsilon" not in mesh.model_fields_set:
+            problems.error("mesh.outside", mesh.outside, "needs epsilon, beyond which the body is linear")
+    if len(chosen) < len(meshes) or any(mesh.outside != "coarse" for mesh in chosen):
         return
-    for mesh in meshes:
+    for mesh in chosen:
         if "epsilon" in mesh.model_fields_set:
             problems.error(
                 "mesh.epsilon",
