@@ -20,25 +20,14 @@ _FACTORS = {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_
 _GCR = {"ksp_type": "gcr", "ksp_max_it": 300, "ksp_initial_guess_nonzero": True}
 _TANGENT = {"ksp_norm_type": "natural", "ksp_rtol": 1e-4, "ksp_max_it": 400}
 _OF_SADDLE = {"ksp_rtol": 1e-4, "ksp_converged_use_initial_residual_norm": "", "ksp_gcr_restart": 60}
-_NEWTON = {
-    "ksp_initial_guess_nonzero": False,
-    "snes_type": "newtonls",
-    "snes_linesearch_type": "basic",
-    "snes_rtol": 0.0,
-    "snes_stol": 0.0,
-    "snes_max_it": 25,
-}
 # PETSc options by the system solved. Iterations use the vector passed as initial guess, except where noted.
 SOLVERS: dict[str, dict[str, Any]] = {
     "factors": _FACTORS,
     "elasticity": _CG | {"ksp_norm_type": "natural", "ksp_max_it": 500},
     # No norm: it would cost one more application of the preconditioner.
     "energy decrements": _CG | {"ksp_norm_type": "none", "ksp_max_it": 60},
-    # Newton's method gains three digits a step; each linear solve has a zero initial guess.
     "tangent": _CG | _TANGENT,
     "tangent, mixed": _GCR | _OF_SADDLE,
-    "Newton's method": _CG | _TANGENT | _NEWTON,
-    "Newton's method, mixed": _GCR | _OF_SADDLE | _NEWTON,
     "eigenvalues": {"ksp_type": "cg", "ksp_norm_type": "natural", "ksp_rtol": 1e-12, "ksp_max_it": 30},
     "saddle point": _GCR,
     "mass": {

@@ -19,7 +19,7 @@ squared energy norms that the preconditioner sees in r and in r'.
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, prod
 
 import numpy as np
 from petsc4py import PETSc
@@ -28,13 +28,16 @@ from pipeline.arrays import FloatArray
 from pipeline.solve.compiled import assemble, global_sum
 from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate, Linearised, Products, Solver
 from pipeline.solve.movement import Motion, Movement
-from pipeline.solve.newton import HyperelasticBody, LargeError
+from pipeline.solve.newton import LEFT, HyperelasticBody, LargeError
 from pipeline.solve.physics import MaterialLaw
 
 # Fewest load steps, and the smallest step as a share of the depth.
-_FEWEST, _SMALLEST = 3, 1 / 50
+_FEWEST, _SMALLEST = 3, 1 / 100
 # A step that would leave less than this share of the depth goes to the end.
 _SLIVER = 1e-6
+# Residual of steps before the last, in units of the forces: the work of F has fewer digits. And states besides the last
+# one that the initial guess continues.
+_ON_THE_WAY, _CONTINUED = 1e-6, 2
 # The next load step is longer if this one took at most so many Newton iterations.
 _EASY = 4
 # Largest relative difference of work and energy, and rounding of energies where strains are tiny. An element at the
@@ -47,8 +50,8 @@ class LoadPath:
     """A load path: how far a ``motion`` of the probe has proceeded in a body of a ``law``.
 
     ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part. ``state`` is that of the last
-    step: displacement, and in mixed elements pressure (owned dofs). The first step of the next depth is at most as long
-    as the last one, ``step`` (m).
+    step: displacement, and in mixed elements pressure (owned dofs). ``step`` (m) is the longest that Newton's method is
+    expected to reach at once.
     """
 
     law: MaterialLaw
@@ -56,11 +59,25 @@ class LoadPath:
     state: FloatArray
     path: list[tuple[float, float, float]] = field(default_factory=lambda: [(0.0, 0.0, 0.0)])
     step: float = inf
+    earlier: list[FloatArray] = field(default_factory=list)
 
     @property
     def reached(self) -> float:
         """The depth (m) of the last step."""
         return self.path[-1][0]
+
+    def add(self, depth: float, force: float, energy: float, state: FloatArray) -> None:
+        """Add a step at a ``depth`` (m), with its ``force`` (N), ``energy`` (J) and ``state``."""
+        self.earlier = [*self.earlier, self.state][-_CONTINUED:]
+        self.state = state.copy()
+        self.path.append((depth, force, energy))
+
+    def continued(self, depth: float) -> FloatArray:
+        """Return the polynomial through the last states, at a ``depth`` (m)."""
+        states = [*self.earlier, self.state]
+        depths = [at for at, _, _ in self.path[-len(states) :]]
+        weights = [prod((depth - other) / (at - other) for other in depths if other != at) for at in depths]
+        return np.asarray(np.tensordot(weights, states, axes=1))
 
     def can_reach(self, law: MaterialLaw, movement: Movement) -> bool:
         """Return whether this path can be continued to the movement under this law."""
@@ -183,8 +200,7 @@ class LoadSteps(Solver):
     def _press(self, state: PETSc.Vec, column: Column) -> FloatArray:
         """Continue ``state`` along the load path to the depth of a column.
 
-        Return the path: depth, force and energy of each step. The tangent gives the initial guess of each step. A step
-        is halved where Newton's method does not converge.
+        Return the path: depth, force and energy of each step. A step is halved where Newton's method does not converge.
 
         Raises:
             LargeError: if a step becomes too small; the path keeps the steps that converged.
@@ -192,44 +208,42 @@ class LoadSteps(Solver):
         load_path, depth = self._load_path, column.amount
         state.array[:] = load_path.state
         longest = depth / _FEWEST
-        step = min(load_path.step, longest)
-        with ExitStack() as stack:
-            unit, rate, trial, forces = (stack.enter_context(self._body.state()) for _ in range(4))
+        with self._body.state() as unit, self._body.state() as forces:
             self._put_unit(column, unit)
-            while (reached := load_path.reached) < depth:
-                self._body.move(state, unit, rate)
-                step, steps = self._step(state, rate, trial, load_path, step, depth)
-                state.array[:] = trial.array
-                energy = self._body.energy(state)
+            held = unit.array[self._space.prescribed_owned]
+            while load_path.reached < depth:
+                asked = min(load_path.step, longest, depth - load_path.reached)
+                there, steps = self._step(state, held, load_path, asked, depth)
+                step = there - load_path.reached
                 self._body.forces(state, forces)
-                there = depth if step >= depth - reached else reached + step
-                load_path.path.append((there, forces.dot(unit), energy))
-                load_path.state[:] = state.array
-                load_path.step = step = min(step * (2 if steps <= _EASY else 1), longest)
+                load_path.add(there, forces.dot(unit), self._body.energy(state), state.array)
+                longer = step * (2 if steps <= _EASY else 1)
+                load_path.step = longer if step < (1 - _SLIVER) * asked else max(load_path.step, longer)
         return np.array(load_path.path)
 
     def _step(
-        self, state: PETSc.Vec, rate: PETSc.Vec, trial: PETSc.Vec, load_path: LoadPath, step: float, depth: float
+        self, state: PETSc.Vec, held: FloatArray, load_path: LoadPath, step: float, depth: float
     ) -> tuple[float, int]:
-        """Write the equilibrium a ``step`` (m) farther into ``trial``; return the step and its Newton iterations.
+        """Write the equilibrium a ``step`` (m) farther into ``state``; return its depth and Newton's iterations.
 
-        ``rate`` is the tangent at ``state``, per metre; the path ends at ``depth`` (m).
+        ``held`` are the prescribed dofs per metre; the path ends at ``depth`` (m).
+
+        Raises:
+            LargeError: if the step becomes too small.
         """
-        reached = load_path.reached
-        if step > (1 - _SLIVER) * (depth - reached):
-            step = depth - reached  # no further step for a rounding error
-        with self._body.state() as forces:
-            while True:
-                trial.array[:] = state.array + step * rate.array
-                try:
-                    if not np.isfinite(self._body.energy(trial)):
-                        raise LargeError("tissue is turned inside out")
-                    self._body.forces(trial, forces)
-                    return step, self._body.settle(trial, self._body.norm_on_held(forces))
-                except LargeError as error:
-                    step /= 2
-                    if step < _SMALLEST * depth:
-                        raise self._stopped(load_path, depth, error) from error
+        left = depth - load_path.reached
+        while True:
+            # No further step for a rounding error.
+            there = depth if step > (1 - _SLIVER) * left else load_path.reached + step
+            state.array[:] = load_path.continued(there)
+            if not np.isfinite(self._body.energy(state)):
+                state.array[:] = load_path.state  # the first step of Newton's method then brings it there
+            try:
+                return there, self._body.settle(state, there * held, LEFT if there == depth else _ON_THE_WAY)
+            except LargeError as error:
+                step = min(step, left) / 2
+                if step < _SMALLEST * depth:
+                    raise self._stopped(load_path, depth, error) from error
 
     def _stopped(self, load_path: LoadPath, depth: float, why: LargeError) -> LargeError:
         """Return the error of a path that ends before ``depth`` (m)."""

@@ -1,13 +1,14 @@
 """Newton's method for the equilibrium of a hyperelastic body with prescribed displacements.
 
-PETSc's SNES with a line search. The linear systems are solved by conjugate gradients, in mixed elements by generalised
-conjugate residuals. The tangent is matrix-free. The preconditioner is that of linear elasticity, which is set up once:
-at moderate strain the tangent is close to linear elasticity.
+The first step may also bring prescribed dofs to their goal: it is then the response of the tangent. Linear systems are
+solved by conjugate gradients, in mixed elements by generalised conjugate residuals. The tangent is matrix-free. The
+preconditioner is that of linear elasticity, which is set up once: at moderate strain the tangent is close to it.
 """
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from typing import Any, Protocol
+from math import inf
+from typing import Protocol
 
 import numpy as np
 from dolfinx import fem
@@ -20,13 +21,15 @@ from pipeline.solve.compiled import assemble
 from pipeline.solve.elements.base import Elements, Fields
 from pipeline.solve.elements.tangent import Prestress, Tangent
 from pipeline.solve.kernels.tangent import TangentCells
-from pipeline.solve.krylov import INDEFINITE, SOLVERS, configure, explain, keep, solver_of
+from pipeline.solve.krylov import INDEFINITE, explain, solver_of
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.stages import stage
 
 # Tolerance on the residual, relative to the forces at prescribed dofs, and most Newton iterations.
-_LEFT = 1e-9
+LEFT, _MOST = 1e-9, 25
+# Tolerances of linear solves: the first one and the least, and the share of the gain that is needed to the end.
+_ROUGH, _FINE, _SPARE = 1e-2, 1e-4, 0.1
 # Most halvings of a step that turns tissue inside out.
 _HALVINGS = 12
 # Sufficient decrease: least gain of energy, as a share of that predicted by the slope.
@@ -192,28 +195,79 @@ class HyperelasticBody:
             result.set(0.0)
             result.array[self._held] = prescribed.array[self._held]
             ksp = solver_of(self._kind("tangent"), self.tangent, stack, self._solver)
-            self._run(ksp, ksp, lambda: ksp.solve(load, result))
+            ksp.setTolerances(rtol=_FINE)
+            self._run(ksp, lambda: ksp.solve(load, result))
 
     @stage("Newton's method")
-    def settle(self, state: PETSc.Vec, scale: float) -> int:
-        """Find the equilibrium from the initial guess ``state``, its prescribed dofs fixed; collective.
+    def settle(self, state: PETSc.Vec, goal: FloatArray, left: float = LEFT) -> int:
+        """Find the equilibrium from the initial guess ``state``; collective.
 
-        Return Newton's iterations. ``scale`` (N) is the size of the forces at prescribed dofs.
+        ``goal`` (m) are the prescribed dofs there, ``left`` is the residual at the end in units of the forces at these
+        dofs. Return Newton's iterations.
 
         Raises:
             LargeError: if Newton's method does not converge.
         """
-        with ExitStack() as stack, self.state() as residual:
-            snes = keep(stack, PETSc.SNES().create(self._space.comm))
-            configure(snes, SOLVERS[self._kind("Newton's method")])
-            snes.ksp.pc.setType("python")
-            snes.ksp.pc.setPythonContext(self._solver)
-            snes.setFunction(self._function, residual)
-            snes.setJacobian(self._jacobian, self.tangent, self.tangent)
-            snes.setLineSearchPreCheck(self._shorten)
-            snes.setTolerances(atol=_LEFT * scale / self._unit)
-            self._run(snes, snes.ksp, lambda: snes.solve(None, state))
-            return int(snes.getIterationNumber())
+        with ExitStack() as stack:
+            residual, step, there = (stack.enter_context(self.state()) for _ in range(3))
+            ksp = solver_of(self._kind("tangent"), self.tangent, stack, self._solver)
+            stored = self.energy(state) / self._unit
+            if not np.isfinite(stored):
+                raise LargeError("tissue is turned inside out")
+            before = inf
+            for iteration in range(_MOST):
+                self._residual(state, residual)
+                scale, todo = self.norm_on_held(residual), goal - state.array[self._held]
+                residual.array[self._held] = 0.0
+                norm, is_there = residual.norm(), not self._space.comm.allreduce(bool(todo.any()), op=MPI.LOR)
+                if is_there and norm <= left * scale:
+                    return iteration
+                ksp.setTolerances(rtol=_share(norm / before, left * scale / norm) if is_there else _ROUGH)
+                before = norm if is_there else inf
+                self._newton_step(ksp, state, residual, todo, step)
+                stored = self._advance(state, stored, residual, step, there, is_there=is_there)
+        raise LargeError(f"no equilibrium after {_MOST} iterations")
+
+    def _newton_step(
+        self, ksp: PETSc.KSP, state: PETSc.Vec, residual: PETSc.Vec, todo: FloatArray, step: PETSc.Vec
+    ) -> None:
+        """Write the step from ``state``, with the change ``todo`` of prescribed dofs, into ``step``."""
+        self.assemble(state)
+        with self.state() as load:
+            step.set(0.0)
+            step.array[self._held] = todo
+            load.array[:] = -residual.array - self._tangent.whole(step.array[: self._space.owned])
+            load.array[self._held] = todo
+            self._run(ksp, lambda: ksp.solve(load, step))
+
+    def _advance(
+        self, state: PETSc.Vec, stored: float, residual: PETSc.Vec, step: PETSc.Vec, there: PETSc.Vec, *, is_there: bool
+    ) -> float:
+        """Add the step to ``state``, halved until no tissue is inside out and less energy is stored; return the energy.
+
+        Where rounding hides the decrease of the energy, and in mixed elements, whose energy is stationary and no
+        minimum, the residual must fall. A step that moves prescribed dofs (not ``is_there``) is taken whole.
+
+        Raises:
+            LargeError: if no step is short enough.
+        """
+        left, slope = residual.norm(), -residual.dot(step)
+        for halvings in range(_HALVINGS):
+            share = 0.5**halvings
+            there.waxpy(share, step, state)
+            energy = self.energy(there) / self._unit
+            if not np.isfinite(energy):
+                if not is_there:
+                    break
+                continue
+            falls = not is_there or (not self._is_mixed and energy <= stored - _GAIN * share * slope)
+            if not falls:
+                self._function(there, residual)
+                falls = residual.norm() <= (1 - _GAIN * share) * left
+            if falls:
+                there.copy(state)
+                return energy
+        raise LargeError("tissue is turned inside out")
 
     @property
     def _is_mixed(self) -> bool:
@@ -232,12 +286,9 @@ class HyperelasticBody:
             self._elements.weigh(parts)
             result.array[:] = np.concatenate([part.array for part in parts])
 
-    def _function(self, _: PETSc.SNES | None, state: PETSc.Vec, result: PETSc.Vec) -> None:
+    def _function(self, state: PETSc.Vec, result: PETSc.Vec) -> None:
         self._residual(state, result)
         result.array[self._held] = 0.0
-
-    def _jacobian(self, _: PETSc.SNES, state: PETSc.Vec, tangent: PETSc.Mat, __: PETSc.Mat) -> None:
-        self.assemble(state)
 
     def assemble(self, state: PETSc.Vec) -> None:
         """Evaluate the tangent at a state; collective."""
@@ -245,30 +296,8 @@ class HyperelasticBody:
         self._tangent.update()
         self.tangent.assemble()
 
-    def _shorten(self, here: PETSc.Vec, step: PETSc.Vec) -> bool:
-        """Halve a ``step`` (which is subtracted) until no tissue is inside out after it, and less energy is stored.
-
-        Where rounding hides the decrease of the energy, and in mixed elements, whose energy is stationary and no
-        minimum, the residual must fall.
-        """
-        with self.state() as there, self.state() as residual:
-            stored = self.energy(here) / self._unit
-            self._function(None, here, residual)
-            left, slope = residual.norm(), residual.dot(step)
-            for halvings in range(_HALVINGS):
-                there.array[:] = here.array - step.array
-                energy, share = self.energy(there) / self._unit, 0.5**halvings
-                if np.isfinite(energy):
-                    if not self._is_mixed and energy <= stored - _GAIN * share * slope:
-                        return halvings > 0
-                    self._function(None, there, residual)
-                    if residual.norm() <= (1 - _GAIN * share) * left:
-                        return halvings > 0
-                step.scale(0.5)
-        return True
-
-    def _run(self, solver: Any, ksp: PETSc.KSP, solve: Callable[[], None]) -> None:
-        """Run a PETSc solver, with the linear solver ``ksp``, and check that it converges; collective.
+    def _run(self, ksp: PETSc.KSP, solve: Callable[[], None]) -> None:
+        """Solve a linear system, and check that it converges; collective.
 
         If the preconditioner proves indefinite, it is repaired and the solver continues.
 
@@ -276,14 +305,23 @@ class HyperelasticBody:
             LargeError: if the solver does not converge.
         """
         try:
-            self._counted(solver, solve)
+            self._counted(ksp, solve)
             if ksp.getConvergedReason() == INDEFINITE and self._solver and self._solver.refine_eigenvalues():
-                self._counted(solver, solve)
+                self._counted(ksp, solve)
         except PETSc.Error as error:
             raise LargeError(explain(error)) from error
-        if solver.getConvergedReason() <= 0:
-            raise LargeError(f"reason {solver.getConvergedReason()}")
+        if ksp.getConvergedReason() <= 0:
+            raise LargeError(f"reason {ksp.getConvergedReason()}")
 
-    def _counted(self, solver: Any, solve: Callable[[], None]) -> None:
+    def _counted(self, ksp: PETSc.KSP, solve: Callable[[], None]) -> None:
         solve()
-        self.iterations += solver.getLinearSolveIterations() if isinstance(solver, PETSc.SNES) else solver.its
+        self.iterations += ksp.its
+
+
+def _share(gained: float, needed: float) -> float:
+    """Return the tolerance of a linear solve, from the last gain of the residual and the gain ``needed`` to the end.
+
+    The square of the last gain is what a step of Newton's method can gain (S. C. Eisenstat and H. F. Walker, SIAM J.
+    Sci. Comput. 17, 16, 1996).
+    """
+    return min(_ROUGH, max(_FINE, gained**2, _SPARE * needed))

@@ -187,7 +187,7 @@ def test_depths_of_a_sweep_share_one_load_path(monkeypatch):
     step = LoadSteps._step
 
     def counted(self, *arguments):
-        ends.append(arguments[3].reached)
+        ends.append(arguments[2].reached)
         return step(self, *arguments)
 
     monkeypatch.setattr(LoadSteps, "_step", counted)
