@@ -2,7 +2,7 @@
 
     python -m benchmarks.deep_contact [--count N] [--seed N] [--set calibrate|judge] [--out FILE]
 
-Scenes are balls, cones and wedges on cylinders and boxes, some layered, of five laws, with ν from 0.3 to 0.5. The two
+Scenes are balls and cones on cylinders and boxes, some layered, of five laws, with ν from 0.3 to 0.5. The two
 sets have bodies and tools of other proportions: factors are read off one, and judged on the other. Each line of the
 output has the force, the change of degree 3, the bar, and the force of the finer mesh.
 """
@@ -75,15 +75,15 @@ def thrown(dice: Dice, ranges: dict[str, tuple[float, float]]) -> tuple[str, dic
     """Return a scene: its name, its sections without a mesh, and the size of elements in half widths of contact."""
     law, poisson = dice.one_of(list(_LAWS)), dice.one_of(list(_POISSON))
     depth, height, wide = (dice.log(*ranges[key]) for key in ("depth", "height", "wide"))
-    kind = dice.one_of(["sphere", "sphere", "sphere", "cone", "wedge"])
+    kind = dice.one_of(["sphere", "sphere", "cone"])
     probe: dict[str, Any] = {"shape": kind, "depth": mm(RADIUS * depth), "contact": "unilateral"}
     if kind == "sphere":
         probe["radius"] = mm(RADIUS)
     else:
         probe |= {"angle": f"{dice.between(60.0, 78.0, 1)} deg", "tip": mm(dice.log(1.0, 3.0))}
-        probe |= {"radius": mm(3 * RADIUS)} if kind == "cone" else {"length": mm(2 * RADIUS)}
+        probe["radius"] = mm(3 * RADIUS)
     body: dict[str, Any] = {"shape": "cylinder", "radius": mm(RADIUS * wide), "height": mm(RADIUS * height)}
-    if kind == "wedge" or dice.chance(0.3):
+    if dice.chance(0.3):
         size = [mm(2 * RADIUS * wide), mm(2 * RADIUS * wide), mm(RADIUS * height)]
         body = {"shape": "box", "size": size}
     if dice.chance(0.2):

@@ -320,7 +320,9 @@ def compile_forms(
             large = HyperelasticForms(space, elastic, laws, pressure)
             _ = large.residuals, large.products
             if of_contact:
-                _ = large.energy, large.tangents
+                _ = large.energy
+                for law in sorted(set(laws)):
+                    PointLaw(mesh, law, is_mixed=mixed is not None).compile()
             if level == degree:
                 _ = large.energy
                 for law in sorted(set(laws)):

@@ -101,3 +101,30 @@ def test_frames_keep_planes_of_symmetry():
     assert frames[:, :, 2] == pytest.approx(normal)
     assert frames[:10, :, 0] == pytest.approx(np.tile([1.0, 0.0, 0.0], (10, 1)))
     assert np.abs(frames[10:20, :, 1]) == pytest.approx(np.tile([0.0, 1.0, 0.0], (10, 1)))
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("element", ["displacement", "mixed"])
+def test_ranks_and_solvers_agree(element):
+    forces = []
+    for comm, method in ((MPI.COMM_WORLD, "auto"), (MPI.COMM_SELF, "auto"), (MPI.COMM_SELF, "direct")):
+        (case,) = study(material=TISSUE, probe=SPHERE, mesh=COARSE | {"element": element}).cases()
+        with Spaces(mesh_case(case, ("x", "y"), comm)) as spaces:
+            problem = QuasiStaticProblem(spaces, 2, CONDITIONS, element, tool=tool_of(case))
+            forces.append(problem.solve(law_of(case), movement_of(case), method=method).reaction[2])
+    assert forces[0] == pytest.approx(forces[1], rel=1e-7)
+    assert forces[2] == pytest.approx(forces[1], rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"shape": "ellipsoid", "axes": ["24 mm", "24 mm", "20 mm"], "fixed": {"below": "-8 mm"}},
+        {"layer": [{"name": "skin", "thickness": "2 mm", "young": "30 kPa", "poisson": 0.4}]},
+    ],
+    ids=["curved", "skin"],
+)
+def test_bodies_are_linear_at_small_depths(body):
+    probe, mesh = SPHERE | {"depth": "0.04 mm"}, COARSE | {"rim": "0.5 mm"}
+    found = force(body=body, material=TISSUE, probe=probe, mesh=mesh)
+    assert found == pytest.approx(force(body=body, material={"poisson": 0.4}, probe=probe, mesh=mesh), rel=0.01)

@@ -41,7 +41,7 @@ class DeformedBody:
         self._unit = elements.unit(law)
         self._numbering = Numbering(space.space, self.candidates.numbers)
         self._tangent: TurnedTangent
-        if elements.is_direct(method):
+        if method == "direct":
             self._tangent = FactorisedTangent(elements, law, self._body, self._numbering, stack)
         else:
             self._tangent = IteratedTangent(elements, law, self._body, self._numbering, surface, stack)

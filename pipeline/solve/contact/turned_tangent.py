@@ -1,7 +1,7 @@
 """Linear systems of the tangent in turned frames, in which normal displacements of active nodes are held.
 
-Small systems are factorised. Larger ones are solved by conjugate gradients, in mixed elements by generalised conjugate
-residuals, with the matrix-free tangent. The preconditioner is that of linear elasticity, which holds the same nodes
+Systems are solved by conjugate gradients, in mixed elements by generalised conjugate residuals, with the matrix-free
+tangent, or factorised on request. The preconditioner is that of linear elasticity, which holds the same nodes
 along z: it knows neither the turn of the frames nor the strain, and needs more iterations the larger both are.
 """
 
@@ -26,7 +26,7 @@ from pipeline.solve.physics import MaterialLaw
 
 # Relative residual of a Newton step: three digits more than a step gains.
 _TOLERANCE = 1e-6
-_MOST_ITERATIONS = 600
+_MOST_ITERATIONS = 300
 
 
 class TurnedTangent(ABC):
