@@ -54,6 +54,8 @@ _FOUND, _FOUND_UNSEEN, _FOUND_OF_AREA = 1.6, 1.4, 1.5
 _FOUND_SPREAD, _FOUND_SPREAD_ELSEWHERE, _FOUND_SPREAD_COARSE = 0.4, 0.5, 0.8
 # The same where contact is solved again: in units of the change in one degree more, and of the area's bar.
 _FOUND_AGAIN, _FOUND_AT_EDGE = 2.0, 0.1
+# The same at large displacements, for the area's bar: docs/accuracy.md.
+AT_EDGE_LARGE = 0.15
 # Limits of a mesh that counts as graded to the edge: rim size relative to the probe's half width, and growth.
 _GRADED = (0.4, 0.7)
 
@@ -162,13 +164,13 @@ def found_bar(decrement: float, unseen: float = 0.0, area_bar: float = 0.0) -> f
     return share / (1 - min(share, _MOST))
 
 
-def found_again_bar(share: float, area_bar: float) -> tuple[float, float]:
+def found_again_bar(share: float, area_bar: float, at_edge: float = _FOUND_AT_EDGE) -> tuple[float, float]:
     """Return a decrement and the relative 95 % bar on F_p, from the ``share`` of F that one degree more removes.
 
-    Contact is solved again in that degree. The share may vanish by chance, so the bar is at least a fraction of
-    ``area_bar``.
+    Contact is solved again in that degree. The share may vanish by chance, so the bar is at least a fraction
+    ``at_edge`` of ``area_bar``.
     """
-    bar = max(_FOUND_AGAIN * abs(share), _FOUND_AT_EDGE * area_bar)
+    bar = max(_FOUND_AGAIN * abs(share), at_edge * area_bar)
     return 2 * share / _FOUND, bar / (1 - min(bar, _MOST))
 
 

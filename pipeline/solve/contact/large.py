@@ -25,7 +25,7 @@ from pipeline.solve.contact.geometry import Area, contact_area
 from pipeline.solve.contact.levels import Surface
 from pipeline.solve.contact.tissue import DeformedBody
 from pipeline.solve.elements.base import Column, Elements, Equilibrium, HierarchicalEstimate
-from pipeline.solve.estimate import found_again_bar
+from pipeline.solve.estimate import AT_EDGE_LARGE, found_again_bar
 from pipeline.solve.movement import Movement
 from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import MaterialLaw, of_regions
@@ -173,7 +173,7 @@ class LargeTouch:
         """
         finer = self._found_again(stack)
         share, at_edge = 1 - finer.force / self.force, self._area().bar
-        taken, bar = found_again_bar(share, at_edge)
+        taken, bar = found_again_bar(share, at_edge, AT_EDGE_LARGE)
         return HierarchicalEstimate(
             finer.body.elements,
             [],
