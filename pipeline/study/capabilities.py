@@ -255,7 +255,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "history",
         f"friction depends on the path, and F is not the elastic force times a function of time: {_STATIC}",
     ),
-    Refusal("friction", "large displacements", f"is not computed {_OF_LAW}: omit it"),
     Refusal(
         "friction",
         "touch beside the axis",

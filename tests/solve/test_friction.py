@@ -109,7 +109,7 @@ def test_half_a_body_and_a_quarter_agree():
         ({"probe": SPHERE | {"friction": 2.5}}, 'a number from 0 to 2, or "stick"'),
         ({"probe": SPHERE | {"friction": "rough"}}, 'a number from 0 to 2, or "stick"'),
         ({"probe": DISC | {"contact": "bonded", "friction": 0.3}}, 'use contact = "unilateral"'),
-        ({"probe": SPHERE | {"friction": 0.3}, "material": {"law": "neo-hookean"}}, "law of large displacements"),
+        ({"probe": SPHERE | {"friction": 0.3}, "mesh": {"epsilon": "9 mm", "outside": "halfspace"}}, "far field"),
     ],
 )
 def test_what_friction_is_not_for(changes, reason):
@@ -128,3 +128,35 @@ def test_closed_form_is_that_of_a_flat_punch_with_the_depth_of_a_ball():
     assert known.stick_ratio(0.4999, 2) == pytest.approx(1.0, abs=1e-5)
     assert known.stick_ratio(0.0, 2) == pytest.approx(1.0529, abs=1e-3)
     assert known.stick_ratio(0.0, 2) < log(3)
+
+
+LARGE = {"body": {"shape": "cylinder", "radius": "20 mm", "height": "15 mm"}}
+NEO_HOOKEAN = {"law": "neo-hookean", "poisson": 0.3}
+
+
+def large(friction):
+    """Return the record of a ball on neo-Hookean tissue, solved once for all tests."""
+    mesh = {"fine": "6 mm", "coarse": "6 mm", "rim": "0.35 mm", "growth": 0.7}
+    key = "large", friction
+    if key not in KNOWN:
+        (KNOWN[key],) = solve(**LARGE, probe=SPHERE | {"friction": friction}, mesh=mesh, material=NEO_HOOKEAN).values()
+        assert KNOWN[key].status == "ok", KNOWN[key].message
+    return KNOWN[key]
+
+
+def test_at_large_displacements_little_friction_is_none():
+    assert large(1e-9).force == pytest.approx(large(0.0).force, rel=1e-6)
+    assert large(1e-9).slip_area == pytest.approx(large(1e-9).contact_area)
+
+
+def test_at_small_depth_the_law_does_not_matter():
+    """What friction adds is that at small displacements, up to the ratio of contact radius and ball, which is 0.1."""
+    for friction in (0.3, "stick"):
+        found, smooth = large(friction), large(0.0)
+        added = found.force / smooth.force - 1
+        wanted = record(friction).force / record().force - 1
+        assert added == pytest.approx(wanted, rel=0.25)
+        assert added > 0.005
+        assert found.balance < 1e-6
+    assert large("stick").slip_area == 0.0
+    assert 0 < large(0.3).slip_area < large(0.3).contact_area

@@ -11,13 +11,18 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
+from pipeline.solve.contact.coulomb import Neighbours, Slide
 from pipeline.solve.contact.deformed import PlacedTool, Tissue, Touched, first_set, settle
+from pipeline.solve.contact.rubbing import Rubbing, met
 from pipeline.solve.newton import LargeError
 
 # Smallest step, as a share of the depth, and a step that leaves less than this share goes to the end.
 _SMALLEST, _SLIVER = 1 / 64, 1e-6
 # The next step is longer by this factor if this one took at most so many iterations.
 _LONGER, _EASY = 1.5, 8
+# Largest share of the force at the end of a path on nodes whose friction does not settle. At a smaller depth, where few
+# nodes touch, the share may be larger, since that force is smaller.
+_SIMPLIFIED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +55,27 @@ class ContactPath:
         return self.last.state + share * (self.last.state - self.before.state)
 
 
-def press(tissue: Tissue, tool_at: Callable[[float], PlacedTool], path: ContactPath, depth: float) -> int:
+@dataclass(frozen=True, eq=False)
+class Friction:
+    """Coulomb's ``coefficient`` (infinite: it sticks) for a tool that moves along the unit vector ``advance``.
+
+    ``penalty`` (n), N/m: see :mod:`.coulomb`. ``deepest`` (m) is the depth at the end of the path.
+    """
+
+    coefficient: float
+    advance: FloatArray
+    penalty: FloatArray
+    neighbours: Neighbours
+    deepest: float
+
+
+def press(
+    tissue: Tissue,
+    tool_at: Callable[[float], PlacedTool],
+    path: ContactPath,
+    depth: float,
+    friction: Friction | None = None,
+) -> int:
     """Continue a load ``path`` to a ``depth`` (m); return Newton's iterations; collective.
 
     Raises:
@@ -62,7 +87,7 @@ def press(tissue: Tissue, tool_at: Callable[[float], PlacedTool], path: ContactP
         step = min(path.step, left)
         there = depth if step > (1 - _SLIVER) * left else path.last.depth + step
         try:
-            touched = _step(tissue, tool_at(there), path, there)
+            touched = _step(tissue, tool_at, path, there, friction)
         except SolveError as error:
             path.step = (there - path.last.depth) / 2
             if path.step < _SMALLEST * depth:
@@ -76,8 +101,77 @@ def press(tissue: Tissue, tool_at: Callable[[float], PlacedTool], path: ContactP
     return iterations
 
 
-def _step(tissue: Tissue, tool: PlacedTool, path: ContactPath, depth: float) -> Touched:
-    active = np.zeros(len(tissue.fixed), dtype=bool) if path.last.touched is None else path.last.touched.active
+def rub(
+    tissue: Tissue,
+    tool_at: Callable[[float], PlacedTool],
+    path: ContactPath,
+    depth: float,
+    friction: Friction,
+    steps: int,
+) -> int:
+    """Continue a new load ``path`` to a ``depth`` (m) with friction; return Newton's iterations; collective.
+
+    There are at least so many ``steps``, whose depths go with the square of their numbers. At the first ones, the tool
+    may touch no node.
+
+    Raises:
+        LargeError: if a step becomes too small; the path keeps the steps that converged.
+    """
+    iterations = 0
+    for number in range(1, steps + 1):
+        there = depth * (number / steps) ** 2
+        if path.last.touched is None:
+            tissue.state = path.last.state
+            nothing = np.zeros(len(tissue.fixed), dtype=bool)
+            if number < steps and not first_set(tissue, tool_at(there), nothing).any():
+                path.add(Stage(there, path.last.state))
+                continue
+        path.step = inf
+        iterations += press(tissue, tool_at, path, there, friction)
+    return iterations
+
+
+def _rubbing(
+    tissue: Tissue, tool_at: Callable[[float], PlacedTool], last: Stage, depth: float, friction: Friction
+) -> Rubbing:
+    """Return the friction of a step from the ``last`` stage to a ``depth`` (m), whose state is predicted."""
+    after, guess = tissue.positions(), tissue.state
+    tissue.state = last.state
+    before = tissue.positions()
+    tissue.state = guess
+
+    def gap(points: FloatArray, there: float) -> FloatArray:
+        return tool_at(there).distance(points).gap
+
+    references = met(gap, (before, after), (last.depth, depth), friction.advance)
+    nothing = np.zeros(len(before), dtype=bool)
+    touched = last.touched
+    if touched is not None:
+        carried = before + (depth - last.depth) * friction.advance
+        references = np.where(touched.active[:, None], carried, references)
+    normal = np.zeros(len(before)) if touched is None else touched.pressed
+    slide = None if touched is None else touched.slide
+    return Rubbing(
+        friction.coefficient,
+        references,
+        friction.penalty,
+        friction.neighbours,
+        slide or Slide(nothing, np.zeros(before.shape)),
+        normal,
+        tissue.fixed,
+        _SIMPLIFIED * friction.deepest / depth,
+    )
+
+
+def _step(
+    tissue: Tissue,
+    tool_at: Callable[[float], PlacedTool],
+    path: ContactPath,
+    depth: float,
+    friction: Friction | None,
+) -> Touched:
+    tool, last = tool_at(depth), path.last
+    active = np.zeros(len(tissue.fixed), dtype=bool) if last.touched is None else last.touched.active
     guess = path.guess(depth)
     if guess is not None:
         tissue.state = guess
@@ -85,4 +179,5 @@ def _step(tissue: Tissue, tool: PlacedTool, path: ContactPath, depth: float) -> 
             guess = None
     if guess is None:
         tissue.state = path.last.state
-    return settle(tissue, tool, first_set(tissue, tool, active))
+    rubbing = None if friction is None else _rubbing(tissue, tool_at, last, depth, friction)
+    return settle(tissue, tool, first_set(tissue, tool, active), rubbing)

@@ -9,7 +9,8 @@ The sign of a corner's reaction means nothing (:mod:`pipeline.solve.contact.acti
 corners slide where most of their neighbours do, in the mean direction of these.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from pipeline.arrays import BoolArray, FloatArray, IntArray
 # Nodes change between sticking and sliding beyond this share of the largest friction.
 _SLACK = 1e-6
 _TINY = 1e-300
+# Changes of a node's state after which it is simplified.
+_CHANGES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,3 +92,43 @@ class Slide:
         sliding = np.where(self.sliding, stays, size > (1 + _SLACK) * most) & active
         sliding = neighbours.majority(sliding, active) & active
         return Slide(sliding, neighbours.mean(trial, sliding))
+
+
+@dataclass(frozen=True, eq=False)
+class Simplified:
+    """Nodes (n) that do not settle, by how often they ``entered`` or left the active set, or ``turned`` to sliding.
+
+    Beyond a few times, friction is left out of the former, and the latter slide.
+    """
+
+    entered: IntArray
+    turned: IntArray
+
+    @staticmethod
+    def none(count: int) -> "Simplified":
+        """Return zero counts of ``count`` nodes."""
+        nothing = np.zeros(count, dtype=np.int64)
+        return Simplified(nothing, nothing)
+
+    @property
+    def nodes(self) -> BoolArray:
+        """Mask of the nodes that slide whatever their traction."""
+        return np.maximum(self.entered, self.turned) >= _CHANGES
+
+    def counting(self, moves: BoolArray, turns: BoolArray) -> "Simplified":
+        """Return the counts after another iteration."""
+        return Simplified(self.entered + moves, self.turned + turns)
+
+    def law(self, friction: float) -> FloatArray:
+        """Return the coefficient of friction of each node."""
+        return np.where(self.entered >= _CHANGES, 0.0, friction)
+
+    def sliding(self, slide: Slide, active: BoolArray) -> Slide:
+        """Return ``slide`` with these nodes sliding, if they are ``active``."""
+        return replace(slide, sliding=(slide.sliding | self.nodes) & active)
+
+
+def largest_friction(law: FloatArray, normal: FloatArray) -> FloatArray:
+    """Return the largest friction (n) in N, from coefficients ``law`` (n) and ``normal`` reactions (n)."""
+    sticks = law == inf
+    return np.where(sticks, inf, np.where(sticks, 0.0, law) * np.maximum(normal, 0.0))

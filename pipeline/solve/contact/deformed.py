@@ -20,11 +20,16 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.contact.active_set import SLACK
+from pipeline.solve.contact.constraint import Constraint
+from pipeline.solve.contact.coulomb import Slide
+from pipeline.solve.contact.rubbing import Placed, Rub, Rubbing
 from pipeline.solve.contact.turned import turned_frames
 from pipeline.solve.newton import LargeError
 
 # Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
 _LEFT, _CLOSED = 1e-8, 1e-8
+# The same with friction, whose direction and size follow from one iteration to the next.
+_LEFT_RUBBING = 1e-6
 # Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
 _MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
 # A set that is solved so often ends changes of many nodes at once.
@@ -43,22 +48,6 @@ class Distance(Protocol):
     def normal(self) -> FloatArray: ...  # noqa: D102
     @property
     def curvature(self) -> FloatArray: ...  # noqa: D102
-
-
-@dataclass(frozen=True, eq=False)
-class Constraint:
-    """Constraint of one Newton step at n nodes, in d coordinates.
-
-    ``frames`` (n, d, d) have the tangents and, in the last column, the tool's normal. ``held`` (n, d) are the slots of
-    the frames whose displacement is prescribed, to ``values`` (n, d), m. ``turning`` (n, d, d), N/m, is λ H, which is
-    subtracted from the tangent. ``forces`` (n, d), N, act on the nodes besides the reactions.
-    """
-
-    frames: FloatArray
-    held: BoolArray
-    values: FloatArray
-    turning: FloatArray
-    forces: FloatArray
 
 
 class Tissue(Protocol):
@@ -108,12 +97,17 @@ class PlacedTool:
 
 @dataclass(frozen=True, eq=False)
 class Touched:
-    """Contact at equilibrium: the ``active`` nodes (n), forces of the tool on the nodes (n, d), N, and gaps (n), m."""
+    """Contact at equilibrium: the ``active`` nodes (n), forces of the tool on the nodes (n, d), N, and gaps (n), m.
+
+    ``pressed`` (n) are the normal parts of the forces (N). ``slide`` is the state of friction, None without.
+    """
 
     active: BoolArray
     forces: FloatArray
     gap: FloatArray
     iterations: int
+    pressed: FloatArray
+    slide: Slide | None = None
 
 
 def first_set(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> BoolArray:
@@ -122,16 +116,20 @@ def first_set(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> BoolArray:
     return tool.complete(active | through)
 
 
-def settle(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> Touched:
+def settle(tissue: Tissue, tool: PlacedTool, active: BoolArray, rubbing: Rubbing | None = None) -> Touched:
     """Find equilibrium and contact from the tissue's state and an initial ``active`` set (n); collective.
+
+    Without ``rubbing`` there is no friction.
 
     Raises:
         LargeError: if the loop does not converge.
         SolveError: if a linear solver fails.
     """
     careful, seen, reactions = False, Counter[bytes](), np.full(len(active), np.inf)
+    rub, predicted = None if rubbing is None else Rub(rubbing), np.zeros(tissue.fixed.shape)
     for iteration in range(_MOST + 1):
-        place = tool.distance(tissue.positions())
+        positions = tissue.positions()
+        place = tool.distance(positions)
         normal = _within_planes(place.normal, tissue.fixed)
         forces = tissue.forces()
         following = _next_set(tool, active, reactions, place.gap)
@@ -140,15 +138,23 @@ def settle(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> Touched:
         pressed = np.where(active, np.einsum("ni,ni->n", forces, normal), 0.0)
         if careful:
             following = tool.complete(_first_change(active, following))
+        there, exerted = Placed(positions, normal), pressed[:, None] * normal
+        if rub is not None:
+            if iteration:
+                rub.follow(iteration, there, predicted, active, following)
+            exerted = exerted + rub.exerted(there, forces, active)
         is_same, active = np.array_equal(following, active), following
-        if is_same and _is_settled(tissue, tool, active, place.gap, forces - pressed[:, None] * normal, pressed):
-            return Touched(active, pressed[:, None] * normal, place.gap, iteration)
+        if is_same and _is_settled(tissue, tool, active, place.gap, forces - exerted, pressed, rub):
+            return Touched(active, exerted, place.gap, iteration, pressed, None if rub is None else rub.slide)
         if not is_same:
             seen[active.tobytes()] += 1
             careful = careful or seen[active.tobytes()] >= _CAREFUL
-            if seen[active.tobytes()] >= _MOST_REPEATS:
+            if seen[active.tobytes()] >= _MOST_REPEATS and rub is None:  # friction leaves nodes that do not settle
                 raise LargeError("active sets repeat")
-        predicted = tissue.linearise(_constraint(place, normal, np.where(active, pressed, 0.0), active))
+        constraint = _constraint(place, normal, np.where(active, pressed, 0.0), active)
+        if rub is not None:
+            constraint = rub.constrain(constraint, there, active)
+        predicted = np.where(tissue.fixed, 0.0, tissue.linearise(constraint))
         reactions = np.einsum("ni,ni->n", predicted, normal)
         _advance(tissue)
     raise LargeError(f"no equilibrium after {_MOST} iterations")
@@ -182,12 +188,18 @@ def _first_change(active: BoolArray, following: BoolArray) -> BoolArray:
 
 
 def _is_settled(
-    tissue: Tissue, tool: PlacedTool, active: BoolArray, gap: FloatArray, free: FloatArray, pressed: FloatArray
+    tissue: Tissue,
+    tool: PlacedTool,
+    active: BoolArray,
+    gap: FloatArray,
+    free: FloatArray,
+    pressed: FloatArray,
+    rub: Rub | None,
 ) -> bool:
     left = float(np.hypot(tissue.unbalanced(), np.linalg.norm(free)))
-    return bool(
-        left <= _LEFT * np.linalg.norm(pressed) and np.abs(gap[active]).max(initial=0.0) <= _CLOSED * tool.depth
-    )
+    size, most = np.linalg.norm(pressed), _LEFT if rub is None else _LEFT_RUBBING
+    is_closed = np.abs(gap[active]).max(initial=0.0) <= _CLOSED * tool.depth
+    return bool(left <= most * size and is_closed and (rub is None or (rub.is_same and rub.is_sound(active))))
 
 
 def _advance(tissue: Tissue) -> None:

@@ -16,15 +16,15 @@ from math import inf
 
 import numpy as np
 
-from pipeline.arrays import BoolArray, FloatArray, IntArray
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.contact.active_set import SLACK, ContactError
-from pipeline.solve.contact.coulomb import Neighbours, Slide
+from pipeline.solve.contact.coulomb import Neighbours, Simplified, Slide, largest_friction
 
 # Steps of a load path, and further ones before the first.
 STEPS, _BEFORE = 16, (0.25, 0.5, 0.75)
 _MOST_ITERATIONS = 60
-# Changes of a node's state after which it is simplified, and the iterations from which they count.
-_CHANGES, _PATIENCE = 3, 4
+# Iterations from which changes of the state of a node count.
+_PATIENCE = 4
 # Iterations after which changes of the direction of slip are halved, again and again.
 _SWINGING = 12
 # Largest share of the force on simplified nodes: friction then changes by about as much, half of the bar on it.
@@ -142,7 +142,7 @@ def _settled(
     Raises:
         Unsettled: if states repeat, or too much of the force is on nodes that are simplified.
     """
-    step, simple = replace(guess, iterations=0), _Simplified.none(len(surface))
+    step, simple = replace(guess, iterations=0), Simplified.none(len(surface))
     for iteration in range(1, _MOST_ITERATIONS + 1):
         law = simple.law(friction)
         step = replace(step, slide=simple.sliding(step.slide, step.active), iterations=iteration)
@@ -152,7 +152,7 @@ def _settled(
         moves = after.active != step.active
         turns = (after.slide.sliding != step.slide.sliding) & ~moves
         if not moves.any() and not turns.any() and _is_close(surface, step, after.slide, law, simple):
-            if simple.share(step, surface.neighbours.is_corner) > _SIMPLIFIED:
+            if _share(surface, step, simple) > _SIMPLIFIED:
                 break
             return step
         if not after.active.any():
@@ -163,39 +163,10 @@ def _settled(
     raise Unsettled("contact with friction does not settle: use smaller elements below the probe, or less friction")
 
 
-@dataclass(frozen=True, eq=False)
-class _Simplified:
-    """Nodes (n) by how often they ``entered`` or left the active set, or ``turned`` between sticking and sliding."""
-
-    entered: IntArray
-    turned: IntArray
-
-    @staticmethod
-    def none(count: int) -> "_Simplified":
-        nothing = np.zeros(count, dtype=np.int64)
-        return _Simplified(nothing, nothing)
-
-    @property
-    def nodes(self) -> BoolArray:
-        """Mask of the nodes that slide whatever their traction."""
-        return np.maximum(self.entered, self.turned) >= _CHANGES
-
-    def counting(self, moves: BoolArray, turns: BoolArray) -> "_Simplified":
-        """Return the counts after another iteration."""
-        return _Simplified(self.entered + moves, self.turned + turns)
-
-    def law(self, friction: float) -> FloatArray:
-        """Return the coefficient of friction of each node."""
-        return np.where(self.entered >= _CHANGES, 0.0, friction)
-
-    def sliding(self, slide: Slide, active: BoolArray) -> Slide:
-        """Return ``slide`` with these nodes sliding, if they are ``active``."""
-        return replace(slide, sliding=(slide.sliding | self.nodes) & active)
-
-    def share(self, step: Step, is_corner: BoolArray) -> float:
-        """Return the share of the force on these nodes, without corners, whose state is that of their neighbours."""
-        there = step.active & self.nodes & ~is_corner
-        return float(np.abs(step.reactions[there, 0]).sum()) / step.force
+def _share(surface: CondensedSurface, step: Step, simple: Simplified) -> float:
+    """Return the share of the force on simplified nodes, without corners, whose state is that of their neighbours."""
+    there = step.active & simple.nodes & ~surface.neighbours.is_corner
+    return float(np.abs(step.reactions[there, 0]).sum()) / step.force
 
 
 def _following(
@@ -204,7 +175,7 @@ def _following(
     pressed: FloatArray,
     references: FloatArray,
     law: FloatArray,
-    simple: _Simplified,
+    simple: Simplified,
 ) -> Step:
     """Return the next guess of the states of the nodes, from the solution for the last one."""
     normal, slips = step.reactions[:, 0], step.moved[:, 1:] - references
@@ -217,18 +188,12 @@ def _following(
     return replace(step, active=active, slide=simple.sliding(slide, active))
 
 
-def _is_close(surface: CondensedSurface, step: Step, after: Slide, law: FloatArray, simple: _Simplified) -> bool:
+def _is_close(surface: CondensedSurface, step: Step, after: Slide, law: FloatArray, simple: Simplified) -> bool:
     """Return whether the friction of sliding nodes, with the directions ``after``, is Coulomb's."""
     where = step.slide.sliding & after.sliding & ~simple.nodes & ~surface.neighbours.is_corner
     wanted = largest_friction(law, step.reactions[:, 0])[where, None] * after.directions[where]
     off = np.abs(step.reactions[where, 1:] - wanted).max(initial=0.0)
     return bool(off <= _CLOSE * np.abs(step.reactions[step.active, 0]).mean())
-
-
-def largest_friction(law: FloatArray, normal: FloatArray) -> FloatArray:
-    """Return the largest friction (n) in N, from coefficients ``law`` (n) and ``normal`` reactions (n)."""
-    sticks = law == inf
-    return np.where(sticks, inf, np.where(sticks, 0.0, law) * np.maximum(normal, 0.0))
 
 
 def _solved(

@@ -33,7 +33,7 @@ _RINGS = 2
 # Right-hand sides solved with one factorisation of mixed elements.
 _TOGETHER = 128
 # The bar on what friction adds to the force, as a share of it: docs/accuracy.md.
-_OF_FRICTION = 0.2
+OF_FRICTION = 0.2
 # Signs of the components: the tool advances along −z, x and y are tangents.
 _COMPONENTS = np.array([2, 0, 1])
 _SIGNS = np.array([-1.0, 1.0, 1.0])
@@ -162,7 +162,7 @@ class FrictionalContact(FoundContact):
         self._plug.put(columns[0], self.rubbed, depth)
         assert found.relative is not None
         added = abs(self.force / super().force - 1)
-        return replace(found, relative=found.relative + self.path_bar + _OF_FRICTION * added)
+        return replace(found, relative=found.relative + self.path_bar + OF_FRICTION * added)
 
     def _touching(self) -> tuple[BoolArray, State]:
         step = self.pressed

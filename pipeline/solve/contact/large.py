@@ -62,34 +62,33 @@ class LargeContact:
             LargeError: if the load steps end before the depth, or the solution fails a check.
             ContactError: if contact reaches the support or the edge of the candidates.
         """
-        movement, elements = asked.movement, self._elements
-        (depth,) = movement.amounts
-        body = DeformedBody(elements, self._surface, self._law, asked.method, stack)
+        found, iterations = self.find(asked, stack)
+        return found.equilibrium(asked.movement, iterations, stack)
+
+    def find(self, asked: Request, stack: ExitStack) -> "tuple[LargeTouch, int]":
+        """Return contact at the depth of the movement, and Newton's iterations; see :meth:`solve`."""
+        (depth,) = asked.movement.amounts
+        body = DeformedBody(self._elements, self._surface, self._law, asked.method, stack)
         try:
             iterations = press(body, lambda there: placed_tool(body, self._distance, there), self._path, depth)
         except LargeError as error:
-            raise self._stopped(body, depth, error) from error
+            raise stopped(body, self._path, depth, error) from error
         touched = self._path.last.touched
         assert touched is not None
         body.state = self._path.last.state
-        columns = elements.columns(movement, stack)
-        elements.put(columns[0], body.split(), depth)
-        found = LargeTouch(self._surface, body, self._distance, touched, depth)
-        found.check()
-        return Equilibrium(
-            found, columns, movement, iterations, found.response(movement), contact=Contact(found.whole_area)
-        )
+        return LargeTouch(self._surface, body, self._distance, touched, depth), iterations
 
-    def _stopped(self, body: DeformedBody, depth: float, why: LargeError) -> LargeError:
-        """Return the error of a path that ends before ``depth`` (m)."""
-        last, whole = self._path.last, 2.0 ** len(self._elements.body.mirrored)
-        force = 0.0 if last.touched is None else -whole * float(last.touched.forces[:, 2].sum())
-        message = (
-            f"load steps reached {last.depth * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {force:.4g} N "
-            f"(Newton's method: {why}); the tissue becomes unstable, or elements are flattened; "
-            "use a smaller depth, or smaller elements below the probe"
-        )
-        return LargeError(message, (last.depth, force) if last.depth else None)
+
+def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError) -> LargeError:
+    """Return the error of a ``path`` that ends before ``depth`` (m)."""
+    last, whole = path.last, 2.0 ** len(body.elements.body.mirrored)
+    force = 0.0 if last.touched is None else -whole * float(last.touched.forces[:, 2].sum())
+    message = (
+        f"load steps reached {last.depth * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {force:.4g} N "
+        f"(Newton's method: {why}); the tissue becomes unstable, or elements are flattened; "
+        "use a smaller depth, or smaller elements below the probe"
+    )
+    return LargeError(message, (last.depth, force) if last.depth else None)
 
 
 def placed_tool(body: DeformedBody, distance: Callable[[FloatArray, float], Distance], depth: float) -> PlacedTool:
@@ -128,6 +127,21 @@ class LargeTouch:
     def whole_area(self) -> float:
         """The contact area (m²) of the whole body, normal to the axis."""
         return float(2.0 ** len(self.body.elements.body.mirrored) * self._area().value)
+
+    def equilibrium(self, movement: Movement, iterations: int, stack: ExitStack) -> Equilibrium:
+        """Return the checked equilibrium of a ``movement``; the ``stack`` frees its columns."""
+        columns = self.body.elements.columns(movement, stack)
+        self.body.elements.put(columns[0], self.body.split(), self.depth)
+        self.check()
+        return Equilibrium(self, columns, movement, iterations, self.response(movement), contact=self.summary())
+
+    def summary(self) -> Contact:
+        """Return the area of the whole contact, and the part of it that slides if there is friction."""
+        area, touched, weights = self.whole_area, self.touched, self.body.candidates.weights
+        if touched.slide is None:
+            return Contact(area)
+        sliding = float(weights[touched.active & touched.slide.sliding].sum()) / float(weights[touched.active].sum())
+        return Contact(area, slip_area=sliding * area)
 
     def check(self) -> None:
         """Check the work, and that contact ends within the candidates.

@@ -25,6 +25,7 @@ from pipeline.solve.contact.found import FoundContact
 from pipeline.solve.contact.frictional import rub
 from pipeline.solve.contact.geometry import Touch
 from pipeline.solve.contact.large import LargeContact
+from pipeline.solve.contact.large_friction import RubbingContact
 from pipeline.solve.contact.levels import Numbering, Surface
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.sweep import Sweep
@@ -135,7 +136,8 @@ class ContactSearch:
         """Find contact at large displacements: see :class:`LargeContact`."""
         assert self._tool.distance is not None
         if self._large is None or not (self._reuse and self._large.can_reach(asked)):
-            self._large = LargeContact(self._surface, self._elements, self._tool.distance, asked.law)
+            tool, parts = self._tool, (self._surface, self._elements, self._tool.distance, asked.law)
+            self._large = RubbingContact(*parts, tool.friction) if tool.friction else LargeContact(*parts)
         return self._large.solve(asked, stack)
 
     # ---- far field ------------------------------------------------------------------------------------

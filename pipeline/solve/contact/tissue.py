@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.compiled import global_sum
-from pipeline.solve.contact.deformed import Constraint
+from pipeline.solve.contact.constraint import Constraint
 from pipeline.solve.contact.levels import Numbering, Surface
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.turned_tangent import FactorisedTangent, IteratedTangent, TurnedTangent

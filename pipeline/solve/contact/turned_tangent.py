@@ -12,7 +12,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray, Int32Array
-from pipeline.solve.contact.deformed import Constraint
+from pipeline.solve.contact.constraint import Constraint
 from pipeline.solve.contact.levels import Hierarchy, Numbering, Surface
 from pipeline.solve.elements.assembled import AssembledTangent
 from pipeline.solve.elements.base import Elements, Solver

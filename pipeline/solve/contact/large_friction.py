@@ -1,0 +1,112 @@
+"""Contact with friction at large displacements: the load path in steps, and the error bar.
+
+Contact without friction is found first; it gives the error bar of the mesh. The path is then followed in load steps
+with friction, and again in half as many: the change of the force is the bar of the steps.
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.solve.contact.contact_steps import ContactPath, Friction, Stage, rub
+from pipeline.solve.contact.coulomb import Neighbours
+from pipeline.solve.contact.deformed import Distance
+from pipeline.solve.contact.frictional import OF_FRICTION
+from pipeline.solve.contact.large import LargeContact, LargeTouch, placed_tool, stopped
+from pipeline.solve.contact.levels import Surface
+from pipeline.solve.contact.tissue import DeformedBody
+from pipeline.solve.elements.base import Column, Elements, Equilibrium, HierarchicalEstimate
+from pipeline.solve.movement import Movement
+from pipeline.solve.newton import LargeError
+from pipeline.solve.physics import MaterialLaw, of_regions
+from pipeline.solve.solution import Request
+
+# Load steps: enough for a bar of some tenths of a per cent where tissue sticks.
+_STEPS = 8
+
+
+class RubbingContact(LargeContact):
+    """Contact with a coefficient of ``friction``, infinite for tissue that sticks; each depth has a path of its own."""
+
+    def __init__(
+        self,
+        surface: Surface,
+        elements: Elements,
+        distance: Callable[[FloatArray, float], Distance],
+        law: MaterialLaw,
+        friction: float,
+    ):
+        """Prepare; ``distance`` is that of points to the tool at a depth."""
+        super().__init__(surface, elements, distance, law)
+        self._friction = friction
+
+    def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
+        """Find equilibrium and contact at the depth of the movement; the ``stack`` frees what is made; collective.
+
+        Raises:
+            LargeError: if the load steps end before the depth, or the solution fails a check.
+            ContactError: if contact reaches the support or the edge of the candidates.
+        """
+        smooth, iterations = self.find(asked, stack)
+        body, depth, state = smooth.body, smooth.depth, smooth.body.state
+        friction, touched = friction_of(body, self._friction, depth), []
+        for steps in (_STEPS // 2, _STEPS):
+            path = ContactPath(Stage(0.0, np.zeros_like(state)))
+            try:
+                iterations += rub(
+                    body, lambda there: placed_tool(body, self._distance, there), path, depth, friction, steps
+                )
+            except LargeError as error:
+                raise stopped(body, path, depth, error) from error
+            assert path.last.touched is not None
+            touched.append(path.last.touched)
+        body.state = path.last.state
+        coarse, fine = touched
+        path_bar = abs(float(coarse.forces[:, 2].sum() / fine.forces[:, 2].sum()) - 1)
+        found = RubbingTouch(self._surface, body, self._distance, fine, depth, smooth, state, path_bar)
+        return found.equilibrium(asked.movement, iterations, stack)
+
+
+def friction_of(body: DeformedBody, coefficient: float, depth: float) -> Friction:
+    """Return the friction of a tool that advances along −z to a ``depth`` (m) on the candidates of a body."""
+    candidates = body.candidates
+    width = float(np.median(candidates.widths[candidates.widths > 0]))
+    modulus = float(np.mean(of_regions(body.law.plane_moduli, candidates.regions, len(candidates.facets))))
+    return Friction(
+        coefficient,
+        np.array([0.0, 0.0, -1.0]),
+        np.full(len(candidates), modulus * width),
+        Neighbours(candidates.is_corner, candidates.beside_corners(np.arange(len(candidates)))),
+        depth,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class RubbingTouch(LargeTouch):
+    """Contact with friction, beside the frictionless one, ``smooth``, with its state.
+
+    ``path_bar`` is the change of the force from half as many load steps, relative.
+    """
+
+    smooth: LargeTouch
+    smooth_state: FloatArray
+    path_bar: float
+
+    def hierarchical_estimate(
+        self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
+    ) -> HierarchicalEstimate:
+        """Return the change of the frictionless force in one degree more, and the bar with those of friction.
+
+        Raises:
+            LargeError: if the next degree does not converge.
+        """
+        state = self.body.state
+        self.body.state = self.smooth_state
+        found, frictionless = self.smooth.hierarchical_estimate(columns, movement, stack, keep=keep), self.smooth.force
+        self.body.state = state
+        assert found.relative is not None
+        added = abs(self.force / frictionless - 1)
+        return replace(found, relative=found.relative + self.path_bar + OF_FRICTION * added)

@@ -1,0 +1,128 @@
+"""Friction of contact at large displacements, as a term of the loop of :mod:`pipeline.solve.contact.deformed`.
+
+Nodes that stick are held at a place of the tool, their reference; those that slide carry friction along the tool's
+surface, which the next iteration corrects. The law is that of :mod:`pipeline.solve.contact.coulomb`. Of a new node, the
+reference is the place at which its predicted path meets the tool.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
+from pipeline.solve.contact.constraint import Constraint
+from pipeline.solve.contact.coulomb import Neighbours, Simplified, Slide, largest_friction
+
+# Iterations after which changes of the direction of slip are halved, again and again.
+_SWINGING = 8
+# Iterations from which changes of the state of a node count.
+_PATIENCE = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Rubbing:
+    """Friction between n nodes and a tool at one depth: its coefficient ``friction``, infinite for tissue that sticks.
+
+    ``references`` (n, d) are places on the tool at this depth (m); ``penalty`` (n) is the parameter c (N/m). ``slide``
+    and ``normal`` (n, N) are the state and the normal reactions at the equilibrium before. ``fixed`` (n, d) are the
+    components that symmetry or the support fixes. ``simplified`` is the largest share of the force on nodes that do not
+    settle.
+    """
+
+    friction: float
+    references: FloatArray
+    penalty: FloatArray
+    neighbours: Neighbours
+    slide: Slide
+    normal: FloatArray
+    fixed: BoolArray
+    simplified: float
+
+
+class Rub:
+    """The state of friction during the iterations of one equilibrium."""
+
+    def __init__(self, rubbing: Rubbing):
+        self._with, self.slide, self.normal = rubbing, rubbing.slide, rubbing.normal
+        self._simple = Simplified.none(len(rubbing.normal))
+        self.is_same = False
+
+    def follow(self, iteration: int, place: "Placed", predicted: FloatArray, before: BoolArray, now: BoolArray) -> None:
+        """Take the next state from ``predicted`` forces (n, d) N; active sets (n) are those ``before`` and ``now``."""
+        self.normal = np.einsum("ni,ni->n", predicted, place.normal)
+        rubbing, law = self._with, self._simple.law(self._with.friction)
+        across = predicted - self.normal[:, None] * place.normal
+        trial = across - rubbing.penalty[:, None] * place.slips(rubbing.references)
+        most = largest_friction(law, self.normal)
+        after = self._simple.sliding(self.slide.following(trial, most, now, rubbing.neighbours), now)
+        moves = before != now
+        turns = (after.sliding != self.slide.sliding) & ~moves
+        if iteration > _PATIENCE:
+            self._simple = self._simple.counting(moves, turns)
+        self.is_same = not turns.any()
+        self.slide = self.slide.towards(after, 0.5 ** (iteration // _SWINGING))
+
+    def is_sound(self, active: BoolArray) -> bool:
+        """Return whether nodes whose state was simplified carry little of the force."""
+        there = active & self._simple.nodes & ~self._with.neighbours.is_corner
+        pressed = np.abs(self.normal)
+        return float(pressed[there].sum()) <= self._with.simplified * float(pressed[active].sum())
+
+    def friction(self, place: "Placed") -> FloatArray:
+        """Return the friction (n, d) N on nodes that slide, zero on others."""
+        most = largest_friction(self._simple.law(self._with.friction), self.normal)
+        within = self.slide.trial - np.einsum("ni,ni->n", self.slide.trial, place.normal)[:, None] * place.normal
+        directions = replace(self.slide, trial=np.where(self._with.fixed, 0.0, within)).directions
+        return np.where(self.slide.sliding & (most < np.inf), most, 0.0)[:, None] * directions
+
+    def exerted(self, place: "Placed", forces: FloatArray, active: BoolArray) -> FloatArray:
+        """Return the friction (n, d) N of the tool: of nodes that stick what their ``forces`` (n, d) need."""
+        across = forces - np.einsum("ni,ni->n", forces, place.normal)[:, None] * place.normal
+        return np.where(self.sticks(active)[:, None], across, self.friction(place))
+
+    def constrain(self, constraint: Constraint, place: "Placed", active: BoolArray) -> Constraint:
+        """Return a ``constraint`` with the tangents of sticking nodes held, and the friction on sliding ones."""
+        held, values = constraint.held.copy(), constraint.values.copy()
+        sticks = self.sticks(active)
+        along = -np.einsum("nji,nj->ni", constraint.frames, self.slips(place))
+        held[sticks, :-1] = True
+        values[sticks, :-1] = along[sticks, :-1]
+        return replace(constraint, held=held, values=values, forces=self.friction(place))
+
+    def sticks(self, active: BoolArray) -> BoolArray:
+        """Return a mask (n) of the nodes that stick."""
+        return active & (~self.slide.sliding | (self._simple.law(self._with.friction) == np.inf))
+
+    def slips(self, place: "Placed") -> FloatArray:
+        """Return the slips (n, d) since the references, m."""
+        return place.slips(self._with.references)
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Deformed ``positions`` (n, d) of the nodes, and unit normals (n, d) of the tool there."""
+
+    positions: FloatArray
+    normal: FloatArray
+
+    def slips(self, references: FloatArray) -> FloatArray:
+        """Return the vectors (n, d) from ``references`` (n, d), along the tool's surface."""
+        moved = self.positions - references
+        return np.asarray(moved - np.einsum("ni,ni->n", moved, self.normal)[:, None] * self.normal)
+
+
+def met(
+    gap: Callable[[FloatArray, float], FloatArray],
+    paths: tuple[FloatArray, FloatArray],
+    depths: tuple[float, float],
+    advance: FloatArray,
+) -> FloatArray:
+    """Return the places (n, d) on the tool, at the second depth, which nodes meet on straight ``paths``.
+
+    The tool moves along the unit vector ``advance``; ``gap`` returns distances (n) of places to it at a depth.
+    """
+    first, second = (gap(place, depth) for place, depth in zip(paths, depths, strict=True))
+    share = np.clip(np.divide(first, first - second, out=np.ones_like(first), where=first - second > 0), 0.0, 1.0)
+    moved = paths[1] - paths[0] - (depths[1] - depths[0]) * advance  # relative to the tool
+    return np.asarray(paths[0] + (depths[1] - depths[0]) * advance + share[:, None] * moved)
