@@ -32,6 +32,8 @@ _FOLDED, _OF_BALL = 5.0, 15.6
 # Factors on the time: mixed elements, search for the contact area, several materials, proof of an accuracy; meshes of
 # curved and folded bodies.
 _MIXED, _SEARCH, _LAYERED, _PROOF = 1.4, 2.7, 1.8, 1.6
+# A course of some 40 time steps, linear and with a law of large displacements: times the static solve.
+_COURSE, _COURSE_LARGE = 40.0, 10.0
 _MESHED = {"curved": 2.5, "folded": 18.0}
 _MERIDIAN, _MERIDIAN_BYTES = 0.27, 3.8e8
 # A meridian with contact to find takes _TRIALS times as long.
@@ -139,7 +141,8 @@ def _memory(solve: Solve) -> float:
 def features(solve: Solve) -> tuple[str, float, float]:
     """Return the inputs of the cost model for a solve: its kind, the estimated tetrahedra of the modelled part, ν.
 
-    The kind names element, degree, several movements, found contact, several materials, and a curved or folded body.
+    The kind names element, degree, several movements, found contact, several materials, time steps, and a curved
+    or folded body.
     """
     case = solve.case
     if solve.axisymmetric:
@@ -149,6 +152,7 @@ def features(solve: Solve) -> tuple[str, float, float]:
     words += [str(case.movements)] if case.movements > 1 else []
     words += ["found"] if case.probe.is_unilateral else []
     words += ["regions"] if case.body.regions else []
+    words += ["steps"] if case.is_stepped else []
     if not isinstance(case.body, Layered):
         folds = case.body.curvature > _FOLDED * _OF_BALL * case.body.volume ** (1 / 3)
         words += ["folded" if folds else "curved"]
@@ -206,6 +210,7 @@ def _prior(stage: str, kind: str) -> _Numbers:
         return log(seconds * _MESHED.get(words[-1] if words else "", 1.0)), power, 0.0
     if element not in ("displacement", "mixed"):  # the name of a hyperelastic law
         seconds, power = _LARGE[stage]
+        seconds *= _COURSE_LARGE if stage == "solve" and "steps" in words else 1.0
         is_mixed = element.endswith("-mixed")
         return log(seconds * (_MIXED_LARGE if is_mixed else 1.0)), power, 0.0 if is_mixed else _LOCKING
     seconds, power = (_SOLVE if stage == "solve" else _BAR)[int(degree)]
@@ -213,4 +218,5 @@ def _prior(stage: str, kind: str) -> _Numbers:
     seconds *= (1 + _MOVEMENT * (movements - 1)) * (_MIXED if element == "mixed" else 1.0)
     seconds *= _LAYERED if "regions" in words else 1.0
     seconds *= _SEARCH if stage == "solve" and "found" in words else 1.0
+    seconds *= _COURSE if stage == "solve" and "steps" in words else 1.0
     return log(seconds), power, 0.0 if element == "mixed" else _LOCKING

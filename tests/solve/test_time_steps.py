@@ -67,6 +67,7 @@ def test_linear_tissue_is_the_convolution(changes):
     assert found.dissipated == pytest.approx(2 * energy * heat, rel=1e-6, abs=1e-9 * energy)
 
 
+@pytest.mark.nightly
 def test_work_is_stored_or_dissipated():
     found, _, energy = followed(JUMP, TERMS, material=LINEAR, steps=16)
     assert np.abs(found.imbalance).max() < 2e-3 * energy  # of the trapezoidal rule of the work
@@ -100,6 +101,7 @@ def test_regions_that_relax_differently_end_as_a_body_of_their_long_term_moduli(
     assert found.forces[4, 2] < force
 
 
+@pytest.mark.nightly
 def test_the_error_of_steps_falls_with_their_square_and_is_in_the_bar():
     changes = {"material": LARGE, "probe": {"depth": "0.75 mm"}}
     motion = (0.0, 1.0, 4.0), (0.0, 1.0, 1.0)
@@ -114,6 +116,7 @@ def test_the_error_of_steps_falls_with_their_square_and_is_in_the_bar():
         assert (np.abs(ends) <= runs[steps].bars[::steps]).all()
 
 
+@pytest.mark.nightly
 def test_steps_that_end_early_name_the_time_and_the_depth():
     with pytest.raises(LargeError, match=r"time steps reached .* s of 1 s, at a depth of .* mm") as caught:
         followed(((0.0, 1.0), (0.0, 8.0)), TERMS, steps=2, material=LARGE, probe={"depth": "1 mm"})
