@@ -112,12 +112,12 @@ def rub(
     """Continue a new load ``path`` to a ``depth`` (m) with friction; return Newton's iterations; collective.
 
     There are at least so many ``steps``, whose depths go with the square of their numbers. At the first ones, the tool
-    may touch no node.
+    may touch no node, or too few for the contact to settle.
 
     Raises:
         LargeError: if a step becomes too small; the path keeps the steps that converged.
     """
-    iterations = 0
+    iterations, start = 0, path.last
     for number in range(1, steps + 1):
         there = depth * (number / steps) ** 2
         if path.last.touched is None:
@@ -127,7 +127,12 @@ def rub(
                 path.add(Stage(there, path.last.state))
                 continue
         path.step = inf
-        iterations += press(tissue, tool_at, path, there, friction)
+        try:
+            iterations += press(tissue, tool_at, path, there, friction)
+        except LargeError:  # few nodes touch, whose state does not settle: contact begins with the next step
+            if number > steps // 2:
+                raise
+            path.last, path.before = start, None
     return iterations
 
 
