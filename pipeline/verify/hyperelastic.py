@@ -8,7 +8,7 @@ from mpi4py import MPI
 from pipeline.verify.compare import solve
 from pipeline.verify.laws import FURTHER
 from pipeline.verify.row import Row
-from pipeline.verify.sections import cylinder, disc, mesh, study
+from pipeline.verify.sections import cylinder, disc, mesh, mm, study
 
 # F over F of linear elasticity by (ν, depth over radius), cylinder R = H = 20 a / 3, from axisymmetric elements. At
 # ν = 0.3: linear elements with constant volume change, down to 0.002 a at the edge; elements of a fifth of that size
@@ -22,6 +22,13 @@ _RATIO = {
     (0.5, 0.2): 0.9857,
 }
 _RATIO_BAR = 1.5e-3
+# F / (E R²) of a ball of radius R pressed in by a depth (units of R), by (law, ν, depth), cylinder of radius 6 R and
+# height 5 R: from the meridian with elements of a quarter of the size at the edge and half of it elsewhere.
+_BALL = {
+    ("neo-hookean", 0.3, 0.1): 0.0490421,
+    ("neo-hookean", 0.5, 0.5): 0.646931,
+}
+_BALL_BAR = 1e-5
 # Depth over radius, which is the order of F / F_linear - 1; and that at which every law must agree within 0.3 %.
 _SMALL, _SHALLOW, _AGREE = 1e-3, 5e-3, 3e-3
 # Poisson's ratio where none is given, and the depth of a quick run.
@@ -77,6 +84,24 @@ def hyperelastic_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
             bar + _RATIO_BAR,
             message or more,
         )
+    yield from () if quick else _on_meridian(comm)
+
+
+def _on_meridian(comm: MPI.Comm) -> Iterator[Row]:
+    """Yield rows of the meridian: every law at a small depth, and a ball whose contact is found at large ones."""
+    sizes = mesh(rim=0.6, growth=0.6, fine=3)
+    for nu, law in product((_NU, 0.5), sorted({*FURTHER} - {"holzapfel"})):
+        reference, bar, message = solve(comm, "2D", _scene("linear", _SHALLOW, nu))
+        value, own, more = solve(comm, "2D", _scene(law, _SHALLOW, nu), sizes)
+        name = f"finite cylinder, disc, {law}, ν = {nu:g}, d = a/200"
+        yield Row(name, "2D", reference, "linear elasticity, meridian", value, own, bar + _AGREE, message or more)
+    for (law, nu, depth), force in _BALL.items():
+        ball = {"shape": "sphere", "radius": "3 mm", "depth": mm(3 * depth), "contact": "unilateral"}
+        scene = study(nu, cylinder(18, 15), ball)
+        scene["material"] |= {"law": law}
+        value, own, message = solve(comm, "2D", scene, sizes)
+        name = f"cylinder, ball, {law}, ν = {nu:g}, d = {depth:g} R"
+        yield Row(name, "2D", force * 1e4 * 3e-3**2, "finer elements", value, own, _BALL_BAR, message)
 
 
 def _scene(law: str, depth: float, nu: float = _NU) -> dict[str, dict[str, object]]:
