@@ -96,6 +96,7 @@ benchmark: setup ## make every table of docs/performance.md in results/ (on an i
 	$(PYTHON) -m benchmarks.products
 	$(PYTHON) -m benchmarks.solvers
 	$(PYTHON) -m benchmarks.contact
+	$(PYTHON) -m benchmarks.large
 	$(PYTHON) -m benchmarks.organs
 	$(PYTHON) -m benchmarks.paths
 	$(PYTHON) -m benchmarks.scaling
