@@ -21,6 +21,7 @@ ORDER = (
     "tumour",
     "ellipsoid",
     "sphere",
+    "rounded",
     "cone",
     "wedge",
     "tilted",

@@ -20,7 +20,7 @@ from pipeline.study.sweep import Case
 
 @dataclass(frozen=True)
 class Recipe:
-    """Mesh settings: ``rim`` in units of the half width of contact, and ``bar``, the expected relative error bar.
+    """Mesh settings: ``rim`` in units of :func:`edge_width_of`, and ``bar``, the expected relative error bar.
 
     ``bar`` is for a disc on a deep body at ν = 0.3; see :func:`_expected` for others.
     """
@@ -154,6 +154,11 @@ def half_width_of(case: Case) -> float:
     return case.probe.contact_width if isinstance(case.probe, Indenter) else case.probe.half_width
 
 
+def edge_width_of(case: Case) -> float:
+    """Return the length (m) that elements at the edge of contact resolve, to which ``rim`` of a recipe is relative."""
+    return case.probe.edge_width if isinstance(case.probe, Indenter) else case.probe.half_width
+
+
 def _expected(case: Case, recipe: Recipe) -> float:
     """Return the expected relative error bar of a recipe for a case."""
     shape = case.probe.EXPECTED_ERROR
@@ -203,7 +208,7 @@ def _mesh(case: Case, recipe: Recipe) -> Mesh:
     sizes = {
         "fine": min(thickness / _THROUGH, reach),
         "coarse": reach,
-        "rim": min([recipe.rim * half_width_of(case), *(gap / _ACROSS_GAP for gap in gaps)]),
+        "rim": min([recipe.rim * edge_width_of(case), *(gap / _ACROSS_GAP for gap in gaps)]),
         "growth": recipe.growth,
         "degree": recipe.degree,
     }

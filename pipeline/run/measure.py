@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.plan.cost import features
-from pipeline.plan.recipe import half_width_of
+from pipeline.plan.recipe import edge_width_of, half_width_of
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
 from pipeline.shapes.body import Layered
@@ -151,7 +151,7 @@ def _known_of(case: Case, force: Vector) -> Vector:
 
 def is_graded_to_contact(case: Case) -> bool:
     """Return whether the mesh of ``case`` is graded to the expected edge of contact."""
-    rim = case.mesh.rim_size(case.probe.half_width) / half_width_of(case)
+    rim = case.mesh.rim_size(case.probe.half_width) / edge_width_of(case)
     # The coarsest recipe equals the limit of `is_graded`: rounding must not exceed it.
     rim *= 1 - _ROUNDING if isinstance(case.probe, Indenter) else 1.0
     if case.probe.is_unilateral:  # small elements surround the axis, so contact must be there

@@ -139,7 +139,9 @@ def round_tool_of(case: Case) -> RoundTool:
         return probe.distance(points + np.array([0.0, 0.0, depth]))
 
     if isinstance(probe, RoundIndenter):
-        return RoundTool(gap, probe.limit, probe.kinks, distance)
+        # On a curved body, contact may end below the flat face.
+        flat = 0.0 if body.is_curved else probe.section.flat
+        return RoundTool(gap, probe.limit, probe.kinks, distance, flat)
     return RoundTool(gap, probe.circumradius)
 
 

@@ -74,25 +74,31 @@ def slab(half: float, points: FloatArray, axis: int) -> Distance:
     return Distance(np.abs(points[:, axis]) - half, normal, np.zeros((*points.shape, 3)))
 
 
-def intersection(first: Distance, second: Distance, rounding: float = 0.0) -> Distance:
-    """Return the distance to what is inside both, with the edge between them rounded to a radius (m).
+def above(points: FloatArray) -> Distance:
+    """Return the distance to all that is above the height 0."""
+    return Distance(-points[:, 2], np.tile(_DOWN, (len(points), 1)), np.zeros((*points.shape, 3)))
 
-    Their normals must be at right angles to each other wherever the points are beyond both.
+
+def intersection(*parts: Distance, rounding: float = 0.0) -> Distance:
+    """Return the distance to what is inside all ``parts``, with the edges between them rounded to a radius (m).
+
+    Their normals must be at right angles to each other wherever points are beyond more than one of them.
     """
-    beyond = np.maximum(np.column_stack([first.gap, second.gap]) + rounding, 0.0)
-    both = (beyond > 0).all(axis=1)
-    length = np.where(both, np.hypot(*beyond.T), 1.0)
-    one, two = (beyond / length[:, None]).T
-    is_first = first.gap > second.gap
-    plain = np.where(is_first[:, None], first.normal, second.normal)
-    normal = np.where(both[:, None], one[:, None] * first.normal + two[:, None] * second.normal, plain)
-    curvature = np.where(is_first[:, None, None], first.curvature, second.curvature)
-    shared = one[:, None, None] * first.curvature + two[:, None, None] * second.curvature
+    gaps, normals = np.stack([part.gap for part in parts]), np.stack([part.normal for part in parts])
+    curvatures, points = np.stack([part.curvature for part in parts]), np.arange(gaps.shape[1])
+    largest = gaps.argmax(axis=0)
+    beyond = np.maximum(gaps + rounding, 0.0)
+    is_beyond, length = beyond > 0, np.linalg.norm(beyond, axis=0)
+    shares = beyond / np.where(length > 0, length, 1.0)
+    several = is_beyond.sum(axis=0) > 1
+    normal = np.where(several[:, None], np.einsum("kn,kni->ni", shares, normals), normals[largest, points])
+    curvature = np.einsum(
+        "kn,knij->nij", np.where(several, shares, largest == np.arange(len(parts))[:, None]), curvatures
+    )
     if rounding:
-        across = two[:, None] * first.normal - one[:, None] * second.normal
-        shared += _outer(across, 1 / np.maximum(length, rounding / 2))
-    gap = np.where(both, length - rounding, np.maximum(first.gap, second.gap))
-    return Distance(gap, normal, np.where(both[:, None, None], shared, curvature))
+        faces = np.einsum("kn,kni,knj->nij", is_beyond, normals, normals) - normal[:, :, None] * normal[:, None, :]
+        curvature += (several / np.maximum(length, rounding / 2))[:, None, None] * faces
+    return Distance(np.where(several, length - rounding, gaps[largest, points]), normal, curvature)
 
 
 def _along_axis(

@@ -24,6 +24,8 @@ from pipeline.units import Length
 CANDIDATES = 1.5
 # Contact is expected to end between its edge on a half-space and this factor farther out, because bodies are finite.
 BAND = 1.15
+# Elements at the edge of contact are as small for a rounding in contact over a width as for a tool so many times wider.
+ON_ROUNDING = 2.0
 # Depths are equal within this share.
 _ROUNDING = 1e-9
 # Largest slope of the tool against the surface at the edge of contact: strains are of the same order.
@@ -148,6 +150,21 @@ class Indenter(Probe):
         return least, largest
 
     @property
+    def candidate_width(self) -> float:
+        """Half the width (m) of the region that it may touch, however wide the tool is."""
+        flat = self.section.flat
+        return flat + CANDIDATES * (self.section.reach(self.depths[1]) - flat)
+
+    @property
+    def edge_width(self) -> float:
+        """Length (m) that elements at the expected edge of contact resolve: half the width of contact.
+
+        Beside a flat face, contact ends on a narrow rounding.
+        """
+        flat = self.section.flat
+        return min(self.contact_width, ON_ROUNDING * (self.contact_width - flat)) if flat else self.contact_width
+
+    @property
     @abstractmethod
     def expected_radius(self) -> float:
         """Radius (m) of the smallest circle about the axis that contains the expected contact."""
@@ -182,7 +199,7 @@ class Indenter(Probe):
                 "for which the mesh is made: widen it, or leave it out for one mesh per depth",
             )
         slope = float(self.section.slope(np.array([self.contact_width]))[0])
-        if slope > _STEEPEST:
+        if slope > _STEEPEST and not self.section.flat:
             problems.warn(
                 "probe.depth",
                 f"{self.depth * 1e3:.4g} mm",

@@ -30,9 +30,7 @@ class Shapes(Mapping[str, type[Shape_co]], Generic[Shape_co]):
     def __getitem__(self, name: str) -> type[Shape_co]:
         if name not in self._names:
             raise KeyError(name)
-        module = import_module(f"pipeline.shapes.{self._folder}.{name}")
-        kinds: list[Any] = [kind for kind in vars(module).values() if isinstance(kind, type)]
-        found: type[Shape_co] = next(kind for kind in kinds if _shape(kind) == (name,))
+        found: type[Shape_co] = _kind(f"pipeline.shapes.{self._folder}.{name}", name)
         return found
 
     def __contains__(self, name: object) -> bool:
@@ -43,6 +41,25 @@ class Shapes(Mapping[str, type[Shape_co]], Generic[Shape_co]):
 
     def __len__(self) -> int:
         return len(self._names)
+
+
+def _kind(path: str, shape: str) -> Any:
+    """Return the class of a module with the given ``shape``."""
+    kinds = [kind for kind in vars(import_module(path)).values() if isinstance(kind, type) and kind.__module__ == path]
+    return next(kind for kind in kinds if _shape(kind) == (shape,))
+
+
+def specialised(section: Section) -> Section:
+    """Return a section in the class that its values require: a disc or blade with a rounded edge finds its contact."""
+    if not getattr(section, "is_rounded", False):
+        return section
+    shape: str = section.shape  # type: ignore[attr-defined]
+    kind = _kind(f"pipeline.shapes.probes._rounded_{shape}", shape)
+    known = type(section).model_fields.keys() & kind.model_fields.keys()
+    rounded: Section = kind.model_construct(
+        section.model_fields_set, **{name: getattr(section, name) for name in known}
+    )
+    return rounded
 
 
 def _shape(kind: type) -> tuple[object, ...]:

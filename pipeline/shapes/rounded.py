@@ -1,8 +1,8 @@
 """Section of a tool of revolution or of an edge: a straight flank at an angle, with a rounded or a flat tip."""
 
 from dataclasses import dataclass
-from functools import lru_cache
-from math import cos, inf, log, pi, sin, tan
+from functools import cache, lru_cache
+from math import asin, cos, inf, log, pi, sin, tan
 
 import numpy as np
 
@@ -34,13 +34,17 @@ class Rounded:
 
     def height(self, distance: FloatArray) -> FloatArray:
         """Return heights (n,), in m, at distances (n,) from the axis, in m; infinite beyond a ball's equator."""
-        within = self._on_rounding(distance)
-        # In this form R - (R² - r²)^½ has no cancellation near the lowest point.
-        root = np.sqrt(np.maximum(self.tip**2 - within**2, 0.0))
-        low = within**2 / np.maximum(self.tip + root, 1e-300)
+        low = rise(self._on_rounding(distance), self.tip)
         beyond = np.maximum(distance - self.tangent, 0.0)
         flank = beyond / tan(self.angle) if self.angle else np.where(beyond > 0, inf, 0.0)
         height: FloatArray = low + flank
+        return height
+
+    def inner_height(self, distance: FloatArray, inset: FloatArray) -> FloatArray:
+        """Return heights (n,), in m, of the curves ``inset`` (n,), in m, inside of it: at most ``tip``."""
+        tangent = (self.tip - inset) * cos(self.angle)
+        beyond = np.maximum(distance - tangent, 0.0)
+        height: FloatArray = inset + rise(np.minimum(distance, tangent), self.tip - inset) + beyond / tan(self.angle)
         return height
 
     def slope(self, distance: FloatArray) -> FloatArray:
@@ -82,16 +86,36 @@ class Rounded:
         return _solved(self, depth, length)
 
 
+def rise(beside: FloatArray, radius: float | FloatArray) -> FloatArray:
+    """Return the heights (n,), in m, of a circle of a ``radius`` (m) above its lowest point, up to its equator."""
+    # In this form R - (R² - r²)^½ has no cancellation near the lowest point.
+    root = np.sqrt(np.maximum(np.square(radius) - beside**2, 0.0))
+    low: FloatArray = beside**2 / np.maximum(radius + root, 1e-300)
+    return low
+
+
+@cache
+def _gauss() -> tuple[FloatArray, FloatArray]:
+    return np.polynomial.legendre.leggauss(_POINTS)
+
+
+def quarter_turn(least: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """Return sines (n,) and weights (n,) of a quadrature rule over the part of a quarter turn whose sine is larger."""
+    (nodes, weights), start = _gauss(), asin(least)
+    half = (pi / 2 - start) / 2
+    return np.sin(start + half * (nodes + 1)), half * weights
+
+
 @lru_cache(_MANY)
 def _solved(section: Rounded, depth: float, length: float) -> float:
-    nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
-    sine, weights = np.sin(pi / 4 * (nodes + 1)), pi / 4 * weights
-
     def indented(half: float) -> float:
+        if half <= section.flat:
+            return 0.0
+        sine, weight = quarter_turn(section.flat / half)
         slope = section.slope(half * sine)
         if length == inf:
-            return half * float(weights @ slope)
-        line_load = half * float(weights @ (sine * slope))
+            return half * float(weight @ slope)
+        line_load = half * float(weight @ (sine * slope))
         return 2 / pi * line_load * (max(log(length / half), 0.0) + _WEDGE)
 
     low, high = 0.0, section.reach(depth)

@@ -106,6 +106,10 @@ def _is_flat(scene: Scene) -> bool:
     return is_flat(scene.body, scene.probe, scene.probe.frame_on(scene.body))
 
 
+def _has_edge(scene: Scene) -> bool:
+    return getattr(scene.probe, "edge", 0.0) != 0
+
+
 def _relaxations(scene: Scene) -> set[Terms]:
     """Return the different relaxations of a body's regions; of one without its own, the material's."""
     regions = scene.body.regions
@@ -141,6 +145,10 @@ FEATURES: dict[str, Feature] = {
         "probe.contact", lambda s: s.probe.is_unilateral and not isinstance(s.probe, Indenter)
     ),
     "frictionless contact": Feature("probe.contact", lambda s: s.probe.contact == "frictionless"),
+    "rounded edge": Feature("probe.edge", _has_edge, write=in_mm),
+    "rounded edge of a prescribed footprint": Feature(
+        "probe.contact", lambda s: _has_edge(s) and not s.probe.is_unilateral
+    ),
     "friction": Feature("probe.friction", lambda s: s.probe.friction > 0, write=_coefficient),
     "touch beside the axis": Feature("probe.axis", _touches_beside, ("body",), list),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
@@ -229,6 +237,12 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("degree 1", "slit", "is too low for a slit, whose front needs quarter-point elements: use 2 or 3"),
     Refusal("mixed elements", "degree 1", "there is no stable mixed element of degree 1: use 2 or 3"),
     # Tools and how they touch.
+    Refusal(
+        "rounded edge",
+        "rounded edge of a prescribed footprint",
+        'has no meaning where the footprint is prescribed, and ends at a sharp edge: use contact = "unilateral", or '
+        "omit edge",
+    ),
     Refusal("six motions", "unilateral contact", _HOLDS),
     Refusal("six motions", "frictionless contact", _HOLDS),
     Refusal("six motions", "slit", "a blade in a slit only presses and slides: omit it"),
@@ -377,6 +391,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "large displacements": "at large displacements, F_exact would not be more accurate than F on a fine mesh",
     },
     "real-time model": {
+        "rounded edge": "probe.edge: real-time models have sharp edges. Omit it",
         "friction": "probe.friction: real-time models have no friction. Omit it and export the frictionless force",
         "loads": "[load]: gravity and tractions have no real-time model",
         "large displacements": "material.law: large displacements have no real-time model",

@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from pipeline.shapes.history import deepest
+from pipeline.shapes.registry import specialised
 from pipeline.shapes.section import Section
 from pipeline.study.path import Way, read_path
 from pipeline.study.problems import MOST_ERRORS, Problems, closest, nearest, tuples
@@ -301,4 +302,4 @@ def _validate_each(
 
 
 def _validate(model: type[Section], raw: dict[str, Any]) -> Section:
-    return model.model_validate({key: tuples(value) for key, value in raw.items()})
+    return specialised(model.model_validate({key: tuples(value) for key, value in raw.items()}))

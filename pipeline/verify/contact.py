@@ -26,6 +26,8 @@ _FAR = 20_000
 _FINITE, _FINITE_ERROR = 3.97e-3, 3e-5
 _BALL, _ANGLE = 50.0, 60.0  # mm, degrees
 _LAYERS = (3.0, 1.0, 1 / 3)  # thickness over the radius of contact
+# Relative difference of F between roundings along a circle, as the tool has it, and a parabola.
+_PARABOLA = 1e-4
 # Tools on a body of six contact radii, in three dimensions.
 _SMALL = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm", "fixed": "bottom"}
 _TOOLS: dict[str, Section] = {
@@ -44,6 +46,7 @@ def contact_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows of unilateral contact; ``quick`` yields a layer; collective."""
     if not quick:
         yield from _half_space(comm)
+        yield from _rounded_punch(comm)
         yield from _finite(comm)
         yield from _flat(comm)
         yield from _solid(comm)
@@ -70,6 +73,16 @@ def _half_space(comm: MPI.Comm) -> Iterator[Row]:
         yield _row(f"half-space, {name}, F of depth", "2D", force, known.SNEDDON, record, 1e-4)
         by_radius = _of_contact(section, record.contact_radius)
         yield _row(f"half-space, {name}, F of radius", "2D", by_radius, known.SNEDDON, record, 1e-6)
+
+
+def _rounded_punch(comm: MPI.Comm) -> Iterator[Row]:
+    """A flat punch with a rounded edge, of which a part is in contact."""
+    for edge, depth in ((0.2, 2e-5), (0.05, 2e-5), (1e-3, 1e-7)):
+        force = known.rounded_punch(_YOUNG, _POISSON, 1e-3, edge * 1e-3, depth)
+        tool = {"shape": "disc", "radius": "1 mm", "edge": f"{edge} mm"}
+        record = _solved(comm, "2D", _cylinder(_FAR, _FAR), tool, depth)
+        name = f"half-space, disc with a rounded edge of {edge:g} radii"
+        yield _row(name, "2D", force, known.CIAVARELLA, record, _PARABOLA)
 
 
 def _of_contact(section: Rounded, radius: float) -> float:

@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Callable
-from math import log, pi, sqrt, tan
+from math import acos, cos, log, pi, sin, sqrt, tan
 
 import numpy as np
 from scipy.special import ellipk
@@ -50,12 +50,14 @@ BOX_BLADE = (4.02343, 5e-5)
 # is 1.3e-6; NGSolve's third order (Nitsche's method) agrees to 1.2e-4.
 CYLINDER_BALL = (1.640007, 2e-6)
 
+CIAVARELLA = "M. Ciavarella, Int. J. Solids Struct. 36, 4149 (1999)"
 SNEDDON = "I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965)"
 STICKING = "F. M. Borodich, L. M. Keer, Int. J. Solids Struct. 41, 2479 (2004)"
 SPENCE = "D. A. Spence, Proc. R. Soc. A 305, 55 (1968)"
 GALIN = "L. A. Galin, Contact Problems (1961)"
 # Quadrature of tissue that sticks: points, and the end of the integral, whose integrand falls like exp(-2 x).
 _POINTS, _FARTHEST = 200, 20.0
+_HALVINGS = 60
 
 
 def half_space_disc(young: float, poisson: float, radius: float, depth: float, contact: str) -> tuple[float, str]:
@@ -125,6 +127,22 @@ def half_space_contact(young: float, poisson: float, slope: Callable[[FloatArray
     nodes, weights = np.polynomial.legendre.leggauss(200)
     sine = np.sin(pi / 4 * (nodes + 1))
     return 2 * young / (1 - poisson**2) * radius**2 * float(pi / 4 * weights @ (sine**2 * slope(radius * sine)))
+
+
+def rounded_punch(young: float, poisson: float, radius: float, edge: float, depth: float) -> float:
+    """Return F of a frictionless flat round punch with a rounded edge on a half-space (M. Ciavarella).
+
+    The profile is flat up to b = ``radius`` - ``edge``, then a parabola of curvature 1 / ``edge``. With contact up to
+    a, and cos t = b / a: d = a (a sin t - b t) / edge, F = 2 E* a² (a (sin t - sin³ t / 3) - b (t + sin t cos t) / 2) /
+    edge.
+    """
+    flat, low, high = radius - edge, radius - edge, radius
+    for _ in range(_HALVINGS):
+        a = (low + high) / 2
+        t = acos(flat / a)
+        low, high = (a, high) if a * (a * sin(t) - flat * t) < depth * edge else (low, a)
+    size = a * (sin(t) - sin(t) ** 3 / 3) - flat * (t + sin(t) * cos(t)) / 2
+    return 2 * young / (1 - poisson**2) * a**2 * size / edge
 
 
 def rectangle(stiffness: float, young: float, poisson: float, width: float, depth: float) -> float:

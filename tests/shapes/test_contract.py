@@ -19,7 +19,7 @@ from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body, Drawn
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import PLANES, Probe
-from pipeline.shapes.registry import BODIES, PROBES
+from pipeline.shapes.registry import BODIES, PROBES, specialised
 from pipeline.shapes.section import words_of
 from tests.cases import study
 
@@ -35,7 +35,7 @@ def example(model, **changes):
     examples = tomllib.loads("\n".join(f"{name} = {words_of(model, name).example}" for name in sorted(required)))
     (shape,) = model.model_fields["shape"].annotation.__args__
     given = {name: tuple(value) if isinstance(value, list) else value for name, value in examples.items()}
-    return model.model_validate({"shape": shape} | given | changes)
+    return specialised(model.model_validate({"shape": shape} | given | changes))
 
 
 def body(shape: str, fixed=None) -> Body:
@@ -64,9 +64,18 @@ def a_body(request) -> Body:
     return body(request.param)
 
 
-@pytest.fixture(params=PROBES)
+ROUNDED = {"edge": "0.45 mm", "contact": "unilateral"}
+TOOLS = {name: (name, {}) for name in PROBES} | {
+    "rounded disc": ("disc", ROUNDED),
+    "rounded blade": ("blade", ROUNDED),
+    "wedge with rounded ends": ("wedge", ROUNDED | {"tip": "0.5 mm"}),
+}
+
+
+@pytest.fixture(params=TOOLS)
 def a_probe(request) -> Probe:
-    return probe(request.param)
+    shape, changes = TOOLS[request.param]
+    return probe(shape, **changes)
 
 
 @pytest.fixture(scope="module", params=list(product(DRAWN, PROBES)), ids="-".join)
@@ -402,10 +411,21 @@ def inside(probe, count=400):
     return np.vstack([(shares * outline).reshape(-1, 2), outline])
 
 
+def beyond_a_corner(probe, points):
+    """Return a mask of points (n, 2) in the corners of the rectangle that a rounded blade leaves free."""
+    if not (probe.shape == "blade" and getattr(probe, "edge", 0.0)):
+        return np.zeros(len(points), dtype=bool)
+    flat = np.array([probe.length, probe.width]) / 2 - probe.edge
+    return np.hypot(*np.maximum(np.abs(points) - flat, 0).T) > (1 + 1e-6) * probe.edge
+
+
 def test_a_profile_is_finite_over_the_footprint_and_begins_at_the_lowest_point(a_probe):
     points = inside(a_probe)
     height = a_probe.profile(points)
-    assert np.all((height >= 0) & np.isfinite(height))
+    is_tool = ~beyond_a_corner(a_probe, points)
+    assert np.all(height >= 0)
+    assert np.array_equal(np.isfinite(height), is_tool)
+    height = height[is_tool]
     assert a_probe.profile(np.zeros((1, 2)))[0] == 0
     # Where the tool ends there is nothing beyond; elsewhere the footprint contains all that it may touch.
     outline = a_probe.outline()

@@ -7,13 +7,16 @@ import pytest
 
 from pipeline.plan.key import case_key, mesh_key
 from pipeline.plan.plan import make_plan
-from pipeline.shapes.rounded import Rounded
+from pipeline.shapes.rounded import Rounded, quarter_turn
 from pipeline.study.problems import StudyError
+from pipeline.verify import known
 from tests.cases import study
 
 SPHERE = {"shape": "sphere", "radius": "3 mm", "depth": "0.1 mm", "contact": "unilateral"}
 CONE = {"shape": "cone", "angle": "80 deg", "radius": "3 mm", "depth": "0.1 mm", "contact": "unilateral"}
 WEDGE = {"shape": "wedge", "angle": "80 deg", "length": "6 mm", "depth": "0.1 mm", "contact": "unilateral"}
+DISC = {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "unilateral"}
+FLAT = {"shape": "blade", "length": "4 mm", "width": "1 mm", "depth": "0.1 mm", "contact": "unilateral"}
 TOOLS = {"sphere": SPHERE, "cone": CONE, "wedge": WEDGE}
 
 
@@ -78,6 +81,15 @@ def test_what_such_a_tool_cannot_do_is_refused(tool, change, words):
           for tool in (CONE, WEDGE) for angle in ("0 deg", "90 deg", "120 deg", "-10 deg", 60, "3 mm")),
         (CONE | {"angle": "10 deg", "radius": "0.4 mm", "tip": "0.5 mm"}, ["probe.tip", "leaves no cone"]),
         (CONE | {"radius": "50 mm", "tip": "40 mm", "angle": "70 deg", "depth": "9 mm"}, ["probe.at", "contact area"]),
+        (DISC | {"edge": "0.2 mm", "contact": "bonded"}, ["probe.edge", "no meaning", "unilateral"]),
+        (DISC | {"edge": "0.2 mm", "contact": "frictionless"}, ["probe.edge", "no meaning", "unilateral"]),
+        (DISC | {"edge": "2 mm"}, ["probe.edge", "leaves no flat face", "sphere"]),
+        (DISC | {"edge": "-1 mm"}, ["probe.edge", "at least 0"]),
+        (DISC | {"edge": "0.2 mm", "depth_range": ["0.1 mm", "0.2 mm"]}, ["probe.depth_range", "a disc has no"]),
+        (FLAT | {"edge": "0.5 mm"}, ["probe.edge", "leaves no flat face"]),
+        (FLAT | {"edge": "0.2 mm", "slice": "0.1 mm"}, ["probe.contact", "no slice"]),
+        (FLAT | {"edge": "0.2 mm", "incision": "5 mm"}, ["probe.contact", "lift off"]),
+        (WEDGE | {"tip": "0.2 mm", "edge": "0.3 mm"}, ["probe.edge", "at most `tip`"]),
         (CONE | {"depth": "0.6 mm"}, ["probe.depth", "shaft"]),
         (SPHERE | {"depth": "3 mm"}, ["probe.depth", "radius 3 mm"]),
         (SPHERE | {"radius": "400 mm", "depth": "1 mm"}, ["probe.at", "contact area"]),
@@ -136,3 +148,32 @@ def test_contact_of_a_flat_tool_is_on_the_mesh_of_any_other():
     disc = {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm"}
     keys = {mesh_key(*study(probe=disc | {"contact": c}).cases()) for c in ("bonded", "frictionless", "unilateral")}
     assert len(keys) == 1
+
+
+def test_a_rounded_edge_is_between_a_flat_disc_and_a_ball():
+    """Contact on a half-space ends on the rounding; a disc that is all edge is a ball."""
+    disc = study(probe=DISC | {"edge": "0.5 mm"}).case(()).probe
+    assert disc.section.flat < disc.contact_width < disc.footprint.radius <= disc.radius
+    assert disc.contact_width - disc.section.flat < disc.edge_width < disc.contact_width
+    almost = Rounded(0.0, 2e-3 - 1e-9, 1e-9)
+    assert almost.contact_radius(1e-4) == pytest.approx(Rounded(0.0, 2e-3).contact_radius(1e-4), rel=1e-5)
+    assert Rounded(0.0, 1e-6, 2e-3).contact_radius(1e-4) == pytest.approx(2e-3, rel=1e-3)
+
+
+def test_an_edge_of_zero_is_a_sharp_tool_and_can_be_swept():
+    sharp, rounded = (case.probe for case in study(probe=DISC | {"edge": ["0 mm", "0.2 mm"]}).cases())
+    assert sharp.has_singular_edge and not rounded.has_singular_edge
+    assert sharp.force_exponent == 1.0
+    assert rounded.force_exponent is None
+
+
+def test_the_closed_form_of_a_rounded_punch_tends_to_the_flat_one():
+    """M. Ciavarella (1999), against Sneddon's integral for the circle, and against the flat punch."""
+    for edge, depth in ((0.2e-3, 2e-5), (0.05e-3, 2e-5)):
+        section = Rounded(0.0, edge, 1e-3 - edge)
+        radius = section.contact_radius(depth)
+        sine, weights = quarter_turn(section.flat / radius)
+        force = 2e4 / 0.91 * radius**2 * float(weights @ (sine**2 * section.slope(radius * sine)))
+        assert known.rounded_punch(1e4, 0.3, 1e-3, edge, depth) == pytest.approx(force, rel=1e-4)
+    flat = known.half_space_disc(1e4, 0.3, 1e-3, 1e-6, "frictionless")[0]
+    assert known.rounded_punch(1e4, 0.3, 1e-3, 1e-8, 1e-6) == pytest.approx(flat, rel=1e-4)

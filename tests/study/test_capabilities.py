@@ -13,12 +13,13 @@ from tests.studies import changed
 SPHERE = {"shape": "sphere", "radius": "6 mm", "depth": "0.2 mm", "contact": "unilateral"}
 # A tilted tool touches beside its axis, an ellipsoid has no layers, and mixed elements are for larger ν: these are
 # refused before the table is asked.
-_BEFORE = ("would touch the body", "an ellipsoid has no layer", "mixed elements need")
+_BEFORE = ("would touch the body", "a sphere has no edge", "an ellipsoid has no layer", "mixed elements need")
 TISSUE = {"young": "20 kPa", "poisson": 0.3, "density": "1 g/cm^3"}
 HAVING = {
     "unilateral contact": {"probe": SPHERE},
     "tool that is not flat": {"probe": SPHERE},
     "friction": {"probe": SPHERE | {"friction": 0.3}},
+    "rounded edge": {"probe": {"edge": "0.2 mm", "contact": "unilateral"}},
     "six motions": {"probe": {"motion": "all"}},
     "slice": {"probe": BLADE | {"slice": "0.1 mm"}},
     "slit": {"probe": BLADE | {"incision": "6 mm"}},

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.contour import Contour
 from pipeline.shapes.distance import Distance, revolved
-from pipeline.shapes.indenter import CANDIDATES, Indenter
+from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes.disc import Disc
 
@@ -25,12 +25,12 @@ class RoundIndenter(Indenter):
     def kinks(self) -> tuple[float, ...]:
         """Radii (m) at which its section is not smooth: a sharp tip, or where a rounding ends."""
         section = self.section
-        return (section.tangent,) if section.angle else ()
+        return (*((section.flat,) if section.flat else ()), *((section.tangent,) if section.angle else ()))
 
     @property
     def footprint(self) -> Probe:
         """The disc that contains all that it may touch."""
-        radius = min(CANDIDATES * self.section.reach(self.depths[1]), self.limit)
+        radius = min(self.candidate_width, self.limit)
         return Disc.model_construct(shape="disc", radius=radius, depth=self.depth, at=self.at, axis=self.axis)
 
     @property

@@ -11,6 +11,7 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.probe import ON_EDGE
+from pipeline.shapes.probes._edge import Edge
 from pipeline.shapes.punch import Punch
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.shapes.slit import Slit, to_rectangle
@@ -36,6 +37,7 @@ class Blade(Punch):
         tuple[float, float, float],
         Words("Direction of the edge: this vector, projected normal to the axis.", "[1.0, 0.0, 0.0]"),
     ] = (1.0, 0.0, 0.0)
+    edge: Edge = 0.0
     slice: Annotated[Travel, Words("Travel along the edge while the blade is pressed in.", '"0.05 mm"')] = 0.0
     incision: Annotated[
         Travel,
@@ -61,6 +63,11 @@ class Blade(Punch):
             '"blade"',
         ),
     ] = "blade"
+
+    @property
+    def is_rounded(self) -> bool:
+        """Whether contact is found on its rounded edge; a blade that slides, or in a slit, has no such contact."""
+        return self.edge > 0 and self.is_unilateral and not (self.slice or self.incision)
 
     def travel(self, frame: Frame) -> Vector:
         """Return depth along the axis and slice along the edge (m)."""

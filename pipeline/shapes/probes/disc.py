@@ -8,6 +8,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame
+from pipeline.shapes.probes._edge import Edge
 from pipeline.shapes.round import RoundPunch
 from pipeline.shapes.section import Words
 from pipeline.units import Length
@@ -21,6 +22,12 @@ class Disc(RoundPunch):
 
     shape: Literal["disc"]
     radius: Annotated[Length, Words("Radius of the disc.", '"2 mm"', is_used=True)]
+    edge: Edge = 0.0
+
+    @property
+    def is_rounded(self) -> bool:
+        """Whether contact is found on its rounded edge."""
+        return self.edge > 0 and self.is_unilateral
 
     @property
     def semi_axes(self) -> tuple[float, float]:

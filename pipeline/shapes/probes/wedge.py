@@ -8,10 +8,10 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.contour import Contour
 from pipeline.shapes.distance import Distance, extruded, intersection, slab
-from pipeline.shapes.indenter import CANDIDATES, Indenter
+from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes.blade import Blade
-from pipeline.shapes.rounded import Rounded
+from pipeline.shapes.rounded import Rounded, rise
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.units import Angle, Length, Rounding
 
@@ -30,6 +30,9 @@ class Wedge(Indenter):
     ]
     length: Annotated[Length, Words("Length of the wedge's edge.", '"6 mm"', is_used=True)]
     tip: Annotated[Rounding, Words("Radius of the rounded edge. 0 is sharp.", '"0.2 mm"')] = 0.0
+    edge: Annotated[
+        Rounding, Words("Radius of the rounded edge around both ends, at most `tip`. 0 is sharp.", '"0.2 mm"')
+    ] = 0.0
     direction: Annotated[
         tuple[float, float, float],
         Words("Direction of the edge: this vector, projected normal to the axis.", "[1.0, 0.0, 0.0]"),
@@ -43,7 +46,7 @@ class Wedge(Indenter):
     @property
     def footprint(self) -> Probe:
         """The rectangle, as long as the edge, that contains all that it may touch."""
-        width = 2 * CANDIDATES * self.section.reach(self.depths[1])
+        width = 2 * self.candidate_width
         return Blade.model_construct(
             shape="blade",
             length=self.length,
@@ -83,12 +86,17 @@ class Wedge(Indenter):
 
     def profile(self, points: FloatArray) -> FloatArray:
         """Return the heights (m) of the tool, infinite beyond its ends."""
-        height = self.section.height(np.abs(points[:, 1]))
+        beside = np.abs(points[:, 1])
+        height = self.section.height(beside)
+        if self.edge:  # around the ends it is a smaller and smaller section
+            beyond = np.clip(np.abs(points[:, 0]) - self.length / 2 + self.edge, 0.0, self.edge)
+            height = self.section.inner_height(beside, rise(beyond, self.edge))
         return np.where(np.abs(points[:, 0]) <= (1 + ON_EDGE) * self.length / 2, height, np.inf)
 
     def distance(self, points: FloatArray) -> Distance:
         """Return the distance to the tool and to what is above it between its ends."""
-        return intersection(extruded(Contour(self.section), points), slab(self.length / 2, points, axis=0))
+        edge, ends = extruded(Contour(self.section), points), slab(self.length / 2, points, axis=0)
+        return intersection(edge, ends, rounding=self.edge)
 
     def ends_at(self, points: FloatArray) -> BoolArray:
         """Return a mask of points at its two ends."""
@@ -107,11 +115,19 @@ class Wedge(Indenter):
         beyond = f"(Fabs({along})-{unit * self.length / 2:.12g})"
         aside = f"Max(Max({inner:.12g}-Fabs({across}),Fabs({across})-{outer:.12g}),0)"
         to_strips = f"Sqrt({aside}^2+Max({beyond},0)^2)"
-        to_ends = f"Sqrt({beyond}^2+Max(Fabs({across})-{outer:.12g},0)^2)"
+        past = f"Max({beyond},Max({-unit * self.edge:.12g}-{beyond},0))" if self.edge else beyond
+        to_ends = f"Sqrt({past}^2+Max(Fabs({across})-{outer:.12g},0)^2)"
         return f"Sqrt(Min({to_strips},{to_ends})^2+Max(Fabs({height})-{unit * self.depths[1]:.12g},0)^2)"
 
     def check(self, problems: Problems) -> None:
-        """Report a rounding wider than the edge is long."""
+        """Report a rounding wider than the edge is long, and ends with a larger rounding than the edge."""
+        if self.edge > self.tip:
+            problems.error(
+                "probe.edge",
+                in_mm(self.edge),
+                f"rounds the ends of an edge that is sharper: must be at most `tip`, {in_mm(self.tip)}",
+            )
+            return
         if self.section.tangent >= self.length / 2:
             problems.error(
                 "probe.tip",

@@ -49,6 +49,10 @@ class Obstacle:
     bounds: FloatArray
     depth: float
 
+    def enclosed(self, active: BoolArray) -> BoolArray:
+        """Return a mask of nodes below the tool with only ``active`` neighbours; beside it bounds are infinite."""
+        return self.candidates.enclosed(active) & np.isfinite(self.bounds)
+
 
 @stage("contact sets")
 def find_set(
@@ -70,6 +74,7 @@ def find_set(
         ContactError: if sets repeat, or become empty.
     """
     count = iterations = 0
+    active = active & np.isfinite(obstacle.bounds)  # guessed from larger elements, it may reach beside the tool
     elements.hold(active)
     for number, tolerance in enumerate(tolerances, start=1):
         seen = set[bytes]()
@@ -79,7 +84,7 @@ def find_set(
             state = elements.state()
             energy = state.energy
             following = next_set(obstacle, active, state)
-            following |= obstacle.candidates.enclosed(following)
+            following |= obstacle.enclosed(following)
             if np.array_equal(following, active):
                 break
             seen.add(active.tobytes())

@@ -128,7 +128,7 @@ def _advance(surface: CondensedSurface, before: Step, depth: float, friction: fl
         references[new] += (share[:, None] * (moved - before.moved)[:, 1:])[new]
     else:
         active = pressed > 0
-        active = active | surface.neighbours.enclosed(active)
+        active = active | surface.neighbours.enclosed(active) & np.isfinite(pressed)
     if not active.any():
         return replace(before, depth=depth)
     return _settled(surface, replace(before, depth=depth, active=active), pressed, references, friction)
@@ -182,7 +182,7 @@ def _following(
     pull = SLACK * float(np.abs(normal[step.active]).mean())
     enters = pressed - step.moved[:, 0] > SLACK * step.depth
     active = np.where(step.active, normal > -pull, enters)
-    active = active | surface.neighbours.enclosed(active)
+    active = active | surface.neighbours.enclosed(active) & np.isfinite(pressed)
     trial = step.reactions[:, 1:] - surface.penalty[:, None] * slips
     slide = step.slide.following(trial, largest_friction(law, normal), active, surface.neighbours)
     return replace(step, active=active, slide=simple.sliding(slide, active))

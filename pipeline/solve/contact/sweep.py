@@ -93,7 +93,7 @@ class Sweep:
             for name in ("moved", "reactions")
         )
         active = np.where(last.found.active, reactions < 0, moved > obstacle.bounds)
-        active |= obstacle.candidates.enclosed(active)
+        active |= obstacle.enclosed(active)
         if not active.any():
             return None
         unknowns = tuple(

@@ -94,7 +94,9 @@ class _Search:
     def find(self, depth: float) -> _Patch:
         """Return the contact area without rings."""
         radius, power = self._tool.on_half_space(depth, self._limit)
-        low, high, before = 0.0, self._limit, None
+        # A flat face is in contact at any depth: its rounding alone grows with the depth.
+        flat = self._tool.flat
+        low, high, before = flat, self._limit, None
         for _ in range(_MOST_TRIALS):
             punch = self.punches.at(radius)
             if radius == self._limit and punch.depth <= depth:
@@ -105,13 +107,13 @@ class _Search:
                 raise SolveError("no contact area was found: the tool does not touch on its axis first")
             miss = log(punch.depth / depth)
             if before is not None:
-                power = (miss - before[1]) / log(radius / before[0])
+                power = (miss - before[1]) / log((radius - flat) / (before[0] - flat))
                 power = min(max(power, POWERS[0]), POWERS[1])
             if abs(miss) < _NEAR:
-                return _Patch(radius, power)
+                return _Patch(radius, power * radius / (radius - flat))
             low, high = (radius, high) if miss < 0 else (low, radius)
             before = radius, miss
-            radius *= exp(-miss / power)
+            radius = flat + (radius - flat) * exp(-miss / power)
             if radius >= high:
                 radius = high if high == self._limit != before[0] else (before[0] + high) / 2
             if radius <= low:

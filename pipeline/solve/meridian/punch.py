@@ -6,7 +6,6 @@ region 0, displacements in metres.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 from math import log, pi
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading, MeridianArrays
+from pipeline.shapes.rounded import quarter_turn
 from pipeline.solve import SolveError
 from pipeline.solve.contact.deformed import Distance
 from pipeline.solve.meridian.forms import MeridianForms, Meshes
@@ -42,13 +42,15 @@ class RoundTool:
 
     ``gap`` returns the initial distance (n,) along the axis (m) between tool and surface, at radii (n,) up to ``limit``
     (m), where the tool ends. ``kinks`` are the radii (m) at which the gap is not smooth. ``distance`` is that of points
-    (n, 3), in m from the first touch, to the tool at a depth (m), for contact at large displacements.
+    (n, 3), in m from the first touch, to the tool at a depth (m), for contact at large displacements. Up to
+    the radius ``flat`` (m) the tool is flat.
     """
 
     gap: Callable[[FloatArray], FloatArray]
     limit: float
     kinks: tuple[float, ...] = ()
     distance: Callable[[FloatArray, float], Distance] | None = None
+    flat: float = 0.0
 
     def is_flat(self, radius: float) -> bool:
         """Return whether the gap is zero all the way to a ``radius`` (m)."""
@@ -56,29 +58,27 @@ class RoundTool:
 
     def indentation(self, radius: float) -> float:
         """Return the depth (m) at which contact on an elastic half-space has this ``radius`` (I. N. Sneddon, 1965)."""
-        sine, weights = _quarter_turn()
+        if radius <= self.flat:
+            return 0.0
+        sine, weights = quarter_turn(self.flat / radius)
         at = radius * sine
         slope = (self.gap(at) - self.gap((1 - STEP) * at)) / (STEP * at)
         return radius * float(weights @ slope)
 
     def on_half_space(self, depth: float, limit: float) -> tuple[float, float]:
-        """Return the contact radius on an elastic half-space, up to a ``limit`` (m), and its exponent in the depth."""
+        """Return the contact radius on an elastic half-space, up to a ``limit`` (m), and an exponent in the depth.
+
+        It is that of the part outside of its flat face.
+        """
         if self.indentation((1 - STEP) * limit) <= depth:
             return limit, 2.0
-        low, high = 0.0, limit
+        low, high = self.flat, limit
         for _ in range(50):
             middle = (low + high) / 2
             low, high = (middle, high) if self.indentation(middle) < depth else (low, middle)
-        wider = min(1.01 * low, limit)
-        power = log(self.indentation(wider) / depth) / log(wider / low)
+        wider = min(low + 0.01 * (low - self.flat), limit)
+        power = log(self.indentation(wider) / depth) / log((wider - self.flat) / (low - self.flat))
         return low, min(max(power, POWERS[0]), POWERS[1])
-
-
-@cache
-def _quarter_turn() -> tuple[FloatArray, FloatArray]:
-    """Return sines and weights of a quadrature rule over a quarter turn."""
-    nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
-    return np.sin(pi / 4 * (nodes + 1)), pi / 4 * weights
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,43 @@
+"""A disc whose edge is rounded: contact ends on the rounding."""
+
+from math import nan
+from typing import ClassVar, Literal
+
+from pipeline.shapes.probes._round import RoundIndenter
+from pipeline.shapes.rounded import Rounded
+from pipeline.shapes.section import Problems, in_mm
+from pipeline.units import Length
+
+
+class RoundedDisc(RoundIndenter):
+    """A disc with its edge rounded to the radius ``edge`` (m), in unilateral contact: `shape = "disc"` in a study."""
+
+    # None: contact grows on the rounding while the face stays in contact.
+    force_exponent: ClassVar[float | None] = None
+    # Unknown.
+    mean_square: ClassVar[float] = nan
+
+    shape: Literal["disc"]
+    radius: Length
+    edge: Length
+
+    @property
+    def section(self) -> Rounded:
+        """A flat face, and a quarter of a circle."""
+        return Rounded(0.0, self.edge, self.radius - self.edge)
+
+    @property
+    def limit(self) -> float:
+        """The radius (m) of the disc: contact ends below its side."""
+        return self.radius
+
+    def check(self, problems: Problems) -> None:
+        """Report an edge that leaves no face."""
+        if self.edge >= self.radius:
+            problems.error(
+                "probe.edge",
+                in_mm(self.edge),
+                f"leaves no flat face of a disc of radius {in_mm(self.radius)}: use a smaller edge, or a sphere",
+            )
+            return
+        super().check(problems)
