@@ -4,14 +4,14 @@ The initial guess of a step continues the last one linearly, and is dropped wher
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
-from pipeline.solve.contact.coulomb import Neighbours, Slide
+from pipeline.solve.contact.coulomb import MOST_SIMPLIFIED, Neighbours, Slide
 from pipeline.solve.contact.deformed import PlacedTool, Tissue, Touched, first_set, settle
 from pipeline.solve.contact.rubbing import Rubbing, met
 from pipeline.solve.newton import LargeError
@@ -20,9 +20,6 @@ from pipeline.solve.newton import LargeError
 _SMALLEST, _SLIVER = 1 / 64, 1e-6
 # The next step is longer by this factor if this one took at most so many iterations.
 _LONGER, _EASY = 1.5, 8
-# Largest share of the force at the end of a path on nodes whose friction does not settle. At a smaller depth, where few
-# nodes touch, the share may be larger, since that force is smaller.
-_SIMPLIFIED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +38,10 @@ class ContactPath:
     last: Stage
     before: Stage | None = None
     step: float = inf
-    count: int = field(default=0)
 
     def add(self, stage: Stage) -> None:
         """Go on to a stage."""
-        self.before, self.last, self.count = self.last, stage, self.count + 1
+        self.before, self.last = self.last, stage
 
     def guess(self, depth: float) -> FloatArray | None:
         """Return the state continued to a ``depth`` (m), None from a single equilibrium."""
@@ -164,7 +160,8 @@ def _rubbing(
         slide or Slide(nothing, np.zeros(before.shape)),
         normal,
         tissue.fixed,
-        _SIMPLIFIED * friction.deepest / depth,
+        # At a smaller depth, where few nodes touch, the share may be larger, since that force is smaller.
+        MOST_SIMPLIFIED * friction.deepest / depth,
     )
 
 

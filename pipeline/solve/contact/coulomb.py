@@ -19,6 +19,10 @@ from pipeline.arrays import BoolArray, FloatArray, IntArray
 # Nodes change between sticking and sliding beyond this share of the largest friction.
 _SLACK = 1e-6
 _TINY = 1e-300
+# Iterations from which changes of the state of a node count.
+_PATIENCE = 4
+# Largest share of the force on simplified nodes: friction then changes by about as much, half of the bar on it.
+MOST_SIMPLIFIED = 0.1
 # Changes of a node's state after which it is simplified.
 _CHANGES = 3
 
@@ -69,6 +73,10 @@ class Slide:
         """Sizes (n) of the trial tractions (N)."""
         return np.asarray(np.linalg.norm(self.trial, axis=1))
 
+    def share(self, weights: FloatArray, active: BoolArray) -> float:
+        """Return the sliding part of the area of ``active`` nodes (n), whose own areas are ``weights`` (n)."""
+        return float(weights[active & self.sliding].sum()) / float(weights[active].sum())
+
     def turning(self, most: FloatArray) -> FloatArray:
         """Return (n, t, t), the change of the unit vector with the trial traction, times ``most`` (n), the friction."""
         along = self.directions
@@ -115,8 +123,10 @@ class Simplified:
         """Mask of the nodes that slide whatever their traction."""
         return np.maximum(self.entered, self.turned) >= _CHANGES
 
-    def counting(self, moves: BoolArray, turns: BoolArray) -> "Simplified":
-        """Return the counts after another iteration."""
+    def counting(self, iteration: int, moves: BoolArray, turns: BoolArray) -> "Simplified":
+        """Return the counts after an ``iteration``; the first ones do not count."""
+        if iteration <= _PATIENCE:
+            return self
         return Simplified(self.entered + moves, self.turned + turns)
 
     def law(self, friction: float) -> FloatArray:

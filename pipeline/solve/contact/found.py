@@ -30,7 +30,6 @@ from pipeline.solve.estimate import error_bar, found_again_bar, found_bar
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.linear_solver import LinearSolver
 from pipeline.solve.movement import Movement
-from pipeline.solve.physics import of_regions
 from pipeline.solve.response import Contact, Response, reaction
 
 # Bounds that differ by at most this share of the depth are equal.
@@ -134,11 +133,8 @@ class FoundContact:
 
     def _area(self) -> Area:
         """Return the contact area of the modelled part."""
-        candidates, law = self.obstacle.candidates, self.sweep.law
         active, state = self._touching()
-        modulus = np.empty(len(candidates))
-        of_facets = of_regions(law.plane_moduli, candidates.regions, len(candidates.facets))
-        modulus[candidates.facets] = of_facets[:, None]
+        modulus = self.obstacle.candidates.from_regions(self.sweep.law.plane_moduli)
         return contact_area(self.obstacle, active, state, modulus, self._plug.body.mirrored)
 
     def _touching(self) -> tuple[BoolArray, State]:

@@ -18,17 +18,13 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.contact.active_set import SLACK, ContactError
-from pipeline.solve.contact.coulomb import Neighbours, Simplified, Slide, largest_friction
+from pipeline.solve.contact.coulomb import MOST_SIMPLIFIED, Neighbours, Simplified, Slide, largest_friction
 
 # Steps of a load path, and further ones before the first.
 STEPS, _BEFORE = 16, (0.25, 0.5, 0.75)
 _MOST_ITERATIONS = 60
-# Iterations from which changes of the state of a node count.
-_PATIENCE = 4
 # Iterations after which changes of the direction of slip are halved, again and again.
 _SWINGING = 12
-# Largest share of the force on simplified nodes: friction then changes by about as much, half of the bar on it.
-_SIMPLIFIED = 0.1
 # Tolerance on the friction of sliding nodes, in units of the mean normal reaction.
 _CLOSE = 1e-7
 _MOST_HALVINGS = 6
@@ -152,13 +148,12 @@ def _settled(
         moves = after.active != step.active
         turns = (after.slide.sliding != step.slide.sliding) & ~moves
         if not moves.any() and not turns.any() and _is_close(surface, step, after.slide, law, simple):
-            if _share(surface, step, simple) > _SIMPLIFIED:
+            if _share(surface, step, simple) > MOST_SIMPLIFIED:
                 break
             return step
         if not after.active.any():
             break
-        if iteration > _PATIENCE:
-            simple = simple.counting(moves, turns)
+        simple = simple.counting(iteration, moves, turns)
         step = replace(after, slide=step.slide.towards(after.slide, 0.5 ** (iteration // _SWINGING)))
     raise Unsettled("contact with friction does not settle: use smaller elements below the probe, or less friction")
 

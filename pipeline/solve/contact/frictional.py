@@ -33,7 +33,7 @@ _RINGS = 2
 # Right-hand sides solved with one factorisation of mixed elements.
 _TOGETHER = 128
 # The bar on what friction adds to the force, as a share of it: docs/accuracy.md.
-OF_FRICTION = 0.2
+_OF_FRICTION = 0.2
 # Signs of the components: the tool advances along −z, x and y are tangents.
 _COMPONENTS = np.array([2, 0, 1])
 _SIGNS = np.array([-1.0, 1.0, 1.0])
@@ -136,9 +136,8 @@ class FrictionalContact(FoundContact):
     def summary(self, sag: float) -> Contact:
         """Return the area of the whole contact, and the part of it that slides."""
         weights, step = self.obstacle.candidates.weights, self.pressed
-        sliding = float(weights[step.active & step.slide.sliding].sum()) / float(weights[step.active].sum())
         contact = super().summary(sag)
-        return replace(contact, slip_area=sliding * contact.area)
+        return replace(contact, slip_area=step.slide.share(weights, step.active) * contact.area)
 
     def response(self, column: Column, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d, with its components across the axis."""
@@ -160,13 +159,20 @@ class FrictionalContact(FoundContact):
         self._plug.put(columns[0], self.smooth, depth)
         found = super().hierarchical_estimate(columns, movement, stack, keep=keep)
         self._plug.put(columns[0], self.rubbed, depth)
-        assert found.relative is not None
-        added = abs(self.force / super().force - 1)
-        return replace(found, relative=found.relative + self.path_bar + OF_FRICTION * added)
+        return with_friction(found, self.path_bar, added=self.force / super().force - 1)
 
     def _touching(self) -> tuple[BoolArray, State]:
         step = self.pressed
         return step.active, State(-step.moved[:, 0], -step.reactions[:, 0], 2 * step.energy)
+
+
+def with_friction(found: HierarchicalEstimate, path_bar: float, *, added: float) -> HierarchicalEstimate:
+    """Return the estimate of frictionless contact with the bars of friction, which has ``added`` this to the force.
+
+    ``path_bar`` is that of the load steps; both are shares of the force.
+    """
+    assert found.relative is not None
+    return replace(found, relative=found.relative + path_bar + _OF_FRICTION * abs(added))
 
 
 def rub(contact: FoundContact, friction: float, smooth: Unknowns, stack: ExitStack) -> FrictionalContact:

@@ -28,7 +28,7 @@ from pipeline.solve.elements.base import Column, Elements, Equilibrium, Hierarch
 from pipeline.solve.estimate import AT_EDGE_LARGE, found_again_bar
 from pipeline.solve.movement import Movement
 from pipeline.solve.newton import LargeError
-from pipeline.solve.physics import MaterialLaw, of_regions
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Contact, Response, reaction
 from pipeline.solve.solution import Request
 from pipeline.stages import stage
@@ -137,11 +137,10 @@ class LargeTouch:
 
     def summary(self) -> Contact:
         """Return the area of the whole contact, and the part of it that slides if there is friction."""
-        area, touched, weights = self.whole_area, self.touched, self.body.candidates.weights
+        area, touched = self.whole_area, self.touched
         if touched.slide is None:
             return Contact(area)
-        sliding = float(weights[touched.active & touched.slide.sliding].sum()) / float(weights[touched.active].sum())
-        return Contact(area, slip_area=sliding * area)
+        return Contact(area, slip_area=touched.slide.share(self.body.candidates.weights, touched.active) * area)
 
     def check(self) -> None:
         """Check the work, and that contact ends within the candidates.
@@ -216,10 +215,8 @@ class LargeTouch:
 
     def _area(self) -> Area:
         """Return the contact area of the modelled part, at the deformed place and normal to the axis."""
-        candidates, law = self.body.candidates, self.body.law
-        moved = replace(candidates, points=self.body.positions())
-        modulus = np.empty(len(candidates))
-        modulus[candidates.facets] = of_regions(law.plane_moduli, candidates.regions, len(candidates.facets))[:, None]
+        moved = replace(self.body.candidates, points=self.body.positions())
+        modulus = moved.from_regions(self.body.law.plane_moduli)
         obstacle = Obstacle(moved, self.touched.gap, self.depth)
         state = State(np.zeros(len(moved)), self.touched.forces[:, 2], nan)
         return contact_area(obstacle, self.touched.active, state, modulus, self.body.elements.body.mirrored)

@@ -6,7 +6,7 @@ with friction, and again in half as many: the change of the force is the bar of 
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from pipeline.arrays import FloatArray
 from pipeline.solve.contact.contact_steps import ContactPath, Friction, Stage, rub
 from pipeline.solve.contact.coulomb import Neighbours
 from pipeline.solve.contact.deformed import Distance
-from pipeline.solve.contact.frictional import OF_FRICTION
+from pipeline.solve.contact.frictional import with_friction
 from pipeline.solve.contact.large import LargeContact, LargeTouch, placed_tool, stopped
 from pipeline.solve.contact.levels import Surface
 from pipeline.solve.contact.tissue import DeformedBody
@@ -107,6 +107,4 @@ class RubbingTouch(LargeTouch):
         self.body.state = self.smooth_state
         found, frictionless = self.smooth.hierarchical_estimate(columns, movement, stack, keep=keep), self.smooth.force
         self.body.state = state
-        assert found.relative is not None
-        added = abs(self.force / frictionless - 1)
-        return replace(found, relative=found.relative + self.path_bar + OF_FRICTION * added)
+        return with_friction(found, self.path_bar, added=self.force / frictionless - 1)

@@ -16,8 +16,6 @@ from pipeline.solve.contact.coulomb import Neighbours, Simplified, Slide, larges
 
 # Iterations after which changes of the direction of slip are halved, again and again.
 _SWINGING = 8
-# Iterations from which changes of the state of a node count.
-_PATIENCE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +56,7 @@ class Rub:
         after = self._simple.sliding(self.slide.following(trial, most, now, rubbing.neighbours), now)
         moves = before != now
         turns = (after.sliding != self.slide.sliding) & ~moves
-        if iteration > _PATIENCE:
-            self._simple = self._simple.counting(moves, turns)
+        self._simple = self._simple.counting(iteration, moves, turns)
         self.is_same = not turns.any()
         self.slide = self.slide.towards(after, 0.5 ** (iteration // _SWINGING))
 

@@ -3,6 +3,7 @@
 The active set is decided for all ranks at once. Candidates are a few thousand at most, and each rank stores them all.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -15,6 +16,7 @@ from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import PROBE
 from pipeline.solve.conditions import Conditions
+from pipeline.solve.physics import of_regions
 
 FACET_CORNERS = 3
 # Corners of the facet opposite to each corner of the reference tetrahedron, and an equilateral facet.
@@ -138,6 +140,12 @@ class Candidates:
         shares = np.outer(self.areas, self.shape.weights * self.shape.facets_per_node).ravel()
         count = np.bincount(self.facets.ravel(), minlength=len(self))
         return np.asarray(np.sqrt(np.bincount(self.facets.ravel(), shares, len(self)) / count))
+
+    def from_regions(self, values: Sequence[float]) -> FloatArray:
+        """Return ``values`` by region as values of the nodes (n), from the tissue below their facets."""
+        found = np.empty(len(self))
+        found[self.facets] = of_regions(values, self.regions, len(self.facets))[:, None]
+        return found
 
     def enclosed(self, active: BoolArray) -> BoolArray:
         """Return a mask (n) of corners whose neighbours along all edges are active."""

@@ -21,7 +21,7 @@ from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.load_steps import check_path
-from pipeline.solve.meridian.problem import Answer, MeridianSolver, error_bar
+from pipeline.solve.meridian.problem import Answer, MeridianSolver, best_of, error_bar
 from pipeline.solve.meridian.system import HalfPlane, System, max_strain, meshes_of
 from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import MaterialLaw
@@ -128,22 +128,13 @@ class LargeSolver(MeridianSolver):
         super().__init__(meridian, accuracy=accuracy, degree=degree)
 
     def _answer(self, law: MaterialLaw, depth: float) -> Answer:
-        best: Answer | None = None
-        for grading in self.gradings:
-            try:
-                found = self._solve_on(grading, law, depth, best)
-            except SolveError:
-                if best is None:
-                    raise
-                break
-            if best is None or found.error < best.error:
-                best = found
-            if best.error <= self._accuracy:
-                break
-        assert best is not None
-        if best.error > _WORST_ERROR:
-            raise SolveError(f"the error bar of the force is {best.error:.0e}, allowed {_WORST_ERROR:.0e}")
-        return best
+        return best_of(
+            self.gradings,
+            lambda grading, before: self._solve_on(grading, law, depth, before),
+            self._accuracy,
+            _WORST_ERROR,
+            ends_with=SolveError,
+        )
 
     @abstractmethod
     def _solve_on(self, grading: Grading, law: MaterialLaw, depth: float, before: Answer | None) -> Answer:

@@ -115,23 +115,44 @@ class MeridianSolver(Problem):
         Raises:
             SolveError: if a solve fails a check, or the error bar stays above 1e-3.
         """
-        best: Answer | None = None
-        for grading in GRADINGS:
-            try:
-                found = solve_on(grading)
-            except Unbalanced:
-                # Round-off grows with refinement: a finer mesh would be no better.
-                if best is None:
-                    raise
-                break
-            if best is None or found.error < best.error:
-                best = found
-            if best.error <= self._accuracy:
-                break
-        assert best is not None
-        if best.error > _WORST_ERROR:
-            raise SolveError(f"the error bar of the force is {best.error:.0e}, allowed {_WORST_ERROR:.0e}")
-        return best
+        # Round-off grows with refinement: a mesh finer than an unbalanced one would be no better.
+        return best_of(
+            GRADINGS, lambda grading, _: solve_on(grading), self._accuracy, _WORST_ERROR, ends_with=Unbalanced
+        )
+
+
+def best_of(
+    gradings: Sequence[Grading],
+    solve_on: Callable[[Grading, Answer | None], Answer],
+    accuracy: float,
+    worst: float,
+    *,
+    ends_with: type[SolveError],
+) -> Answer:
+    """Return the best result of meshes, each tried until the error bar is at most ``accuracy``.
+
+    ``solve_on`` returns the result on a mesh, given the best one of coarser meshes. If a finer mesh fails with
+    ``ends_with``, the best result before stands.
+
+    Raises:
+        SolveError: if another solve fails, or the error bar stays above ``worst``.
+    """
+    best: Answer | None = None
+    for grading in gradings:
+        try:
+            found = solve_on(grading, best)
+        except ends_with:
+            if best is None:
+                raise
+            break
+        if best is None or found.error < best.error:
+            best = found
+        if best.error <= accuracy:
+            break
+    assert best is not None
+    if best.error > worst:
+        raise SolveError(f"the error bar of the force is {best.error:.0e}, allowed {worst:.0e}")
+    return best
 
 
 def error_bar(coarse: float, fine: float, degree: int, balance: float) -> float:
