@@ -62,6 +62,16 @@ def test_nodes_touch_the_ball_at_their_deformed_place_and_nothing_pulls(element)
     assert solution.balance < 1e-6
 
 
+def test_corners_that_push_their_neighbours_out_do_not_enter_again():
+    """On this mesh, corners enter with all their neighbours, which then pull and leave, and so forth."""
+    body = {"size": ["60 mm", "60 mm", "40 mm"]}
+    mesh = {"epsilon": "10 mm", "rim": "0.8 mm", "fine": "4 mm", "coarse": "8 mm", "growth": 1.0}
+    _, found = touched("0.4 mm", body=body, mesh=mesh)
+    judged = ~found["edge"]
+    assert found["gap"][judged].min() > -1e-5 * 0.4e-3
+    assert (found["forces"][judged, 2] <= 0).all()
+
+
 def test_force_is_the_derivative_of_the_energy():
     probe = SPHERE | {"depth_range": ["1.98 mm", "2.02 mm"]}
     deep, deeper = (touched(f"{depth} mm", base=probe)[0] for depth in (1.98, 2.02))

@@ -32,8 +32,8 @@ _LEFT, _CLOSED = 1e-8, 1e-8
 _LEFT_RUBBING = 1e-6
 # Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
 _MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
-# A set that is solved so often ends changes of many nodes at once.
-_CAREFUL = 3
+# A set that is solved so often ends the entry of followers, and then changes of many nodes at once.
+_WITHOUT_FOLLOWERS, _ONE_BY_ONE = 2, 3
 
 
 class Distance(Protocol):
@@ -86,12 +86,13 @@ class Tissue(Protocol):
 class PlacedTool:
     """The tool at one ``depth`` (m): its ``distance`` from points (n, d).
 
-    ``complete`` returns an active set that nodes may have: without those of the support, and with corners whose
-    reactions mean nothing only where all their neighbours are active.
+    Reactions of the ``followers`` (n) mean nothing, as those of corners in degree 2. ``complete`` returns an active set
+    that nodes may have: without those of the support, and with followers only where all their neighbours are active.
     """
 
     distance: Callable[[FloatArray], Distance]
     complete: Callable[[BoolArray], BoolArray]
+    followers: BoolArray
     depth: float
 
 
@@ -125,7 +126,7 @@ def settle(tissue: Tissue, tool: PlacedTool, active: BoolArray, rubbing: Rubbing
         LargeError: if the loop does not converge.
         SolveError: if a linear solver fails.
     """
-    careful, seen, reactions = False, Counter[bytes](), np.full(len(active), np.inf)
+    repeats, seen, reactions = 0, Counter[bytes](), np.full(len(active), np.inf)
     rub, predicted = None if rubbing is None else Rub(rubbing), np.zeros(tissue.fixed.shape)
     for iteration in range(_MOST + 1):
         positions = tissue.positions()
@@ -133,23 +134,22 @@ def settle(tissue: Tissue, tool: PlacedTool, active: BoolArray, rubbing: Rubbing
         normal = _within_planes(place.normal, tissue.fixed)
         forces = tissue.forces()
         following = _next_set(tool, active, reactions, place.gap)
-        if not following.any():
-            raise LargeError("the probe does not touch a single node: use smaller elements below it")
         pressed = np.where(active, np.einsum("ni,ni->n", forces, normal), 0.0)
-        if careful:
-            following = tool.complete(_first_change(active, following))
+        following = _with_care(tool, active, following, repeats)
         there, exerted = Placed(positions, normal), pressed[:, None] * normal
         if rub is not None:
             if iteration:
                 rub.follow(iteration, there, predicted, active, following)
             exerted = exerted + rub.exerted(there, forces, active)
         is_same, active = np.array_equal(following, active), following
+        if is_same and not active.any():
+            raise LargeError("the probe does not touch a single node: use smaller elements below it")
         if is_same and _is_settled(tissue, tool, active, place.gap, forces - exerted, pressed, rub):
             return Touched(active, exerted, place.gap, iteration, pressed, None if rub is None else rub.slide)
         if not is_same:
             seen[active.tobytes()] += 1
-            careful = careful or seen[active.tobytes()] >= _CAREFUL
-            if seen[active.tobytes()] >= _MOST_REPEATS and rub is None:  # friction leaves nodes that do not settle
+            repeats = max(repeats, seen[active.tobytes()])
+            if repeats >= _MOST_REPEATS and rub is None:  # friction leaves nodes that do not settle
                 raise LargeError("active sets repeat")
         constraint = _constraint(place, normal, np.where(active, pressed, 0.0), active)
         if rub is not None:
@@ -176,15 +176,21 @@ def _next_set(tool: PlacedTool, active: BoolArray, reactions: FloatArray, gap: F
     return tool.complete(following)
 
 
-def _first_change(active: BoolArray, following: BoolArray) -> BoolArray:
-    """Return the active set with a single change, the first one: such sets cannot repeat in a linear problem.
+def _with_care(tool: PlacedTool, active: BoolArray, following: BoolArray, repeats: int) -> BoolArray:
+    """Return the ``following`` set with fewer changes where sets repeat, of which one was solved ``repeats`` times.
 
-    K. G. Murty, Opsearch 11, 42, 1974.
+    A follower that enters may push its neighbours out, and so leave again. Without their entry, the sets are those of a
+    linear complementarity problem at each linearisation, in which single changes, the first one each, cannot repeat
+    (K. G. Murty, Opsearch 11, 42, 1974). Followers then leave only, so there is an end to that, too.
     """
-    changes = np.flatnonzero(active != following)[:1]
-    found = active.copy()
-    found[changes] = following[changes]
-    return found
+    if repeats >= _ONE_BY_ONE:
+        changes = np.flatnonzero((active != following) & ~tool.followers)
+        following = active.copy()
+        following[changes[:1]] ^= True
+        following = tool.complete(following)
+    if repeats >= _WITHOUT_FOLLOWERS:
+        following = following & (active | ~tool.followers)
+    return following
 
 
 def _is_settled(

@@ -95,12 +95,12 @@ def placed_tool(body: DeformedBody, distance: Callable[[FloatArray, float], Dist
     """Return the tool at a ``depth`` (m) above the candidates of a body."""
     candidates, on_support = body.candidates, body.fixed.all(axis=1)
     # In degree 2 a pressure has no forces at corners, whose own reactions are noise; in degree 3 they have some.
-    follows = candidates.is_corner & (candidates.shape.degree == 2)
+    followers = candidates.is_corner & (candidates.shape.degree == 2)
 
     def complete(active: BoolArray) -> BoolArray:
-        return np.asarray((active & ~follows | candidates.enclosed(active)) & ~on_support)
+        return np.asarray((active & ~followers | candidates.enclosed(active) & followers) & ~on_support)
 
-    return PlacedTool(lambda points: distance(points, depth), complete, depth)
+    return PlacedTool(lambda points: distance(points, depth), complete, followers, depth)
 
 
 @dataclass(frozen=True, eq=False)

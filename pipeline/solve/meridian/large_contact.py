@@ -152,7 +152,7 @@ class _Touch:
             # The shape function of the node on the axis has no share of the pressure, so its reaction means nothing.
             return np.concatenate([active[1:2], active[1:]]) & ~on_support
 
-        return PlacedTool(distance, complete, depth)
+        return PlacedTool(distance, complete, np.arange(len(on_support)) == 0, depth)
 
     @property
     def _contact(self) -> Touched:

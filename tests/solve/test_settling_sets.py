@@ -1,0 +1,81 @@
+"""The active set of contact settles where sets would repeat, and is then the solution of the contact problem."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from pipeline.arrays import BoolArray, FloatArray
+from pipeline.shapes.distance import Distance
+from pipeline.solve.contact.constraint import Constraint
+from pipeline.solve.contact.deformed import PlacedTool, settle
+
+COUNT = 9
+
+
+@dataclass
+class Springs:
+    """Nodes that move along z only, on springs whose ``stiffness`` couples any two of them; loads push them up."""
+
+    stiffness: FloatArray
+    loads: FloatArray
+    state: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
+    is_sound = True
+
+    @property
+    def fixed(self) -> BoolArray:
+        return np.tile([True, False], (COUNT, 1))
+
+    def positions(self) -> FloatArray:
+        return np.column_stack([np.arange(COUNT, dtype=float), self.state])
+
+    def forces(self) -> FloatArray:
+        return np.column_stack([np.zeros(COUNT), self.stiffness @ self.state - self.loads])
+
+    def unbalanced(self) -> float:
+        return 0.0
+
+    def linearise(self, constraint: Constraint) -> FloatArray:
+        held = constraint.held[:, 1]
+        change = np.where(held, constraint.values[:, 1] * constraint.frames[:, 1, 1], 0.0)
+        right = -self.forces()[:, 1] - self.stiffness @ change
+        change[~held] = np.linalg.solve(self.stiffness[np.ix_(~held, ~held)], right[~held])
+        self.before, self.change = self.state, change
+        return self.forces() + np.column_stack([np.zeros(COUNT), self.stiffness @ change])
+
+    def advance(self, share: float) -> bool:
+        self.state = self.before + share * self.change
+        return True
+
+
+def ceiling(heights: FloatArray, followers: BoolArray) -> PlacedTool:
+    """Return a tool above the nodes. Followers are active where the nodes on both sides are."""
+
+    def distance(points: FloatArray) -> Distance:
+        return Distance(heights - points[:, 1], np.tile([0.0, -1.0], (COUNT, 1)), np.zeros((COUNT, 2, 2)))
+
+    def complete(active: BoolArray) -> BoolArray:
+        sides = np.pad(active, 1, constant_values=True)
+        return np.where(followers, sides[:-2] & sides[2:], active)
+
+    return PlacedTool(distance, complete, followers, 1.0)
+
+
+@pytest.mark.parametrize("with_followers", [False, True])
+def test_sets_settle_on_springs_of_any_coupling(with_followers):
+    """Here, changes of many nodes at once often repeat."""
+    generator = np.random.default_rng(3)
+    followers = (np.arange(COUNT) % 2 == 0) & with_followers
+    for _ in range(150):
+        mixed = generator.normal(size=(COUNT, COUNT + 1))
+        springs = Springs(mixed @ mixed.T, generator.normal(size=COUNT) + 1.0)
+        heights = 0.1 * generator.random(COUNT)
+        if not (np.linalg.solve(springs.stiffness, springs.loads) > heights)[~followers].any():
+            continue  # no contact
+        found = settle(springs, ceiling(heights, followers), np.ones(COUNT, dtype=bool))
+        pressed, gap = -found.forces[:, 1], heights - springs.state
+        judged = ~followers
+        assert (gap[judged] > -1e-5).all()
+        assert (pressed[judged] > -1e-5 * np.abs(pressed).max()).all()
+        assert gap[found.active] == pytest.approx(0.0, abs=1e-7)
+        assert (pressed[~found.active] == 0.0).all()
