@@ -11,7 +11,9 @@ from pipeline.cli import app
 from pipeline.plan.plan import make_plan
 from pipeline.quantities import RUN, attributes
 from pipeline.report.dataset import build
-from pipeline.study.capabilities import FEATURES, OBSTACLES, REFUSALS
+from pipeline.study.capabilities.features import FEATURES
+from pipeline.study.capabilities.obstacles import OBSTACLES
+from pipeline.study.capabilities.refusals import REFUSALS
 from pipeline.study.json_schema import schema_text
 from pipeline.study.keys import SECTION_TEXTS, all_sections, heading, keys_of
 from pipeline.study.read import parse

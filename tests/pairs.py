@@ -250,7 +250,7 @@ def write_bodies(folder: Path) -> None:
 def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> Result:
     """Run one study in ``folder``, which has the files of :func:`write_bodies`; only read it unless ``solved``."""
     from pipeline.plan.plan import declare, make_plan
-    from pipeline.study.capabilities import obstacle
+    from pipeline.study.capabilities.obstacles import obstacle
     from pipeline.study.problems import StudyError
     from pipeline.study.read import read_mapping
 

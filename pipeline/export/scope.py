@@ -9,7 +9,7 @@ from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.registry import PROBES
 from pipeline.shapes.support import Faces
 from pipeline.shapes.tissue import Tissue
-from pipeline.study.capabilities import obstacle
+from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.sweep import Case, Study
 
 # Poisson's ratios that a model covers by default; the largest one before displacement elements lock.

@@ -15,7 +15,7 @@ from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.printable import counted
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import in_mm
-from pipeline.study.capabilities import obstacle
+from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.sweep import Case
 
 # Depth over half width at which tissue folds at the edge of a bonded punch, so that Newton's method stops; somewhat

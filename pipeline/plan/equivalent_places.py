@@ -15,7 +15,7 @@ from pipeline.plan.symmetry import body_planes, is_body_round
 from pipeline.shapes.body import Layered
 from pipeline.shapes.contact import is_level
 from pipeline.shapes.frame import Vector
-from pipeline.study.capabilities import obstacle
+from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.sweep import Case
 
 # Digits to which places, in units of the body's size, and directions are compared.

@@ -12,7 +12,7 @@ from pipeline.shapes.body import PIECES, Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.shapes.tissue import Tissue
-from pipeline.study.capabilities import obstacle
+from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.loads import Load
 from pipeline.study.schema import Material, Mesh
 from pipeline.study.sweep import Case

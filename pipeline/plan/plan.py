@@ -11,7 +11,7 @@ from pipeline.plan.shard import Shard, take
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import NO_RECORD, Plan, Struck
-from pipeline.study.capabilities import obstacle
+from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.schema import Mesh, Solving
 from pipeline.study.sweep import Case, Study
 

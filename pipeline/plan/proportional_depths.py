@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from pipeline.plan.key import case_key
 from pipeline.shapes.contact import is_level
-from pipeline.study.capabilities import obstacle
+from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.sweep import Case
 
 

@@ -12,7 +12,7 @@ from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_s
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import Plan, Struck, reason_of
 from pipeline.shapes.body import Body
-from pipeline.study.capabilities import obstacle
+from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.closure import FarRegion
 from pipeline.study.sweep import Case
 

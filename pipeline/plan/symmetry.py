@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import PLANES, Probe
-from pipeline.study.capabilities import obstacle
+from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.sweep import Case
 
 _MANY = 200_000  # pairs of body and probe of a large study

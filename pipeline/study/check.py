@@ -13,7 +13,7 @@ from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
-from pipeline.study.capabilities import check_features
+from pipeline.study.capabilities.refusals import check_features
 from pipeline.study.check_law import check_laws
 from pipeline.study.check_mesh import (
     check_chosen,

@@ -14,7 +14,8 @@ from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.shapes.tissue import Tissue
-from pipeline.study.capabilities import features_of, needs_time_steps, obstacle
+from pipeline.study.capabilities.features import features_of, needs_time_steps
+from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.closure import FarRegion
 from pipeline.study.loads import Load
 from pipeline.study.place import CLEAR, is_clear, place_error

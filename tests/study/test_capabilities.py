@@ -4,7 +4,9 @@ import itertools
 
 import pytest
 
-from pipeline.study.capabilities import FEATURES, OBSTACLES, REFUSALS, obstacle
+from pipeline.study.capabilities.features import FEATURES
+from pipeline.study.capabilities.obstacles import OBSTACLES, obstacle
+from pipeline.study.capabilities.refusals import REFUSALS
 from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
 from tests.cases import BLADE, raw, study

@@ -1,0 +1,76 @@
+"""Obstacles: of each shorter way of computing, the features that exclude it, each with the reason.
+
+A way is a reduction, a dataset's variable or a real-time model. A scene with an obstacle is computed the long way.
+"""
+
+from pipeline.study.capabilities.features import FEATURES, Scene
+
+_PRESSED_ONLY = "real-time models are only for tools that press straight down"
+# Of each way that may be shorter, the features with which it is not taken, each with the reason.
+OBSTACLES: dict[str, dict[str, str]] = {
+    "meridian": {
+        "time steps": "time steps are computed in three dimensions",
+        "fibres": "fibres have a direction, and are not axisymmetric",
+        "linear outside": "the boundary of the linear part is a sphere, and no line of the mesh of the meridian",
+        "six motions": "most of the six motions are not axisymmetric",
+        "friction": "friction is computed in three dimensions",
+        "half ball": "a half ball is coupled to its far field in three dimensions",
+        "loads": "loads are computed in three dimensions",
+    },
+    # Taken if no case of the study is in the way: what is compared is computed alike.
+    "meridian, in a comparison": {
+        "time steps": "all cases of the comparison are solved in three dimensions",
+        "linear outside": "all cases of the comparison are solved in three dimensions",
+        "half ball": "all cases of the comparison are solved in three dimensions",
+        "friction": "all cases of the comparison are solved in three dimensions",
+    },
+    "reduced basis": {
+        "layers": "a body of several materials has more than one parameter",
+        "inclusion": "a body of several materials has more than one parameter",
+        "unilateral contact": "the contact area changes with Poisson's ratio",
+        "half ball": "the far field changes with Poisson's ratio",
+        "large displacements": "the problem is nonlinear",
+        "slit": "a slit has results besides F",
+        "loads": "loads have results besides F",
+        "time steps": "a history in time steps is no static solution",
+    },
+    "scaling": {
+        "loads": "their force is not proportional to modulus and depth",
+    },
+    "images": {
+        "fibres": "the direction of the fibres differs in a mirror image",
+        "six motions": "the 6 × 6 stiffness differs in a mirror image",
+        "loads": "loads break the symmetry",
+    },
+    "equivalent places": {
+        "fibres": "the direction of the fibres is fixed in the body",
+        "inclusion": "the distance to the inclusion differs",
+        "loads": "loads act on the whole body",
+        "Green's function": "the Green's function of the body depends on the place",
+    },
+    "proportional depths": {
+        "loads": "their force is not proportional to the depth",
+        "large displacements": "F is not proportional to the depth",
+    },
+    "F_exact": {
+        "time steps": "F_exact is static, and these forces are no multiples of static ones",
+        "friction": "with friction, F_exact would not be more accurate than F on a fine mesh",
+        "large displacements": "at large displacements, F_exact would not be more accurate than F on a fine mesh",
+    },
+    "real-time model": {
+        "rounded edge": "probe.edge: real-time models have sharp edges. Omit it",
+        "friction": "probe.friction: real-time models have no friction. Omit it and export the frictionless force",
+        "loads": "[load]: gravity and tractions have no real-time model",
+        "large displacements": "material.law: large displacements have no real-time model",
+        "relaxation": "material.relaxation: real-time models are elastic, and have no time. Omit it and export the "
+        "instantaneous force",
+        "slit": f"probe.incision: {_PRESSED_ONLY}",
+        "six motions": f'probe.motion = "all": {_PRESSED_ONLY}',
+        "slice": f"probe.slice: {_PRESSED_ONLY}",
+    },
+}
+
+
+def obstacle(way: str, scene: Scene) -> str:
+    """Return why a scene excludes a shorter way of computing; "" if it does not."""
+    return next((reason for name, reason in OBSTACLES[way].items() if FEATURES[name].holds(scene)), "")

@@ -1,0 +1,216 @@
+"""Pairs of features that a study must not have together, each with the reason: of mechanics, or what was not built."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from types import SimpleNamespace
+from typing import Any, cast
+
+from pipeline.shapes.body import Body
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.section import Section
+from pipeline.study.capabilities.features import FEATURES, MOST_OF_GREEN, PLACE, Scene
+from pipeline.study.problems import Problems
+from pipeline.study.schema import Material
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Two features that exclude each other. The message has the key of the first."""
+
+    first: str
+    second: str
+    reason: str
+
+
+_COARSE = 'use outside = "coarse" here'
+_ONE_MATERIAL = f"the far field is known only for one material: {_COARSE}"
+_PRESSES = f"the far field is known only for a tool that presses: {_COARSE}"
+_HOLDS = 'a tool that slides along the tissue has no lateral stiffness: use contact = "bonded"'
+_STATIC = "omit [probe.history] and relaxation"
+_IN_STEPS = "with this law or relaxation the force over time is computed in time steps"
+_LINEAR = "needs linear elasticity: omit it with a law of large displacements"
+_OF_LAW = "with a law of large displacements"
+
+REFUSALS: tuple[Refusal, ...] = (
+    # What the shapes have no keys for: the schema refuses it.
+    Refusal("layers", "curved body", "layers need the flat top of a box or a cylinder"),
+    Refusal("tool that is not flat", "frictionless contact", "the area in contact is computed, not prescribed"),
+    # A half ball that a far field closes.
+    Refusal("half ball", "accuracy", "the far field adds an error that accuracy does not cover: omit accuracy"),
+    Refusal("degree 1", "half ball", "is too low for a half ball, since elements are straight: use 2 or 3"),
+    Refusal(
+        "half ball",
+        "no flat top",
+        f"the far field is known only for a tool that presses straight down on a box or a cylinder: {_COARSE}",
+    ),
+    Refusal("half ball", "layers", _ONE_MATERIAL),
+    Refusal("half ball", "inclusion", _ONE_MATERIAL),
+    Refusal("half ball", "slice", _PRESSES),
+    Refusal("half ball", "slit", _PRESSES),
+    Refusal("half ball", "six motions", _PRESSES),
+    Refusal(
+        "ν > 0.49",
+        "Green's function",
+        f'is too near to 0.5 for outside = "green": must be at most {MOST_OF_GREEN}; "halfspace" allows all values',
+    ),
+    # A column that is kept of the body.
+    Refusal(
+        "column",
+        "surface or image",
+        f"a column cannot be cut out of triangles: {_COARSE}",
+    ),
+    Refusal("fixed column", "open slit", 'would stop the open slit at the side of the column: use ends = "blade"'),
+    Refusal(
+        "free column",
+        "only sides fixed",
+        "the column around the tool does not touch the fixed sides, and would float: "
+        'use `outside = "coarse"` or "fixed", or fix the bottom',
+    ),
+    Refusal("open slit", "fixed sides", 'the slit would cut through the sides, which are fixed: use ends = "blade"'),
+    # Degrees of elements.
+    Refusal(
+        "degree 1",
+        "unilateral contact",
+        "is too low for unilateral contact, since elements are straight: use 2 or 3",
+    ),
+    Refusal("degree 1", "inclusion", "is too low for inclusions, since elements are straight: use 2 or 3"),
+    Refusal("degree 1", "curved or inclined surface", "is too low for a curved surface, or a tilted tool: use 2 or 3"),
+    Refusal("degree 1", "slit", "is too low for a slit, whose front needs quarter-point elements: use 2 or 3"),
+    Refusal("mixed elements", "degree 1", "there is no stable mixed element of degree 1: use 2 or 3"),
+    # Tools and how they touch.
+    Refusal(
+        "rounded edge",
+        "rounded edge of a prescribed footprint",
+        'has no meaning where the footprint is prescribed, and ends at a sharp edge: use contact = "unilateral", or '
+        "omit edge",
+    ),
+    Refusal("six motions", "unilateral contact", _HOLDS),
+    Refusal("six motions", "frictionless contact", _HOLDS),
+    Refusal("six motions", "slit", "a blade in a slit only presses and slides: omit it"),
+    Refusal(
+        "unilateral contact",
+        "slice",
+        'unilateral contact has no friction, and so no slice: use contact = "bonded"',
+    ),
+    Refusal(
+        "unilateral contact",
+        "slit",
+        'tissue does not lift off a blade in a slit: use contact = "bonded" or "frictionless"',
+    ),
+    Refusal(
+        "slice",
+        "frictionless contact",
+        'a frictionless blade slides without force: use contact = "bonded"',
+    ),
+    Refusal("friction", "half ball", f"the far field is known only for forces along the tool's axis: {_COARSE}"),
+    Refusal("friction", "accuracy", "meshes for an accuracy are chosen without friction: omit one of the two"),
+    Refusal("friction", "bent surface", "the path of the tissue under loads is not known: omit [load], or friction"),
+    Refusal(
+        "friction",
+        "history",
+        f"friction depends on the path, and F is not the elastic force times a function of time: {_STATIC}",
+    ),
+    Refusal(
+        "friction",
+        "touch beside the axis",
+        "the tool touches beside its axis, where its surface is inclined: friction is computed about the axis. Turn "
+        "the axis to the surface's normal, or omit friction",
+    ),
+    Refusal("slit", "no flat top", "a slit needs the flat top of a box or a cylinder, and goes straight down"),
+    Refusal(
+        "oblique slit",
+        "frictionless contact",
+        "a frictionless slit must be along x or y: turn the body, or use contact = 'bonded'",
+    ),
+    Refusal(
+        "range of depths",
+        "accuracy",
+        "needs given element sizes: with `accuracy`, each depth has a mesh of its own. Omit one of the two",
+    ),
+    # Loads.
+    Refusal(
+        "truncated body",
+        "loads",
+        'loads act on the whole body, so no part of it may be cut away: use outside = "coarse"',
+    ),
+    Refusal("large displacements", "loads", 'loads need law = "linear": omit [load]'),
+    # Relaxation, and histories of the depth.
+    Refusal(
+        "static relaxing tissue",
+        "relaxation",
+        "is required with relaxation, since F depends on how long ago the tool moved: write [probe.history], with "
+        'ramp = "1 s" and hold = "10 s", or omit relaxation',
+    ),
+    Refusal(
+        "history",
+        "bent surface",
+        f"loads bend the surface on which contact is found, and the force is no power of the depth: {_STATIC}",
+    ),
+    Refusal(
+        "history",
+        "slit",
+        f"the opening of the slit has no history, and the energy release rate depends on the front's speed: {_STATIC}",
+    ),
+    Refusal(
+        "time steps",
+        "unilateral contact",
+        f'{_IN_STEPS}, and the contact area is not followed over them: use contact = "bonded", or a linear law and the '
+        "same relaxation in all regions",
+    ),
+    Refusal("time steps", "six motions", f'{_IN_STEPS}, of one movement: use motion = "press"'),
+    Refusal("time steps", "loads", f"{_IN_STEPS}, and the tissue has crept under the loads before: omit [load]"),
+    Refusal("time steps", "accuracy", f"{_IN_STEPS}, which meshes for an accuracy do not cover: give sizes"),
+    Refusal("time steps", "half ball", f"{_IN_STEPS}, and the far field has none: {_COARSE}"),
+    # Large strains.
+    Refusal(
+        "ν < 0.2",
+        "large displacements",
+        f"must be at least {Material.LEAST_OF_LARGE} {_OF_LAW}: below, F depends on the elements at the tool's edge",
+    ),
+    Refusal(
+        "flat tool that may lift off",
+        "large displacements",
+        f'must be "bonded" {_OF_LAW}: at a sharp edge the direction of the contact force has no limit',
+    ),
+    Refusal("frictionless contact", "large displacements", f'must be "bonded" {_OF_LAW}'),
+    Refusal("six motions", "large displacements", f'must be "press" {_OF_LAW}: there is no single stiffness'),
+    Refusal("slit", "large displacements", _LINEAR),
+    Refusal("slice", "large displacements", f"must be 0 mm {_OF_LAW}: the blade only presses"),
+    Refusal("half ball", "large displacements", f'must be "coarse", "free" or "fixed" {_OF_LAW}'),
+)
+
+_PARTS = ("body", "material", "probe", "mesh", "load")
+
+
+def check_features(
+    sections: Mapping[str, Sequence[Section]], placed: Sequence[tuple[Body, Probe]], problems: Problems
+) -> None:
+    """Report every pair of features that exclude each other; ``placed`` are the bodies and probes that fit together."""
+
+    @cache
+    def occurs(name: str) -> bool:
+        feature = FEATURES[name]
+        return any(map(feature.holds, _scenes(feature.parts, sections, placed)))
+
+    for refusal in REFUSALS:
+        if not (occurs(refusal.first) and occurs(refusal.second)):
+            continue
+        first, second = FEATURES[refusal.first], FEATURES[refusal.second]
+        for scene in _scenes((*first.parts, *second.parts), sections, placed):
+            if first.holds(scene) and second.holds(scene):
+                with problems.about(**vars(scene)):
+                    problems.error(first.key, first.value(scene), refusal.reason)
+
+
+def _scenes(
+    parts: Sequence[str], sections: Mapping[str, Sequence[Section]], placed: Sequence[tuple[Body, Probe]]
+) -> Iterator[Scene]:
+    """Yield the combinations of these sections; of bodies and probes, those that fit together."""
+    is_placed = {*PLACE} <= {*parts}
+    names = [name for name in _PARTS if name in parts and not (is_placed and name in PLACE)]
+    others: list[Sequence[Any]] = [sections[name] for name in names]
+    for pair, *rest in product(placed if is_placed else ((),), *others):
+        scene = SimpleNamespace(**dict(zip(PLACE, pair, strict=False)), **dict(zip(names, rest, strict=True)))
+        yield cast(Scene, scene)
