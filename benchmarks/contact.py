@@ -28,8 +28,8 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Spaces
+from pipeline.study.case import Case
 from pipeline.study.read import parse
-from pipeline.study.sweep import Case
 
 _REPEATS = 3
 _BODY = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm", "fixed": "bottom"}

@@ -28,9 +28,9 @@ from pipeline.solve.contact.surface import CONDITIONS
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Spaces
+from pipeline.study.case import Case
 from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
-from pipeline.study.sweep import Case
 
 SEED, COUNT = 11, 60
 RADIUS = 4.0

@@ -21,7 +21,7 @@ from pipeline import compat
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.scene.model import FIXED, PROBE, Scene, build
 from pipeline.solve.compiled import form, vector_space
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 _CG = {"ksp_type": "cg", "ksp_rtol": 1e-8}
 _GAMG = {"pc_type": "gamg", "pc_gamg_threshold": 0.01, "mg_levels_ksp_type": "chebyshev"}

@@ -30,8 +30,9 @@ from benchmarks.processor import ROOT, processor_seconds
 from benchmarks.tables import markdown, options, write
 from pipeline.arrays import FloatArray
 from pipeline.plan import estimate
+from pipeline.study.case import Case
 from pipeline.study.read import read_study
-from pipeline.study.sweep import Case, Study
+from pipeline.study.sweep import Study
 
 # Study that compiles all forms of a run, in seconds.
 _WARM_UP = ROOT / "studies" / "quick.toml"

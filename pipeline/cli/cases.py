@@ -9,7 +9,8 @@ from pipeline.launcher import is_first_rank
 from pipeline.printable import counted
 
 if TYPE_CHECKING:
-    from pipeline.study.sweep import Case, Study
+    from pipeline.study.case import Case
+    from pipeline.study.sweep import Study
 
 
 def find_case(study: "Study", text: str, word: str = "CASE") -> "Case":

@@ -32,7 +32,8 @@ from pipeline.run.remaining import format_seconds
 if TYPE_CHECKING:
     from pipeline.plan.plan import Plan
     from pipeline.run.record import Record
-    from pipeline.study.sweep import Case, Study
+    from pipeline.study.case import Case
+    from pipeline.study.sweep import Study
 
 # What there is to do, as it is called in the summary of a plan, and one of it.
 _TO_DO = {"meshes": "mesh", "operators": "operator", "solves": "solve"}

@@ -23,7 +23,8 @@ from pipeline.cli.words import (
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.study.sweep import Case, Study
+    from pipeline.study.case import Case
+    from pipeline.study.sweep import Study
 
 # What `--scene` takes besides a case: no scene at all, and the case of the report's answer.
 _NONE, _ANSWER = "none", "answer"

@@ -13,7 +13,8 @@ from pipeline.cli.words import DEFAULT_MESHES, DEFAULT_OUTPUT, File, Json, Outpu
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from pipeline.study.sweep import Case, Study
+    from pipeline.study.case import Case
+    from pipeline.study.sweep import Study
     from pipeline.view.fields import Fields
 
 

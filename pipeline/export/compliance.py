@@ -23,8 +23,8 @@ from pipeline.solve.far_field import PointForce
 from pipeline.solve.greens_function import regular_parts
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
+from pipeline.study.case import Case
 from pipeline.study.schema import Mesh
-from pipeline.study.sweep import Case
 
 # Number of elements from the region's edge to the sides, through the thickness, or down to other tissue; growth.
 _NEAR, _THROUGH, _TO_TISSUE, _GROWTH = 2.5, 4, 2, 0.4

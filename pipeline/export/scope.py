@@ -10,7 +10,8 @@ from pipeline.shapes.registry import PROBES
 from pipeline.shapes.support import Faces
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.capabilities.obstacles import obstacle
-from pipeline.study.sweep import Case, Study
+from pipeline.study.case import Case
+from pipeline.study.sweep import Study
 
 # Poisson's ratios that a model covers by default; the largest one before displacement elements lock.
 _USUAL, _MOST = (0.3, 0.49), 0.49

@@ -18,7 +18,7 @@ from pipeline.plan.symmetry import mirror_planes
 from pipeline.scene.model import Scene
 from pipeline.shapes.half_plane import HalfEllipse, Rectangle
 from pipeline.shapes.scanned import Scanned
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 if TYPE_CHECKING:
     from pipeline.mesh.organ.base import Kept

@@ -15,7 +15,7 @@ from pipeline.plan import estimate
 from pipeline.plan.steps import MeshStep, Solve
 from pipeline.plan.symmetry import model_planes
 from pipeline.shapes.body import Layered
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 # Parallel speed-up of one solve: n ranks are n^0.8 times faster.
 _PARALLEL = 0.8

@@ -16,7 +16,7 @@ from pipeline.printable import counted
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import in_mm
 from pipeline.study.capabilities.obstacles import obstacle
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 # Depth over half width at which tissue folds at the edge of a bonded punch, so that Newton's method stops; somewhat
 # less on finer meshes.

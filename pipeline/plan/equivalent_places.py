@@ -16,7 +16,7 @@ from pipeline.shapes.body import Layered
 from pipeline.shapes.contact import is_level
 from pipeline.shapes.frame import Vector
 from pipeline.study.capabilities.obstacles import obstacle
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 # Digits to which places, in units of the body's size, and directions are compared.
 _DIGITS = 9

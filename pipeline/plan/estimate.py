@@ -3,7 +3,7 @@
 from math import inf, log, pi
 
 from pipeline.shapes.indenter import Indenter
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 # Mean volume of gmsh's tetrahedra, in units of the cube of the element size: measured, docs/performance.md.
 _TETRAHEDRON = 0.21

@@ -9,9 +9,9 @@ from pipeline.plan.symmetry import mirror_planes
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.registry import PROBES
+from pipeline.study.case import Case
 from pipeline.study.closure import FarRegion, room
 from pipeline.study.schema import Mesh
-from pipeline.study.sweep import Case
 
 # Number of elements to the nearest side or the bottom, and through the thickness; growth. Half as many change F by less
 # than 1e-3.

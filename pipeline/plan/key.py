@@ -13,9 +13,9 @@ from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.capabilities.obstacles import obstacle
+from pipeline.study.case import Case
 from pipeline.study.loads import Load
 from pipeline.study.schema import Material, Mesh
-from pipeline.study.sweep import Case
 from pipeline.units import canonical
 
 # Raise by hand when the same input gives another force: earlier records are then no longer used.

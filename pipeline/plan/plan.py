@@ -12,8 +12,9 @@ from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import NO_RECORD, Plan, Struck
 from pipeline.study.capabilities.obstacles import obstacle
+from pipeline.study.case import Case
 from pipeline.study.schema import Mesh, Solving
-from pipeline.study.sweep import Case, Study
+from pipeline.study.sweep import Study
 
 __all__ = ["EXACT", "Plan", "Struck", "ask_for_exact", "declare", "first_attempts", "make_plan"]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pipeline.plan.key import case_key
 from pipeline.shapes.contact import is_level
 from pipeline.study.capabilities.obstacles import obstacle
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.shapes.body import Layered
 from pipeline.shapes.contact import is_level
 from pipeline.shapes.indenter import Indenter
+from pipeline.study.case import Case
 from pipeline.study.check_mesh import held_gaps
 from pipeline.study.schema import Mesh
-from pipeline.study.sweep import Case
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import Plan, Struck, reason_of
 from pipeline.shapes.body import Body
 from pipeline.study.capabilities.obstacles import obstacle
+from pipeline.study.case import Case
 from pipeline.study.closure import FarRegion
-from pipeline.study.sweep import Case
 
 # With fewer Poisson's ratios, each is solved: a reduced basis needs about five solutions itself.
 _FEWEST_RATIOS = 8

@@ -6,7 +6,7 @@ from math import nan
 
 from pipeline.plan.key import mesh_key, operator_key
 from pipeline.plan.recipe import MARGIN, Rung
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 # The middle of the top face.
 CENTRE = (0.0, 0.0)

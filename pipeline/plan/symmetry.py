@@ -9,7 +9,7 @@ from itertools import pairwise
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import PLANES, Probe
 from pipeline.study.capabilities.obstacles import obstacle
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 _MANY = 200_000  # pairs of body and probe of a large study
 _ON_AXIS = (0.0, 0.0)

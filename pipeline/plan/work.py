@@ -8,7 +8,8 @@ from pipeline.plan.cost import CostModel
 from pipeline.plan.equivalent_places import EquivalentPlace
 from pipeline.plan.proportional_depths import ProportionalDepth
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
-from pipeline.study.sweep import Case, Scale, Study
+from pipeline.study.case import Case, Scale
+from pipeline.study.sweep import Study
 
 # The key of a case without record: the tool has lost contact, or F_exact is not computed.
 NO_RECORD = ""

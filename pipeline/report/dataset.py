@@ -24,7 +24,9 @@ from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.scanned import Scanned
 from pipeline.states import LOST, OK, PENDING
-from pipeline.study.sweep import Axis, Case, Study
+from pipeline.study.axis import Axis
+from pipeline.study.case import Case
+from pipeline.study.sweep import Study
 
 _SIZES = {"component": 3, "movement": 6, "conjugate": 6}
 

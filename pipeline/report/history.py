@@ -15,7 +15,8 @@ from pipeline.run.record import Record
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.states import worst
-from pipeline.study.sweep import Case, Study
+from pipeline.study.case import Case
+from pipeline.study.sweep import Study
 from pipeline.viscoelastic import Contact, Motion, Terms, follow, interpolation, respond
 
 # What a history with several solves costs, and what is largest of them.

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 # Values by key, as mesh.fine or body.layer[1].young. A key that a shape does not have is not there.
 Parameters = dict[str, Any]

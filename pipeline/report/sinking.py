@@ -9,7 +9,7 @@ from pipeline.plan.symmetry import mirror_planes
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.probe import PLANES
 from pipeline.shapes.punch import Punch
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 # Of the axes of a probe, those that say how far it moves, and those that say where it is: the others say what it is.
 LOADS = {"depth", "slice"}

@@ -14,9 +14,10 @@ from pipeline.quantities import MESH_DIMENSIONS
 from pipeline.report.sinking import LOADS, PLACES, Sinking
 from pipeline.report.values import by_case, elastic, relative
 from pipeline.states import OK, PENDING, STATES
+from pipeline.study.case import Case
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_text
-from pipeline.study.sweep import Case, Study
+from pipeline.study.sweep import Study
 
 Labels = dict[str, Any]
 

@@ -15,8 +15,8 @@ from pipeline.solve.far_field import BodyField, PointForce, Smooth
 from pipeline.solve.greens_function import regular_parts
 from pipeline.solve.movement import Place
 from pipeline.stages import stage
+from pipeline.study.case import Case
 from pipeline.study.closure import FarRegion, room
-from pipeline.study.sweep import Case
 
 _Key = tuple[Body, Place, float, FarRegion | None]
 # Regular parts of Green's functions with the seconds of their solves, by body, place, Poisson's ratio and the region of

@@ -8,8 +8,8 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.surface import Surface
 from pipeline.solve.movement import Loads, SurfaceLoad
+from pipeline.study.case import Case
 from pipeline.study.loads import FREE, Cap, Traction
-from pipeline.study.sweep import Case
 
 _Test = Callable[[FloatArray, FloatArray], BoolArray]
 # A facet belongs to a cap if the cosine between its normal and that at the cap's centre exceeds this.

@@ -20,7 +20,7 @@ from pipeline.solve.history import History
 from pipeline.solve.response import Contact
 from pipeline.solve.solution import Solution
 from pipeline.states import OK
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 _ROUNDING = 1e-9
 # The mesh is graded to the axis. If first contact is farther away, in units of the half width, it is not graded to it.

@@ -16,7 +16,7 @@ from pipeline.mesh.generate import MeshArrays
 from pipeline.npz import read_npz
 from pipeline.plan.key import digest, mesh_key
 from pipeline.stages import stage
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 # Raise by hand when the same input gives another mesh.
 MESH_VERSION = 6

@@ -12,7 +12,7 @@ from pipeline.mesh.of_case import mesh_arrays, upright
 from pipeline.run.failure import describe
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.stages import Times, recharge, stage
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 T = TypeVar("T")
 

@@ -6,8 +6,8 @@ from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST
 from pipeline.run.record import Record
 from pipeline.states import FAILED, LOST, OK, PARTIAL, PENDING, SKIPPED, worst
+from pipeline.study.case import Case
 from pipeline.study.place import CLEAR
-from pipeline.study.sweep import Case
 
 
 def without_contact(case: Case) -> Record | None:

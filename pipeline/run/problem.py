@@ -36,7 +36,7 @@ from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Spaces
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 from pipeline.units import canonical
 
 # Largest number of unknowns for a direct solve if iterations do not converge.

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 from pipeline.plan.cost import Observation, speed_up
 from pipeline.quantities import STRESSES
 from pipeline.states import FAILURES, OK, PARTIAL
-from pipeline.study.sweep import Scale
+from pipeline.study.case import Scale
 
 # The prefix of the message of an unexpected failure.
 UNFORESEEN = "an error of the program: "

@@ -10,7 +10,7 @@ from pipeline.plan.steps import Solve
 from pipeline.quantities import write
 from pipeline.run.record import Record
 from pipeline.states import SKIPPED
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 # F stays close to F_exact if it is close at this many values of ε in a row.
 _IN_A_ROW = 2

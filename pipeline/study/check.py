@@ -13,6 +13,7 @@ from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
+from pipeline.study.axis import Axis
 from pipeline.study.capabilities.refusals import check_features
 from pipeline.study.check_law import check_laws
 from pipeline.study.check_mesh import (
@@ -33,7 +34,6 @@ from pipeline.study.regions import tissues_of
 from pipeline.study.schema import Material, Mesh, Solving
 from pipeline.study.slit import check_slit, check_slit_in
 from pipeline.study.stages import check_history
-from pipeline.study.sweep import Axis
 
 # Linear elasticity: strain under the probe is of order depth / radius.
 _LINEAR = 0.10

@@ -11,10 +11,10 @@ from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section, in_mm
 from pipeline.shapes.support import Faces, NamedFace
+from pipeline.study.axis import Axis
 from pipeline.study.loads import FREE, Cap, Load, Traction
 from pipeline.study.problems import Problems, nearest
 from pipeline.study.schema import Material
-from pipeline.study.sweep import Axis
 
 # Largest distance of a centre from the surface, in units of the cap's radius.
 _FARTHEST_OFF = 0.5

@@ -9,11 +9,11 @@ from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.section import in_mm
+from pipeline.study.axis import Axis
 from pipeline.study.place import held_gap
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
 from pipeline.study.schema import Material, Mesh
-from pipeline.study.sweep import Axis
 
 # Displacement elements lock as ν nears ½: from the first value on visibly, from the second on F is worth nothing
 # (docs/accuracy.md), and a number that looks like any other would be returned for it.

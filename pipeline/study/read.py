@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.shapes.section import Section
+from pipeline.study.axis import Axis
 from pipeline.study.check import check_sense
 from pipeline.study.check_loads import check_loads
 from pipeline.study.loads import Load
@@ -14,7 +15,7 @@ from pipeline.study.problems import Problem, Problems, StudyError, nearest
 from pipeline.study.regions import check_regions, material_without_section
 from pipeline.study.schema import NESTED, SECTIONS, Mesh
 from pipeline.study.stages import with_stages
-from pipeline.study.sweep import Axis, Study
+from pipeline.study.sweep import Study
 from pipeline.study.tables import MOST_CASES, read_section
 from pipeline.study.text import check_text, read_toml, toml_of
 from pipeline.study.toml import to_toml

@@ -12,10 +12,10 @@ from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.regions import Inclusion
 from pipeline.shapes.section import Section, in_mm
 from pipeline.shapes.tissue import Tissue
+from pipeline.study.axis import Axis
 from pipeline.study.howto import page_of
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Material, material_of
-from pipeline.study.sweep import Axis
 
 # Room around an inclusion, in units of its smallest semi-axis: elements there are no larger.
 GAP = 0.1

@@ -7,9 +7,9 @@ from typing import Any, cast
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section, in_mm
+from pipeline.study.axis import Axis
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Mesh
-from pipeline.study.sweep import Axis
 from pipeline.units import canonical
 
 # Depths of the elastic curve: F is a power of the depth times a smooth function of its root, which five Chebyshev

@@ -7,8 +7,8 @@ from typing import Any
 from pydantic import BaseModel
 
 from pipeline.shapes.section import Section
+from pipeline.study.axis import Axis
 from pipeline.study.problems import Problems, nested_model, table_model
-from pipeline.study.sweep import Axis
 
 # Place of a value within a section: keys, and numbers in arrays of tables, from 0.
 Place = tuple[str | int, ...]

@@ -11,12 +11,12 @@ from pydantic import ValidationError
 from pipeline.shapes.history import deepest
 from pipeline.shapes.registry import specialised
 from pipeline.shapes.section import Section
+from pipeline.study.axis import Axis
 from pipeline.study.path import Way, read_path
 from pipeline.study.problems import MOST_ERRORS, Problems, closest, nearest, tuples
 from pipeline.study.ranges import without_ranges
 from pipeline.study.renamed import renamed
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE
-from pipeline.study.sweep import Axis
 from pipeline.study.swept import Place, axis_of, placed, sweeps, written
 from pipeline.study.text import check_text
 from pipeline.study.vocabulary import NOT_COMPUTED, OTHER_NAMES

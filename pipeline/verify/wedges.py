@@ -14,8 +14,8 @@ from pipeline.run.meshing import on_first_rank
 from pipeline.run.problem import problem_of, solve_problem
 from pipeline.scene.model import FREE, MIRROR
 from pipeline.solve.spaces import Spaces
+from pipeline.study.case import Case
 from pipeline.study.read import parse
-from pipeline.study.sweep import Case
 from pipeline.verify.layer_wedge import layer_wedge
 from pipeline.verify.row import Row
 

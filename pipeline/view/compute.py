@@ -39,7 +39,8 @@ from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
-from pipeline.study.sweep import Case, Study
+from pipeline.study.case import Case
+from pipeline.study.sweep import Study
 from pipeline.view.fields import Fields
 
 Note = Callable[[str], None]

@@ -9,7 +9,7 @@ from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.bodies.cad import FromCad
 from pipeline.shapes.body import Drawn
 from pipeline.shapes.indenter import Indenter
-from pipeline.study.sweep import Case
+from pipeline.study.case import Case
 
 # Displacements are drawn so large that the largest is about this share of the body's smallest extent.
 _VISIBLE = 0.15

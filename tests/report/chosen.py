@@ -8,8 +8,8 @@ import xarray as xr
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.run.record import Record
+from pipeline.study.case import Case
 from pipeline.study.read import parse
-from pipeline.study.sweep import Case
 
 TEXT = """
 title = "known"

@@ -19,7 +19,7 @@ from pipeline.solve.laws.law import Law
 from pipeline.solve.load_steps import LoadSteps, check_path
 from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import MaterialLaw
-from pipeline.study.sweep import Scale
+from pipeline.study.case import Scale
 from tests.cases import force, solve, study
 
 LARGE = {"law": "neo-hookean"}

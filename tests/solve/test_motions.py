@@ -16,7 +16,7 @@ from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
-from pipeline.study.sweep import Scale
+from pipeline.study.case import Scale
 from pipeline.verify import known
 from tests.cases import BLADE, solve, study
 from tests.solve.test_mixed import law, make_mesh

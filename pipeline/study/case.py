@@ -1,0 +1,212 @@
+"""A case: one scene with one mesh setting, and what its sections together imply."""
+
+from dataclasses import dataclass, field
+from math import inf
+
+from pipeline.shapes.body import Body
+from pipeline.shapes.contact import is_level
+from pipeline.shapes.frame import Frame, Vector
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.tissue import Tissue
+from pipeline.study.axis import Axis
+from pipeline.study.capabilities.features import features_of, needs_time_steps
+from pipeline.study.capabilities.obstacles import obstacle
+from pipeline.study.closure import FarRegion
+from pipeline.study.loads import Load
+from pipeline.study.place import CLEAR, is_clear, place_error
+from pipeline.study.schema import Material, Mesh, Solving
+from pipeline.viscoelastic import Terms
+
+# Thickness over reach up to which a body without support below the probe is a plate (docs/accuracy.md).
+_PLATE = 0.1
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What results are proportional to: F to stress (Pa) × length (m), energies to that × length, strains to length."""
+
+    stress: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Case:
+    """One scene with one mesh setting: yields one force.
+
+    ``far_region`` is set where the body's far field is found on a mesh that many places share; None if on its own.
+    """
+
+    index: tuple[int, ...]
+    axes: tuple[Axis, ...]
+    body: Body
+    material: Material
+    probe: Probe
+    mesh: Mesh
+    solve: Solving
+    load: Load = field(default_factory=Load)
+    far_region: FarRegion | None = None
+
+    @property
+    def labels(self) -> tuple[tuple[str, float | int | str], ...]:
+        """Names and values of what is swept."""
+        return tuple((axis.name, axis.labels[i]) for axis, i in zip(self.axes, self.index, strict=True))
+
+    @property
+    def words(self) -> dict[str, str]:
+        """Names of what is swept, and values as people read them."""
+        return {axis.name: axis.write(axis.labels[i]) for axis, i in zip(self.axes, self.index, strict=True)}
+
+    @property
+    def frame(self) -> Frame:
+        """Where the probe meets the body."""
+        return self.probe.frame_on(self.body)
+
+    @property
+    def features(self) -> frozenset[str]:
+        """What it has of the features that :mod:`pipeline.study.capabilities` names."""
+        return features_of(self)
+
+    @property
+    def lost_contact(self) -> str:
+        """Why there is no contact at this place of a path that may leave the body; "" if there is."""
+        if not any(axis.off == "lost" for axis in self.axes):
+            return ""
+        error = place_error(self.body, self.probe)
+        return "" if error is None else CLEAR if is_clear(self.body, self.probe) else f"the tool does not fit: {error}"
+
+    @property
+    def travel(self) -> Vector:
+        """Prescribed displacement (m) of the footprint."""
+        return self.probe.travel(self.frame)
+
+    @property
+    def movements(self) -> int:
+        """How many solutions there are: press, slide, opening of a slit, far field, or all six motions; and loads."""
+        slides = self.travel != tuple(self.probe.depth * a for a in self.frame.axis)
+        opens = self.probe.slit is not None and self.probe.contact == "bonded"
+        motions = 6 if self.probe.motion == "all" else 1 + slides + opens + self.is_closed
+        return motions + self.load.acts
+
+    @property
+    def tissues(self) -> tuple[Tissue, ...]:
+        """What the regions of the body are made of, in the order of their numbers in meshes.
+
+        Where layers fill the body, no cell has number 0.
+        """
+        return self.material, *self.body.regions
+
+    @property
+    def relaxations(self) -> tuple[Terms, ...]:
+        """Terms of the relaxation of the regions of the body; where a region has none, the material's."""
+        return tuple(tissue.prony or self.material.prony for tissue in self.tissues)
+
+    @property
+    def is_stepped(self) -> bool:
+        """Whether its history is computed in time steps."""
+        return needs_time_steps(self)
+
+    @property
+    def densities(self) -> tuple[float | None, ...]:
+        """Densities (kg/m³) of the regions of the body, in the order of their numbers; None where there is none."""
+        return tuple(tissue.density if tissue.density is not None else self.material.density for tissue in self.tissues)
+
+    @property
+    def poisson(self) -> float:
+        """The largest Poisson's ratio of all regions."""
+        return max(tissue.poisson for tissue in self.tissues)
+
+    @property
+    def proportional_to(self) -> tuple[str, ...]:
+        """The keys that F is proportional to, those of one section, or of all materials, changing together."""
+        if obstacle("scaling", self):
+            return ()
+        first = ("young of all materials together",) if self.body.regions else self.material.PROPORTIONAL_TO
+        return *first, *self.moves_in_proportion
+
+    @property
+    def moves_in_proportion(self) -> tuple[str, ...]:
+        """The keys of the probe that F is proportional to: none where displacements are large."""
+        return () if self.material.is_large or self.is_stepped else self.probe.proportional_to
+
+    @property
+    def scale(self) -> Scale:
+        """The units in which its results do not depend on what they are proportional to."""
+        if self.is_bent:
+            return Scale(1.0, 1.0)
+        return Scale(self.material.young, self.probe.scale if self.moves_in_proportion else 1.0)
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether loads bend the surface on which contact is found: F is then proportional to nothing."""
+        return self.load.acts and self.probe.is_unilateral
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the probe's edge rules the error of F: what is pressed is even, and no plate."""
+        return self.is_even and not self.is_plate
+
+    @property
+    def is_even(self) -> bool:
+        """Whether a body of one material is pressed straight down on a plane face."""
+        return not self.body.regions and self.probe.slit is None and is_level(self.body, self.frame)
+
+    @property
+    def is_plate(self) -> bool:
+        """Whether the body has no support below the probe, and is so thin that it bends."""
+        thickness, reach = self.body.thickness(self.frame), self.body.reach(self.frame)
+        return not self.body.support.holds_column() and thickness < _PLATE * reach
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the mesh is fine everywhere: ε is "full", or reaches past the whole body."""
+        return self.mesh.epsilon == inf or self.mesh.epsilon >= self.body.farthest(self.frame)
+
+    @property
+    def column(self) -> float:
+        """Radius (m) of the piece of the body that is kept round the probe's axis or, if closed, the contact.
+
+        Infinite if all of it is kept.
+        """
+        return self.mesh.column(self.body.reach(self.frame))
+
+    @property
+    def is_truncated(self) -> bool:
+        """Whether only a column of the body is kept."""
+        return self.column < inf
+
+    @property
+    def is_linear_beyond(self) -> bool:
+        """Whether tissue beyond ε is linear elastic, and not that within."""
+        return self.mesh.outside == "linear" and not self.is_full
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether only a half ball of the body is kept, which a far field closes."""
+        return self.mesh.is_closed and not self.is_full
+
+    @property
+    def has_own_far_field(self) -> bool:
+        """Whether what closes it is the Green's function of its body, and not that of a half-space."""
+        return self.is_closed and self.mesh.outside == "green"
+
+    @property
+    def element(self) -> str:
+        """The element that solves it: displacement or mixed."""
+        return self.mesh.element_for(self.poisson, is_large=self.material.is_large)
+
+    @property
+    def formulation(self) -> str:
+        """What is solved: the element, at large displacements the names of the laws, and -mixed if the element is."""
+        if not self.material.is_large:
+            return self.element
+        beyond = ["linear"] if self.is_linear_beyond else []
+        names = "+".join(sorted({*(str(tissue.law) for tissue in self.tissues), *beyond}))
+        return names + ("-mixed" if self.element == "mixed" else "")
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether a depth is reached over smaller ones: contact is found, or displacements are large."""
+        return self.probe.is_unilateral or self.material.is_large
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} = {text}" for name, text in self.words.items()) or "the one case"
