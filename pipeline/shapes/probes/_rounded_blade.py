@@ -47,15 +47,7 @@ class RoundedBlade(Indenter):
     def footprint(self) -> Probe:
         """The rectangle that contains all that it may touch."""
         length, width = 2 * self._sides(self.candidate_width - self.section.flat)
-        return Blade.model_construct(
-            shape="blade",
-            length=float(length),
-            width=float(width),
-            direction=self.direction,
-            depth=self.depth,
-            at=self.at,
-            axis=self.axis,
-        )
+        return Blade.below(self, self.direction, float(length), float(width))
 
     @property
     def half_length(self) -> float:

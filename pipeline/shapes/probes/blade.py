@@ -10,7 +10,7 @@ from pydantic import Field
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.probe import ON_EDGE
+from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes._edge import Edge
 from pipeline.shapes.punch import Punch
 from pipeline.shapes.section import Problems, Words, in_mm
@@ -63,6 +63,19 @@ class Blade(Punch):
             '"blade"',
         ),
     ] = "blade"
+
+    @classmethod
+    def below(cls, tool: Probe, direction: Vector, length: float, width: float) -> "Blade":
+        """Return the rectangle of these sides (m) below another tool, its length along ``direction``."""
+        return cls.model_construct(
+            shape="blade",
+            length=length,
+            width=width,
+            direction=direction,
+            depth=tool.depth,
+            at=tool.at,
+            axis=tool.axis,
+        )
 
     @property
     def is_rounded(self) -> bool:

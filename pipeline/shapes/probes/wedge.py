@@ -46,16 +46,7 @@ class Wedge(Indenter):
     @property
     def footprint(self) -> Probe:
         """The rectangle, as long as the edge, that contains all that it may touch."""
-        width = 2 * self.candidate_width
-        return Blade.model_construct(
-            shape="blade",
-            length=self.length,
-            width=width,
-            direction=self.direction,
-            depth=self.depth,
-            at=self.at,
-            axis=self.axis,
-        )
+        return Blade.below(self, self.direction, self.length, 2 * self.candidate_width)
 
     @property
     def half_length(self) -> float:
