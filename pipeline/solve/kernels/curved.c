@@ -4,16 +4,9 @@
  */
 
 #include <math.h>
-#include <stddef.h>
-#include <string.h>
-#include <stdint.h>
 
+#include "cells.h"
 #include "kernels.h"
-
-enum { LANES = 16, MOST_POINTS = 35 }; /* of degree 4 */
-
-typedef float floats __attribute__((vector_size(64)));
-typedef double doubles __attribute__((vector_size(64)));
 
 /* The mapping of gradients at each quadrature point, times the root of the weight's magnitude and of the volume ratio
  * there, lane by lane: maps (batches, quadrature, 3, 3, LANES). roots (batches, quadrature, LANES) are these roots, with
@@ -111,47 +104,24 @@ void NAME(int points, int quadrature, int batches, const int* restrict dofs, con
     memcpy(&lambda, lame + 2 * LANES * batch + begin, sizeof lambda);                                                  \
     memcpy(&mu, lame + 2 * LANES * batch + LANES + begin, sizeof mu);                                                  \
     memset(f, 0, 3 * points * sizeof(VECTOR));                                                                         \
-    for (int i = 0; i < points; ++i)                                                                                   \
-    {                                                                                                                  \
-      TYPE* row = (TYPE*)u[i];                                                                                         \
-      for (int lane = 0; lane < WIDTH; ++lane)                                                                         \
-        for (int r = 0; r < 3; ++r)                                                                                    \
-          row[r * WIDTH + lane] = x[3 * (size_t)at[i * LANES + lane] + r];                                             \
-    }                                                                                                                  \
+    gather(VECTOR)(points, at, x, u);                                                                                  \
     for (int q = 0; q < quadrature; ++q)                                                                               \
     {                                                                                                                  \
       const TYPE* restrict D = gradients + 3 * (size_t)points * q;                                                     \
-      VECTOR G[3][3] = {{{0}}}, K[3][3], H[3][3], F[3][3];                                                             \
-      for (int i = 0; i < points; ++i)                                                                                 \
-        for (int a = 0; a < 3; ++a)                                                                                    \
-          for (int r = 0; r < 3; ++r)                                                                                  \
-            G[a][r] += D[3 * i + a] * u[i][r];                                                                         \
+      VECTOR K[9], H[9], T[9];                                                                                         \
       for (int n = 0; n < 9; ++n)                                                                                      \
-        memcpy(&K[n / 3][n % 3], maps + ((batch * quadrature + q) * 9 + n) * LANES + begin, sizeof(VECTOR));           \
-      for (int r = 0; r < 3; ++r)                                                                                      \
-        for (int s = 0; s < 3; ++s)                                                                                    \
-          H[r][s] = G[0][r] * K[0][s] + G[1][r] * K[1][s] + G[2][r] * K[2][s];                                         \
-      const VECTOR pressure = signs[q] * lambda * (H[0][0] + H[1][1] + H[2][2]), signed_mu = signs[q] * mu;            \
+        memcpy(&K[n], maps + ((batch * quadrature + q) * 9 + n) * LANES + begin, sizeof(VECTOR));                      \
+      GRADIENT(VECTOR, H, D, points, u, K);                                                                            \
+      const VECTOR pressure = signs[q] * lambda * (H[0] + H[4] + H[8]), signed_mu = signs[q] * mu;                     \
       for (int r = 0; r < 3; ++r)                                                                                      \
       {                                                                                                                \
-        VECTOR T[3];                                                                                                   \
         for (int s = 0; s < 3; ++s)                                                                                    \
-          T[s] = signed_mu * (H[r][s] + H[s][r]);                                                                      \
-        T[r] += pressure;                                                                                              \
-        for (int a = 0; a < 3; ++a)                                                                                    \
-          F[a][r] = T[0] * K[a][0] + T[1] * K[a][1] + T[2] * K[a][2];                                                  \
+          T[3 * r + s] = signed_mu * (H[3 * r + s] + H[3 * s + r]);                                                    \
+        T[4 * r] += pressure;                                                                                          \
       }                                                                                                                \
-      for (int i = 0; i < points; ++i)                                                                                 \
-        for (int r = 0; r < 3; ++r)                                                                                    \
-          f[i][r] += D[3 * i] * F[0][r] + D[3 * i + 1] * F[1][r] + D[3 * i + 2] * F[2][r];                             \
+      ADD_FORCES(VECTOR, f, D, points, T, K);                                                                          \
     }                                                                                                                  \
-    for (int i = 0; i < points; ++i)                                                                                   \
-    {                                                                                                                  \
-      const TYPE* row = (const TYPE*)f[i];                                                                             \
-      for (int lane = 0; lane < WIDTH; ++lane)                                                                         \
-        for (int r = 0; r < 3; ++r)                                                                                    \
-          y[3 * (size_t)at[i * LANES + lane] + r] += row[r * WIDTH + lane];                                            \
-    }                                                                                                                  \
+    scatter(VECTOR)(points, at, f, y);                                                                                 \
   }                                                                                                                    \
 }
 

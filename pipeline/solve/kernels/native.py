@@ -57,7 +57,7 @@ def library() -> Any:
     """
     header, sources = _FOLDER / "kernels.h", sorted(_FOLDER.glob("*.c"))
     suffix = sysconfig.get_config_var("EXT_SUFFIX")
-    texts = [file.read_text() for file in (header, *sources)]
+    texts = [file.read_text() for file in sorted(_FOLDER.glob("*.[ch]"))]
     name = "epsmesh_" + hashlib.sha256("".join((*texts, suffix, *_FLAGS)).encode()).hexdigest()[:16]
     path = form_cache() / f"{name}{suffix}"
     if not path.exists():

@@ -5,31 +5,10 @@
  * with the sign of the cell's determinant; padding cells add zero.
  */
 
-#include <stddef.h>
-#include <string.h>
-#include <stdint.h>
-
+#include "cells.h"
 #include "kernels.h"
 
-enum { LANES = 16, WIDTH = 8, MOST_POINTS = 35, MOST_PRESSURES = 20 }; /* of degree 4, and of 3 */
-
-typedef double doubles __attribute__((vector_size(64)));
-
-static inline void load(int points, int size, const int* restrict at, const double* restrict x, doubles* restrict u)
-{
-  for (int i = 0; i < points; ++i)
-    for (int lane = 0; lane < WIDTH; ++lane)
-      for (int r = 0; r < size; ++r)
-        u[size * i + r][lane] = x[size * (size_t)at[i * LANES + lane] + r];
-}
-
-static inline void add(int points, int size, const int* restrict at, const doubles* restrict u, double* restrict y)
-{
-  for (int i = 0; i < points; ++i)
-    for (int lane = 0; lane < WIDTH; ++lane)
-      for (int r = 0; r < size; ++r)
-        y[size * (size_t)at[i * LANES + lane] + r] += u[size * i + r][lane];
-}
+enum { WIDTH = 8 };
 
 /* to = T from, T sparse by rows, with `size` numbers for each. */
 static inline __attribute__((always_inline)) void transform(
@@ -76,7 +55,7 @@ void add_dilation(int points, int count, int batches, const int* dofs, const int
     for (int n = 0; n < 9; ++n)
       memcpy(&K[n], maps + (9 * batch + n) * LANES + begin, sizeof K[n]);
     memcpy(&root, roots + LANES * batch + begin, sizeof root);
-    load(points, 3, dofs + batch * points * LANES + begin, x, u[0]);
+    gather(doubles)(points, dofs + batch * points * LANES + begin, x, u);
     transform(points, 3, first, column, weight, u[0], c[0]);
     for (int b = 0; b < count; ++b)
     {
@@ -89,7 +68,7 @@ void add_dilation(int points, int count, int batches, const int* dofs, const int
     }
     apply_mass(count, mass, p, d);
     transform(count, 1, first_back, column_back, weight_back, d, p);
-    add(count, 1, pressures + batch * count * LANES + begin, p, y);
+    scatter_pressures(count, pressures + batch * count * LANES + begin, p, y);
   END
 }
 
@@ -105,7 +84,7 @@ void add_pull(int points, int count, int batches, const int* dofs, const int* pr
     for (int n = 0; n < 9; ++n)
       memcpy(&K[n], maps + (9 * batch + n) * LANES + begin, sizeof K[n]);
     memcpy(&root, roots + LANES * batch + begin, sizeof root);
-    load(count, 1, pressures + batch * count * LANES + begin, x, p);
+    gather_pressures(count, pressures + batch * count * LANES + begin, x, p);
     transform(count, 1, first, column, weight, p, d);
     apply_mass(count, mass, d, p);
     memset(c, 0, 3 * points * sizeof c[0][0]);
@@ -122,7 +101,7 @@ void add_pull(int points, int count, int batches, const int* dofs, const int* pr
         }
     }
     transform(points, 3, first_back, column_back, weight_back, c[0], u[0]);
-    add(points, 3, dofs + batch * points * LANES + begin, u[0], y);
+    scatter(doubles)(points, dofs + batch * points * LANES + begin, u, y);
   END
 }
 
@@ -133,11 +112,11 @@ void add_mass(int count, int batches, const int* pressures, const double* roots,
   BEGIN
     doubles p[MOST_PRESSURES], d[MOST_PRESSURES], root;
     memcpy(&root, roots + LANES * batch + begin, sizeof root);
-    load(count, 1, pressures + batch * count * LANES + begin, x, p);
+    gather_pressures(count, pressures + batch * count * LANES + begin, x, p);
     apply_mass(count, mass, p, d);
     for (int b = 0; b < count; ++b)
       d[b] *= root * root;
-    add(count, 1, pressures + batch * count * LANES + begin, d, y);
+    scatter_pressures(count, pressures + batch * count * LANES + begin, d, y);
   END
 }
 
@@ -150,7 +129,7 @@ void add_curved_dilation(int points, int count, int quadrature, int batches, con
   BEGIN
     doubles u[MOST_POINTS][3], p[MOST_PRESSURES];
     memset(p, 0, sizeof p);
-    load(points, 3, dofs + batch * points * LANES + begin, x, u[0]);
+    gather(doubles)(points, dofs + batch * points * LANES + begin, x, u);
     for (int q = 0; q < quadrature; ++q)
     {
       const double* D = gradients + 3 * (size_t)points * q;
@@ -170,7 +149,7 @@ void add_curved_dilation(int points, int count, int quadrature, int batches, con
       for (int j = 0; j < count; ++j)
         p[j] += values[(size_t)count * q + j] * sum;
     }
-    add(count, 1, pressures + batch * count * LANES + begin, p, y);
+    scatter_pressures(count, pressures + batch * count * LANES + begin, p, y);
   END
 }
 
@@ -182,7 +161,7 @@ void add_curved_pull(int points, int count, int quadrature, int batches, const i
   BEGIN
     doubles u[MOST_POINTS][3], p[MOST_PRESSURES];
     memset(u, 0, sizeof u);
-    load(count, 1, pressures + batch * count * LANES + begin, x, p);
+    gather_pressures(count, pressures + batch * count * LANES + begin, x, p);
     for (int q = 0; q < quadrature; ++q)
     {
       const double* D = gradients + 3 * (size_t)points * q;
@@ -200,7 +179,7 @@ void add_curved_pull(int points, int count, int quadrature, int batches, const i
         for (int r = 0; r < 3; ++r)
           u[i][r] += D[3 * i] * F[r] + D[3 * i + 1] * F[3 + r] + D[3 * i + 2] * F[6 + r];
     }
-    add(points, 3, dofs + batch * points * LANES + begin, u[0], y);
+    scatter(doubles)(points, dofs + batch * points * LANES + begin, u, y);
   END
 }
 
@@ -211,7 +190,7 @@ void add_curved_mass(int count, int quadrature, int batches, const int* pressure
   BEGIN
     doubles p[MOST_PRESSURES], d[MOST_PRESSURES];
     memset(d, 0, sizeof d);
-    load(count, 1, pressures + batch * count * LANES + begin, x, p);
+    gather_pressures(count, pressures + batch * count * LANES + begin, x, p);
     for (int q = 0; q < quadrature; ++q)
     {
       const double* value = values + (size_t)count * q;
@@ -223,6 +202,6 @@ void add_curved_mass(int count, int quadrature, int batches, const int* pressure
       for (int j = 0; j < count; ++j)
         d[j] += value[j] * sum;
     }
-    add(count, 1, pressures + batch * count * LANES + begin, d, y);
+    scatter_pressures(count, pressures + batch * count * LANES + begin, d, y);
   END
 }

@@ -11,16 +11,11 @@
  */
 
 #include <math.h>
-#include <stddef.h>
-#include <string.h>
-#include <stdint.h>
 
+#include "cells.h"
 #include "kernels.h"
 
-enum { LANES = 16, MOST_POINTS = 35, MOST_COEFFICIENTS = 20 }; /* of degree 4, and of its gradient */
-
-typedef float floats __attribute__((vector_size(64)));
-typedef double doubles __attribute__((vector_size(64)));
+enum { MOST_COEFFICIENTS = 20 }; /* of the gradient in degree 4 */
 
 /* The mapping of gradients times the root of the cell's volume, lane by lane: maps (batches, 3, 3, LANES), which the
  * `count` cells do not fill to the end. */
@@ -116,17 +111,7 @@ static inline __attribute__((always_inline)) void of_degree(NAME)(              
       memcpy(&K[q / 3][q % 3], maps + (9 * batch + q) * LANES + begin, sizeof(VECTOR));                                \
     memcpy(&lambda, lame + 2 * LANES * batch + begin, sizeof lambda);                                                  \
     memcpy(&mu, lame + 2 * LANES * batch + LANES + begin, sizeof mu);                                                  \
-    for (int i = 0; i < points; ++i)                                                                                   \
-    {                                                                                                                  \
-      TYPE* row = (TYPE*)u[i];                                                                                         \
-      for (int lane = 0; lane < WIDTH; ++lane)                                                                         \
-      {                                                                                                                \
-        const TYPE* value = x + 3 * (size_t)at[i * LANES + lane];                                                      \
-        row[lane] = value[0];                                                                                          \
-        row[WIDTH + lane] = value[1];                                                                                  \
-        row[2 * WIDTH + lane] = value[2];                                                                              \
-      }                                                                                                                \
-    }                                                                                                                  \
+    gather(VECTOR)(points, at, x, u);                                                                                  \
     transform(NAME)(points, first, column, weight, u, c);                                                              \
     for (int b = 0; b < coefficients; ++b)                                                                             \
     {                                                                                                                  \
@@ -171,17 +156,7 @@ static inline __attribute__((always_inline)) void of_degree(NAME)(              
       }                                                                                                                \
     }                                                                                                                  \
     transform(NAME)(points, first_back, column_back, weight_back, c, u);                                               \
-    for (int i = 0; i < points; ++i)                                                                                   \
-    {                                                                                                                  \
-      const TYPE* row = (const TYPE*)u[i];                                                                             \
-      for (int lane = 0; lane < WIDTH; ++lane)                                                                         \
-      {                                                                                                                \
-        TYPE* value = y + 3 * (size_t)at[i * LANES + lane];                                                            \
-        value[0] += row[lane];                                                                                         \
-        value[1] += row[WIDTH + lane];                                                                                 \
-        value[2] += row[2 * WIDTH + lane];                                                                             \
-      }                                                                                                                \
-    }                                                                                                                  \
+    scatter(VECTOR)(points, at, u, y);                                                                                 \
   }                                                                                                                    \
 }                                                                                                                      \
                                                                                                                        \

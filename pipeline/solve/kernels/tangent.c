@@ -10,16 +10,11 @@
  * what Newton's method converges to. Components of F are row by row, 3 r + s of the derivative of u_r by x_s.
  */
 
-#include <stddef.h>
-#include <string.h>
-#include <stdint.h>
-
+#include "cells.h"
 #include "kernels.h"
 
-enum { LANES = 16, MOST_POINTS = 35, MOST_PRESSURES = 20, MODULI = 45, HALF = 8 };
+enum { MODULI = 45, HALF = 8 };
 
-typedef float floats __attribute__((vector_size(64)));
-typedef double doubles __attribute__((vector_size(64)));
 typedef float halves __attribute__((vector_size(32)));
 
 /* A generated cell kernel (UFCx); later versions have a seventh argument, which earlier ones ignore. */
@@ -29,38 +24,6 @@ typedef void (*cell_kernel)(double* A, const double* w, const double* c, const d
 /* Nodes of the reference cell, corners and middles of edges. */
 static const double reference_cell[30] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, .5, .5, .5,
                                           0, .5, .5, .5, 0, 0, 0, .5, 0, .5, 0, .5, 0, 0};
-
-/* The gradient of u at a point, times the factor of the map K: D (points, 3) are reference gradients. */
-#define GRADIENT(VECTOR, H, D, points, u, K)                                                                           \
-  do                                                                                                                   \
-  {                                                                                                                    \
-    VECTOR G[3][3] = {{{0}}};                                                                                          \
-    for (int i = 0; i < points; ++i)                                                                                   \
-      for (int a = 0; a < 3; ++a)                                                                                      \
-        for (int r = 0; r < 3; ++r)                                                                                    \
-          G[a][r] += D[3 * i + a] * u[i][r];                                                                           \
-    for (int r = 0; r < 3; ++r)                                                                                        \
-      for (int s = 0; s < 3; ++s)                                                                                      \
-        H[3 * r + s] = G[0][r] * K[s] + G[1][r] * K[3 + s] + G[2][r] * K[6 + s];                                       \
-  } while (0)
-
-/* Read the displacements of half a batch. */
-static inline void gather(int points, const int* at, const double* x, doubles (*u)[3])
-{
-  for (int i = 0; i < points; ++i)
-    for (int lane = 0; lane < HALF; ++lane)
-      for (int r = 0; r < 3; ++r)
-        ((double*)u[i])[r * HALF + lane] = x[3 * (size_t)at[i * LANES + lane] + r];
-}
-
-/* Add the forces of half a batch. */
-static inline void scatter(int points, const int* at, const doubles (*f)[3], double* y)
-{
-  for (int i = 0; i < points; ++i)
-    for (int lane = 0; lane < HALF; ++lane)
-      for (int r = 0; r < 3; ++r)
-        y[3 * (size_t)at[i * LANES + lane] + r] += ((const double*)f[i])[r * HALF + lane];
-}
 
 /* Evaluate a second derivative of the energy at the quadrature points of some cells; `outputs` is 45 for the upper
  * triangle of that by F twice, 9 for that by p and F, with one more root: found (batches, quadrature, outputs, LANES).
@@ -79,7 +42,7 @@ void evaluate_moduli(int cells, int points, int quadrature, const int* dofs, con
   {
     const size_t batch = begin / LANES, lanes = begin % LANES;
     doubles v[MOST_POINTS][3], H[9], K[9], root;
-    gather(points, dofs + batch * points * LANES + lanes, u, v);
+    gather(doubles)(points, dofs + batch * points * LANES + lanes, u, v);
     for (int q = 0; q < quadrature; ++q)
     {
       const size_t place = step ? batch * quadrature + q : batch;
@@ -166,7 +129,7 @@ void add_tangent_dilation(int points, int quadrature, int batches, const int* do
   {
     const size_t batch = part / 2, lanes = part % 2 * HALF;
     doubles u[MOST_POINTS][3], f[MOST_PRESSURES] = {{0}}, H[9], K[9];
-    gather(points, dofs + batch * points * LANES + lanes, x, u);
+    gather(doubles)(points, dofs + batch * points * LANES + lanes, x, u);
     for (int q = 0; q < quadrature; ++q)
     {
       const double* map = maps + (step ? batch * quadrature + q : batch) * 9 * LANES + lanes;
@@ -183,9 +146,7 @@ void add_tangent_dilation(int points, int quadrature, int batches, const int* do
       for (int j = 0; j < count; ++j)
         f[j] += values[q * count + j] * sum;
     }
-    for (int j = 0; j < count; ++j)
-      for (int lane = 0; lane < HALF; ++lane)
-        y[pressures[(batch * count + j) * LANES + lanes + lane]] += f[j][lane];
+    scatter_pressures(count, pressures + batch * count * LANES + lanes, f, y);
   }
 }
 
@@ -199,9 +160,7 @@ void add_tangent_pull(int points, int quadrature, int batches, const int* dofs, 
     const size_t batch = part / 2, lanes = part % 2 * HALF;
     doubles f[MOST_POINTS][3], p[MOST_PRESSURES], K[9], T[9];
     memset(f, 0, points * sizeof f[0]);
-    for (int j = 0; j < count; ++j)
-      for (int lane = 0; lane < HALF; ++lane)
-        p[j][lane] = x[pressures[(batch * count + j) * LANES + lanes + lane]];
+    gather_pressures(count, pressures + batch * count * LANES + lanes, x, p);
     for (int q = 0; q < quadrature; ++q)
     {
       const double* map = maps + (step ? batch * quadrature + q : batch) * 9 * LANES + lanes;
@@ -216,16 +175,9 @@ void add_tangent_pull(int points, int quadrature, int batches, const int* dofs, 
         memcpy(&K[n], map + n * LANES, sizeof K[n]);
         T[n] = __builtin_convertvector(factor, doubles) * sum;
       }
-      for (int r = 0; r < 3; ++r)
-      {
-        doubles F[3];
-        for (int a = 0; a < 3; ++a)
-          F[a] = T[3 * r] * K[3 * a] + T[3 * r + 1] * K[3 * a + 1] + T[3 * r + 2] * K[3 * a + 2];
-        for (int i = 0; i < points; ++i)
-          f[i][r] += D[3 * i] * F[0] + D[3 * i + 1] * F[1] + D[3 * i + 2] * F[2];
-      }
+      ADD_FORCES(doubles, f, D, points, T, K);
     }
-    scatter(points, dofs + batch * points * LANES + lanes, (const doubles(*)[3])f, y);
+    scatter(doubles)(points, dofs + batch * points * LANES + lanes, f, y);
   }
 }
 
@@ -241,10 +193,7 @@ void NAME(int points, int quadrature, int batches, const int* restrict dofs, con
     const int* restrict at = dofs + batch * points * LANES + begin;                                                    \
     VECTOR u[MOST_POINTS][3], f[MOST_POINTS][3];                                                                       \
     memset(f, 0, 3 * points * sizeof(VECTOR));                                                                         \
-    for (int i = 0; i < points; ++i)                                                                                   \
-      for (int lane = 0; lane < WIDTH; ++lane)                                                                         \
-        for (int r = 0; r < 3; ++r)                                                                                    \
-          ((TYPE*)u[i])[r * WIDTH + lane] = x[3 * (size_t)at[i * LANES + lane] + r];                                   \
+    gather(VECTOR)(points, at, x, u);                                                                                  \
     for (int q = 0; q < quadrature; ++q)                                                                               \
     {                                                                                                                  \
       const TYPE* restrict D = gradients + 3 * (size_t)points * q;                                                     \
@@ -266,19 +215,9 @@ void NAME(int points, int quadrature, int batches, const int* restrict dofs, con
           if (m > n)                                                                                                   \
             T[m] += modulus * H[n];                                                                                    \
         }                                                                                                              \
-      for (int r = 0; r < 3; ++r)                                                                                      \
-      {                                                                                                                \
-        VECTOR F[3];                                                                                                   \
-        for (int a = 0; a < 3; ++a)                                                                                    \
-          F[a] = T[3 * r] * K[3 * a] + T[3 * r + 1] * K[3 * a + 1] + T[3 * r + 2] * K[3 * a + 2];                      \
-        for (int i = 0; i < points; ++i)                                                                               \
-          f[i][r] += D[3 * i] * F[0] + D[3 * i + 1] * F[1] + D[3 * i + 2] * F[2];                                      \
-      }                                                                                                                \
+      ADD_FORCES(VECTOR, f, D, points, T, K);                                                                          \
     }                                                                                                                  \
-    for (int i = 0; i < points; ++i)                                                                                   \
-      for (int lane = 0; lane < WIDTH; ++lane)                                                                         \
-        for (int r = 0; r < 3; ++r)                                                                                    \
-          y[3 * (size_t)at[i * LANES + lane] + r] += ((const TYPE*)f[i])[r * WIDTH + lane];                            \
+    scatter(VECTOR)(points, at, f, y);                                                                                 \
   }                                                                                                                    \
 }
 
