@@ -24,7 +24,8 @@ from pipeline.quantities import CLEAR
 from pipeline.scene.model import FIXED, MIRROR, PROBE
 from pipeline.solve.compiled import cellwise_space, form, vector_space
 from pipeline.solve.conditions import Front
-from pipeline.solve.forms import dx, one_cell
+from pipeline.solve.forms import one_cell
+from pipeline.solve.measures import dx
 from pipeline.solve.physics import MaterialLaw, of_regions
 from pipeline.stages import stage
 

@@ -35,7 +35,8 @@ from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.conditions import Front
 from pipeline.solve.estimate import extrapolate_release, release_bar
-from pipeline.solve.forms import ElasticForms, dx, one_cell
+from pipeline.solve.forms import ElasticForms, one_cell
+from pipeline.solve.measures import dx
 from pipeline.solve.physics import pressurised, small_strain, strain
 
 # Step of the nodes, as a share of the front's radius, for the finite difference of the loads' nodal forces.

@@ -20,10 +20,11 @@ from pipeline.scene.model import FIXED, MIRROR, PROBE
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import assemble, fill, vector_space
 from pipeline.solve.conditions import Conditions, Front
-from pipeline.solve.forms import ElasticForms, curved_cells, has_curved_cells
+from pipeline.solve.forms import ElasticForms
 from pipeline.solve.kernels.assembly import StraightStiffness, cell_kernel
 from pipeline.solve.kernels.product import DEGREES, CellStiffness
 from pipeline.solve.loads import Applied, apply_loads
+from pipeline.solve.measures import curved_cells, has_curved_cells
 from pipeline.solve.movement import Loads, Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage

@@ -16,9 +16,9 @@ from pipeline.scene.model import FIXED
 from pipeline.solve.compiled import form
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.elements.mixed import MixedElements
-from pipeline.solve.forms import dx
 from pipeline.solve.laws import LAWS
 from pipeline.solve.load_steps import LoadSteps
+from pipeline.solve.measures import dx
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
