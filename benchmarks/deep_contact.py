@@ -1,10 +1,11 @@
 """Error bars of contact at large displacements: random scenes on coarse meshes, compared with finer meshes of degree 3.
 
-    python -m benchmarks.deep_contact [--count N] [--seed N] [--set calibrate|judge] [--out FILE]
+    python -m benchmarks.deep_contact [--count N] [--seed N] [--set calibrate|judge] [--family F] [--degree 2|3]
+                                      [--out FILE]
 
-Scenes are balls and cones on cylinders and boxes, some layered, of five laws, with ν from 0.3 to 0.5. The two
-sets have bodies and tools of other proportions: factors are read off one, and judged on the other. Each line of the
-output has the force, the change of degree 3, the bar, and the force of the finer mesh.
+Scenes are those of :mod:`benchmarks.deep_scenes`: tools on cylinders and boxes, some layered, of five laws, with ν from
+0.3 to 0.5. Each line of the output has the force, the change of one degree more, the bar, and the force of the finer
+mesh.
 """
 
 import json
@@ -12,12 +13,12 @@ import sys
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from benchmarks.campaigns import ended_soon
+from benchmarks.deep_scenes import FAMILIES, RADIUS, SETS, Scene, thrown
 from benchmarks.families import Dice, mm
 from benchmarks.tables import options
 from pipeline.plan.symmetry import mirror_planes
@@ -33,21 +34,6 @@ from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
 
 SEED, COUNT = 11, 60
-RADIUS = 4.0
-_LAWS: dict[str, dict[str, Any]] = {
-    "neo-hookean": {},
-    "mooney-rivlin": {"c2": 0.3},
-    "yeoh": {"c2": 0.3},
-    "ogden": {"terms": [{"share": 0.7, "alpha": 2.0}, {"share": 0.3, "alpha": 7.0}]},
-    "veronda-westmann": {"alpha": 1.2},
-}
-_POISSON = (0.3, 0.4, 0.45, 0.48, 0.495, 0.5)
-# Ranges of each set: depth, height and radius of the body, in radii of the tool; size of elements at the edge of
-# contact, in half widths of contact.
-_SETS = {
-    "calibrate": {"depth": (0.05, 0.7), "height": (1.5, 5.0), "wide": (3.0, 6.0), "rim": (0.25, 0.7)},
-    "judge": {"depth": (0.08, 0.6), "height": (1.2, 7.0), "wide": (2.5, 8.0), "rim": (0.22, 0.75)},
-}
 # Elements of the finer mesh, relative to those of the case, and their largest size.
 _FINER, _FINEST = 0.55, 0.3
 
@@ -71,61 +57,43 @@ class Trial:
         return abs(self.truth / self.force - 1)
 
 
-def thrown(dice: Dice, ranges: dict[str, tuple[float, float]]) -> tuple[str, dict[str, Any], float]:
-    """Return a scene: its name, its sections without a mesh, and the size of elements in half widths of contact."""
-    law, poisson = dice.one_of(list(_LAWS)), dice.one_of(list(_POISSON))
-    depth, height, wide = (dice.log(*ranges[key]) for key in ("depth", "height", "wide"))
-    kind = dice.one_of(["sphere", "sphere", "cone"])
-    probe: dict[str, Any] = {"shape": kind, "depth": mm(RADIUS * depth), "contact": "unilateral"}
-    if kind == "sphere":
-        probe["radius"] = mm(RADIUS)
-    else:
-        probe |= {"angle": f"{dice.between(60.0, 78.0, 1)} deg", "tip": mm(dice.log(1.0, 3.0))}
-        probe["radius"] = mm(3 * RADIUS)
-    body: dict[str, Any] = {"shape": "cylinder", "radius": mm(RADIUS * wide), "height": mm(RADIUS * height)}
-    if dice.chance(0.3):
-        size = [mm(2 * RADIUS * wide), mm(2 * RADIUS * wide), mm(RADIUS * height)]
-        body = {"shape": "box", "size": size}
-    if dice.chance(0.2):
-        skin = {"name": "skin", "thickness": mm(0.25 * RADIUS * height), "young": "30 kPa", "poisson": poisson}
-        body["layer"] = [skin]
-    material = {"young": "10 kPa", "poisson": poisson, "law": law} | _LAWS[law]
-    name = f"{kind} {law} ν {poisson:g} d/R {depth:.2f} h/R {height:.1f}{' skin' if 'layer' in body else ''}"
-    return (
-        name,
-        {"body": body | {"fixed": "bottom"}, "material": material, "probe": probe},
-        dice.between(*ranges["rim"], 2),
-    )
-
-
-def solved(scene: dict[str, Any], rim: float, degree: int, *, estimate: bool) -> Solution:
-    """Solve a scene with elements of a size at the edge of contact, in half widths of contact."""
-    case = _case(scene, rim, degree)
+def solved(scene: Scene, finer: float, degree: int, *, estimate: bool) -> Solution:
+    """Solve a scene, with elements ``finer`` than its own at the edge of contact by this factor."""
+    case = case_of(scene, finer, degree)
     with Spaces(mesh_case(case, mirror_planes(case), MPI.COMM_SELF)) as spaces:
         problem = QuasiStaticProblem(spaces, degree, CONDITIONS, case.element, tool=tool_of(case))
         return problem.solve(law_of(case), movement_of(case), estimate=estimate)
 
 
-def _case(scene: dict[str, Any], rim: float, degree: int) -> Case:
+def case_of(scene: Scene, finer: float, degree: int) -> Case:
+    """Return the case of a scene.
+
+    Raises:
+        StudyError: if it is not valid.
+    """
     mesh = {"epsilon": "full", "degree": degree, "growth": 0.9, "coarse": mm(2.5 * RADIUS), "fine": mm(2 * RADIUS)}
-    (case,) = parse({**scene, "mesh": mesh | {"rim": mm(RADIUS)}, "solve": {"exact": False}}).cases()
-    size = mm(1e3 * rim * case.probe.contact_width, ".4f")
-    (case,) = parse({**scene, "mesh": mesh | {"rim": size}, "solve": {"exact": False}}).cases()
-    return case
+
+    def parsed(rim: float) -> Case:
+        (case,) = parse({**scene.sections, "mesh": mesh | {"rim": mm(rim, ".4f")}, "solve": {"exact": False}}).cases()
+        return case
+
+    unit = scene.unit or 1e3 * parsed(RADIUS).probe.contact_width
+    return parsed(finer * scene.rim * unit)
 
 
-def trial(name: str, scene: dict[str, Any], rim: float) -> Trial:
+def trial(scene: Scene, degree: int) -> Trial:
     """Solve a scene on its mesh and on a finer one."""
     start, force, bar, share, area_bar, truth, message = time.process_time(), *[float("nan")] * 5, ""
     try:
-        coarse = solved(scene, rim, 2, estimate=True)
+        coarse = solved(scene, 1.0, degree, estimate=True)
         assert coarse.contact is not None
         force, bar = coarse.reaction[2], coarse.bar
         share, area_bar = 0.8 * coarse.decrement, coarse.contact.bar - bar
-        truth = solved(scene, min(_FINER * rim, _FINEST), 3, estimate=False).reaction[2]
+        truth = solved(scene, min(_FINER, _FINEST / scene.rim), 3, estimate=False).reaction[2]
     except SolveError as error:
         message = str(error)
-    return Trial(f"{name} rim {rim:g}", force, bar, share, area_bar, truth, time.process_time() - start, message)
+    name = f"{scene.name} rim {scene.rim:g} degree {degree}"
+    return Trial(name, force, bar, share, area_bar, truth, time.process_time() - start, message)
 
 
 def main(arguments: list[str]) -> int:
@@ -133,18 +101,20 @@ def main(arguments: list[str]) -> int:
     parser = options(__doc__, writes=False)
     parser.add_argument("--count", type=int, default=COUNT, help="number of scenes")
     parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("--set", choices=list(_SETS), default="calibrate")
+    parser.add_argument("--set", choices=list(SETS), default="calibrate")
+    parser.add_argument("--family", choices=FAMILIES, default="round")
+    parser.add_argument("--degree", type=int, choices=[2, 3], default=2)
     parser.add_argument("--out", type=Path, help="a line of JSON for each scene")
     asked = parser.parse_args(arguments)
     dice, found = Dice(np.random.default_rng(asked.seed)), list[Trial]()
     with ended_soon():
         while len(found) < asked.count:
-            name, scene, rim = thrown(dice, _SETS[asked.set])
+            scene = thrown(dice, SETS[asked.set], asked.family)
             try:
-                _case(scene, rim, 2)
+                case_of(scene, 1.0, asked.degree)
             except StudyError:  # an invalid draw
                 continue
-            found.append(trial(name, scene, rim))
+            found.append(trial(scene, asked.degree))
             print(_line(found[-1]), flush=True)
             if asked.out:
                 with asked.out.open("a") as lines:

@@ -87,10 +87,10 @@ def test_the_whole_is_the_quarter():
 
 
 def test_a_depth_that_is_not_reached_is_partial_and_says_where(monkeypatch):
-    def fails_beyond(tissue, tool, active, rubbing):
+    def fails_beyond(tissue, tool, active, rubbing, **how):
         if tool.depth > 1.5e-3:
             raise LargeError("it is told to")
-        return settle(tissue, tool, active, rubbing)
+        return settle(tissue, tool, active, rubbing, **how)
 
     monkeypatch.setattr(contact_steps, "settle", fails_beyond)
     (record,) = solve(material=TISSUE, probe=SPHERE | {"depth": "2 mm"}, mesh=COARSE).values()

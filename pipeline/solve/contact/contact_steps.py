@@ -18,6 +18,8 @@ from pipeline.solve.newton import LargeError
 
 # Smallest step, as a share of the depth, and a step that leaves less than this share goes to the end.
 _SMALLEST, _SLIVER = 1 / 64, 1e-6
+# Larger steps than this share, without friction, are given up soon.
+_LARGE = 1 / 8
 # The next step is longer by this factor if this one took at most so many iterations.
 _LONGER, _EASY = 1.5, 8
 
@@ -83,7 +85,8 @@ def press(
         step = min(path.step, left)
         there = depth if step > (1 - _SLIVER) * left else path.last.depth + step
         try:
-            touched = _step(tissue, tool_at, path, there, friction)
+            is_patient = friction is not None or there - path.last.depth <= _LARGE * depth
+            touched = _step(tissue, tool_at, path, there, friction, is_patient=is_patient)
         except SolveError as error:
             path.step = (there - path.last.depth) / 2
             if path.step < _SMALLEST * depth:
@@ -171,6 +174,8 @@ def _step(
     path: ContactPath,
     depth: float,
     friction: Friction | None,
+    *,
+    is_patient: bool,
 ) -> Touched:
     tool, last = tool_at(depth), path.last
     active = np.zeros(len(tissue.fixed), dtype=bool) if last.touched is None else last.touched.active
@@ -182,4 +187,4 @@ def _step(
     if guess is None:
         tissue.state = path.last.state
     rubbing = None if friction is None else _rubbing(tissue, tool_at, last, depth, friction)
-    return settle(tissue, tool, first_set(tissue, tool, active), rubbing)
+    return settle(tissue, tool, first_set(tissue, tool, active), rubbing, is_patient=is_patient)

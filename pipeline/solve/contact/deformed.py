@@ -32,6 +32,9 @@ _LEFT, _CLOSED = 1e-8, 1e-8
 _LEFT_RUBBING = 1e-6
 # Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
 _MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
+# Without patience: the least share of the first increment that may be taken, and the number of iterations after which
+# gaps of active nodes are at most so large, in units of the depth.
+_WHOLE, _SOON, _NEARLY_CLOSED = 0.5, 10, 1e-3
 # A set that is solved so often ends the entry of followers, and then changes of many nodes at once.
 _WITHOUT_FOLLOWERS, _ONE_BY_ONE = 2, 3
 
@@ -117,10 +120,13 @@ def first_set(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> BoolArray:
     return tool.complete(active | through)
 
 
-def settle(tissue: Tissue, tool: PlacedTool, active: BoolArray, rubbing: Rubbing | None = None) -> Touched:
+def settle(
+    tissue: Tissue, tool: PlacedTool, active: BoolArray, rubbing: Rubbing | None = None, *, is_patient: bool = True
+) -> Touched:
     """Find equilibrium and contact from the tissue's state and an initial ``active`` set (n); collective.
 
-    Without ``rubbing`` there is no friction.
+    Without ``rubbing`` there is no friction. Without patience, the loop ends where smaller load steps need fewer
+    iterations.
 
     Raises:
         LargeError: if the loop does not converge.
@@ -146,6 +152,8 @@ def settle(tissue: Tissue, tool: PlacedTool, active: BoolArray, rubbing: Rubbing
             raise LargeError("the probe does not touch a single node: use smaller elements below it")
         if is_same and _is_settled(tissue, tool, active, place.gap, forces - exerted, pressed, rub):
             return Touched(active, exerted, place.gap, iteration, pressed, None if rub is None else rub.slide)
+        if not is_patient and iteration >= _SOON and np.abs(place.gap[active]).max() > _NEARLY_CLOSED * tool.depth:
+            raise LargeError(f"no equilibrium is near after {iteration} iterations")
         if not is_same:
             seen[active.tobytes()] += 1
             repeats = max(repeats, seen[active.tobytes()])
@@ -156,7 +164,8 @@ def settle(tissue: Tissue, tool: PlacedTool, active: BoolArray, rubbing: Rubbing
             constraint = rub.constrain(constraint, there, active)
         predicted = np.where(tissue.fixed, 0.0, tissue.linearise(constraint))
         reactions = np.einsum("ni,ni->n", predicted, normal)
-        _advance(tissue)
+        if _advance(tissue) < _WHOLE and iteration == 0 and not is_patient:
+            raise LargeError("the load step turns tissue inside out")
     raise LargeError(f"no equilibrium after {_MOST} iterations")
 
 
@@ -208,15 +217,16 @@ def _is_settled(
     return bool(left <= most * size and is_closed and (rub is None or (rub.is_same and rub.is_sound(active))))
 
 
-def _advance(tissue: Tissue) -> None:
-    """Take the longest step, by halves, that leaves no tissue inside out.
+def _advance(tissue: Tissue) -> float:
+    """Take the longest step, by halves, that leaves no tissue inside out; return it as a share of the whole one.
 
     Raises:
         LargeError: if there is none.
     """
     for halvings in range(_HALVINGS):
-        if tissue.advance(0.5**halvings):
-            return
+        share = 0.5**halvings
+        if tissue.advance(share):
+            return share
     raise LargeError("tissue is turned inside out")
 
 
