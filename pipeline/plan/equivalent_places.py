@@ -50,6 +50,12 @@ class EquivalentPlace:
         x, y, z = (sum(abs(t) * v for t, v in zip(row, values, strict=True) if abs(t) > _SAME) for row in self.rows)
         return x, y, z
 
+    @property
+    def handedness(self) -> float:
+        """The sign of the image of a torque about an axis: −1 for a reflection."""
+        (a, b, c), (d, e, f), (g, h, i) = self.rows
+        return 1.0 if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0 else -1.0
+
 
 def image_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
     """Return a key that all images share, and the matrix (3, 3) from the case to their common frame.

@@ -57,7 +57,7 @@ _PARTS = (
         ("contact_area", "contact_area_error", "contact_radius", "contact_radius_error"),
         of=lambda case: case.probe.is_unilateral,
     ),
-    _Part(("slip_area",), of=lambda case: case.probe.friction > 0),
+    _Part(("slip_area", "friction_force", "torque"), of=lambda case: case.probe.friction > 0),
     _Part(("depth_reached", "force_reached"), of=lambda case: case.material.is_large),
     _Part(("surface_deviation",), of=lambda case: isinstance(case.body, Scanned)),
     _Part((*LARGEST, *_COUNTS)),
@@ -263,7 +263,8 @@ def _imaged(record: Record | None, image: EquivalentPlace | None) -> Record | No
     if course:
         moved = [image.vector(one) for one in zip(*(course[name] for name in "xyz"), strict=True)]
         course |= dict(zip("xyz", zip(*moved, strict=True), strict=True))
-    return replace(record, origin="image", force_vector=vector, force_vector_error=bars, course=course)
+    torque = image.handedness * record.torque
+    return replace(record, origin="image", force_vector=vector, force_vector_error=bars, torque=torque, course=course)
 
 
 def _frame(case: Case) -> Frame | None:

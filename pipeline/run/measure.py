@@ -110,7 +110,8 @@ def _of_contact(contact: Contact | None) -> dict[str, Any]:
     if contact is None:
         return {}
     bars = {"contact_area_error": contact.bar, "contact_radius_error": contact.bar / 2}
-    areas = {"contact_area": contact.area, "slip_area": contact.slip_area}
+    names = ("slip_area", "friction_force", "torque")
+    areas = {"contact_area": contact.area} | {name: getattr(contact, name) for name in names}
     return {**areas, "contact_radius": contact.radius, **bars}
 
 

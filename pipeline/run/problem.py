@@ -21,7 +21,7 @@ from pipeline.shapes.tissue import FIBRE, Tissue
 from pipeline.solve import SolveError
 from pipeline.solve.conditions import Conditions, Front
 from pipeline.solve.contact.active_set import ContactError
-from pipeline.solve.contact.search import Tool
+from pipeline.solve.contact.tool import Tool
 from pipeline.solve.far_field import BodyField, PointForce
 from pipeline.solve.history import Course
 from pipeline.solve.krylov import DIRECT_LIMIT, is_direct
@@ -107,7 +107,14 @@ def tool_of(case: Case) -> Tool:
         return probe.distance(frame.local(points) + np.array([0.0, 0.0, first + depth])).turned(frame.axes)
 
     *_, first = first_touch(case.body, probe, case.frame)
-    return Tool(height, lambda points: probe.ends_at(frame.local(points)[:, :2]), first, probe.friction, distance)
+    return Tool(
+        height,
+        lambda points: probe.ends_at(frame.local(points)[:, :2]),
+        first,
+        probe.friction,
+        distance,
+        frame.point[:2],
+    )
 
 
 def _fronts_of(case: Case) -> tuple[Front | None, Front | None]:

@@ -19,7 +19,8 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.solve.cell_values import CellValues, plain_share
 from pipeline.solve.conditions import Conditions, Front
-from pipeline.solve.contact.search import ContactSearch, Tool
+from pipeline.solve.contact.search import ContactSearch
+from pipeline.solve.contact.tool import Tool
 from pipeline.solve.crack import Advance
 from pipeline.solve.elements import elements_of
 from pipeline.solve.elements.base import Column, Elements, Equilibrium

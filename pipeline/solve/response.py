@@ -35,13 +35,16 @@ _SAME = 1e-9
 class Contact:
     """Unilateral contact: its area (m²), with a relative 95 % bar if requested.
 
-    ``slip_area`` (m²) is the part of it that slides along the tool, NaN without friction. ``sag`` (m) is the
-    displacement of the first touch by loads, ``load_energy`` (J) their strain energy without probe.
+    ``slip_area`` (m²) is the part of it that slides along the tool, ``friction_force`` (N) the sum of the sizes of the
+    tangential forces, and ``torque`` (N m) that of the tissue on the tool about its advance: NaN without friction.
+    ``sag`` (m) is the displacement of the first touch by loads, ``load_energy`` (J) their strain energy without probe.
     """
 
     area: float
     bar: float = nan
     slip_area: float = nan
+    friction_force: float = nan
+    torque: float = nan
     sag: float = nan
     load_energy: float = nan
 
@@ -49,6 +52,16 @@ class Contact:
     def radius(self) -> float:
         """Radius (m) of a disc of the same area."""
         return float(self.area / pi) ** 0.5
+
+    def with_friction(self, share: float, across: FloatArray, torque: float, mirrored: Sequence[int]) -> "Contact":
+        """Return the contact with friction, a ``share`` of whose area slides.
+
+        Tangential forces ``across`` (n, 2 or 3) in N, and the ``torque`` (N m), are those of the part that planes of
+        symmetry, normal to the axes ``mirrored``, bound. A mirror image has the opposite torque.
+        """
+        total = 2.0 ** len(mirrored) * float(np.linalg.norm(across, axis=1).sum())
+        whole_torque = 0.0 if mirrored else torque
+        return replace(self, slip_area=share * self.area, friction_force=total, torque=whole_torque)
 
 
 @dataclass(frozen=True, eq=False)

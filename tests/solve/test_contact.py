@@ -11,8 +11,8 @@ from mpi4py import MPI
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, movement_of, tool_of
 from pipeline.solve.contact.active_set import ContactError
-from pipeline.solve.contact.search import Tool
 from pipeline.solve.contact.surface import CONDITIONS
+from pipeline.solve.contact.tool import Tool
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError

@@ -160,3 +160,36 @@ def test_at_small_depth_the_law_does_not_matter():
         assert found.balance < 1e-6
     assert large("stick").slip_area == 0.0
     assert 0 < large(0.3).slip_area < large(0.3).contact_area
+
+
+def test_the_torque_of_a_blade_that_sticks_is_that_of_the_bonded_one():
+    """Both components of the force across the axis, and the torque about it, from the stiffness of six motions."""
+    square, depth = {"shape": "box", "size": ["16 mm", "16 mm", "8 mm"]}, 0.1e-3
+    blade = {"shape": "blade", "length": "4 mm", "width": "1 mm", "depth": "0.1 mm", "direction": [1, 0.4, 0]}
+    blade |= {"at": ["4 mm", "2 mm"]}
+    mesh = {"fine": "4 mm", "coarse": "4 mm", "rim": "0.8 mm"}
+    sticks = record("stick", blade | {"contact": "unilateral"}, mesh, body=square)
+    bonded = record(0.0, blade | {"contact": "bonded", "motion": "all"}, mesh, body=square)
+    force = -depth * np.array(bonded.stiffness)[:, 2]
+    assert sticks.contact_area == pytest.approx(4e-6, rel=0.02)
+    assert sticks.torque == pytest.approx(force[5], rel=1e-4)
+    assert abs(sticks.torque) > 1e-8
+    assert -np.array(sticks.force_vector) == pytest.approx(force[:3], rel=1e-4)
+
+
+def test_a_ball_beside_a_corner_has_forces_across_its_axis_and_next_to_no_torque():
+    square = {"shape": "box", "size": ["12 mm", "12 mm", "8 mm"]}
+    ball = SPHERE | {"radius": "4 mm", "depth": "0.2 mm", "at": ["3 mm", "1.2 mm"]}
+    found = record(0.3, ball, {"fine": "4 mm", "coarse": "4 mm", "rim": "0.35 mm"}, poisson=0.2, body=square)
+    across, along, _ = found.force_vector
+    assert across > 2 * along > 0
+    assert abs(found.torque) < 0.01 * found.friction_force * found.contact_radius
+
+
+def test_friction_that_slides_is_the_law_times_the_force():
+    """Without slope, the sizes of the tangential forces add up to µ F where all of the contact slides."""
+    slides = record(0.02)
+    assert slides.slip_area == pytest.approx(slides.contact_area)
+    assert slides.friction_force == pytest.approx(0.02 * slides.force, rel=0.05)
+    assert slides.torque == 0.0
+    assert record("stick").friction_force > 0

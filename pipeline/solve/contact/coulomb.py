@@ -19,8 +19,6 @@ from pipeline.arrays import BoolArray, FloatArray, IntArray
 # Nodes change between sticking and sliding beyond this share of the largest friction.
 _SLACK = 1e-6
 _TINY = 1e-300
-# Iterations from which changes of the state of a node count.
-_PATIENCE = 4
 # Largest share of the force on simplified nodes: friction then changes by about as much, half of the bar on it.
 MOST_SIMPLIFIED = 0.1
 # Changes of a node's state after which it is simplified.
@@ -89,15 +87,21 @@ class Slide:
         middle = (1 - share) * self.directions + share * other.directions
         return Slide(other.sliding, other.sizes[:, None] * np.where(self.sliding[:, None], middle, other.directions))
 
-    def following(self, trial: FloatArray, most: FloatArray, active: BoolArray, neighbours: Neighbours) -> "Slide":
+    def following(
+        self, trial: FloatArray, most: FloatArray, active: BoolArray, neighbours: Neighbours, *, single: bool = False
+    ) -> "Slide":
         """Return the next guess, from ``trial`` tractions (n, t) and the largest friction ``most`` (n).
 
-        A node whose trial traction reverses would slide back and forth: it sticks.
+        A node whose trial traction reverses would slide back and forth: it sticks. With ``single``, only the first node
+        of those that change does so: neighbours that change together may do so forever.
         """
         size = np.linalg.norm(trial, axis=1)
         reverses = np.einsum("nt,nt->n", trial, self.trial) < 0
         stays = (size > (1 - _SLACK) * most) & ~reverses
         sliding = np.where(self.sliding, stays, size > (1 + _SLACK) * most) & active
+        if single:
+            changes = (sliding != self.sliding) & active & ~neighbours.is_corner
+            sliding = np.where(changes & (np.cumsum(changes) > 1), self.sliding, sliding)
         sliding = neighbours.majority(sliding, active) & active
         return Slide(sliding, neighbours.mean(trial, sliding))
 
@@ -123,10 +127,8 @@ class Simplified:
         """Mask of the nodes that slide whatever their traction."""
         return np.maximum(self.entered, self.turned) >= _CHANGES
 
-    def counting(self, iteration: int, moves: BoolArray, turns: BoolArray) -> "Simplified":
-        """Return the counts after an ``iteration``; the first ones do not count."""
-        if iteration <= _PATIENCE:
-            return self
+    def counting(self, moves: BoolArray, turns: BoolArray) -> "Simplified":
+        """Return the counts after an iteration in which these nodes (n) change."""
         return Simplified(self.entered + moves, self.turned + turns)
 
     def law(self, friction: float) -> FloatArray:

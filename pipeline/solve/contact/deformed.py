@@ -28,8 +28,8 @@ from pipeline.solve.newton import LargeError
 
 # Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
 _LEFT, _CLOSED = 1e-8, 1e-8
-# The same with friction, whose direction and size follow from one iteration to the next.
-_LEFT_RUBBING = 1e-6
+# With friction: the residual of nodes that slide, whose friction is that of the iteration before, and of all others.
+_LEFT_RUBBING, _LEFT_BESIDE = 1e-4, 1e-7
 # Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
 _MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
 # Without patience: the least share of the first increment that may be taken, and the number of iterations after which
@@ -151,6 +151,7 @@ def settle(
         if is_same and not active.any():
             raise LargeError("the probe does not touch a single node: use smaller elements below it")
         if is_same and _is_settled(tissue, tool, active, place.gap, forces - exerted, pressed, rub):
+            exerted = np.where(active[:, None], forces, 0.0)
             return Touched(active, exerted, place.gap, iteration, pressed, None if rub is None else rub.slide)
         if not is_patient and iteration >= _SOON and np.abs(place.gap[active]).max() > _NEARLY_CLOSED * tool.depth:
             raise LargeError(f"no equilibrium is near after {iteration} iterations")
@@ -211,10 +212,13 @@ def _is_settled(
     pressed: FloatArray,
     rub: Rub | None,
 ) -> bool:
-    left = float(np.hypot(tissue.unbalanced(), np.linalg.norm(free)))
-    size, most = np.linalg.norm(pressed), _LEFT if rub is None else _LEFT_RUBBING
-    is_closed = np.abs(gap[active]).max(initial=0.0) <= _CLOSED * tool.depth
-    return bool(left <= most * size and is_closed and (rub is None or (rub.is_same and rub.is_sound(active))))
+    left, most = tissue.unbalanced(), np.linalg.norm(pressed)
+    if not np.abs(gap[active]).max(initial=0.0) <= _CLOSED * tool.depth:
+        return False
+    if rub is None:
+        return bool(np.hypot(left, np.linalg.norm(free)) <= _LEFT * most)
+    is_close = left <= _LEFT_BESIDE * most and np.linalg.norm(free) <= _LEFT_RUBBING * most
+    return bool(is_close and rub.is_same and rub.is_sound(active))
 
 
 def _advance(tissue: Tissue) -> float:

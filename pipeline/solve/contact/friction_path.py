@@ -80,6 +80,21 @@ class Step:
         return float(np.einsum("nc,nc->", self.moved, self.reactions)) / 2
 
 
+@dataclass(frozen=True)
+class _Course:
+    """The coefficient of ``friction``, and the depth (m) at the end of the path."""
+
+    friction: float
+    deepest: float
+
+    def most_simplified(self, depth: float) -> float:
+        """Return the largest share of the force on simplified nodes at a ``depth`` (m).
+
+        At a smaller depth, where few nodes touch, the share may be larger, since that force is smaller.
+        """
+        return MOST_SIMPLIFIED * self.deepest / depth
+
+
 def press(surface: CondensedSurface, depth: float, friction: float, steps: int = STEPS) -> Step:
     """Return the equilibrium at a ``depth`` (m), reached in ``steps``; infinite ``friction`` sticks.
 
@@ -90,32 +105,32 @@ def press(surface: CondensedSurface, depth: float, friction: float, steps: int =
     nothing = np.zeros(count, dtype=bool)
     free = np.zeros((count, components))
     step = Step(0.0, free, free, nothing, Slide(nothing, free[:, 1:]))
-    iterations = 0
+    iterations, course = 0, _Course(friction, depth)
     for number in (*_BEFORE, *range(1, steps + 1)):
-        step = _reach(surface, step, depth * (number / steps) ** 2, friction, _MOST_HALVINGS)
+        step = _reach(surface, step, depth * (number / steps) ** 2, course, _MOST_HALVINGS)
         iterations += step.iterations
     if not step.active.any():
         raise ContactError("the probe does not touch a single node: use smaller elements below it")
     return replace(step, iterations=iterations)
 
 
-def _reach(surface: CondensedSurface, before: Step, depth: float, friction: float, halvings: int) -> Step:
+def _reach(surface: CondensedSurface, before: Step, depth: float, course: _Course, halvings: int) -> Step:
     """Return the equilibrium at a ``depth`` (m), in one step or in halves of it."""
     try:
-        return _advance(surface, before, depth, friction)
+        return _advance(surface, before, depth, course)
     except Unsettled:
         if not halvings:
             raise
-        halfway = _reach(surface, before, (before.depth + depth) / 2, friction, halvings - 1)
-        return _reach(surface, halfway, depth, friction, halvings - 1)
+        halfway = _reach(surface, before, (before.depth + depth) / 2, course, halvings - 1)
+        return _reach(surface, halfway, depth, course, halvings - 1)
 
 
-def _advance(surface: CondensedSurface, before: Step, depth: float, friction: float) -> Step:
+def _advance(surface: CondensedSurface, before: Step, depth: float, course: _Course) -> Step:
     pressed = depth - surface.heights
     active = before.active
     references = before.moved[:, 1:].copy()
     if active.any():
-        law = np.full(len(surface), friction)
+        law = np.full(len(surface), course.friction)
         _, moved = _solved(surface, pressed, references, law, before)
         gap, closing = surface.heights - before.depth + before.moved[:, 0], before.moved[:, 0] - moved[:, 0]
         closing = closing + depth - before.depth
@@ -127,11 +142,11 @@ def _advance(surface: CondensedSurface, before: Step, depth: float, friction: fl
         active = active | surface.neighbours.enclosed(active) & np.isfinite(pressed)
     if not active.any():
         return replace(before, depth=depth)
-    return _settled(surface, replace(before, depth=depth, active=active), pressed, references, friction)
+    return _settled(surface, replace(before, depth=depth, active=active), pressed, references, course)
 
 
 def _settled(
-    surface: CondensedSurface, guess: Step, pressed: FloatArray, references: FloatArray, friction: float
+    surface: CondensedSurface, guess: Step, pressed: FloatArray, references: FloatArray, course: _Course
 ) -> Step:
     """Return the equilibrium with the tool ``pressed`` (n, m) below the nodes, and slip from ``references`` (n, t, m).
 
@@ -139,21 +154,26 @@ def _settled(
         Unsettled: if states repeat, or too much of the force is on nodes that are simplified.
     """
     step, simple = replace(guess, iterations=0), Simplified.none(len(surface))
+    seen, single = set[bytes](), False
     for iteration in range(1, _MOST_ITERATIONS + 1):
-        law = simple.law(friction)
+        law = simple.law(course.friction)
         step = replace(step, slide=simple.sliding(step.slide, step.active), iterations=iteration)
         reactions, moved = _solved(surface, pressed, references, law, step)
         step = replace(step, reactions=reactions, moved=moved)
-        after = _following(surface, step, pressed, references, law, simple)
+        state = step.active.tobytes() + step.slide.sliding.tobytes()
+        single = single or state in seen
+        after = _following(surface, step, pressed, references, law, simple, single=single)
         moves = after.active != step.active
         turns = (after.slide.sliding != step.slide.sliding) & ~moves
         if not moves.any() and not turns.any() and _is_close(surface, step, after.slide, law, simple):
-            if _share(surface, step, simple) > MOST_SIMPLIFIED:
+            if _share(surface, step, simple) > course.most_simplified(step.depth):
                 break
             return step
         if not after.active.any():
             break
-        simple = simple.counting(iteration, moves, turns)
+        if moves.any() or turns.any():
+            seen.add(state)
+        simple = simple.counting(moves, turns) if single else simple
         step = replace(after, slide=step.slide.towards(after.slide, 0.5 ** (iteration // _SWINGING)))
     raise Unsettled("contact with friction does not settle: use smaller elements below the probe, or less friction")
 
@@ -171,6 +191,8 @@ def _following(
     references: FloatArray,
     law: FloatArray,
     simple: Simplified,
+    *,
+    single: bool,
 ) -> Step:
     """Return the next guess of the states of the nodes, from the solution for the last one."""
     normal, slips = step.reactions[:, 0], step.moved[:, 1:] - references
@@ -179,7 +201,7 @@ def _following(
     active = np.where(step.active, normal > -pull, enters)
     active = active | surface.neighbours.enclosed(active) & np.isfinite(pressed)
     trial = step.reactions[:, 1:] - surface.penalty[:, None] * slips
-    slide = step.slide.following(trial, largest_friction(law, normal), active, surface.neighbours)
+    slide = step.slide.following(trial, largest_friction(law, normal), active, surface.neighbours, single=single)
     return replace(step, active=active, slide=simple.sliding(slide, active))
 
 

@@ -22,6 +22,7 @@ from pipeline.solve.contact.elements import State, Unknowns
 from pipeline.solve.contact.found import FoundContact
 from pipeline.solve.contact.friction_path import STEPS, CondensedSurface, Step, press
 from pipeline.solve.contact.surface import Candidates
+from pipeline.solve.contact.tool import Tool
 from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate, Solver
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
@@ -112,12 +113,13 @@ class SurfaceBody:
 
 @dataclass(frozen=True, eq=False)
 class FrictionalContact(FoundContact):
-    """Contact with friction, beside the frictionless one that was ``found``.
+    """Contact with the friction of a ``tool``, beside the frictionless one that was ``found``.
 
     ``pressed`` is its equilibrium, nodes in the order of the candidates; ``path_bar`` the change of the force from half
     as many load steps, relative. ``smooth`` and ``rubbed`` are the unknowns without and with friction.
     """
 
+    tool: Tool
     pressed: Step
     path_bar: float
     smooth: Unknowns
@@ -135,9 +137,11 @@ class FrictionalContact(FoundContact):
 
     def summary(self, sag: float) -> Contact:
         """Return the area of the whole contact, and the part of it that slides."""
-        weights, step = self.obstacle.candidates.weights, self.pressed
-        contact = super().summary(sag)
-        return replace(contact, slip_area=step.slide.share(weights, step.active) * contact.area)
+        candidates, step = self.obstacle.candidates, self.pressed
+        across = step.reactions[:, 1:]
+        torque = self.tool.torque(candidates.points, across)
+        share = step.slide.share(candidates.weights, step.active)
+        return super().summary(sag).with_friction(share, across, torque, self._plug.body.mirrored)
 
     def response(self, column: Column, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d, with its components across the axis."""
@@ -175,8 +179,10 @@ def with_friction(found: HierarchicalEstimate, path_bar: float, *, added: float)
     return replace(found, relative=found.relative + path_bar + _OF_FRICTION * abs(added))
 
 
-def rub(contact: FoundContact, friction: float, smooth: Unknowns, stack: ExitStack) -> FrictionalContact:
-    """Return the contact with ``friction``, from the one without, whose unknowns are ``smooth``; collective.
+def rub(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: ExitStack) -> FrictionalContact:
+    """Return the contact with the friction of a ``tool``, from the one without, whose unknowns are ``smooth``.
+
+    Collective.
 
     Raises:
         SolveError: if the factorisation fails.
@@ -191,7 +197,7 @@ def rub(contact: FoundContact, friction: float, smooth: Unknowns, stack: ExitSta
     while True:
         nodes = np.flatnonzero(_around(candidates, touched) & reachable)
         surface = _condensed(body, obstacle, nodes, is_free)
-        steps = [press(surface, obstacle.depth, friction, count) for count in (STEPS, STEPS // 2)]
+        steps = [press(surface, obstacle.depth, tool.friction, count) for count in (STEPS, STEPS // 2)]
         pressed, coarse = (_of_all(candidates, nodes, step) for step in steps)
         moved, rubbed = body.moved(pressed.reactions)
         through = (-obstacle.bounds - moved[:, 0] > SLACK * obstacle.depth) & ~pressed.active & reachable
@@ -202,7 +208,7 @@ def rub(contact: FoundContact, friction: float, smooth: Unknowns, stack: ExitSta
     path_bar = abs(coarse.force / pressed.force - 1)
     known = {name: getattr(contact, name) for name in ("sweep", "obstacle", "found", "loaded", "obstacle_above")}
     return FrictionalContact(
-        **known, pressed=replace(pressed, moved=moved), path_bar=path_bar, smooth=smooth, rubbed=rubbed
+        **known, tool=tool, pressed=replace(pressed, moved=moved), path_bar=path_bar, smooth=smooth, rubbed=rubbed
     )
 
 

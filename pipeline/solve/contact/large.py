@@ -7,23 +7,24 @@ The error bar comes from one degree more, from the same state on and with contac
 larger part of the error.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
 
-from pipeline.arrays import BoolArray, FloatArray
+from pipeline.arrays import BoolArray
 from pipeline.solve.balance import check_balance
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import ContactError, Obstacle
 from pipeline.solve.contact.contact_steps import ContactPath, Stage, press
-from pipeline.solve.contact.deformed import Distance, PlacedTool, Touched, first_set, settle
+from pipeline.solve.contact.deformed import PlacedTool, Touched, first_set, settle
 from pipeline.solve.contact.elements import State
 from pipeline.solve.contact.geometry import Area, contact_area
 from pipeline.solve.contact.levels import Surface
 from pipeline.solve.contact.tissue import DeformedBody
+from pipeline.solve.contact.tool import Tool
 from pipeline.solve.elements.base import Column, Elements, Equilibrium, HierarchicalEstimate
 from pipeline.solve.estimate import AT_EDGE_LARGE, found_again_bar
 from pipeline.solve.movement import Movement
@@ -40,15 +41,9 @@ _SMALL, _WORK = 1e-4, 1e-5
 class LargeContact:
     """Contact of a tool with a hyperelastic body of one ``law``; a load path continues to ever larger depths."""
 
-    def __init__(
-        self,
-        surface: Surface,
-        elements: Elements,
-        distance: Callable[[FloatArray, float], Distance],
-        law: MaterialLaw,
-    ):
-        """Prepare; ``distance`` is that of points to the tool at a depth."""
-        self._surface, self._elements, self._distance, self._law = surface, elements, distance, law
+    def __init__(self, surface: Surface, elements: Elements, tool: Tool, law: MaterialLaw):
+        """Prepare."""
+        self._surface, self._elements, self._tool, self._law = surface, elements, tool, law
         self._path = ContactPath(Stage(0.0, np.zeros(elements.unknowns)))
 
     def can_reach(self, asked: Request) -> bool:
@@ -70,13 +65,13 @@ class LargeContact:
         (depth,) = asked.movement.amounts
         body = DeformedBody(self._elements, self._surface, self._law, asked.method, stack)
         try:
-            iterations = press(body, lambda there: placed_tool(body, self._distance, there), self._path, depth)
+            iterations = press(body, lambda there: placed_tool(body, self._tool, there), self._path, depth)
         except LargeError as error:
             raise stopped(body, self._path, depth, error) from error
         touched = self._path.last.touched
         assert touched is not None
         body.state = self._path.last.state
-        return LargeTouch(self._surface, body, self._distance, touched, depth), iterations
+        return LargeTouch(self._surface, body, self._tool, touched, depth), iterations
 
 
 def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError) -> LargeError:
@@ -91,7 +86,7 @@ def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError
     return LargeError(message, (last.depth, force) if last.depth else None)
 
 
-def placed_tool(body: DeformedBody, distance: Callable[[FloatArray, float], Distance], depth: float) -> PlacedTool:
+def placed_tool(body: DeformedBody, tool: Tool, depth: float) -> PlacedTool:
     """Return the tool at a ``depth`` (m) above the candidates of a body."""
     candidates, on_support = body.candidates, body.fixed.all(axis=1)
     # In degree 2 a pressure has no forces at corners, whose own reactions are noise; in degree 3 they have some.
@@ -100,7 +95,7 @@ def placed_tool(body: DeformedBody, distance: Callable[[FloatArray, float], Dist
     def complete(active: BoolArray) -> BoolArray:
         return np.asarray((active & ~followers | candidates.enclosed(active) & followers) & ~on_support)
 
-    return PlacedTool(lambda points: distance(points, depth), complete, followers, depth)
+    return PlacedTool(lambda points: tool.distance(points, depth), complete, followers, depth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +104,7 @@ class LargeTouch:
 
     surface: Surface
     body: DeformedBody
-    distance: Callable[[FloatArray, float], Distance]
+    tool: Tool
     touched: Touched
     depth: float
 
@@ -137,10 +132,13 @@ class LargeTouch:
 
     def summary(self) -> Contact:
         """Return the area of the whole contact, and the part of it that slides if there is friction."""
-        area, touched = self.whole_area, self.touched
+        contact, touched, body = Contact(self.whole_area), self.touched, self.body
         if touched.slide is None:
-            return Contact(area)
-        return Contact(area, slip_area=touched.slide.share(self.body.candidates.weights, touched.active) * area)
+            return contact
+        places, share = body.positions(), touched.slide.share(body.candidates.weights, touched.active)
+        across = touched.forces - touched.pressed[:, None] * self.tool.distance(places, self.depth).normal
+        torque = self.tool.torque(places, touched.forces)
+        return contact.with_friction(share, across, torque, body.elements.body.mirrored)
 
     def check(self) -> None:
         """Check the work, and that contact ends within the candidates.
@@ -203,7 +201,7 @@ class LargeTouch:
         body = DeformedBody(finer, self.surface, self.body.law, self.body.method, stack)
         self.body.show()
         body.interpolate(coarse)
-        tool = placed_tool(body, self.distance, self.depth)
+        tool = placed_tool(body, self.tool, self.depth)
         active = self.body.candidates.raised(self.touched.active, body.candidates)
         try:
             if not body.is_sound:

@@ -4,7 +4,7 @@ Contact without friction is found first; it gives the error bar of the mesh. The
 with friction, and again in half as many: the change of the force is the bar of the steps.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 
@@ -13,15 +13,13 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.solve.contact.contact_steps import ContactPath, Friction, Stage, rub
 from pipeline.solve.contact.coulomb import Neighbours
-from pipeline.solve.contact.deformed import Distance
 from pipeline.solve.contact.frictional import with_friction
 from pipeline.solve.contact.large import LargeContact, LargeTouch, placed_tool, stopped
-from pipeline.solve.contact.levels import Surface
 from pipeline.solve.contact.tissue import DeformedBody
-from pipeline.solve.elements.base import Column, Elements, Equilibrium, HierarchicalEstimate
+from pipeline.solve.elements.base import Column, Equilibrium, HierarchicalEstimate
 from pipeline.solve.movement import Movement
 from pipeline.solve.newton import LargeError
-from pipeline.solve.physics import MaterialLaw, of_regions
+from pipeline.solve.physics import of_regions
 from pipeline.solve.solution import Request
 
 # Load steps: enough for a bar of some tenths of a per cent where tissue sticks.
@@ -29,19 +27,7 @@ _STEPS = 8
 
 
 class RubbingContact(LargeContact):
-    """Contact with a coefficient of ``friction``, infinite for tissue that sticks; each depth has a path of its own."""
-
-    def __init__(
-        self,
-        surface: Surface,
-        elements: Elements,
-        distance: Callable[[FloatArray, float], Distance],
-        law: MaterialLaw,
-        friction: float,
-    ):
-        """Prepare; ``distance`` is that of points to the tool at a depth."""
-        super().__init__(surface, elements, distance, law)
-        self._friction = friction
+    """Contact with a tool that has friction; each depth has a path of its own."""
 
     def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
         """Find equilibrium and contact at the depth of the movement; the ``stack`` frees what is made; collective.
@@ -52,12 +38,12 @@ class RubbingContact(LargeContact):
         """
         smooth, iterations = self.find(asked, stack)
         body, depth, state = smooth.body, smooth.depth, smooth.body.state
-        friction, touched = friction_of(body, self._friction, depth), []
+        friction, touched = friction_of(body, self._tool.friction, depth), []
         for steps in (_STEPS // 2, _STEPS):
             path = ContactPath(Stage(0.0, np.zeros_like(state)))
             try:
                 iterations += rub(
-                    body, lambda there: placed_tool(body, self._distance, there), path, depth, friction, steps
+                    body, lambda there: placed_tool(body, self._tool, there), path, depth, friction, steps
                 )
             except LargeError as error:
                 raise stopped(body, path, depth, error) from error
@@ -66,7 +52,7 @@ class RubbingContact(LargeContact):
         body.state = path.last.state
         coarse, fine = touched
         path_bar = abs(float(coarse.forces[:, 2].sum() / fine.forces[:, 2].sum()) - 1)
-        found = RubbingTouch(self._surface, body, self._distance, fine, depth, smooth, state, path_bar)
+        found = RubbingTouch(self._surface, body, self._tool, fine, depth, smooth, state, path_bar)
         return found.equilibrium(asked.movement, iterations, stack)
 
 

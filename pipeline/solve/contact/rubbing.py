@@ -14,8 +14,8 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.contact.constraint import Constraint
 from pipeline.solve.contact.coulomb import Neighbours, Simplified, Slide, largest_friction
 
-# Iterations after which changes of the direction of slip are halved, again and again.
-_SWINGING = 8
+# Iterations from which a change of the directions of slip is halved if it is not this much smaller than the one before.
+_SWINGING, _CONTRACTS = 4, 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +44,8 @@ class Rub:
     def __init__(self, rubbing: Rubbing):
         self._with, self.slide, self.normal = rubbing, rubbing.slide, rubbing.normal
         self._simple = Simplified.none(len(rubbing.normal))
+        self._share, self._swing = 1.0, np.inf
+        self._seen, self._single = set[bytes](), False
         self.is_same = False
 
     def follow(self, iteration: int, place: "Placed", predicted: FloatArray, before: BoolArray, now: BoolArray) -> None:
@@ -53,12 +55,26 @@ class Rub:
         across = predicted - self.normal[:, None] * place.normal
         trial = across - rubbing.penalty[:, None] * place.slips(rubbing.references)
         most = largest_friction(law, self.normal)
-        after = self._simple.sliding(self.slide.following(trial, most, now, rubbing.neighbours), now)
+        state = before.tobytes() + self.slide.sliding.tobytes()
+        self._single = self._single or state in self._seen
+        following = self.slide.following(trial, most, now, rubbing.neighbours, single=self._single)
+        after = self._simple.sliding(following, now)
         moves = before != now
         turns = (after.sliding != self.slide.sliding) & ~moves
-        self._simple = self._simple.counting(iteration, moves, turns)
+        if moves.any() or turns.any():
+            self._seen.add(state)
+        self._simple = self._simple.counting(moves, turns) if self._single else self._simple
         self.is_same = not turns.any()
-        self.slide = self.slide.towards(after, 0.5 ** (iteration // _SWINGING))
+        self.slide = self._towards(after, iteration)
+
+    def _towards(self, after: Slide, iteration: int) -> Slide:
+        """Return the next state, with smaller changes of directions where these swing to and fro."""
+        both = self.slide.sliding & after.sliding
+        swing = float(np.linalg.norm((after.directions - self.slide.directions)[both]))
+        if iteration > _SWINGING and swing > _CONTRACTS * self._swing:
+            self._share /= 2
+        self._swing = swing
+        return self.slide.towards(after, self._share)
 
     def is_sound(self, active: BoolArray) -> bool:
         """Return whether nodes whose state was simplified carry little of the force."""

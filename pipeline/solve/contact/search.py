@@ -7,19 +7,18 @@ Loads deform the surface before the probe touches it. The depth counts from the 
 along the axis.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import nan
 
 import numpy as np
 
-from pipeline.arrays import BoolArray, FloatArray
+from pipeline.arrays import BoolArray
 from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance
 from pipeline.solve.contact.active_set import ContactError, Found, Obstacle, find_set
 from pipeline.solve.contact.condensed import CondensedElements, suits
-from pipeline.solve.contact.deformed import Distance
 from pipeline.solve.contact.elements import ContactElements, FarShare, FreeResponse
 from pipeline.solve.contact.found import FoundContact
 from pipeline.solve.contact.frictional import rub
@@ -29,6 +28,7 @@ from pipeline.solve.contact.large_friction import RubbingContact
 from pipeline.solve.contact.levels import Numbering, Surface
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.sweep import Sweep
+from pipeline.solve.contact.tool import Tool
 from pipeline.solve.elements.base import Column, Elements, Equilibrium, close_far
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
@@ -42,24 +42,6 @@ _LOOSE = 1e-3
 _STRICTER = 0.01
 # Largest λ/μ for the first active set (ν = 0.3), so that elements of degree 1 do not lock.
 _FIRST_RATIO = 1.5
-
-
-@dataclass(frozen=True)
-class Tool:
-    """A probe's surface, pressed in along -z.
-
-    ``height`` gives the initial height of the probe above points (n, 3) of the undeformed surface (m), infinite where
-    there is no probe. ``ends_at`` is a mask of points (n, 3) on the edge of the candidates: true where the probe itself
-    ends. Elsewhere contact must not reach that edge. ``first`` (m) is the smallest height; None if the probe touches on
-    its axis first. ``friction`` is Coulomb's coefficient, infinite for tissue that sticks. ``distance`` is that of
-    points (n, 3) to the probe pressed in by a depth (m) from the first touch, for contact at large displacements.
-    """
-
-    height: Callable[[FloatArray], FloatArray]
-    ends_at: Callable[[FloatArray], BoolArray]
-    first: float = 0.0
-    friction: float = 0.0
-    distance: Callable[[FloatArray, float], Distance] | None = None
 
 
 class ContactSearch:
@@ -121,7 +103,7 @@ class ContactSearch:
             obstacle_above=lambda: self._obstacle(self._surface.of(self._elements.degree + 1), depth, loaded),
         )
         if self._tool.friction:
-            self.contact = contact = rub(contact, self._tool.friction, unknowns, stack)
+            self.contact = contact = rub(contact, self._tool, unknowns, stack)
             self._elements.put(columns[0], contact.rubbed, depth)
             found = replace(found, sets=found.sets + contact.pressed.iterations)
         response = contact.response(columns[0], movement)
@@ -134,10 +116,9 @@ class ContactSearch:
 
     def _solve_large(self, asked: Request, stack: ExitStack) -> Equilibrium:
         """Find contact at large displacements: see :class:`LargeContact`."""
-        assert self._tool.distance is not None
         if self._large is None or not (self._reuse and self._large.can_reach(asked)):
-            tool, parts = self._tool, (self._surface, self._elements, self._tool.distance, asked.law)
-            self._large = RubbingContact(*parts, tool.friction) if tool.friction else LargeContact(*parts)
+            kind = RubbingContact if self._tool.friction else LargeContact
+            self._large = kind(self._surface, self._elements, self._tool, asked.law)
         return self._large.solve(asked, stack)
 
     # ---- far field ------------------------------------------------------------------------------------
