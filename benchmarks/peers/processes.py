@@ -32,7 +32,7 @@ def ask(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
         subprocess.Popen(
             command,
             cwd=ROOT,
-            env=_environment(job),
+            env=_environment(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=errors,
@@ -50,7 +50,7 @@ def ask(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
             raise RuntimeError(f"{program} ended with status {process.returncode}: {errors.read()[-2000:]}")
 
 
-def _environment(job: dict[str, Any]) -> dict[str, str]:
+def _environment() -> dict[str, str]:
     """Restrict every library to one thread; ranks and NGSolve's tasks are set separately."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}

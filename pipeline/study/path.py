@@ -183,7 +183,7 @@ def read_path(raw: Any, where: str, problems: Problems) -> Way | None:
         if count > _MOST:
             problems.error(f"{where}.{form}", None, f"has {count} places: at most {_MOST} are allowed")
             return None
-    way = _way_of(path, form)
+    way = _way_of(path)
     _check(way, raw[form], f"{where}.{form}", problems)
     return None if len(problems.errors) > before else way
 
@@ -215,7 +215,7 @@ def _report(item: Any, raw: Mapping[str, Any], where: str, problems: Problems) -
             problems.error(where, found, allowed(item, model))
 
 
-def _way_of(path: Path, form: str) -> Way:
+def _way_of(path: Path) -> Way:
     if path.raster is not None:
         x, y = (_spread(v.start, v.to, v.steps) if isinstance(v, Range) else v for v in (path.raster.x, path.raster.y))
         return Way(tuple(product(x, y)), (("x", x), ("y", y)), path.off)

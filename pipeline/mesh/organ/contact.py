@@ -24,8 +24,6 @@ Lift = Callable[[FloatArray], FloatArray]
 # Radius of the remeshed patch, in units of the footprint's, if facets are small; smaller ones are tried where a fold
 # is close.
 _COLLARS = (1.25, 1.1, 1.0)
-# A corner of an outline turns by more than this (cosine).
-_CORNER = 0.9
 # Points along a round outline, per element.
 _FOLLOW = 8
 _FOLDED = "the surface is folded around the contact and cannot be projected into the probe's plane"
