@@ -222,7 +222,7 @@ class HyperelasticBody:
                 norm, is_there = residual.norm(), not self._space.comm.allreduce(bool(todo.any()), op=MPI.LOR)
                 if is_there and norm <= left * scale:
                     return iteration
-                ksp.setTolerances(rtol=_share(norm / before, left * scale / norm) if is_there else _ROUGH)
+                ksp.setTolerances(rtol=forcing(norm / before, left * scale / norm) if is_there else _ROUGH)
                 before = norm if is_there else inf
                 self._newton_step(ksp, state, residual, todo, step)
                 stored = self._advance(state, stored, residual, step, there, is_there=is_there)
@@ -318,7 +318,7 @@ class HyperelasticBody:
         self.iterations += ksp.its
 
 
-def _share(gained: float, needed: float) -> float:
+def forcing(gained: float, needed: float = 0.0) -> float:
     """Return the tolerance of a linear solve, from the last gain of the residual and the gain ``needed`` to the end.
 
     The square of the last gain is what a step of Newton's method can gain (S. C. Eisenstat and H. F. Walker, SIAM J.
