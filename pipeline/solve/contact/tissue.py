@@ -14,7 +14,6 @@ from pipeline.solve.contact.levels import Numbering, Surface
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.turned_tangent import FactorisedTangent, IteratedTangent, TurnedTangent
 from pipeline.solve.elements.base import Elements
-from pipeline.solve.elements.mixed import MixedElements
 from pipeline.solve.newton import HyperelasticBody
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
@@ -136,10 +135,7 @@ class DeformedBody:
     def interpolate(self, coarse: Elements) -> None:
         """Set the state to the fields of the forms of ``coarse``."""
         self.elements.interpolate(coarse)
-        fields = [self._space.forms.displacement.x.array[: self._space.owned]]
-        if isinstance(self.elements, MixedElements):
-            fields.append(self.elements.pressures.values)
-        self.state = np.concatenate(fields)
+        self.state = self.elements.values
 
     # ---- the linear system ------------------------------------------------------------------------------
 
