@@ -81,8 +81,7 @@ class LoadPath:
 
     def can_reach(self, law: MaterialLaw, movement: Movement, applied: Applied | None) -> bool:
         """Return whether this path can be continued to the movement under this law and these loads."""
-        own, other = (None if load is None else load.forces for load in (self.applied, applied))
-        is_same = other is None if own is None else other is not None and np.array_equal(own, other)
+        is_same = applied is None if self.applied is None else self.applied.is_same(applied)
         return is_same and (self.law, (self.motion,)) == (law, movement.motions) and self.reached <= movement.amounts[0]
 
 

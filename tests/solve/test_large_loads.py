@@ -136,3 +136,54 @@ def test_ranks_agree():
             solution = problem.solve(law_of(case), movement_of(case), estimate=True)
             found.append([solution.reaction[2], solution.load_force[2], solution.load_response.sag])
     assert found[0] == pytest.approx(found[1], rel=1e-6)
+
+
+BALL = {"shape": "sphere", "radius": "4 mm", "depth": "2 mm"}
+COARSE = {"rim": "1 mm", "fine": "4 mm", "coarse": "6 mm", "growth": 1.5}
+
+
+@pytest.mark.parametrize("element", ["displacement", pytest.param("mixed", marks=pytest.mark.nightly)])
+def test_a_ball_meets_the_sagged_surface(element):
+    """Its force and energy change in proportion to the load; the sag is that of linear tissue for a small load."""
+    scene = {"probe": BALL, "mesh": COARSE | {"element": element}}
+    alone, small, larger = one(**scene), one(load=gravity(1.0), **scene), one(load=gravity(2.0), **scene)
+    assert abs(small.force / alone.force - 1) < 1e-3
+    for name in ("force", "energy"):
+        changes = [getattr(record, name) / getattr(alone, name) - 1 for record in (small, larger)]
+        assert changes[1] / changes[0] == pytest.approx(2.0, rel=0.05)
+    assert larger.sag / small.sag == pytest.approx(2.0, rel=0.01)
+    assert (small.load_force, small.status) == (0.0, "ok")
+    linear = one(material=TISSUE | {"law": "linear"}, load=gravity(1.0), **scene)
+    assert small.sag == pytest.approx(linear.sag, rel=3e-3)
+    assert small.load_energy == pytest.approx(linear.load_energy, rel=3e-3)
+
+
+def test_a_shallow_ball_under_loads_is_that_on_linear_tissue():
+    scene = {"probe": BALL | {"depth": "0.02 mm"}, "mesh": COARSE | {"rim": "0.25 mm"}, "load": gravity(9.81)}
+    linear = one(material=TISSUE | {"law": "linear"}, **scene)
+    assert one(**scene).force == pytest.approx(linear.force, rel=3e-3)
+
+
+@pytest.mark.nightly
+def test_a_finer_mesh_of_a_ball_under_a_pull_beside_it_is_within_the_bar():
+    pull = {"traction": [PULL["traction"][0] | {"on": CAP | {"around": ["12 mm", "0 mm", "0 mm"]}}]}
+    coarse, fine = (one(load=pull, probe=BALL, mesh=COARSE | {"rim": rim}) for rim in ("1 mm", "0.6 mm"))
+    assert abs(fine.force / coarse.force - 1) < coarse.force_error
+
+
+@pytest.mark.nightly
+def test_force_under_loads_is_the_derivative_of_the_energy():
+    probe = BALL | {"depth_range": ["1.98 mm", "2.02 mm"]}
+    deep, deeper = (one(load=gravity(9.81), probe=probe | {"depth": f"{d} mm"}, mesh=COARSE) for d in (1.98, 2.02))
+    assert (deeper.energy - deep.energy) / 0.04e-3 == pytest.approx((deep.force + deeper.force) / 2, rel=1e-3)
+
+
+@pytest.mark.mpi
+def test_ranks_agree_on_contact_under_loads():
+    found = []
+    for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        (case,) = study(material=TISSUE, probe=BALL, mesh=COARSE, load=gravity(9.81)).cases()
+        with Spaces(mesh_case(case, ("x", "y"), comm)) as spaces, problem_of(spaces, case) as problem:
+            solution = problem.solve(law_of(case), movement_of(case))
+            found.append([solution.reaction[2], solution.contact.sag])
+    assert found[0] == pytest.approx(found[1], rel=1e-6)
