@@ -17,7 +17,7 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.solve.balance import check_balance
 from pipeline.solve.compiled import global_sum
-from pipeline.solve.contact.surface import CONDITIONS
+from pipeline.solve.conditions import WITHOUT_FOOTPRINT
 from pipeline.solve.elements import elements_of
 from pipeline.solve.elements.base import Elements
 from pipeline.solve.loads import Applied
@@ -65,7 +65,7 @@ def load_in_steps(body: HyperelasticBody, applied: Applied, state: PETSc.Vec) ->
 def without_tool(elements: Elements) -> Iterator[Elements]:
     """Lend the elements of the same mesh, degree and kind on which no tool acts; collective."""
     with Spaces(elements.body) as spaces, ExitStack() as stack:
-        found = elements_of(spaces, elements.degree, CONDITIONS, elements.element)
+        found = elements_of(spaces, elements.degree, WITHOUT_FOOTPRINT, elements.element)
         stack.callback(found.close)
         yield found
 

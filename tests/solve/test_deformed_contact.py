@@ -6,10 +6,10 @@ from mpi4py import MPI
 
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, movement_of, tool_of
+from pipeline.solve.conditions import WITHOUT_FOOTPRINT
 from pipeline.solve.contact import contact_steps
 from pipeline.solve.contact.deformed import settle
 from pipeline.solve.contact.large import LargeTouch
-from pipeline.solve.contact.surface import CONDITIONS
 from pipeline.solve.contact.turned import turned_frames
 from pipeline.solve.newton import LargeError
 from pipeline.solve.quasi_static import QuasiStaticProblem
@@ -25,7 +25,7 @@ def touched(depth, model=("x", "y"), base=SPHERE, **changes):
     """Return a solution, and its contact."""
     (case,) = study(**{"material": TISSUE, "probe": base | {"depth": depth}, "mesh": COARSE} | changes).cases()
     with Spaces(mesh_case(case, model, MPI.COMM_SELF)) as spaces:
-        problem = QuasiStaticProblem(spaces, 2, CONDITIONS, case.element, tool=tool_of(case))
+        problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.element, tool=tool_of(case))
         found = {}
         check = LargeTouch.check
 
@@ -131,7 +131,7 @@ def test_ranks_and_solvers_agree(element):
     for comm, method in ((MPI.COMM_WORLD, "auto"), (MPI.COMM_SELF, "auto"), (MPI.COMM_SELF, "direct")):
         (case,) = study(material=TISSUE, probe=SPHERE, mesh=COARSE | {"element": element}).cases()
         with Spaces(mesh_case(case, ("x", "y"), comm)) as spaces:
-            problem = QuasiStaticProblem(spaces, 2, CONDITIONS, element, tool=tool_of(case))
+            problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, element, tool=tool_of(case))
             forces.append(problem.solve(law_of(case), movement_of(case), method=method).reaction[2])
     assert forces[0] == pytest.approx(forces[1], rel=1e-7)
     assert forces[2] == pytest.approx(forces[1], rel=1e-7)

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from pipeline.run.loads import loads_of
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, movement_of, problem_of
-from pipeline.solve.contact.surface import CONDITIONS
+from pipeline.solve.conditions import WITHOUT_FOOTPRINT
 from pipeline.solve.dead_loads import sag
 from pipeline.solve.elements import elements_of
 from pipeline.solve.physics import MaterialLaw
@@ -36,7 +36,7 @@ def free(young: float, load):
     """Return places and displacements of a box of neo-Hookean tissue with λ = 0, without its tool at a side."""
     case = study(material=TISSUE, load=load, mesh={"degree": 1}, probe={"at": ["20 mm", "0 mm", "-10 mm"]}).case(())
     with Spaces(mesh_case(case, (), MPI.COMM_SELF)) as spaces:
-        elements = elements_of(spaces, 2, CONDITIONS)
+        elements = elements_of(spaces, 2, WITHOUT_FOOTPRINT)
         sag(elements, MaterialLaw.of_moduli(young, 0.0, "neo-hookean"), loads_of(case))
         in_body = np.eye(3) if case.frame.turn is None else case.frame.turn
         return (values.reshape(-1, 3) @ in_body for values in (elements.displacements.places, elements.values))
