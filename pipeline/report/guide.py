@@ -1,7 +1,9 @@
 """The guideline: which mesh settings keep F near F_exact over all scenes of a study, and at what cost.
 
 The error of a setting is the worst over the scenes of |F/F_exact - 1|, to which the error bars of F and of F_exact are
-added. A setting that lacks a case is not judged; scenes that no setting can be judged on are left out, and named.
+added. A setting that lacks a case is not judged; scenes that no setting can be judged on are left out, and named. A
+dataset without F_exact, such as one at large displacements, is judged by F_max, without error bars: F and F_max have
+the same elements at the tool.
 """
 
 from collections import Counter

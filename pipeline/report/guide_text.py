@@ -6,9 +6,10 @@ import pandas as pd
 
 from pipeline.printable import counted
 from pipeline.quantities import symbol, write
+from pipeline.report.by_scene import OfOutside, Part
 from pipeline.report.guideline import Guideline
 from pipeline.report.laws import Law
-from pipeline.report.table import Labels
+from pipeline.report.table import EXACT, Labels
 from pipeline.report.verdict import Verdict
 from pipeline.report.words import choices
 
@@ -17,9 +18,9 @@ _MOST_NAMED = 4
 
 
 def text(guide: Guideline, *, verbose: bool = False) -> str:
-    """Return title, answer, worst case, cost and mesh; ``verbose`` adds corrections and every value of outside."""
+    """Return title, answer, worst case, cost, mesh, and ε by depth and law; ``verbose`` adds corrections and others."""
     lines = [guide.title, answer(guide), *(f"{name}: {words}" for name, words in details(guide))]
-    lines += gaps(guide)[:1]
+    lines += gaps(guide)[:1] + by_scene(guide)
     if not verbose:
         return "\n".join(lines)
     table = of_each_outside(guide)
@@ -42,14 +43,19 @@ def answer(guide: Guideline) -> str:
     if not isfinite(guide.accuracy):
         return (
             f"{_named(guide, chosen)} is the most accurate setting within {time(guide.budget)} a case: F is within "
-            f"{percent(chosen.error)} of F_exact{_all(guide.scenes)}, error bars included."
+            f"{percent(chosen.error)} of {guide.reference}{_all(guide.scenes)}, {_bars(guide)}."
         )
     smallest = "the smallest ε" if "epsilon" in chosen.labels else "the cheapest setting"
     allowed = " and ".join([percent(guide.accuracy), *([time(guide.budget)] if isfinite(guide.budget) else [])])
     return (
-        f"{_named(guide, chosen)} is {smallest} that suffices: F is within {percent(chosen.error)} of F_exact"
-        f"{_all(guide.scenes)}, error bars included ({allowed} allowed).{_untried(guide, chosen)}"
+        f"{_named(guide, chosen)} is {smallest} that suffices: F is within {percent(chosen.error)} of {guide.reference}"
+        f"{_all(guide.scenes)}, {_bars(guide)} ({allowed} allowed).{_untried(guide, chosen)}"
     )
+
+
+def _bars(guide: Guideline) -> str:
+    """Say what is done with error bars: F and F_max have the same elements at the tool, with the same error."""
+    return "error bars included" if guide.reference == EXACT else "without the elements' error, which F_max shares"
 
 
 def _untried(guide: Guideline, chosen: Verdict) -> str:
@@ -59,7 +65,7 @@ def _untried(guide: Guideline, chosen: Verdict) -> str:
 
 
 def _no_answer(guide: Guideline) -> str:
-    limits = [f"keeps F within {percent(guide.accuracy)} of F_exact{_all(guide.scenes)}"]
+    limits = [f"keeps F within {percent(guide.accuracy)} of {guide.reference}{_all(guide.scenes)}"]
     limits = limits if isfinite(guide.accuracy) else []
     limits += [f"takes at most {time(guide.budget)} a case"] if isfinite(guide.budget) else []
     none = f"No mesh setting {' and '.join(limits)}"
@@ -72,10 +78,13 @@ def _no_answer(guide: Guideline) -> str:
     best = guide.best
     if best.error <= guide.accuracy:
         return f"{none}. {_named(guide, best)} is within {percent(best.error)}, but by chance: a larger ε is not."
+    found = f"{none}. Best: {_named(guide, best)}, within {percent(best.error)}"
+    if guide.reference != EXACT:
+        return f"{found}, {_bars(guide)}."
     parts = {"distance of F from F_exact": best.distance, "error bar of F": best.force_bar}
     parts |= {"error bar of F_exact": best.exact_bar}
     total = " + ".join(f"{percent(part)} {name}" for name, part in parts.items())
-    found = f"{none}. Best: {_named(guide, best)}, within {percent(best.error)} ({total})."
+    found = f"{found} ({total})."
     alone = best.force_bar <= guide.accuracy
     return f"{found} The error bar of F alone is within {percent(guide.accuracy)}." if alone else found
 
@@ -87,10 +96,11 @@ def details(guide: Guideline) -> list[tuple[str, str]]:
         return []
     where = f", at {choices(guide.coordinates, verdict.limit)}" if verdict.limit else ""
     own = verdict.exact / verdict.force  # from a share of F_exact to one of F
-    bars = (f" ± {percent(own * bar)}" if isfinite(bar) else "" for bar in (verdict.force_bar, verdict.exact_bar))
+    known = guide.reference == EXACT
+    bars = (f" ± {percent(own * bar)}" if known else "" for bar in (verdict.force_bar, verdict.exact_bar))
     force, exact = (f"{newton(f)}{bar}" for f, bar in zip((verdict.force, verdict.exact), bars, strict=True))
     return [
-        ("Worst case", f"F = {force}, F_exact = {exact}{where}"),
+        ("Worst case", f"F = {force}, {guide.reference} = {exact}{where}"),
         ("Cost", f"{cost(verdict)}, on {guide.timing}{' (times are doubtful)' if guide.doubts else ''}"),
         ("Mesh", elements(guide, verdict.mesh)),
     ]
@@ -128,12 +138,12 @@ def others(guide: Guideline) -> list[str]:
     corrected = guide.corrected or guide.best_corrected
     if corrected is None:
         why = "needs more than one scene" if guide.scenes == 1 else "does not help: no setting suffices with it"
-        lines.append(f"Correction F_exact ≈ F / r: {why}.")
+        lines.append(f"Correction {guide.reference} ≈ F / r: {why}.")
     else:
         law = corrected.correction
         best = "" if guide.corrected else "no setting suffices with it; best: "
         off = f"within {percent(law.error)} in scenes that r was not fitted to"
-        lines.append(f"Correction F_exact ≈ F / r: {best}{_named(guide, corrected)}, r = {law.r:.4g}, {off}.")
+        lines.append(f"Correction {guide.reference} ≈ F / r: {best}{_named(guide, corrected)}, r = {law.r:.4g}, {off}.")
     return [*lines, _for_other_tools(guide)]
 
 
@@ -148,6 +158,40 @@ def _for_other_tools(guide: Guideline) -> str:
     found = f"{best}{_named(guide, chosen)}, {law.formula}, {constants(law)}"
     off = f"within {percent(law.error)} for tools that it was not fitted to"
     return f"Correction for other tools on the same tissue: {found}, {off}. Fitted to: {'; '.join(guide.tools)}."
+
+
+def by_scene(guide: Guideline) -> list[str]:
+    """Return the smallest ε at each depth and for each law, a line each; nothing if it is the same at all."""
+    if len(guide.parts) < 2:
+        return []
+    rows = [_by_scene_row(guide, part) for part in guide.parts]
+    table = pd.DataFrame(rows).to_string(index=False).splitlines()
+    return [f"Smallest ε for F within {percent(guide.accuracy)} of {guide.reference}:", *table]
+
+
+def _by_scene_row(guide: Guideline, part: Part) -> dict[str, str]:
+    where = {symbol(name): _range(guide, name, part) for name in part.where}
+    return where | {one.outside or "ε": _smallest(guide, one) for one in part.answers}
+
+
+def _range(guide: Guideline, name: str, part: Part) -> str:
+    """Return the labels of a part: "all" of a parameter, or the first and the last of numbers."""
+    labels = part.where[name]
+    everything = {label for other in guide.parts for label in other.where[name]}
+    if len(labels) > 1 and len(labels) == len(everything):
+        return "all"
+    words = [write(name, label) for label in labels]
+    return f"{words[0]} to {words[-1]}" if len(words) > 1 and name == "depth" else ", ".join(words)
+
+
+def _smallest(guide: Guideline, one: OfOutside) -> str:
+    """Return the smallest ε; where none suffices, F over F_max with the largest one."""
+    if isfinite(one.epsilon):
+        return write("epsilon", one.epsilon)
+    if one.widest is None:
+        return "full order" if one.answer else "none"
+    spread, share = one.widest.spread, "F_max" if guide.has_full else guide.reference
+    return f"none: {spread.least:.2f} to {spread.most:.2f} {share} at {write('epsilon', one.widest.mesh['epsilon'])}"
 
 
 def of_each_outside(guide: Guideline) -> pd.DataFrame:

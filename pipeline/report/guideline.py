@@ -11,6 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipeline.printable import counted
+from pipeline.report.by_scene import Part, parts
 from pipeline.report.laws import Laws
 from pipeline.report.sinking import tools
 from pipeline.report.table import Table
@@ -19,7 +20,7 @@ from pipeline.report.verdict import Verdict, choose, judge, keeps, most_accurate
 
 # Settings that are chosen from the verdicts.
 _CHOSEN = ("answer", "corrected", "best", "best_corrected", "carried", "best_carried", "lean")
-_NOT_PLAIN = {*_CHOSEN, "verdicts", "has_full", "coordinates"}
+_NOT_PLAIN = {*_CHOSEN, "verdicts", "has_full", "coordinates", "parts"}
 # Parts of a verdict that are no number or text.
 _APART = ("labels", "mesh", "spread", "correction", "laws", "laws_of_full")
 
@@ -32,11 +33,12 @@ class Guideline:
     the budget; None if there is none. ``lean`` has the fewest unknowns of those that keep the accuracy. ``left_out``
     counts the cases of the scenes ``lost`` to every setting, by reason, ``unjudged`` those that keep settings from
     being judged, ``no_law`` the scenes in which no law adds compliances. ``tools`` are those that laws were fitted to.
+    ``reference`` names what F is compared with; ``parts`` are the answers by depth and law.
     """
 
     def __init__(self, dataset: xr.Dataset, table: Table, accuracy: float, budget: float):
         self.title, self.coordinates = str(dataset.attrs.get("title", "")), dataset.coords
-        self.accuracy, self.budget = accuracy, budget
+        self.accuracy, self.budget, self.reference = accuracy, budget, table.reference
         self.timing, self.doubts = _timing(dataset), doubts(dataset)
         self.axes = {name: len(np.unique(labels)) for name, labels in table.axes.items()}
         self.scenes = int((~table.lost).sum())
@@ -53,6 +55,7 @@ class Guideline:
         self.carried = choose(verdicts, accuracy, budget, "tools")
         self.best_carried = most_accurate(verdicts, budget, "tools")
         keeping = [verdict for verdict in verdicts if self.keeps(verdict)]
+        self.parts = parts(table, accuracy, budget)
         self.lean = min(keeping, key=lambda v: v.dofs, default=None) if isfinite(accuracy) else None
 
     def keeps(self, verdict: Verdict) -> bool:
@@ -74,6 +77,7 @@ class Guideline:
                 name: {"answer": rows.get(id(plain)), "corrected": rows.get(id(law))}
                 for name, (plain, law) in self.of_each_outside().items()
             },
+            "by_scene": [_part(part) for part in self.parts],
         }
 
     def of_each_outside(self) -> dict[str, tuple[Verdict | None, Verdict | None]]:
@@ -102,6 +106,20 @@ class Guideline:
             "laws": _laws(verdict.laws),
             "laws_of_full": _laws(verdict.laws_of_full),
         }
+
+
+def _part(part: Part) -> dict[str, Any]:
+    """Return the answers of a part as plain data: ε (m) by outside, infinite where only the full order suffices."""
+    widest = {one.outside or "epsilon": one.widest for one in part.answers}
+    return {
+        **part.where,
+        "epsilon": {one.outside or "epsilon": one.epsilon for one in part.answers},
+        "widest": {
+            name: {"epsilon": v.mesh["epsilon"], "ratio_min": v.spread.least, "ratio_max": v.spread.most}
+            for name, v in widest.items()
+            if v
+        },
+    }
 
 
 def _laws(laws: Laws) -> dict[str, Any]:

@@ -20,6 +20,9 @@ from pipeline.study.read import read_text
 from pipeline.study.sweep import Study
 
 Labels = dict[str, Any]
+# What F is compared with, by its name: the variable of the dataset.
+EXACT, MAX = "F_exact", "F_max"
+_VARIABLES = {EXACT: "force_exact", MAX: "force_max"}
 
 
 class DatasetError(Exception):
@@ -30,11 +33,13 @@ class DatasetError(Exception):
 class Table:
     """Mesh settings (rows) against scenes (columns); all arrays have that shape, NaN where ``why`` is not empty.
 
-    ``ratio`` is F/F_exact and ``bar`` what the error bars of both add to its distance from 1, ``force_bar`` and
-    ``exact_bar`` are those relative bars; ``share`` is F/F_max; ``seconds`` what a case costs alone, ``dofs`` and
-    ``cells`` those of the whole body.
+    ``reference`` names the force that F is compared with, ``exact``: "F_exact", or "F_max" of a dataset without it.
+    ``ratio`` is F over it and ``bar`` what the error bars of both add to its distance from 1, ``force_bar`` and
+    ``exact_bar`` are those relative bars, 0 beside F_max, which has the same elements; ``share`` is F/F_max;
+    ``seconds`` what a case costs alone, ``dofs`` and ``cells`` those of the whole body.
     """
 
+    reference: str
     settings: tuple[Labels, ...]
     scenes: tuple[Labels, ...]
     axes: dict[str, np.ndarray]  # scene axis: the position of each scene's label
@@ -75,14 +80,10 @@ def arrange(dataset: xr.Dataset) -> Table:
     """Return the table of ``dataset``.
 
     Raises:
-        DatasetError: if it holds no F_exact.
+        DatasetError: if it holds neither F_exact nor F_max.
     """
     dataset = elastic(dataset)
-    if "force_exact" not in dataset or not bool(np.isfinite(dataset["force_exact"]).any()):
-        raise DatasetError(
-            "the dataset holds no F_exact, against which a guide compares each mesh: "
-            "run its study with `exact = true` in [solve]"
-        )
+    reference = _reference(dataset)
     dims = [str(dim) for dim in dataset["force"].dims]
     rows, columns = [d for d in dims if d in MESH_DIMENSIONS], [d for d in dims if d not in MESH_DIMENSIONS]
     settings, scenes = _labels(dataset, rows), _labels(dataset, columns)
@@ -96,10 +97,13 @@ def arrange(dataset: xr.Dataset) -> Table:
         values = by_case(dataset, name).transpose(*rows, *columns).values
         return np.asarray(values.reshape(len(settings), len(scenes))[keep])
 
-    why = _reasons(matrix("status"), matrix("message"), matrix("force_bar"), matrix("force_exact"))
+    exact = matrix(_VARIABLES[reference])
+    why = _reasons(matrix("status"), matrix("message"), matrix("force_bar"), exact, reference)
     blank = np.where(why == "", 0.0, np.nan)
-    force, exact = matrix("force") + blank, matrix("force_exact") + blank
-    force_bar, exact_bar = matrix("force_bar") + blank, matrix("exact_bar") + blank
+    force, exact = matrix("force") + blank, exact + blank
+    force_bar, exact_bar = (
+        blank + (matrix(name) if reference == EXACT else 0.0) for name in ("force_bar", "exact_bar")
+    )
     counts = np.indices([dataset.sizes[d] for d in columns]).reshape(len(columns), len(scenes))
     study = study_of(dataset)
     cases = tuple(case_at(dataset, study, labels, "mesh") for labels in scenes)
@@ -107,6 +111,7 @@ def arrange(dataset: xr.Dataset) -> Table:
         {axis.name for axis in study.axes if axis.section == "probe" and axis.name in columns} if study else set()
     )
     return Table(
+        reference=reference,
         settings=tuple(settings[i] for i in keep),
         scenes=tuple(scenes),
         axes=dict(zip(columns, counts, strict=True)),
@@ -174,11 +179,22 @@ def _distinct(settings: list[Labels]) -> list[int]:
     return keep
 
 
-def _reasons(status: np.ndarray, message: np.ndarray, bar: np.ndarray, exact: np.ndarray) -> np.ndarray:
+def _reference(dataset: xr.Dataset) -> str:
+    """Return the first force that is known of those which F may be compared with."""
+    for name, variable in _VARIABLES.items():
+        if variable in dataset and bool(np.isfinite(dataset[variable]).any()):
+            return name
+    raise DatasetError(
+        "the dataset holds no F_exact, against which a guide compares each mesh: "
+        'run its study with `exact = true` in [solve], or with "full" in epsilon, for F_max'
+    )
+
+
+def _reasons(status: np.ndarray, message: np.ndarray, bar: np.ndarray, exact: np.ndarray, reference: str) -> np.ndarray:
     """Return, cell by cell, why a case cannot be judged; "" if it can."""
     why = np.full(status.shape, "", dtype=object)
     told = np.where(message == "", "", ": " + message.astype(object))
-    why[~np.isfinite(exact)] = "F_exact is not known"
+    why[~np.isfinite(exact)] = f"{reference} is not known"
     why[~(bar >= 0)] = ("no error bar" + told)[~(bar >= 0)]
     for state in (one for one in STATES if one != OK):
         text = "not yet run" if state == PENDING else state

@@ -187,7 +187,7 @@ class Indenter(Probe):
         return self.footprint.half_width - self.edge_band[1]
 
     def check(self, problems: Problems) -> None:
-        """Report a depth outside the mesh's range, and warn about large strains."""
+        """Report a depth outside the range of the mesh."""
         least, largest = self.depths
         if least > largest:
             problems.error("probe.depth_range", _texts(self.depths), "must begin with the smaller depth")
@@ -198,6 +198,11 @@ class Indenter(Probe):
                 f"is outside depth_range, {in_mm(least)} to {in_mm(largest)}, "
                 "for which the mesh is made: widen it, or leave it out for one mesh per depth",
             )
+
+    def warn_of_strains(self, problems: Problems) -> None:
+        """Warn of strains that are large for linear elasticity: of the slope of the tool at the edge of contact."""
+        if self.contact_width >= self.footprint.half_width:  # an error of its own
+            return
         slope = float(self.section.slope(np.array([self.contact_width]))[0])
         if slope > _STEEPEST and not self.section.flat:
             problems.warn(

@@ -121,8 +121,7 @@ class LoadResponse:
 
     ``form`` (n + 1, n + 1) of twice the potential energy (J), for n motions and the loads last, contains K, g and
     -a(w, w). ``forces`` (3) is the force of the tissue on the probe (N) from residuals. ``decrements`` is what one
-    degree more removes from the form, ``bars`` the 95 % bars on its entries. ``stored`` (J) and ``sag`` (m) are
-    strain energy and sag of a nonlinear law; for a linear one they follow from the form.
+    degree more removes from the form, ``bars`` the 95 % bars on its entries.
     """
 
     movement: Movement
@@ -130,13 +129,11 @@ class LoadResponse:
     forces: FloatArray
     decrements: FloatArray | None = None
     bars: FloatArray | None = None
-    stored: float | None = None
-    sag: float | None = None
 
     @property
     def energy(self) -> float:
         """Strain energy (J) of the loads with the probe fixed."""
-        return float(-self.form[-1, -1]) / 2 if self.stored is None else self.stored
+        return float(-self.form[-1, -1]) / 2
 
     @property
     def force(self) -> Vector:

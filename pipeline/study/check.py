@@ -113,8 +113,11 @@ def _placed(
 
 
 def _check_depth(probe: Probe, problems: Problems) -> None:
-    """Warn of depths at which strains at the edge of a flat tool are large. Other tools check their own depths."""
-    if isinstance(probe, Indenter) or probe.half_width <= 0:  # a slit that leaves nothing of a blade says so itself
+    """Warn of depths at which strains at the edge of a tool are large for linear elasticity."""
+    if isinstance(probe, Indenter):
+        probe.warn_of_strains(problems)
+        return
+    if probe.half_width <= 0:  # a slit that leaves nothing of a blade says so itself
         return
     proportional = "F stays proportional to depth" if probe.proportional_to else "strains are assumed small"
     if probe.deepest > _LINEAR * probe.half_width:

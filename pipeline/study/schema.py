@@ -41,8 +41,8 @@ class Material(Tissue):
         Literal[tuple(LAWS)],  # type: ignore[valid-type]
         Words(
             "Law of the material. linear: linear elasticity. All others are for large displacements, and agree with "
-            "linear elasticity at small depths. They need a bonded tool that presses, and Poisson's ratios from 0.2 "
-            "to 0.5.",
+            "linear elasticity at small depths. Contact is bonded, or found at the deformed place. Poisson's ratios "
+            "are 0.2 to 0.5.",
             '["linear", "neo-hookean"]',
         ),
     ] = "linear"

@@ -58,7 +58,7 @@ def test_corrections_are_for_those_who_ask(results):
     ],
 )
 def test_bad_input_ends_with_2(results, arguments, message):
-    write(dataset(exact=lambda case: False), results / "old.nc")
+    write(dataset(TEXT.replace(', "full"', ""), exact=lambda case: False), results / "old.nc")
     done = call(results / arguments[0], *arguments[1:])
     assert done.exit_code == 2
     assert message in done.stderr

@@ -112,6 +112,8 @@ def test_tools_that_make_no_sense_are_refused(probe, words):
                                                (CONE | {"angle": "60 deg"}, True)], ids=str)  # fmt: skip
 def test_steep_tools_are_warned_of(probe, warned):
     assert any("slope" in warning for warning in study(probe=probe).warnings) == warned
+    large = study(probe=probe, material={"law": "neo-hookean"})
+    assert not any("slope" in warning for warning in large.warnings)
 
 
 @pytest.mark.parametrize("outside", ["coarse", "free"])

@@ -165,10 +165,10 @@ class Linearised(ABC):
         """Return the elements of one degree more."""
 
     @abstractmethod
-    def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, FloatArray | None, int]:
-        """Return r_i·K⁻¹·r_j (n, n), J, of n residuals in the elements of one degree more.
+    def decrements(self, residuals: Sequence[Fields]) -> tuple[float, float | None, int]:
+        """Return the decrement (J) from two residuals in these elements: of a solution, and of its rate.
 
-        In mixed elements N of each (n), J, follows, otherwise None; the last number are the iterations.
+        In mixed elements it is followed by N (J), otherwise by None; the last number are the iterations.
         """
 
 
@@ -346,11 +346,6 @@ class Elements(ABC):
     def set_fields(self, fields: Fields) -> None:
         """Copy ``fields`` to the fields of the forms."""
         self.displacements.set_displacement(fields[0])
-
-    @property
-    def values(self) -> FloatArray:
-        """The forms' fields as one vector of owned dofs."""
-        return np.array(self.displacements.forms.displacement.x.array[: self.displacements.owned])
 
     def interpolate(self, coarse: "Elements") -> None:
         """Interpolate the forms' fields of ``coarse`` to those of these elements."""
