@@ -5,12 +5,14 @@
 
 Scenes are those of :mod:`benchmarks.deep_scenes`: tools on cylinders and boxes, some layered, of five laws, with ν from
 0.3 to 0.5. Each line of the output has the force, the change of one degree more, the bar, and the force of the finer
-mesh.
+mesh. With friction, that mesh has degree 2, and twice as many load steps.
 """
 
 import json
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -25,6 +27,7 @@ from pipeline.plan.symmetry import mirror_planes
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, movement_of, tool_of
 from pipeline.solve import SolveError
+from pipeline.solve.contact.large_friction import RubbingContact
 from pipeline.solve.contact.surface import CONDITIONS
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
@@ -34,8 +37,9 @@ from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
 
 SEED, COUNT = 11, 60
-# Elements of the finer mesh, relative to those of the case, and their largest size.
+# Elements of the finer mesh, relative to those of the case, and their largest size, without and with friction.
 _FINER, _FINEST = 0.55, 0.3
+_FINER_RUBBING, _FINEST_RUBBING = 0.45, 0.22
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,25 @@ class Trial:
     def error(self) -> float:
         """The relative error."""
         return abs(self.truth / self.force - 1)
+
+
+@contextmanager
+def more_steps() -> Iterator[None]:
+    """Take twice as many load steps with friction."""
+    usual = RubbingContact.STEPS
+    RubbingContact.STEPS = 2 * usual
+    try:
+        yield
+    finally:
+        RubbingContact.STEPS = usual
+
+
+def truth_of(scene: Scene) -> float:
+    """Return the force (N) on a finer mesh."""
+    if "friction" not in scene.sections["probe"]:
+        return solved(scene, min(_FINER, _FINEST / scene.rim), 3, estimate=False).reaction[2]
+    with more_steps():
+        return solved(scene, min(_FINER_RUBBING, _FINEST_RUBBING / scene.rim), 2, estimate=False).reaction[2]
 
 
 def solved(scene: Scene, finer: float, degree: int, *, estimate: bool) -> Solution:
@@ -89,7 +112,7 @@ def trial(scene: Scene, degree: int) -> Trial:
         assert coarse.contact is not None
         force, bar = coarse.reaction[2], coarse.bar
         share, area_bar = 0.8 * coarse.decrement, coarse.contact.bar - bar
-        truth = solved(scene, min(_FINER, _FINEST / scene.rim), 3, estimate=False).reaction[2]
+        truth = truth_of(scene)
     except SolveError as error:
         message = str(error)
     name = f"{scene.name} rim {scene.rim:g} degree {degree}"

@@ -1,4 +1,5 @@
-"""Random scenes of contact at large displacements, by family: round tools, tools with edges, regions, and fibres.
+"""Random scenes of contact at large displacements, by family: round tools, also with friction, tools with edges,
+regions, and fibres.
 
 Lengths are in units of the tool's radius, 4 mm. The two sets have bodies and tools of other proportions: factors are
 read off one, and judged on the other.
@@ -17,7 +18,8 @@ LAWS: dict[str, dict[str, Any]] = {
     "ogden": {"terms": [{"share": 0.7, "alpha": 2.0}, {"share": 0.3, "alpha": 7.0}]},
     "veronda-westmann": {"alpha": 1.2},
 }
-FAMILIES = ("round", "edges", "regions", "fibres")
+FAMILIES = ("round", "edges", "regions", "fibres", "friction")
+FRICTIONS: tuple[float | str, ...] = (0.2, 0.3, 0.5, 1.0, "stick")
 _POISSON = (0.3, 0.4, 0.45, 0.48, 0.495, 0.5)
 # Ranges of each set: depth, height and radius of the body, in radii of the tool; size of elements at the edge of
 # contact, in half widths of contact, or in radii of the rounding of a flat tool.
@@ -63,6 +65,9 @@ def thrown(dice: Dice, ranges: Ranges, family: str) -> Scene:
         body["layer"], added = [skin], " skin"
     elif family == "regions":
         body["inclusion"], added = [_inclusion(dice, height)], " inclusion"
+    if family == "friction":
+        probe["friction"] = FRICTIONS[dice.one_of(range(len(FRICTIONS)))]
+        added += f" µ {probe['friction']}"
     name = f"{probe['shape']} {law} ν {poisson:g} d/R {depth:.2f} h/R {height:.1f}{added}"
     sections = {"body": body | {"fixed": "bottom"}, "material": material, "probe": probe}
     return Scene(name, sections, dice.between(*ranges["rim"], 2), unit)

@@ -175,15 +175,22 @@ def found_again_bar(share: float, area_bar: float, at_edge: float = _FOUND_AT_ED
 
 
 def extrapolate_found(
-    stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, *, graded: bool = True, elsewhere: bool = False
+    stiffness: FloatArray,
+    decrements: FloatArray,
+    bars: FloatArray,
+    *,
+    graded: bool = True,
+    elsewhere: bool = False,
+    friction: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the limit of F / d (1, 1) of unilateral contact, and its bar: F_2 is about half a bar too large.
 
     ``graded`` says that the mesh is graded to the expected edge of contact, ``elsewhere`` that F has errors from other
-    places, too.
+    places, too. ``friction`` is the part of the relative bar that degrees do not reduce.
     """
-    spread = _FOUND_SPREAD_ELSEWHERE if elsewhere else _FOUND_SPREAD
-    return stiffness - _FOUND / 2 * decrements, (spread if graded else _FOUND_SPREAD_COARSE) * bars
+    spread = (_FOUND_SPREAD_ELSEWHERE if elsewhere else _FOUND_SPREAD) if graded else _FOUND_SPREAD_COARSE
+    left = friction * np.abs(stiffness)
+    return stiffness - _FOUND / 2 * decrements, spread * (bars - left) + left
 
 
 def _theta(degree: int) -> float:

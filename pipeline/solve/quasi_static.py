@@ -186,7 +186,7 @@ class QuasiStaticProblem(Problem):
         )
         return replace(
             solution,
-            contact=found.contact and replace(found.contact, bar=finer.area_bar),
+            contact=found.contact and replace(found.contact, bar=finer.area_bar, friction_bar=finer.friction_bar),
             plain=plain,
             unseen=None if unseen is None else unseen[: len(movement.motions)],
             front=front,

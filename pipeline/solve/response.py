@@ -37,7 +37,8 @@ class Contact:
 
     ``slip_area`` (m²) is the part of it that slides along the tool, ``friction_force`` (N) the sum of the sizes of the
     tangential forces, and ``torque`` (N m) that of the tissue on the tool about its advance: NaN without friction.
-    ``sag`` (m) is the displacement of the first touch by loads, ``load_energy`` (J) their strain energy without probe.
+    ``friction_bar`` is the relative bar on what friction adds to the force. ``sag`` (m) is the displacement of the
+    first touch by loads, ``load_energy`` (J) their strain energy without probe.
     """
 
     area: float
@@ -45,6 +46,7 @@ class Contact:
     slip_area: float = nan
     friction_force: float = nan
     torque: float = nan
+    friction_bar: float = 0.0
     sag: float = nan
     load_energy: float = nan
 

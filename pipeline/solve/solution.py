@@ -179,7 +179,12 @@ class Solution:
             return self  # found contact at large displacements has no known limit: F and its bar stay
         if self.contact is not None:
             stiffness, bars = extrapolate_found(
-                self.stiffness, self.decrements, self.bars, graded=graded, elsewhere=elsewhere
+                self.stiffness,
+                self.decrements,
+                self.bars,
+                graded=graded,
+                elsewhere=elsewhere,
+                friction=self.contact.friction_bar,
             )
             return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
         stiffness, bars = extrapolate(

@@ -176,7 +176,8 @@ def with_friction(found: HierarchicalEstimate, path_bar: float, *, added: float)
     ``path_bar`` is that of the load steps; both are shares of the force.
     """
     assert found.relative is not None
-    return replace(found, relative=found.relative + path_bar + _OF_FRICTION * abs(added))
+    of_friction = path_bar + _OF_FRICTION * abs(added)
+    return replace(found, relative=found.relative + of_friction, friction_bar=of_friction)
 
 
 def rub(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: ExitStack) -> FrictionalContact:

@@ -7,6 +7,7 @@ with friction, and again in half as many: the change of the force is the bar of 
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -22,12 +23,14 @@ from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import of_regions
 from pipeline.solve.solution import Request
 
-# Load steps: enough for a bar of some tenths of a per cent where tissue sticks.
-_STEPS = 8
-
 
 class RubbingContact(LargeContact):
-    """Contact with a tool that has friction; each depth has a path of its own."""
+    """Contact with a tool that has friction; each depth has a path of its own.
+
+    ``STEPS`` is the number of load steps: enough for a bar of some tenths of a per cent where tissue sticks.
+    """
+
+    STEPS: ClassVar[int] = 8
 
     def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
         """Find equilibrium and contact at the depth of the movement; the ``stack`` frees what is made; collective.
@@ -39,7 +42,7 @@ class RubbingContact(LargeContact):
         smooth, iterations = self.find(asked, stack)
         body, depth, state = smooth.body, smooth.depth, smooth.body.state
         friction, touched = friction_of(body, self._tool.friction, depth), []
-        for steps in (_STEPS // 2, _STEPS):
+        for steps in (self.STEPS // 2, self.STEPS):
             path = ContactPath(Stage(0.0, np.zeros_like(state)))
             try:
                 iterations += rub(

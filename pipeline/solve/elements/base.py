@@ -67,6 +67,7 @@ class HierarchicalEstimate:
     ``columns`` are the solutions in ``elements`` of that degree, if requested. ``decrements`` (n, n), J, is the
     reduction of the energies, None if the columns give it. ``unseen`` (n), J, are N of mixed elements. ``relative`` (n)
     are 95 % bars, None if they follow from both. ``area_bar`` is that on the area of unilateral contact.
+    ``friction_bar`` is the part of ``relative`` for what friction adds to the force, which is not from the next degree.
     """
 
     elements: "Elements"
@@ -76,6 +77,7 @@ class HierarchicalEstimate:
     unseen: FloatArray | None = None
     relative: FloatArray | None = None
     area_bar: float = nan
+    friction_bar: float = 0.0
 
 
 class HierarchicalEstimator(Protocol):

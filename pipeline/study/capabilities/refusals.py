@@ -105,7 +105,6 @@ REFUSALS: tuple[Refusal, ...] = (
         'a frictionless blade slides without force: use contact = "bonded"',
     ),
     Refusal("friction", "half ball", f"the far field is known only for forces along the tool's axis: {_COARSE}"),
-    Refusal("friction", "accuracy", "meshes for an accuracy are chosen without friction: omit one of the two"),
     Refusal("friction", "bent surface", "the path of the tissue under loads is not known: omit [load], or friction"),
     Refusal(
         "friction",
