@@ -20,6 +20,8 @@ from pipeline.solve.spaces import ElasticSpace
 
 # Largest relative imbalance of forces of a solution that counts as solved.
 BALANCE_LIMIT = 1e-6
+# The same of the work of forces in a small change of the displacement, and the change of the energy.
+_WORK_LIMIT = 1e-5
 # Relative energy norm of the solver's error. F is quadratic in this error: it errs by at most 1e-9 up to ν = 0.49, and
 # by 1e-11 as a rule (docs/solvers.md).
 TOLERANCE = 1e-6
@@ -49,6 +51,27 @@ def check_balance(balance: float, error: type[SolveError] = SolveError, why: str
     """
     if isnan(balance) or balance > BALANCE_LIMIT:
         raise error(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}{why}")
+
+
+def check_work(
+    work: float,
+    energies: tuple[float, float],
+    change: float,
+    error: type[SolveError] = SolveError,
+    rounding: float = 0.0,
+) -> None:
+    """Check that forces are the derivative of the energy along the displacement, in which they do a ``work`` (J).
+
+    ``energies`` (J) are those of the displacement times 1 + ``change`` and 1 - ``change``, ``rounding`` (J) is the
+    error of their difference.
+
+    Raises:
+        SolveError: if they are not; raised as ``error``.
+    """
+    expected = 2 * change * work
+    wrong = abs((energies[0] - energies[1]) / expected - 1)
+    if not wrong <= _WORK_LIMIT + rounding / expected:
+        raise error(f"the force is not the derivative of the energy: they differ by {wrong:.1e}")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from math import nan
 import numpy as np
 
 from pipeline.arrays import BoolArray
-from pipeline.solve.balance import check_balance
+from pipeline.solve.balance import check_balance, check_work
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import ContactError, Obstacle
 from pipeline.solve.contact.contact_steps import ContactPath, Stage, press
@@ -34,8 +34,8 @@ from pipeline.solve.response import Contact, Response, reaction
 from pipeline.solve.solution import Request
 from pipeline.stages import stage
 
-# Change of the displacement for the check of the work, and the largest relative difference of work and energy.
-_SMALL, _WORK = 1e-4, 1e-5
+# Relative change of the displacement for the check of the work.
+_SMALL = 1e-4
 
 
 class LargeContact:
@@ -160,9 +160,7 @@ class LargeTouch:
             body.state = (1 + change) * state
             energies.append(body.energy)
         body.state = state
-        wrong = abs((energies[0] - energies[1]) / (2 * _SMALL * work) - 1)
-        if not wrong <= _WORK:
-            raise LargeError(f"the force is not the derivative of the energy: they differ by {wrong:.1e}")
+        check_work(work, (energies[0], energies[1]), _SMALL, LargeError)
 
     def response(self, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d."""
