@@ -26,7 +26,8 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.compiled import assemble, global_sum
-from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate, Linearised, Products, Solver
+from pipeline.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Products, Solver
+from pipeline.solve.elements.fields import Column
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.newton import LEFT, HyperelasticBody, LargeError
 from pipeline.solve.physics import MaterialLaw

@@ -18,7 +18,8 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import assemble
-from pipeline.solve.elements.base import Elements, Fields
+from pipeline.solve.elements.base import Elements
+from pipeline.solve.elements.fields import Fields
 from pipeline.solve.elements.tangent import Prestress, Tangent
 from pipeline.solve.kernels.tangent import TangentCells
 from pipeline.solve.krylov import INDEFINITE, explain, solver_of

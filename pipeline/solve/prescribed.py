@@ -15,7 +15,8 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.solve.balance import MOST_ROUNDS, check_balance, rest, sums
 from pipeline.solve.compiled import global_sum
-from pipeline.solve.elements.base import Column, Elements, Equilibrium, Products, Solver, close_far
+from pipeline.solve.elements.base import Elements, Equilibrium, Products, Solver
+from pipeline.solve.elements.fields import Column, close_far
 from pipeline.solve.load_steps import LoadPath, LoadSteps
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw

@@ -23,8 +23,9 @@ from pipeline.solve.contact.search import ContactSearch
 from pipeline.solve.contact.tool import Tool
 from pipeline.solve.crack import Advance
 from pipeline.solve.elements import elements_of
-from pipeline.solve.elements.base import Column, Elements, Equilibrium
+from pipeline.solve.elements.base import Elements, Equilibrium
 from pipeline.solve.elements.displacement import DisplacementElements
+from pipeline.solve.elements.fields import Column
 from pipeline.solve.estimate import error_bar, stiffness_bars
 from pipeline.solve.linear_solver import LinearSolver
 from pipeline.solve.load_steps import LoadSteps

@@ -16,7 +16,8 @@ from pipeline.solve.balance import check_balance
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.levels import Hierarchy, Numbering, Surface, normal_dofs
 from pipeline.solve.contact.surface import Candidates
-from pipeline.solve.elements.base import Column, Elements, Fields, Solver
+from pipeline.solve.elements.base import Elements, Solver
+from pipeline.solve.elements.fields import Column, Fields
 from pipeline.solve.linear_solver import Level
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import FarField

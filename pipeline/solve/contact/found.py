@@ -24,7 +24,8 @@ from pipeline.solve.contact.geometry import Area, contact_area
 from pipeline.solve.contact.levels import HeldOperator, normal_dofs
 from pipeline.solve.contact.surface import CONDITIONS
 from pipeline.solve.contact.sweep import Sweep
-from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate
+from pipeline.solve.elements.base import Elements, HierarchicalEstimate
+from pipeline.solve.elements.fields import Column
 from pipeline.solve.elements.mixed import MixedSolver
 from pipeline.solve.estimate import error_bar, found_again_bar, found_bar
 from pipeline.solve.hierarchical_estimate import energy_decrements

@@ -23,7 +23,8 @@ from pipeline.solve.contact.found import FoundContact
 from pipeline.solve.contact.friction_path import STEPS, CondensedSurface, Step, press
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.tool import Tool
-from pipeline.solve.elements.base import Column, Elements, HierarchicalEstimate, Solver
+from pipeline.solve.elements.base import Elements, HierarchicalEstimate, Solver
+from pipeline.solve.elements.fields import Column
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Contact, Response, reaction

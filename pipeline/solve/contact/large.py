@@ -25,7 +25,8 @@ from pipeline.solve.contact.geometry import Area, contact_area
 from pipeline.solve.contact.levels import Surface
 from pipeline.solve.contact.tissue import DeformedBody
 from pipeline.solve.contact.tool import Tool
-from pipeline.solve.elements.base import Column, Elements, Equilibrium, HierarchicalEstimate
+from pipeline.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
+from pipeline.solve.elements.fields import Column
 from pipeline.solve.estimate import AT_EDGE_LARGE, found_again_bar
 from pipeline.solve.movement import Movement
 from pipeline.solve.newton import LargeError

@@ -17,7 +17,8 @@ from pipeline.solve.contact.coulomb import Neighbours
 from pipeline.solve.contact.frictional import with_friction
 from pipeline.solve.contact.large import LargeContact, LargeTouch, placed_tool, stopped
 from pipeline.solve.contact.tissue import DeformedBody
-from pipeline.solve.elements.base import Column, Equilibrium, HierarchicalEstimate
+from pipeline.solve.elements.base import Equilibrium, HierarchicalEstimate
+from pipeline.solve.elements.fields import Column
 from pipeline.solve.movement import Movement
 from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import of_regions

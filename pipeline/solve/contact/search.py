@@ -29,7 +29,8 @@ from pipeline.solve.contact.levels import Numbering, Surface
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.sweep import Sweep
 from pipeline.solve.contact.tool import Tool
-from pipeline.solve.elements.base import Column, Elements, Equilibrium, close_far
+from pipeline.solve.elements.base import Elements, Equilibrium
+from pipeline.solve.elements.fields import Column, close_far
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.solution import Request

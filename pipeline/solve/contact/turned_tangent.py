@@ -7,6 +7,7 @@ along z: it knows neither the turn of the frames nor the strain, and needs more 
 
 from abc import ABC, abstractmethod
 from contextlib import ExitStack
+from functools import cached_property
 
 import numpy as np
 from petsc4py import PETSc
@@ -32,9 +33,13 @@ _MOST_ITERATIONS = 300
 class TurnedTangent(ABC):
     """The tangent K - Σ λ H of a ``body`` with contact, in the unit of the forms. Methods are collective."""
 
-    def __init__(self, elements: Elements, body: HyperelasticBody, numbering: Numbering, unit: float):
+    def __init__(
+        self, elements: Elements, law: MaterialLaw, body: HyperelasticBody, numbering: Numbering, stack: ExitStack
+    ):
+        """Prepare; what is made is freed with the stack."""
         self._elements, self._space = elements, elements.displacements
-        self._body, self._numbering, self._unit = body, numbering, unit
+        self._law, self._unit, self._stack = law, elements.unit(law), stack
+        self._body, self._numbering = body, numbering
         self._here = numbering.is_owned
         self._dofs = 3 * numbering.local[self._here][:, None] + np.arange(3)
 
@@ -65,17 +70,9 @@ class TurnedTangent(ABC):
 class FactorisedTangent(TurnedTangent):
     """The assembled tangent, factorised at each solve."""
 
-    def __init__(
-        self,
-        elements: Elements,
-        law: MaterialLaw,
-        body: HyperelasticBody,
-        numbering: Numbering,
-        stack: ExitStack,
-    ):
-        """Set up; freed with the stack."""
-        super().__init__(elements, body, numbering, elements.unit(law))
-        self._tangent = AssembledTangent(elements, law, stack)
+    @cached_property
+    def _tangent(self) -> AssembledTangent:
+        return AssembledTangent(self._elements, self._law, self._stack)
 
     def update(self, state: PETSc.Vec, constraint: Constraint) -> None:
         """Assemble the tangent at a state."""
@@ -157,8 +154,7 @@ class IteratedTangent(TurnedTangent):
         Raises:
             SolveError: if the set-up fails.
         """
-        super().__init__(elements, body, numbering, elements.unit(law))
-        self._law, self._stack = law, stack
+        super().__init__(elements, law, body, numbering, stack)
         elastic = elements.elastic(law)
         self._hierarchy = Hierarchy(surface, elements.degree, elastic, stack, direct=False, masks=elements.masks)
         self._solver: Solver | None = None

@@ -9,7 +9,8 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve.compiled import vector
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements.base import Column, Elements, Fields, HierarchicalEstimate, Linearised, Solver, level_of
+from pipeline.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Solver, level_of
+from pipeline.solve.elements.fields import Column, Fields
 from pipeline.solve.elements.tangent import Tangent
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import DIRECT_LIMIT

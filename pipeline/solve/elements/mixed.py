@@ -21,7 +21,8 @@ from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements.base import Column, Elements, Fields, HierarchicalEstimate, Linearised, Solver
+from pipeline.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Solver
+from pipeline.solve.elements.fields import Column, ElementFields, Fields
 from pipeline.solve.elements.pressures import Pressures
 from pipeline.solve.elements.tangent import Tangent
 from pipeline.solve.krylov import keep
@@ -104,13 +105,13 @@ class MixedElements(Elements):
         super().set_fields(fields)
         self.pressures.set(fields[1])
 
-    def interpolate(self, coarse: Elements) -> None:
+    def interpolate(self, coarse: ElementFields) -> None:
         """Interpolate the forms' fields of ``coarse``; displacement elements have no pressure."""
         super().interpolate(coarse)
         if isinstance(coarse, MixedElements):
             self.pressures.forms.pressure.interpolate(coarse.pressures.forms.pressure)
 
-    def start_from(self, coarse: Elements, unknown: Fields, prescribed: FloatArray) -> None:
+    def start_from(self, coarse: ElementFields, unknown: Fields, prescribed: FloatArray) -> None:
         """Interpolate the initial guess from ``coarse``; displacement elements give no pressure."""
         super().start_from(coarse, unknown, prescribed)
         if isinstance(coarse, MixedElements):
