@@ -27,8 +27,8 @@ from pipeline.plan.symmetry import mirror_planes
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, movement_of, tool_of
 from pipeline.solve import SolveError
+from pipeline.solve.conditions import WITHOUT_FOOTPRINT
 from pipeline.solve.contact.large_friction import RubbingContact
-from pipeline.solve.contact.surface import CONDITIONS
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Spaces
@@ -84,7 +84,7 @@ def solved(scene: Scene, finer: float, degree: int, *, estimate: bool) -> Soluti
     """Solve a scene, with elements ``finer`` than its own at the edge of contact by this factor."""
     case = case_of(scene, finer, degree)
     with Spaces(mesh_case(case, mirror_planes(case), MPI.COMM_SELF)) as spaces:
-        problem = QuasiStaticProblem(spaces, degree, CONDITIONS, case.element, tool=tool_of(case))
+        problem = QuasiStaticProblem(spaces, degree, WITHOUT_FOOTPRINT, case.element, tool=tool_of(case))
         return problem.solve(law_of(case), movement_of(case), estimate=estimate)
 
 

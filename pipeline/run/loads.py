@@ -24,7 +24,7 @@ def loads_of(case: Case) -> Loads | None:
     weights: tuple[Vector, ...] = ()
     if any(load.gravity):
         gravity = _turned(turn, load.gravity)
-        densities = [density or 0.0 for density in case.densities]
+        densities = [density or 0.0 for density in case.densities] * (2 if case.is_linear_beyond else 1)
         weights = tuple((rho * gravity[0], rho * gravity[1], rho * gravity[2]) for rho in densities)
     return Loads(weights, tuple(_surface_load(case, traction) for traction in load.traction if traction.acts))
 

@@ -130,8 +130,8 @@ def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:
         "load_force_error": solution.load_force_bar,
         "load_force_vector": turned_back(case.frame.turn, _known_of(case, force)),
         "load_energy": loaded.energy,
-        # At depth d the axial force is k d + load_force; at the sag it is zero.
-        "sag": -force[2] / loaded.stiffness_along(axis),
+        # With a linear law the axial force at depth d is k d + load_force; at the sag it is zero.
+        "sag": loaded.sag if loaded.sag is not None else -force[2] / loaded.stiffness_along(axis),
     }
 
 

@@ -76,3 +76,7 @@ class Conditions:
         if not normal:
             raise SolveError("frictionless contact in a slit needs a slit along x or along y")
         return tuple(normal)
+
+
+# Conditions without a footprint: no tool, or one whose active set alone prescribes displacements.
+WITHOUT_FOOTPRINT = Conditions(bonded=False, unilateral=True)

@@ -3,20 +3,10 @@
 The force is the reaction. It must be the derivative of the stored energy with respect to the depth: its integral over
 the steps is compared with the energy.
 
-The error bar comes from one degree more, as in linear elasticity. With the residual r of the solution u there, and r'
-that of v = ∂u/∂d under the tangent K,
-
-    F_p - F_{p+1} = r'·K⁻¹ r,    of second order in the change that degree p + 1 makes.
-
-(r'·K⁻¹ r' · r·K⁻¹ r)^½ is an upper bound of it that cannot vanish by chance, and is used instead. K is replaced by the
-operator of linear elasticity. At moderate depths this agrees within a few per cent; at larger ones the tangent of one
-degree more is not positive definite at the probe's edge.
-
-In mixed elements, r'·K⁻¹ r itself is used, which may have either sign, and N as in linear elasticity: the root of the
-squared energy norms that the preconditioner sees in r and in r'.
+The error bar comes from one degree more: :mod:`pipeline.solve.large_estimate`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from math import inf, prod
@@ -25,20 +15,23 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.compiled import assemble, global_sum
+from pipeline.solve.compiled import global_sum
+from pipeline.solve.dead_loads import HeldTool, hold_tool
 from pipeline.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Products, Solver
-from pipeline.solve.elements.fields import Column
+from pipeline.solve.elements.fields import Column, Fields
+from pipeline.solve.large_estimate import Decrements, FinerResiduals, subtract
+from pipeline.solve.loads import Applied
 from pipeline.solve.movement import Motion, Movement
-from pipeline.solve.newton import LEFT, HyperelasticBody, LargeError
+from pipeline.solve.newton import LEFT, ON_THE_WAY, HyperelasticBody, LargeError
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.response import LoadResponse, Response, whole_force
 
 # Fewest load steps, and the smallest step as a share of the depth.
 _FEWEST, _SMALLEST = 3, 1 / 100
 # A step that would leave less than this share of the depth goes to the end.
 _SLIVER = 1e-6
-# Residual of steps before the last, in units of the forces: the work of F has fewer digits. And states besides the last
-# one that the initial guess continues.
-_ON_THE_WAY, _CONTINUED = 1e-6, 2
+# States besides the last one that the initial guess continues.
+_CONTINUED = 2
 # The next load step is longer if this one took at most so many Newton iterations.
 _EASY = 4
 # Largest relative difference of work and energy, and rounding of energies where strains are tiny. An element at the
@@ -50,17 +43,24 @@ _WORK, _ROUNDING = 3e-4, 1e-13
 class LoadPath:
     """A load path: how far a ``motion`` of the probe has proceeded in a body of a ``law``.
 
-    ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part. ``state`` is that of the last
-    step: displacement, and in mixed elements pressure (owned dofs). ``step`` (m) is the longest that Newton's method is
-    expected to reach at once.
+    ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part, less that at the ``start``.
+    ``state`` is that of the last step: displacement, and in mixed elements pressure (owned dofs). ``step`` (m) is the
+    longest that Newton's method is expected to reach at once. Under dead loads, ``applied``, the path starts from the
+    body that has sagged, and ``held`` is that with a tool that does not move, once it is known.
     """
 
     law: MaterialLaw
     motion: Motion
-    state: FloatArray
+    start: FloatArray
+    applied: Applied | None = None
+    held: HeldTool | None = None
+    state: FloatArray = field(init=False)
     path: list[tuple[float, float, float]] = field(default_factory=lambda: [(0.0, 0.0, 0.0)])
     step: float = inf
     earlier: list[FloatArray] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.state = self.start
 
     @property
     def reached(self) -> float:
@@ -80,9 +80,10 @@ class LoadPath:
         weights = [prod((depth - other) / (at - other) for other in depths if other != at) for at in depths]
         return np.asarray(np.tensordot(weights, states, axes=1))
 
-    def can_reach(self, law: MaterialLaw, movement: Movement) -> bool:
-        """Return whether this path can be continued to the movement under this law."""
-        return (self.law, (self.motion,)) == (law, movement.motions) and self.reached <= movement.amounts[0]
+    def can_reach(self, law: MaterialLaw, movement: Movement, applied: Applied | None) -> bool:
+        """Return whether this path can be continued to the movement under this law and these loads."""
+        is_same = applied is None if self.applied is None else self.applied.is_same(applied)
+        return is_same and (self.law, (self.motion,)) == (law, movement.motions) and self.reached <= movement.amounts[0]
 
 
 class LoadSteps(Solver):
@@ -103,6 +104,8 @@ class LoadSteps(Solver):
         self._linear = elements.linearised(self._law, stack, direct=direct)
         self._body = HyperelasticBody(elements, self._law, self._linear.preconditioner)
         stack.callback(self._body.close)
+        if load_path.applied is not None:
+            self._body.carry(load_path.applied)
 
     @property
     def linearised(self) -> Linearised:
@@ -113,20 +116,32 @@ class LoadSteps(Solver):
         """Do nothing: each load step prescribes its own displacement."""
 
     def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
-        """Continue the load path to the depth of the single column; return the iterations; collective.
+        """Continue the load path to the depth of the first column; return the iterations; collective.
 
+        The column of loads is the state at the start of the path, the first one the change from there.
         ``tolerance`` and ``target`` are ignored: Newton's method ends where its gain is rounding.
 
         Raises:
             LargeError: if Newton's method does not converge, or the solution fails a check.
         """
-        (column,), before = columns, self._body.iterations
+        (column, *loaded), before, load_path = columns, self._body.iterations, self._load_path
         self.elements.set_law(self._law)
         with self._body.state() as state:
             path = self._press(state, column)
-            self.elements.put(column, self._body.split(state.array, column.unknown), column.amount)
-        check_path(path, _ROUNDING * max(self._law.lame_mu) * self._volume())
-        self.stored = float(path[-1, 2])
+            self.elements.put(column, self._body.split(state.array - load_path.start, column.unknown), column.amount)
+            state.array[:] = load_path.start
+            check_path(path, _ROUNDING * (max(self._law.lame_mu) * self._volume() + abs(self._body.energy(state))))
+            self.stored = float(path[-1, 2])
+            if load_path.applied is not None and load_path.held is None:
+                self._put_unit(column, state)
+                slope = float(path[-1, 1]) / column.amount
+                load_path.held = hold_tool(self.elements, self._body, load_path.applied, state, slope)
+            for of_loads in loaded:
+                state.array[:] = load_path.start
+                self._body.show(state)
+                values = self._space.forms.displacement.x.array
+                of_loads.prescribed[self._space.prescribed] = values[self._space.prescribed]
+                self.elements.put(of_loads, self._body.split(load_path.start, of_loads.unknown))
         return self._body.iterations - before
 
     def improve(self, columns: Sequence[Column], share: float) -> int:
@@ -134,17 +149,30 @@ class LoadSteps(Solver):
         raise LargeError("forces do not balance")
 
     def products(self, columns: Sequence[Column]) -> Products:
-        """Return residual and work of the solution as secants, per unit of the motion."""
-        (column,), space = columns, self._space
-        with self._body.state() as state, self._body.state() as forces:
+        """Return residual and work of the first column as secants, per unit of the motion."""
+        column, space, start = columns[0], self._space, self._load_path.start
+        with self._body.state() as state, self._body.state() as forces, self._body.state() as before:
+            state.array[:] = start
+            self._body.forces(state, before)
             self._at(column, state)
             self._body.forces(state, forces)
             residual, moved = (
-                self._body.split(part.array / column.amount, column.unknown)[0] for part in (forces, state)
+                self._body.split(part / column.amount, column.unknown)[0]
+                for part in (forces.array - before.array, state.array - start)
             )
         held = space.prescribed_owned
         work = global_sum(space.comm, np.array([residual[held] @ column.prescribed[held]]))
         return Products(space, [moved], [residual], work[None], work)
+
+    def load_response(self, response: Response) -> LoadResponse | None:
+        """Return the effect of loads on the whole body, None without loads; ``response`` is that to the motion."""
+        held, mirrored = self._load_path.held, self.elements.body.mirrored
+        if held is None:
+            return None
+        whole = 2.0 ** len(mirrored)
+        form = np.array([[response.stiffness[0, 0], whole * held.force], [whole * held.force, 2 * whole * held.energy]])
+        on_probe = -whole_force(held.on_probe, mirrored)
+        return LoadResponse(response.movement, form, on_probe, stored=whole * held.stored, sag=held.sag)
 
     def hierarchical_estimate(
         self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
@@ -154,38 +182,44 @@ class LoadSteps(Solver):
         Raises:
             LargeError: if the elements of one degree more fail.
         """
-        (column,) = columns
-        state, rate, unit = (stack.enter_context(self._body.state()) for _ in range(3))
-        self._at(column, state)
+        column, held, finer = columns[0], self._load_path.held, self._linear.finer()
+        residuals = FinerResiduals(self.elements, self._body, finer, self._law, movement.loads, stack)
+        state, unit, rate = (stack.enter_context(self._body.state()) for _ in range(3))
         self._put_unit(column, unit)
-        self._body.move(state, unit, rate)
-        finer = self._linear.finer()
-        forms = finer.large_forms(self._law)
-        finer.set_law(self._law)
-        residuals = [stack.enter_context(finer.fields()) for _ in range(2)]
-        self._body.show(rate)
-        finer.interpolate(self.elements)
-        forms.set_directions()
-        self._body.show(state)
-        finer.interpolate(self.elements)
-        for of_forms, residual in zip((forms.residuals, forms.products), residuals, strict=True):
-            for each, part in zip(of_forms, residual, strict=True):
-                assemble(each, part)
-            finer.weigh(residual)
-            for part in residual:
-                part.scale(-1.0)
-            residual[0].array[finer.displacements.prescribed_owned] = 0.0
-        if not all(np.isfinite(part.norm()) for residual in residuals for part in residual):
-            raise LargeError("no error bar: elements of one degree more turn tissue inside out")
-        found, unseen, iterations = self._linear.decrements(residuals)
-        taken = found / column.amount
+
+        def at() -> tuple[Fields, Fields]:
+            self._body.move(state, unit, rate)
+            return residuals.of_rate(state, rate), residuals.at(state)
+
+        self._at(column, state)
+        found = [*at()]
+        if held is not None:
+            state.array[:] = self._load_path.start
+            rate_there, there = at()
+            found = [found[0], subtract(found[1], there), subtract(rate_there, found[0]), there]
+            state.array[:] = held.state
+            found.append(residuals.at(state))
+        estimate = Decrements(self._linear, found)
+        taken, rest = estimate.between(0, 1)
+        if held is not None:
+            taken, rest = (float(np.add(a, b)) for a, b in zip((taken, rest), estimate.between(2, 3), strict=True))
+        taken, rest = taken / column.amount, rest / column.amount
         if not abs(taken) < self.products(columns).stationary[0, 0]:
             raise LargeError(
                 f"no error bar: it needs elements of degree {finer.degree}, which fail at the probe's edge; "
                 "use a smaller depth, a larger rim, or degree 2"
             )
-        rest = None if unseen is None else np.array([unseen / column.amount])
-        return HierarchicalEstimate(finer, [], iterations, decrements=np.array([[taken]]), unseen=rest)
+        decrements, unseen = np.array([[taken]]), np.array([rest])
+        if held is not None:
+            mixed, (own, own_rest) = estimate.products[0, 4], estimate.between(4, 4)
+            decrements, unseen = np.array([[taken, mixed], [mixed, own]]), np.array([rest, own_rest])
+        return HierarchicalEstimate(
+            finer,
+            [],
+            estimate.iterations,
+            decrements=decrements,
+            unseen=None if estimate.is_bound else unseen,
+        )
 
     def _at(self, column: Column, state: PETSc.Vec) -> None:
         """Write the solution at the depth of a column into ``state``."""
@@ -193,6 +227,7 @@ class LoadSteps(Solver):
             self.elements.total(column, parts)
             state.array[:] = np.concatenate([part.array for part in parts])
         state.scale(column.amount)
+        state.array[:] += self._load_path.start
 
     def _put_unit(self, column: Column, state: PETSc.Vec) -> None:
         """Write the prescribed displacement per unit of the motion into ``state``."""
@@ -207,27 +242,29 @@ class LoadSteps(Solver):
             LargeError: if a step becomes too small; the path keeps the steps that converged.
         """
         load_path, depth = self._load_path, column.amount
+        state.array[:] = load_path.start
+        begun, base = self._body.energy(state), self._body.held_of(state)
         state.array[:] = load_path.state
         longest = depth / _FEWEST
         with self._body.state() as unit, self._body.state() as forces:
             self._put_unit(column, unit)
-            held = unit.array[self._space.prescribed_owned]
+            held = self._body.held_of(unit)
             while load_path.reached < depth:
                 asked = min(load_path.step, longest, depth - load_path.reached)
-                there, steps = self._step(state, held, load_path, asked, depth)
+                there, steps = self._step(state, lambda at: base + at * held, load_path, asked, depth)
                 step = there - load_path.reached
                 self._body.forces(state, forces)
-                load_path.add(there, forces.dot(unit), self._body.energy(state), state.array)
+                load_path.add(there, forces.dot(unit), self._body.energy(state) - begun, state.array)
                 longer = step * (2 if steps <= _EASY else 1)
                 load_path.step = longer if step < (1 - _SLIVER) * asked else max(load_path.step, longer)
         return np.array(load_path.path)
 
     def _step(
-        self, state: PETSc.Vec, held: FloatArray, load_path: LoadPath, step: float, depth: float
+        self, state: PETSc.Vec, goal: Callable[[float], FloatArray], load_path: LoadPath, step: float, depth: float
     ) -> tuple[float, int]:
         """Write the equilibrium a ``step`` (m) farther into ``state``; return its depth and Newton's iterations.
 
-        ``held`` are the prescribed dofs per metre; the path ends at ``depth`` (m).
+        ``goal`` returns the prescribed dofs (m) at a depth; the path ends at ``depth`` (m).
 
         Raises:
             LargeError: if the step becomes too small.
@@ -240,7 +277,7 @@ class LoadSteps(Solver):
             if not np.isfinite(self._body.energy(state)):
                 state.array[:] = load_path.state  # the first step of Newton's method then brings it there
             try:
-                return there, self._body.settle(state, there * held, LEFT if there == depth else _ON_THE_WAY)
+                return there, self._body.settle(state, goal(there), LEFT if there == depth else ON_THE_WAY)
             except LargeError as error:
                 step = min(step, left) / 2
                 if step < _SMALLEST * depth:

@@ -42,6 +42,10 @@ class Applied:
     size: float
     resultant: FloatArray
 
+    def is_same(self, other: "Applied | None") -> bool:
+        """Return whether ``other`` loads have the same nodal forces on this rank."""
+        return other is not None and np.array_equal(self.forces, other.forces)
+
 
 def apply_loads(loads: Loads, body: BodyMesh, space: Any) -> Applied:
     """Return the loads on the dofs of ``space``, a space of displacements on the mesh of ``body``; collective.

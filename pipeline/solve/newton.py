@@ -23,12 +23,15 @@ from pipeline.solve.elements.fields import Fields
 from pipeline.solve.elements.tangent import Prestress, Tangent
 from pipeline.solve.kernels.tangent import TangentCells
 from pipeline.solve.krylov import INDEFINITE, explain, solver_of
+from pipeline.solve.loads import Applied
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.stages import stage
 
 # Tolerance on the residual, relative to the forces at prescribed dofs, and most Newton iterations.
 LEFT, _MOST = 1e-9, 25
+# The same for load steps before the last: the work of F has fewer digits.
+ON_THE_WAY = 1e-6
 # Tolerances of linear solves: the first one and the least, and the share of the gain that is needed to the end.
 _ROUGH, _FINE, _SPARE = 1e-2, 1e-4, 0.1
 # Most halvings of a step that turns tissue inside out.
@@ -103,6 +106,7 @@ class HyperelasticBody:
         self._held = self._space.prescribed_owned
         self._forms = elements.large_forms(law, scaled=prestressed)
         self._imposed: Imposed | None = None
+        self._load: FloatArray | None = None  # in units of the law
         self._stack = ExitStack()
         self._tangent = elements.tangent(law)
         self._stack.callback(self._tangent.close)
@@ -136,12 +140,25 @@ class HyperelasticBody:
         return np.split(values, np.cumsum([part.getLocalSize() for part in parts])[:-1])
 
     def energy(self, state: PETSc.Vec) -> float:
-        """Return the stored energy (J) of the modelled part, NaN if tissue is inside out; collective."""
+        """Return the energy (J) of the modelled part, NaN if tissue is inside out; collective.
+
+        It is the stored one, less the work of dead loads.
+        """
         self.show(state)
-        own = fem.assemble_scalar(self._forms.energy)
+        own, u = fem.assemble_scalar(self._forms.energy), state.array_r[: self._space.owned]
         if self._imposed is not None:
-            own += self._imposed.energy(state.array_r[: self._space.owned])
+            own += self._imposed.energy(u)
+        if self._load is not None:
+            own -= float(self._load @ u)
         return self._unit * float(self._space.comm.allreduce(own, op=MPI.SUM))
+
+    def carry(self, applied: Applied, share: float = 1.0) -> None:
+        """Let a ``share`` of dead loads act on the body from now on."""
+        self._load = share / self._unit * applied.forces
+
+    def held_of(self, state: PETSc.Vec) -> FloatArray:
+        """Return the prescribed dofs (m) of a state."""
+        return np.array(state.array_r[self._held])
 
     def impose(self, prestress: Prestress | None, factors: tuple[float, ...] = ()) -> None:
         """Change the energy from now on; None leaves only ``factors``, by region; collective."""
@@ -223,7 +240,7 @@ class HyperelasticBody:
                 norm, is_there = residual.norm(), not self._space.comm.allreduce(bool(todo.any()), op=MPI.LOR)
                 if is_there and norm <= left * scale:
                     return iteration
-                ksp.setTolerances(rtol=_share(norm / before, left * scale / norm) if is_there else _ROUGH)
+                ksp.setTolerances(rtol=forcing(norm / before, left * scale / norm) if is_there else _ROUGH)
                 before = norm if is_there else inf
                 self._newton_step(ksp, state, residual, todo, step)
                 stored = self._advance(state, stored, residual, step, there, is_there=is_there)
@@ -284,6 +301,8 @@ class HyperelasticBody:
                 assemble(residual, part)
             if self._imposed is not None:
                 parts[0].array[:] += self._imposed.forces(state.array_r[: self._space.owned])
+            if self._load is not None:
+                parts[0].array[:] -= self._load
             self._elements.weigh(parts)
             result.array[:] = np.concatenate([part.array for part in parts])
 
@@ -319,7 +338,7 @@ class HyperelasticBody:
         self.iterations += ksp.its
 
 
-def _share(gained: float, needed: float) -> float:
+def forcing(gained: float, needed: float = 0.0) -> float:
     """Return the tolerance of a linear solve, from the last gain of the residual and the gain ``needed`` to the end.
 
     The square of the last gain is what a step of Newton's method can gain (S. C. Eisenstat and H. F. Walker, SIAM J.

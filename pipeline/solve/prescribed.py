@@ -15,9 +15,11 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.solve.balance import MOST_ROUNDS, check_balance, rest, sums
 from pipeline.solve.compiled import global_sum
+from pipeline.solve.dead_loads import start_under_loads
 from pipeline.solve.elements.base import Elements, Equilibrium, Products, Solver
 from pipeline.solve.elements.fields import Column, close_far
 from pipeline.solve.load_steps import LoadPath, LoadSteps
+from pipeline.solve.loads import Applied
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import LoadResponse, Response, load_response_of, reaction
@@ -56,9 +58,10 @@ class PrescribedMotion:
         law, movement, direct = asked.law, asked.movement, self._elements.is_direct(asked.method)
         # A tool at many places: operator and motion stay the same, the far field differs.
         keep = self._reuse and movement.far is not None and not direct
-        solver = self._set_up(law, movement, stack, direct=direct, keep=keep)
         with stage("assembly"):
             columns = self._elements.columns(movement, stack)
+        solver = self._set_up(asked, columns[-1].applied, stack, direct=direct, keep=keep)
+        with stage("assembly"):
             solver.lift(columns)
         with stage("solve"):
             guessed = self._guess(columns, movement)
@@ -87,7 +90,7 @@ class PrescribedMotion:
         aim = tolerance * min(self._elements.stricter, TWO_SIDED if movement.far is not None else 1.0)
         iterations = solver.solve(todo, aim)
         for further in range(MOST_ROUNDS + 1):
-            response, load_response = respond(solver.products(columns), columns, solver.law, movement)
+            response, load_response = _respond(solver, columns, movement)
             share = rest(response.balance, tolerance)
             if solver.is_exact or share == 1.0 or further == MOST_ROUNDS:
                 break
@@ -105,19 +108,31 @@ class PrescribedMotion:
                 guessed.append(column)
         return guessed
 
-    def _set_up(self, law: MaterialLaw, movement: Movement, stack: ExitStack, *, direct: bool, keep: bool) -> Solver:
-        """Return a solver for a law; the ``stack`` frees it unless it is to be kept (``keep``); collective.
+    def _set_up(self, asked: Request, applied: Applied | None, stack: ExitStack, *, direct: bool, keep: bool) -> Solver:
+        """Return a solver for a request; the ``stack`` frees it unless it is to be kept (``keep``); collective.
 
         Raises:
-            SolveError: if it cannot be set up, or the elements do not support the law.
+            SolveError: if it cannot be set up, the elements do not support the law, or do not carry the loads.
         """
+        law, movement = asked.law, asked.movement
         if law.is_linear:
             return self._elements.set_up(law, stack, direct=direct, keep=keep)
         load_path = self._load_path
-        if load_path is None or not load_path.can_reach(law, movement):
-            load_path = LoadPath(law, movement.motions[0], np.zeros(self._elements.unknowns))
+        if load_path is None or not load_path.can_reach(law, movement, applied):
+            start = np.zeros(self._elements.unknowns)
+            if movement.loads is not None:
+                start = start_under_loads(self._elements, law, movement.loads)
+            load_path = LoadPath(law, movement.motions[0], start, applied)
         self._load_path = load_path if self._shares_path else None
         return LoadSteps(self._elements, load_path, stack, direct=direct)
+
+
+def _respond(solver: Solver, columns: Sequence[Column], movement: Movement) -> tuple[Response, LoadResponse | None]:
+    """Return the response of the solution of a ``solver`` to motions and loads; collective."""
+    if isinstance(solver, LoadSteps):
+        response, _ = respond(solver.products(columns), columns[:1], solver.law, movement)
+        return response, solver.load_response(response)
+    return respond(solver.products(columns), columns, solver.law, movement)
 
 
 def respond(

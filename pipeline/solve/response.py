@@ -123,7 +123,8 @@ class LoadResponse:
 
     ``form`` (n + 1, n + 1) of twice the potential energy (J), for n motions and the loads last, contains K, g and
     -a(w, w). ``forces`` (3) is the force of the tissue on the probe (N) from residuals. ``decrements`` is what one
-    degree more removes from the form, ``bars`` the 95 % bars on its entries.
+    degree more removes from the form, ``bars`` the 95 % bars on its entries. ``stored`` (J) and ``sag`` (m) are
+    strain energy and sag of a nonlinear law; for a linear one they follow from the form.
     """
 
     movement: Movement
@@ -131,11 +132,13 @@ class LoadResponse:
     forces: FloatArray
     decrements: FloatArray | None = None
     bars: FloatArray | None = None
+    stored: float | None = None
+    sag: float | None = None
 
     @property
     def energy(self) -> float:
         """Strain energy (J) of the loads with the probe fixed."""
-        return float(-self.form[-1, -1]) / 2
+        return float(-self.form[-1, -1]) / 2 if self.stored is None else self.stored
 
     @property
     def force(self) -> Vector:

@@ -10,8 +10,8 @@ from mpi4py import MPI
 
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, movement_of, tool_of
+from pipeline.solve.conditions import WITHOUT_FOOTPRINT
 from pipeline.solve.contact.active_set import ContactError
-from pipeline.solve.contact.surface import CONDITIONS
 from pipeline.solve.contact.tool import Tool
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
@@ -47,7 +47,7 @@ def pressed(tool=None, **changes):
     (case,) = study(**{"body": SMALL, "probe": SPHERE, "mesh": COARSE} | changes).cases()
     body = mesh_case(case, ("y",) if tool else ("x", "y"), MPI.COMM_SELF)
     with Spaces(body) as spaces:
-        problem = QuasiStaticProblem(spaces, 2, CONDITIONS, case.element, tool=tool or tool_of(case))
+        problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.element, tool=tool or tool_of(case))
         yield problem, law_of(case), movement_of(case)
 
 

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, movement_of, tool_of
-from pipeline.solve.contact.surface import CONDITIONS
+from pipeline.solve.conditions import WITHOUT_FOOTPRINT
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError
@@ -74,7 +74,7 @@ def test_a_flat_punch_that_sticks_is_the_bonded_one():
 def test_tractions_obey_coulomb():
     (case,) = study(body=BODY, probe=SPHERE | {"friction": 0.2}, mesh=MESH).cases()
     with Spaces(mesh_case(case, ("x", "y"), MPI.COMM_SELF)) as spaces:
-        problem = QuasiStaticProblem(spaces, 2, CONDITIONS, case.element, tool=tool_of(case))
+        problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.element, tool=tool_of(case))
         solution = problem.solve(law_of(case), movement_of(case))
         contact = problem.constraint.contact
     step, corner = contact.pressed, contact.obstacle.candidates.is_corner
@@ -96,7 +96,7 @@ def test_half_a_body_and_a_quarter_agree():
     for planes in (("x", "y"), ("y",)):
         (case,) = study(body=BODY, probe=SPHERE | {"friction": 0.2}, mesh=MESH).cases()
         with Spaces(mesh_case(case, planes, MPI.COMM_SELF)) as spaces:
-            problem = QuasiStaticProblem(spaces, 2, CONDITIONS, case.element, tool=tool_of(case))
+            problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.element, tool=tool_of(case))
             solution = problem.solve(law_of(case), movement_of(case))
             forces.append(solution.reaction)
     assert forces[1][2] == pytest.approx(forces[0][2], rel=1e-4)

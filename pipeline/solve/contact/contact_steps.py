@@ -1,6 +1,7 @@
 """Load steps of contact at large displacements: the whole depth at once, or as many steps as the loop needs.
 
-The initial guess of a step continues the last one linearly, and is dropped where it turns tissue inside out.
+The initial guess of a step continues the last one linearly, and is dropped where it turns tissue inside out. Without
+friction the equilibrium does not depend on the path: steps on the way are solved roughly.
 """
 
 from collections.abc import Callable
@@ -20,6 +21,11 @@ from pipeline.solve.newton import LargeError
 _SMALLEST, _SLIVER = 1 / 64, 1e-6
 # Larger steps than this share, without friction, are given up soon.
 _LARGE = 1 / 8
+# Inactive nodes inside the tool, in units of the depth: more than corners beside active nodes have on a coarse mesh.
+_INSIDE = 0.25
+# The first step ends where the tool's normals at the nodes that it penetrates have this mean part along its way, after
+# so many halvings at most: nodes beside the flank of a ball do not stay in contact, and would fold the tissue.
+_FACING, _FIRST_HALVINGS = 0.7, 2
 # The next step is longer by this factor if this one took at most so many iterations.
 _LONGER, _EASY = 1.5, 8
 
@@ -80,17 +86,22 @@ def press(
         LargeError: if a step becomes too small; the path keeps the steps that converged.
     """
     iterations = 0
+    if path.last.touched is None and path.step == inf and friction is None:
+        path.step = _first_step(tissue, tool_at, path.last.depth, depth)
     while path.last.depth < depth:
         left = depth - path.last.depth
         step = min(path.step, left)
         there = depth if step > (1 - _SLIVER) * left else path.last.depth + step
         try:
-            is_patient = friction is not None or there - path.last.depth <= _LARGE * depth
-            touched = _step(tissue, tool_at, path, there, friction, is_patient=is_patient)
+            how = {
+                "is_patient": friction is not None or there - path.last.depth <= _LARGE * depth,
+                "roughly": friction is None and there < depth,
+            }
+            touched = _step(tissue, tool_at, path, there, friction, **how)
         except SolveError as error:
             path.step = (there - path.last.depth) / 2
             if path.step < _SMALLEST * depth:
-                tissue.state = path.last.state
+                _end(tissue, tool_at, path, friction)
                 raise LargeError(str(error)) from error
             continue
         iterations += touched.iterations
@@ -98,6 +109,33 @@ def press(
         path.add(Stage(there, tissue.state, touched))
         path.step = step * (_LONGER if touched.iterations <= _EASY else 1.0)
     return iterations
+
+
+def _first_step(tissue: Tissue, tool_at: Callable[[float], PlacedTool], start: float, depth: float) -> float:
+    """Return the first step (m) from ``start`` towards a ``depth`` (m); collective."""
+    step, nothing = depth - start, np.zeros(len(tissue.fixed), dtype=bool)
+    for _ in range(_FIRST_HALVINGS):
+        tool = tool_at(start + step)
+        through = first_set(tissue, tool, nothing)
+        if not through.any() or -tool.distance(tissue.positions()).normal[through, -1].mean() >= _FACING:
+            break
+        step /= 2
+    return step
+
+
+def _end(tissue: Tissue, tool_at: Callable[[float], PlacedTool], path: ContactPath, friction: Friction | None) -> None:
+    """Leave the tissue in equilibrium at the last depth of a ``path`` that goes no farther; collective."""
+    last = path.last
+    tissue.state = last.state
+    if last.touched is None or friction is not None:
+        return
+    try:
+        touched = settle(tissue, tool_at(last.depth), last.touched.active)
+    except SolveError:  # settled roughly, but no better
+        path.last, path.before = Stage(0.0, np.zeros_like(last.state)), None
+        tissue.state = path.last.state
+        return
+    path.last = Stage(last.depth, tissue.state, touched)
 
 
 def rub(
@@ -176,6 +214,7 @@ def _step(
     friction: Friction | None,
     *,
     is_patient: bool,
+    roughly: bool,
 ) -> Touched:
     tool, last = tool_at(depth), path.last
     active = np.zeros(len(tissue.fixed), dtype=bool) if last.touched is None else last.touched.active
@@ -187,4 +226,7 @@ def _step(
     if guess is None:
         tissue.state = path.last.state
     rubbing = None if friction is None else _rubbing(tissue, tool_at, last, depth, friction)
-    return settle(tissue, tool, first_set(tissue, tool, active), rubbing, is_patient=is_patient)
+    touched = settle(tissue, tool, first_set(tissue, tool, active), rubbing, is_patient=is_patient, roughly=roughly)
+    if touched.gap.min() < -_INSIDE * depth:  # the loop went to another equilibrium, around the tool
+        raise LargeError("tissue is left inside the tool")
+    return touched

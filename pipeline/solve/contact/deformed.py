@@ -28,6 +28,8 @@ from pipeline.solve.newton import LargeError
 
 # Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
 _LEFT, _CLOSED = 1e-8, 1e-8
+# On the way to a depth, both.
+_ON_THE_WAY = 1e-2
 # With friction: the residual of nodes that slide, whose friction is that of the iteration before, and of all others.
 _LEFT_RUBBING, _LEFT_BESIDE = 1e-4, 1e-7
 # Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
@@ -121,12 +123,18 @@ def first_set(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> BoolArray:
 
 
 def settle(
-    tissue: Tissue, tool: PlacedTool, active: BoolArray, rubbing: Rubbing | None = None, *, is_patient: bool = True
+    tissue: Tissue,
+    tool: PlacedTool,
+    active: BoolArray,
+    rubbing: Rubbing | None = None,
+    *,
+    is_patient: bool = True,
+    roughly: bool = False,
 ) -> Touched:
     """Find equilibrium and contact from the tissue's state and an initial ``active`` set (n); collective.
 
     Without ``rubbing`` there is no friction. Without patience, the loop ends where smaller load steps need fewer
-    iterations.
+    iterations. ``roughly`` is enough for a load step on the way to another one.
 
     Raises:
         LargeError: if the loop does not converge.
@@ -150,7 +158,8 @@ def settle(
         is_same, active = np.array_equal(following, active), following
         if is_same and not active.any():
             raise LargeError("the probe does not touch a single node: use smaller elements below it")
-        if is_same and _is_settled(tissue, tool, active, place.gap, forces - exerted, pressed, rub):
+        free = forces - exerted
+        if is_same and _is_settled(tissue, tool, active, place.gap, free, pressed, rub, roughly=roughly):
             exerted = np.where(active[:, None], forces, 0.0)
             return Touched(active, exerted, place.gap, iteration, pressed, None if rub is None else rub.slide)
         if not is_patient and iteration >= _SOON and np.abs(place.gap[active]).max() > _NEARLY_CLOSED * tool.depth:
@@ -211,12 +220,14 @@ def _is_settled(
     free: FloatArray,
     pressed: FloatArray,
     rub: Rub | None,
+    *,
+    roughly: bool,
 ) -> bool:
     left, most = tissue.unbalanced(), np.linalg.norm(pressed)
-    if not np.abs(gap[active]).max(initial=0.0) <= _CLOSED * tool.depth:
+    if not np.abs(gap[active]).max(initial=0.0) <= (_ON_THE_WAY if roughly else _CLOSED) * tool.depth:
         return False
     if rub is None:
-        return bool(np.hypot(left, np.linalg.norm(free)) <= _LEFT * most)
+        return bool(np.hypot(left, np.linalg.norm(free)) <= (_ON_THE_WAY if roughly else _LEFT) * most)
     is_close = left <= _LEFT_BESIDE * most and np.linalg.norm(free) <= _LEFT_RUBBING * most
     return bool(is_close and rub.is_same and rub.is_sound(active))
 

@@ -18,11 +18,11 @@ import numpy as np
 from pipeline.arrays import BoolArray, Int32Array
 from pipeline.solve.cell_values import plain_share
 from pipeline.solve.compiled import global_sum, vector
+from pipeline.solve.conditions import WITHOUT_FOOTPRINT
 from pipeline.solve.contact.active_set import Found, Obstacle, find_set
 from pipeline.solve.contact.elements import ContactElements, FreeResponse, State
 from pipeline.solve.contact.geometry import Area, contact_area
 from pipeline.solve.contact.levels import HeldOperator, normal_dofs
-from pipeline.solve.contact.surface import CONDITIONS
 from pipeline.solve.contact.sweep import Sweep
 from pipeline.solve.elements.base import Elements, HierarchicalEstimate
 from pipeline.solve.elements.fields import Column
@@ -163,7 +163,7 @@ def _decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, fl
 
 
 def _displacement_decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, int]:
-    finer, law = elements.surface.spaces.get(elements.space.degree + 1, CONDITIONS), elements.law
+    finer, law = elements.surface.spaces.get(elements.space.degree + 1, WITHOUT_FOOTPRINT), elements.law
     with ExitStack() as stack, vector(finer.space) as residual:
         levels = elements.held_levels(facets, stack)
         operator = HeldOperator(finer, law, stack, direct=False, masked=True)

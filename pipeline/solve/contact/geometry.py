@@ -8,7 +8,7 @@ distance from it. Each counts with the share of its own area inside the edge, so
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -48,6 +48,11 @@ class Touch:
         """Return how much farther (m) the probe moves to touch the surface that loads have deformed."""
         moved = loaded.moved[candidates.facets]
         return self._first(candidates, moved) - self._first(candidates, np.zeros_like(moved))
+
+    def sag_at(self, candidates: Candidates, points: FloatArray) -> float:
+        """Return how much farther (m) the probe moves to touch the surface with its nodes at deformed ``points``."""
+        still = np.zeros(candidates.facets.shape)
+        return self._first(replace(candidates, points=points), still) - self._first(candidates, still)
 
     def _first(self, candidates: Candidates, moved: FloatArray) -> float:
         """Return the smallest gap (m) to a surface displaced by ``moved`` (m, k) at the nodes of its facets."""

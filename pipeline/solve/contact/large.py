@@ -23,14 +23,14 @@ from pipeline.solve.contact.deformed import PlacedTool, Touched, first_set, sett
 from pipeline.solve.contact.elements import State
 from pipeline.solve.contact.geometry import Area, contact_area
 from pipeline.solve.contact.levels import Surface
+from pipeline.solve.contact.sagged import Sagged, sagged_body
 from pipeline.solve.contact.tissue import DeformedBody
 from pipeline.solve.contact.tool import Tool
 from pipeline.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
 from pipeline.solve.elements.fields import Column
 from pipeline.solve.estimate import AT_EDGE_LARGE, found_again_bar
-from pipeline.solve.movement import Movement
+from pipeline.solve.movement import Loads, Movement
 from pipeline.solve.newton import LargeError
-from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Contact, Response, reaction
 from pipeline.solve.solution import Request
 from pipeline.stages import stage
@@ -40,16 +40,23 @@ _SMALL = 1e-4
 
 
 class LargeContact:
-    """Contact of a tool with a hyperelastic body of one ``law``; a load path continues to ever larger depths."""
+    """Contact of a tool with a hyperelastic body of one law under loads; a load path continues to larger depths."""
 
-    def __init__(self, surface: Surface, elements: Elements, tool: Tool, law: MaterialLaw):
-        """Prepare."""
-        self._surface, self._elements, self._tool, self._law = surface, elements, tool, law
-        self._path = ContactPath(Stage(0.0, np.zeros(elements.unknowns)))
+    def __init__(self, surface: Surface, elements: Elements, tool: Tool, asked: Request):
+        """Prepare for law and loads of a request."""
+        self._surface, self._elements, self._tool = surface, elements, tool
+        self._law, self._loads = asked.law, asked.movement.loads
+        self._applied = None if self._loads is None else elements.displacements.applied(self._loads)
+        self._sagged: Sagged | None = None
+        self._path: ContactPath | None = None
 
     def can_reach(self, asked: Request) -> bool:
         """Return whether the load path can be continued to a request."""
-        return asked.law == self._law and self._path.last.depth <= asked.movement.amounts[0]
+        loads, reached = asked.movement.loads, 0.0 if self._path is None else self._path.last.depth
+        is_same = loads is None
+        if self._applied is not None:
+            is_same = loads is not None and self._applied.is_same(self._elements.displacements.applied(loads))
+        return is_same and asked.law == self._law and reached <= asked.movement.amounts[0]
 
     def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
         """Find equilibrium and contact at the depth of the movement; the ``stack`` frees what is made; collective.
@@ -64,15 +71,20 @@ class LargeContact:
     def find(self, asked: Request, stack: ExitStack) -> "tuple[LargeTouch, int]":
         """Return contact at the depth of the movement, and Newton's iterations; see :meth:`solve`."""
         (depth,) = asked.movement.amounts
-        body = DeformedBody(self._elements, self._surface, self._law, asked.method, stack)
+        body = DeformedBody(self._elements, self._surface, self._law, asked.method, stack, self._applied)
+        if self._sagged is None:
+            self._sagged = sagged_body(body, self._tool, self._loads)
+        tool = self._sagged.placed(self._tool)
+        if self._path is None:
+            self._path = ContactPath(Stage(0.0, self._sagged.state))
         try:
-            iterations = press(body, lambda there: placed_tool(body, self._tool, there), self._path, depth)
+            iterations = press(body, lambda there: placed_tool(body, tool, there), self._path, depth)
         except LargeError as error:
             raise stopped(body, self._path, depth, error) from error
         touched = self._path.last.touched
         assert touched is not None
         body.state = self._path.last.state
-        return LargeTouch(self._surface, body, self._tool, touched, depth), iterations
+        return LargeTouch(self._surface, body, self._tool, touched, depth, self._sagged), iterations
 
 
 def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError) -> LargeError:
@@ -101,18 +113,27 @@ def placed_tool(body: DeformedBody, tool: Tool, depth: float) -> PlacedTool:
 
 @dataclass(frozen=True, eq=False)
 class LargeTouch:
-    """Contact at a ``depth`` (m) with the state of a ``body``; methods are collective."""
+    """Contact at a ``depth`` (m) with the state of a ``body``; methods are collective.
+
+    ``sagged`` is the body before, from whose first touch the depth counts.
+    """
 
     surface: Surface
     body: DeformedBody
     tool: Tool
     touched: Touched
     depth: float
+    sagged: Sagged
+
+    @property
+    def placed(self) -> Tool:
+        """The tool whose depth counts from there."""
+        return self.sagged.placed(self.tool)
 
     @property
     def stored(self) -> float:
-        """The energy (J) of the modelled part."""
-        return self.body.energy
+        """The energy (J) of the modelled part that is due to the depth."""
+        return self.body.energy - self.sagged.energy
 
     @property
     def force(self) -> float:
@@ -126,18 +147,21 @@ class LargeTouch:
 
     def equilibrium(self, movement: Movement, iterations: int, stack: ExitStack) -> Equilibrium:
         """Return the checked equilibrium of a ``movement``; the ``stack`` frees its columns."""
-        columns = self.body.elements.columns(movement, stack)
-        self.body.elements.put(columns[0], self.body.split(), self.depth)
+        columns, elements, body = self.body.elements.columns(movement, stack), self.body.elements, self.body
+        elements.put(columns[0], body.split(body.state - self.sagged.state), self.depth)
+        for of_loads in columns[1:]:
+            elements.put(of_loads, body.split(self.sagged.state))
         self.check()
         return Equilibrium(self, columns, movement, iterations, self.response(movement), contact=self.summary())
 
     def summary(self) -> Contact:
-        """Return the area of the whole contact, and the part of it that slides if there is friction."""
-        contact, touched, body = Contact(self.whole_area), self.touched, self.body
+        """Return the area of the whole contact, with friction the part that slides, with loads their effects."""
+        touched, body, whole = self.touched, self.body, 2.0 ** len(self.body.elements.body.mirrored)
+        contact = Contact(self.whole_area, sag=self.sagged.sag, load_energy=whole * self.sagged.stored)
         if touched.slide is None:
             return contact
         places, share = body.positions(), touched.slide.share(body.candidates.weights, touched.active)
-        across = touched.forces - touched.pressed[:, None] * self.tool.distance(places, self.depth).normal
+        across = touched.forces - touched.pressed[:, None] * self.placed.distance(places, self.depth).normal
         torque = self.tool.torque(places, touched.forces)
         return contact.with_friction(share, across, torque, body.elements.body.mirrored)
 
@@ -168,6 +192,8 @@ class LargeTouch:
         space = self.body.elements.displacements
         local = self.body.residual().reshape(-1, 3)[space.fixed_owned, 2].sum()
         support = float(global_sum(space.comm, np.array([local]))[0])
+        if self.body.applied is not None:
+            support += float(self.body.applied.resultant[2])
         balance = abs(support / self.force - 1)
         check_balance(balance)
         on_probe = self.touched.forces.sum(axis=0)[None] / self.depth
@@ -181,7 +207,7 @@ class LargeTouch:
         Raises:
             LargeError: if the next degree does not converge.
         """
-        finer = self._found_again(stack)
+        finer = self._found_again(movement.loads, stack)
         share, at_edge = 1 - finer.force / self.force, self._area().bar
         taken, bar = found_again_bar(share, at_edge, AT_EDGE_LARGE)
         return HierarchicalEstimate(
@@ -194,21 +220,27 @@ class LargeTouch:
         )
 
     @stage("contact sets")
-    def _found_again(self, stack: ExitStack) -> "LargeTouch":
+    def _found_again(self, loads: Loads | None, stack: ExitStack) -> "LargeTouch":
         coarse, degree = self.body.elements, self.body.elements.degree + 1
         finer = self.surface.elements(degree, coarse.element, stack)
-        body = DeformedBody(finer, self.surface, self.body.law, self.body.method, stack)
-        self.body.show()
-        body.interpolate(coarse)
-        tool = placed_tool(body, self.tool, self.depth)
-        active = self.body.candidates.raised(self.touched.active, body.candidates)
+        applied, state = None if loads is None else finer.displacements.applied(loads), self.body.state
+        body = DeformedBody(finer, self.surface, self.body.law, self.body.method, stack, applied)
         try:
+            self.body.state = self.sagged.state
+            self.body.show()
+            body.interpolate(coarse)
+            sagged = sagged_body(body, self.tool, loads, body.state)
+            self.body.state = state
+            self.body.show()
+            body.interpolate(coarse)
+            tool = placed_tool(body, sagged.placed(self.tool), self.depth)
+            active = self.body.candidates.raised(self.touched.active, body.candidates)
             if not body.is_sound:
                 raise LargeError("tissue is turned inside out")
             touched = settle(body, tool, first_set(body, tool, active))
         except LargeError as error:
             raise LargeError(f"no error bar: elements of degree {degree} fail ({error})") from error
-        return replace(self, body=body, touched=touched)
+        return replace(self, body=body, touched=touched, sagged=sagged)
 
     def _area(self) -> Area:
         """Return the contact area of the modelled part, at the deformed place and normal to the axis."""

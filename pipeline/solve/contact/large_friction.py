@@ -41,14 +41,13 @@ class RubbingContact(LargeContact):
             ContactError: if contact reaches the support or the edge of the candidates.
         """
         smooth, iterations = self.find(asked, stack)
+        tool = smooth.placed
         body, depth, state = smooth.body, smooth.depth, smooth.body.state
         friction, touched = friction_of(body, self._tool.friction, depth), []
         for steps in (self.STEPS // 2, self.STEPS):
-            path = ContactPath(Stage(0.0, np.zeros_like(state)))
+            path = ContactPath(Stage(0.0, smooth.sagged.state))
             try:
-                iterations += rub(
-                    body, lambda there: placed_tool(body, self._tool, there), path, depth, friction, steps
-                )
+                iterations += rub(body, lambda there: placed_tool(body, tool, there), path, depth, friction, steps)
             except LargeError as error:
                 raise stopped(body, path, depth, error) from error
             assert path.last.touched is not None
@@ -56,7 +55,7 @@ class RubbingContact(LargeContact):
         body.state = path.last.state
         coarse, fine = touched
         path_bar = abs(float(coarse.forces[:, 2].sum() / fine.forces[:, 2].sum()) - 1)
-        found = RubbingTouch(self._surface, body, self._tool, fine, depth, smooth, state, path_bar)
+        found = RubbingTouch(self._surface, body, self._tool, fine, depth, smooth.sagged, smooth, state, path_bar)
         return found.equilibrium(asked.movement, iterations, stack)
 
 

@@ -11,7 +11,8 @@ from petsc4py import PETSc
 
 from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pipeline.solve.compiled import global_sum
-from pipeline.solve.contact.surface import CONDITIONS, Candidates, find_candidates
+from pipeline.solve.conditions import WITHOUT_FOOTPRINT
+from pipeline.solve.contact.surface import Candidates, find_candidates
 from pipeline.solve.elements import elements_of
 from pipeline.solve.elements.base import Elements
 from pipeline.solve.kernels.product import is_product
@@ -35,13 +36,13 @@ class Surface:
     def of(self, degree: int) -> Candidates:
         """Return the candidates of a ``degree``; collective."""
         if degree not in self._found:
-            space = self.spaces.get(degree, CONDITIONS).space
+            space = self.spaces.get(degree, WITHOUT_FOOTPRINT).space
             self._found[degree] = find_candidates(self.spaces.body, space)
         return self._found[degree]
 
     def elements(self, degree: int, element: str, stack: ExitStack) -> Elements:
         """Return elements of a ``degree`` and kind, which the ``stack`` closes; collective."""
-        found = elements_of(self.spaces, degree, CONDITIONS, element)
+        found = elements_of(self.spaces, degree, WITHOUT_FOOTPRINT, element)
         stack.callback(found.close)
         return found
 
@@ -111,7 +112,7 @@ class Hierarchy:
     ):
         """Assemble; collective. Matrices are freed with the ``stack``."""
         degrees = [degree] if direct else range(1, degree + 1)
-        found = [surface.spaces.get(d, CONDITIONS) for d in degrees]
+        found = [surface.spaces.get(d, WITHOUT_FOOTPRINT) for d in degrees]
         self._operators = [
             HeldOperator(space, law, stack, direct=direct, masked=masks and not direct and space.degree > 1)
             for space in found

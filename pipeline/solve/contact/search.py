@@ -119,7 +119,7 @@ class ContactSearch:
         """Find contact at large displacements: see :class:`LargeContact`."""
         if self._large is None or not (self._reuse and self._large.can_reach(asked)):
             kind = RubbingContact if self._tool.friction else LargeContact
-            self._large = kind(self._surface, self._elements, self._tool, asked.law)
+            self._large = kind(self._surface, self._elements, self._tool, asked)
         return self._large.solve(asked, stack)
 
     # ---- far field ------------------------------------------------------------------------------------

@@ -15,7 +15,6 @@ from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import PROBE
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.physics import of_regions
 
 FACET_CORNERS = 3
@@ -88,8 +87,6 @@ def facet_nodes(degree: int) -> FacetNodes:
     return FacetNodes(degree, places, first, on_edge[np.argsort(angle[on_edge])], np.array(edges), weights)
 
 
-# Conditions without a footprint: the active set alone prescribes displacements.
-CONDITIONS = Conditions(bonded=False, unilateral=True)
 # A point counts as in a plane of symmetry within this distance, in units of the candidates' extent.
 _IN_PLANE = 1e-9
 # Nodes of two degrees are neighbours within this share of an edge, divided by p; mid nodes are included.

@@ -14,7 +14,7 @@ from pipeline.solve.contact.levels import Numbering, Surface
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.turned_tangent import FactorisedTangent, IteratedTangent, TurnedTangent
 from pipeline.solve.elements.base import Elements
-from pipeline.solve.elements.mixed import MixedElements
+from pipeline.solve.loads import Applied
 from pipeline.solve.newton import HyperelasticBody
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
@@ -27,8 +27,16 @@ class DeformedBody:
     stack.
     """
 
-    def __init__(self, elements: Elements, surface: Surface, law: MaterialLaw, method: str, stack: ExitStack):
-        """Set up; collective. ``method`` is the requested solver.
+    def __init__(
+        self,
+        elements: Elements,
+        surface: Surface,
+        law: MaterialLaw,
+        method: str,
+        stack: ExitStack,
+        applied: Applied | None = None,
+    ):
+        """Set up; collective. ``method`` is the requested solver, ``applied`` are dead loads.
 
         Raises:
             SolveError: if the preconditioner cannot be set up.
@@ -38,6 +46,9 @@ class DeformedBody:
         space = self._space = elements.displacements
         self._body = HyperelasticBody(elements, law)
         stack.callback(self._body.close)
+        self.applied = applied
+        if applied is not None:
+            self._body.carry(applied)
         self._unit = elements.unit(law)
         self._numbering = Numbering(space.space, self.candidates.numbers)
         self._tangent: TurnedTangent
@@ -115,7 +126,7 @@ class DeformedBody:
 
     @property
     def energy(self) -> float:
-        """Stored energy (J) of the modelled part, NaN if tissue is inside out; collective."""
+        """Energy (J) of the modelled part less the work of loads, NaN if tissue is inside out; collective."""
         return self._body.energy(self._now)
 
     # ---- results ----------------------------------------------------------------------------------------
@@ -124,10 +135,16 @@ class DeformedBody:
         """Return the nodal forces (N) of the displacement, owned dofs, reactions of the support included."""
         return self._forces()[: self._space.owned].copy()
 
-    def split(self) -> list[FloatArray]:
-        """Return the state by field."""
+    def split(self, state: FloatArray) -> list[FloatArray]:
+        """Return a state by field."""
         with self.elements.fields() as parts:
-            return self._body.split(self.state, parts)
+            return self._body.split(state, parts)
+
+    @property
+    def work_of_loads(self) -> float:
+        """The work (J) of the loads on the modelled part; collective."""
+        own = 0.0 if self.applied is None else float(self.applied.forces @ self.state[: self._space.owned])
+        return float(global_sum(self._space.comm, np.array([own]))[0])
 
     def show(self) -> None:
         """Set the fields of the forms."""
@@ -136,10 +153,7 @@ class DeformedBody:
     def interpolate(self, coarse: Elements) -> None:
         """Set the state to the fields of the forms of ``coarse``."""
         self.elements.interpolate(coarse)
-        fields = [self._space.forms.displacement.x.array[: self._space.owned]]
-        if isinstance(self.elements, MixedElements):
-            fields.append(self.elements.pressures.values)
-        self.state = np.concatenate(fields)
+        self.state = self.elements.values
 
     # ---- the linear system ------------------------------------------------------------------------------
 

@@ -22,11 +22,9 @@ from pipeline.solve.elements.mixed import MixedElements, MixedSolver
 from pipeline.solve.elements.pressures import without_columns
 from pipeline.solve.kernels.pressure import matrix_of
 from pipeline.solve.krylov import INDEFINITE, check_converged, explained, factorised, keep, solver_of
-from pipeline.solve.newton import HyperelasticBody
+from pipeline.solve.newton import HyperelasticBody, forcing
 from pipeline.solve.physics import MaterialLaw
 
-# Relative residual of a Newton step: three digits more than a step gains.
-_TOLERANCE = 1e-6
 _MOST_ITERATIONS = 300
 
 
@@ -158,6 +156,7 @@ class IteratedTangent(TurnedTangent):
         elastic = elements.elastic(law)
         self._hierarchy = Hierarchy(surface, elements.degree, elastic, stack, direct=False, masks=elements.masks)
         self._solver: Solver | None = None
+        self._before = 0.0  # norm of the last right-hand side
         stack.callback(self._close)
         self._work = [stack.enter_context(body.state()) for _ in range(2)]
         size = self._work[0].getLocalSize()
@@ -200,9 +199,10 @@ class IteratedTangent(TurnedTangent):
             change.axpy(1.0, found)
 
     def _iterate(self, preconditioner: object, load: PETSc.Vec, found: PETSc.Vec, stack: ExitStack) -> None:
-        is_mixed = isinstance(self._elements, MixedElements)
+        is_mixed, norm = isinstance(self._elements, MixedElements), load.norm()
+        gained, self._before = norm / self._before if self._before else 1.0, norm
         for kind in ("tangent, mixed",) if is_mixed else ("tangent", "tangent, mixed"):
-            how = {"ksp_rtol": _TOLERANCE, "ksp_max_it": _MOST_ITERATIONS}
+            how = {"ksp_rtol": forcing(gained), "ksp_max_it": _MOST_ITERATIONS}
             ksp = solver_of(kind, self._matrix, stack, preconditioner, **how)
             found.set(0.0)
             ksp.solve(load, found)

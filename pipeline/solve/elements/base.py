@@ -147,10 +147,10 @@ class Linearised(ABC):
         """Return the elements of one degree more."""
 
     @abstractmethod
-    def decrements(self, residuals: Sequence[Fields]) -> tuple[float, float | None, int]:
-        """Return the decrement (J) from two residuals in these elements: of a solution, and of its rate.
+    def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, FloatArray | None, int]:
+        """Return r_i·K⁻¹·r_j (n, n), J, of n residuals in the elements of one degree more.
 
-        In mixed elements it is followed by N (J), otherwise by None; the last number are the iterations.
+        In mixed elements N of each (n), J, follows, otherwise None; the last number are the iterations.
         """
 
 

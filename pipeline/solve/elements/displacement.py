@@ -177,7 +177,7 @@ class LinearisedDisplacement(Linearised):
         finer, self._above = self._elements.finer(self._law, self._levels, self._stack)
         return finer
 
-    def decrements(self, residuals: Sequence[Fields]) -> tuple[float, None, int]:
-        """Return an upper bound of the decrement that cannot vanish by chance, and the iterations."""
+    def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, None, int]:
+        """Return decrements and iterations."""
         found, _, iterations = energy_decrements(self._above, [residual[0] for residual in residuals])
-        return float(np.sqrt(found[0, 0] * found[1, 1])), None, iterations
+        return found, None, iterations

@@ -77,6 +77,11 @@ class ElementFields:
         """Copy ``fields`` to the fields of the forms."""
         self.displacements.set_displacement(fields[0])
 
+    @property
+    def values(self) -> FloatArray:
+        """The forms' fields as one vector of owned dofs."""
+        return np.array(self.displacements.forms.displacement.x.array[: self.displacements.owned])
+
     def interpolate(self, coarse: "ElementFields") -> None:
         """Interpolate the forms' fields of ``coarse`` to those of these elements."""
         self.displacements.forms.displacement.interpolate(coarse.displacements.forms.displacement)

@@ -105,6 +105,11 @@ class MixedElements(Elements):
         super().set_fields(fields)
         self.pressures.set(fields[1])
 
+    @property
+    def values(self) -> FloatArray:
+        """The forms' fields as one vector of owned dofs."""
+        return np.concatenate([super().values, self.pressures.values])
+
     def interpolate(self, coarse: ElementFields) -> None:
         """Interpolate the forms' fields of ``coarse``; displacement elements have no pressure."""
         super().interpolate(coarse)
@@ -281,8 +286,8 @@ class LinearisedMixed(Linearised):
         """Return the elements of one degree more."""
         return self._elements.finer()
 
-    def decrements(self, residuals: Sequence[Fields]) -> tuple[float, float, int]:
-        """Return decrement, N and iterations."""
+    def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, FloatArray, int]:
+        """Return decrements, N and iterations."""
         finer, law = self._elements.finer(), self._law
         below = self._elements._solvers.get(False, (None, None))[0]
         saddle = finer._solver(self._elements.elastic(law), direct=False, below=below)
@@ -290,13 +295,12 @@ class LinearisedMixed(Linearised):
         found = [Column(fixed, None, residual, self._stack.enter_context(finer.fields())) for residual in residuals]
         iterations = MixedSolver(finer, law, saddle, is_exact=False).solve(found, _ESTIMATE_TOLERANCE)
         unit = finer.unit(law)
-        unseen = unit * float(np.sqrt(np.prod(saddle.first_energies)))
-        # x₀·r₁ + x₁·r₀ − x₀·K x₁: its error is the product of both solutions' errors.
-        works = [
-            sum(x.dot(r) for x, r in zip(x_of.unknown, r_of.right, strict=True)) for x_of, r_of in (found, found[::-1])
-        ]
-        decrement = unit * float(sum(works)) - float(finer.products(law, found, checked=False).stationary[0, 1])
-        return decrement, unseen, iterations
+        # x_i·r_j + x_j·r_i − x_i·K x_j: its error is the product of both solutions' errors.
+        works = np.array(
+            [[sum(x.dot(r) for x, r in zip(i.unknown, j.right, strict=True)) for j in found] for i in found]
+        )
+        energies = finer.products(law, found, checked=False).stationary
+        return unit * (works + works.T) - energies, unit * np.array(saddle.first_energies), iterations
 
 
 def _check_ratio(law: MaterialLaw) -> None:

@@ -134,7 +134,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "loads",
         'loads act on the whole body, so no part of it may be cut away: use outside = "coarse"',
     ),
-    Refusal("large displacements", "loads", 'loads need law = "linear": omit [load]'),
     # Relaxation, and histories of the depth.
     Refusal(
         "static relaxing tissue",
