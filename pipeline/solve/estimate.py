@@ -54,8 +54,8 @@ _FOUND, _FOUND_UNSEEN, _FOUND_OF_AREA = 1.6, 1.4, 1.5
 _FOUND_SPREAD, _FOUND_SPREAD_ELSEWHERE, _FOUND_SPREAD_COARSE = 0.4, 0.5, 0.8
 # The same where contact is solved again: in units of the change in one degree more, and of the area's bar.
 _FOUND_AGAIN, _FOUND_AT_EDGE = 2.0, 0.1
-# The same at large displacements, for the area's bar: docs/accuracy.md.
-AT_EDGE_LARGE = 0.15
+# The same at large displacements, for the area's bar, by degree: docs/accuracy.md.
+AT_EDGE_LARGE = {2: 0.15, 3: 0.075}
 # Limits of a mesh that counts as graded to the edge: rim size relative to the probe's half width, and growth.
 _GRADED = (0.4, 0.7)
 

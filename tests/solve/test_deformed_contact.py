@@ -7,7 +7,7 @@ from mpi4py import MPI
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, movement_of, tool_of
 from pipeline.solve.conditions import WITHOUT_FOOTPRINT
-from pipeline.solve.contact import contact_steps
+from pipeline.solve.contact import contact_steps, large
 from pipeline.solve.contact.deformed import settle
 from pipeline.solve.contact.large import LargeTouch
 from pipeline.solve.contact.turned import turned_frames
@@ -109,6 +109,18 @@ def test_a_ball_pressed_in_to_its_equator_leaves_no_tissue_inside():
     before, _ = touched("3.5 mm", base=SPHERE | {"depth_range": ["3.5 mm", "3.9 mm"]})
     assert found["gap"].min() > -0.1 * 3.9e-3
     assert 1.0 < solution.reaction[2] / before.reaction[2] < (3.9 / 3.5) ** 3
+
+
+def test_the_bar_has_a_load_path_of_its_own_where_the_next_degree_does_not_settle_at_once(monkeypatch):
+    def fails(*_, **__):
+        raise LargeError("it is told to")
+
+    scene = {"material": TISSUE, "probe": SPHERE, "mesh": COARSE}
+    (expected,) = solve(**scene).values()
+    monkeypatch.setattr(large, "settle", fails)
+    (record,) = solve(**scene).values()
+    assert record.status == "ok"
+    assert record.force_error == pytest.approx(expected.force_error, rel=0.05)
 
 
 def test_frames_keep_planes_of_symmetry():

@@ -8,13 +8,14 @@ larger part of the error.
 """
 
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
 
 from pipeline.arrays import BoolArray
+from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance, check_work
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import ContactError, Obstacle
@@ -209,7 +210,7 @@ class LargeTouch:
         """
         finer = self._found_again(movement.loads, stack)
         share, at_edge = 1 - finer.force / self.force, self._area().bar
-        taken, bar = found_again_bar(share, at_edge, AT_EDGE_LARGE)
+        taken, bar = found_again_bar(share, at_edge, AT_EDGE_LARGE[self.body.elements.degree])
         return HierarchicalEstimate(
             finer.body.elements,
             [],
@@ -233,14 +234,30 @@ class LargeTouch:
             self.body.state = state
             self.body.show()
             body.interpolate(coarse)
-            tool = placed_tool(body, sagged.placed(self.tool), self.depth)
-            active = self.body.candidates.raised(self.touched.active, body.candidates)
-            if not body.is_sound:
-                raise LargeError("tissue is turned inside out")
-            touched = settle(body, tool, first_set(body, tool, active))
-        except LargeError as error:
+            touched = self._settled_on(body, sagged)
+        except SolveError as error:
             raise LargeError(f"no error bar: elements of degree {degree} fail ({error})") from error
         return replace(self, body=body, touched=touched, sagged=sagged)
+
+    def _settled_on(self, body: DeformedBody, sagged: Sagged) -> Touched:
+        """Return contact on a ``body`` of another degree: from its state, or along a load path where that fails.
+
+        Raises:
+            SolveError: if both fail.
+        """
+
+        def tool_at(depth: float) -> PlacedTool:
+            return placed_tool(body, sagged.placed(self.tool), depth)
+
+        there = tool_at(self.depth)
+        active = self.body.candidates.raised(self.touched.active, body.candidates)
+        if body.is_sound:
+            with suppress(SolveError):
+                return settle(body, there, first_set(body, there, active), is_patient=False)
+        path = ContactPath(Stage(0.0, sagged.state))
+        press(body, tool_at, path, self.depth)
+        assert path.last.touched is not None
+        return path.last.touched
 
     def _area(self) -> Area:
         """Return the contact area of the modelled part, at the deformed place and normal to the axis."""
