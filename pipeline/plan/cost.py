@@ -147,7 +147,7 @@ def features(solve: Solve) -> tuple[str, float, float]:
     case = solve.case
     if solve.axisymmetric:
         found = _FOUND if case.probe.is_unilateral else "meridian"
-        return _STEPS if case.material.is_large else found, 1.0, 0.0
+        return _STEPS if case.has_load_steps else found, 1.0, 0.0
     words = [case.formulation, str(case.mesh.degree)]
     words += [str(case.movements)] if case.movements > 1 else []
     words += ["found"] if case.probe.is_unilateral else []

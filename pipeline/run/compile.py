@@ -14,6 +14,7 @@ from pipeline.solve.forms import compile_forms
 from pipeline.solve.greens_function import compile_regular
 from pipeline.solve.kernels import native
 from pipeline.solve.meridian.large import DEGREE as LARGE_DEGREE
+from pipeline.solve.meridian.large_contact import DEGREE_OF_STEPS
 from pipeline.solve.meridian.problem import compile_axisymmetric
 from pipeline.solve.meridian.punch import TRIAL_DEGREE
 from pipeline.stages import stage
@@ -68,8 +69,10 @@ def _forms(solve: Solve) -> _Forms:
         half_plane = body.half_plane()
         kind = "elliptic" if half_plane and half_plane.is_curved else "axisymmetric"
         if solve.case.material.is_large:
-            return _Forms(kind, LARGE_DEGREE, tuple(sorted({str(tissue.law) for tissue in solve.case.tissues})))
-        return _Forms(kind, TRIAL_DEGREE if solve.case.probe.is_unilateral else 0)
+            degree = DEGREE_OF_STEPS if solve.case.probe.friction else LARGE_DEGREE
+            return _Forms(kind, degree, tuple(sorted({str(tissue.law) for tissue in solve.case.tissues})))
+        lowest = DEGREE_OF_STEPS - 1 if solve.case.probe.friction else TRIAL_DEGREE
+        return _Forms(kind, lowest if solve.case.probe.is_unilateral else 0)
     has_slit = solve.case.probe.slit is not None
     return _Forms(
         solve.case.formulation,

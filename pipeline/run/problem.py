@@ -78,8 +78,9 @@ def memory_of_basis(case: Case, dofs: int) -> float:
 
 def meridian_problem(case: Case) -> Problem:
     """Return the problem of an axisymmetric ``case`` without loads, on its meridian."""
-    if case.material.is_large and case.probe.is_unilateral:
-        return LargeMeridianContact(meridian_of(case), round_tool_of(case))
+    if case.probe.is_unilateral and case.has_load_steps:
+        how = {} if case.mesh.accuracy is None else {"accuracy": case.mesh.accuracy / 2}
+        return LargeMeridianContact(meridian_of(case), round_tool_of(case), **how)
     if case.material.is_large:
         return LargeMeridian(meridian_of(case), conditions_of(case))
     if case.probe.is_unilateral:
@@ -148,8 +149,8 @@ def round_tool_of(case: Case) -> RoundTool:
     if isinstance(probe, RoundIndenter):
         # On a curved body, contact may end below the flat face.
         flat = 0.0 if body.is_curved else probe.section.flat
-        return RoundTool(gap, probe.limit, probe.kinks, distance, flat)
-    return RoundTool(gap, probe.circumradius)
+        return RoundTool(gap, probe.limit, probe.kinks, distance, flat, probe.friction)
+    return RoundTool(gap, probe.circumradius, friction=probe.friction)
 
 
 def movement_of(case: Case, meshed: Case | None = None) -> Movement:

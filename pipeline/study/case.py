@@ -208,5 +208,10 @@ class Case:
         """Whether a depth is reached over smaller ones: contact is found, or displacements are large."""
         return self.probe.is_unilateral or self.material.is_large
 
+    @property
+    def has_load_steps(self) -> bool:
+        """Whether its law or friction makes a load path of steps necessary, which the meridian follows, too."""
+        return self.material.is_large or self.probe.friction > 0
+
     def __str__(self) -> str:
         return ", ".join(f"{name} = {text}" for name, text in self.words.items()) or "the one case"

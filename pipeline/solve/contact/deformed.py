@@ -160,6 +160,8 @@ def settle(
             raise LargeError("the probe does not touch a single node: use smaller elements below it")
         free = forces - exerted
         if is_same and _is_settled(tissue, tool, active, place.gap, free, pressed, rub, roughly=roughly):
+            if rub is not None and not rub.is_sound(active):
+                raise LargeError("the states of nodes with friction repeat")
             exerted = np.where(active[:, None], forces, 0.0)
             return Touched(active, exerted, place.gap, iteration, pressed, None if rub is None else rub.slide)
         if not is_patient and iteration >= _SOON and np.abs(place.gap[active]).max() > _NEARLY_CLOSED * tool.depth:
@@ -229,7 +231,7 @@ def _is_settled(
     if rub is None:
         return bool(np.hypot(left, np.linalg.norm(free)) <= (_ON_THE_WAY if roughly else _LEFT) * most)
     is_close = left <= _LEFT_BESIDE * most and np.linalg.norm(free) <= _LEFT_RUBBING * most
-    return bool(is_close and rub.is_same and rub.is_sound(active))
+    return bool(is_close and rub.is_same)
 
 
 def _advance(tissue: Tissue) -> float:

@@ -16,6 +16,8 @@ from pipeline.solve.contact.coulomb import Neighbours, Simplified, Slide, larges
 
 # Iterations from which a change of the directions of slip is halved if it is not this much smaller than the one before.
 _SWINGING, _CONTRACTS = 4, 0.7
+# Share of the force below which friction is no part of it.
+_NO_PART = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +79,11 @@ class Rub:
         return self.slide.towards(after, self._share)
 
     def is_sound(self, active: BoolArray) -> bool:
-        """Return whether nodes whose state was simplified carry little of the force."""
+        """Return whether nodes whose state was simplified carry little of the force, or friction no part of it."""
         there = active & self._simple.nodes & ~self._with.neighbours.is_corner
         pressed = np.abs(self.normal)
-        return float(pressed[there].sum()) <= self._with.simplified * float(pressed[active].sum())
+        share = float(pressed[there].sum()) / float(pressed[active].sum())
+        return share <= self._with.simplified or self._with.friction * share <= _NO_PART
 
     def friction(self, place: "Placed") -> FloatArray:
         """Return the friction (n, d) N on nodes that slide, zero on others."""

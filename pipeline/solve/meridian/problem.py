@@ -6,7 +6,7 @@ force is the reaction, times 2π. Meshes are refined until the error bar is smal
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import isnan, nan, pi
 
@@ -35,9 +35,9 @@ _WORST_ERROR = 1e-3
 class Answer:
     """Result of one mesh at a depth: F/d from the energy and from the reaction, in units of μ a, and the solution.
 
-    ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²), and at large
-    displacements the radius (m) at rest of its ``edge``. The strain energy, in units
-    of μ a times m², is half of F d if it is not given.
+    ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²), friction the part of it
+    that slides and the sum of tangential forces over d, in units of μ a, and a load path the radius (m) at rest of the
+    ``edge`` of contact. The strain energy, in units of μ a times m², is half of F d if it is not given.
     """
 
     stiffness: float
@@ -50,8 +50,17 @@ class Answer:
     cells: int
     iterations: int
     area: float = nan
+    slip_area: float = nan
+    friction: float = nan
     edge: float = nan
     energy: float | None = None
+
+    def contact(self, scale: float) -> Contact:
+        """Return the contact, with the tangential forces times ``scale``; by symmetry they have no torque."""
+        found = Contact(self.area, self.error)
+        if isnan(self.slip_area):
+            return found
+        return replace(found, slip_area=self.slip_area, friction_force=scale * self.friction, torque=0.0)
 
 
 class MeridianSolver(Problem):
@@ -101,7 +110,7 @@ class MeridianSolver(Problem):
             iterations=found.iterations,
             times=times,
             bars=found.error * stiffness,
-            contact=None if isnan(found.area) else Contact(found.area, found.error),
+            contact=None if isnan(found.area) else found.contact(scale * depth),
             stored=None if found.energy is None else scale * found.energy,
         )
 

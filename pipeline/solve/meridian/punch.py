@@ -43,7 +43,7 @@ class RoundTool:
     ``gap`` returns the initial distance (n,) along the axis (m) between tool and surface, at radii (n,) up to ``limit``
     (m), where the tool ends. ``kinks`` are the radii (m) at which the gap is not smooth. ``distance`` is that of points
     (n, 3), in m from the first touch, to the tool at a depth (m), for contact at large displacements. Up to
-    the radius ``flat`` (m) the tool is flat.
+    the radius ``flat`` (m) the tool is flat. ``friction`` is the coefficient, infinite for tissue that sticks.
     """
 
     gap: Callable[[FloatArray], FloatArray]
@@ -51,6 +51,7 @@ class RoundTool:
     kinks: tuple[float, ...] = ()
     distance: Callable[[FloatArray, float], Distance] | None = None
     flat: float = 0.0
+    friction: float = 0.0
 
     def is_flat(self, radius: float) -> bool:
         """Return whether the gap is zero all the way to a ``radius`` (m)."""

@@ -13,7 +13,6 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "fibres": "fibres have a direction, and are not axisymmetric",
         "linear outside": "the boundary of the linear part is a sphere, and no line of the mesh of the meridian",
         "six motions": "most of the six motions are not axisymmetric",
-        "friction": "friction is computed in three dimensions",
         "half ball": "a half ball is coupled to its far field in three dimensions",
         "loads": "loads are computed in three dimensions",
     },
@@ -22,7 +21,6 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "time steps": "all cases of the comparison are solved in three dimensions",
         "linear outside": "all cases of the comparison are solved in three dimensions",
         "half ball": "all cases of the comparison are solved in three dimensions",
-        "friction": "all cases of the comparison are solved in three dimensions",
     },
     "reduced basis": {
         "layers": "a body of several materials has more than one parameter",
