@@ -123,6 +123,16 @@ def test_the_bar_has_a_load_path_of_its_own_where_the_next_degree_does_not_settl
     assert record.force_error == pytest.approx(expected.force_error, rel=0.05)
 
 
+def test_depths_on_a_path_have_the_forces_and_bars_of_each_alone():
+    depths = [f"{depth} mm" for depth in (0.5, 1.0, 1.5)]
+    probe = SPHERE | {"depth": depths, "depth_range": ["0.5 mm", "1.5 mm"]}
+    together = solve(material=TISSUE, probe=probe, mesh=COARSE).values()
+    for depth, one in zip(depths, together, strict=True):
+        (alone,) = solve(material=TISSUE, probe=probe | {"depth": depth}, mesh=COARSE).values()
+        assert one.force == pytest.approx(alone.force, rel=1e-7)
+        assert one.force_error == pytest.approx(alone.force_error, rel=1e-2)
+
+
 def test_frames_keep_planes_of_symmetry():
     """A normal in the plane x = 0 leaves the x axis a tangent, and so for y; all frames are orthonormal."""
     generator = np.random.default_rng(5)

@@ -21,6 +21,8 @@ from pipeline.solve.newton import LargeError
 _SMALLEST, _SLIVER = 1 / 64, 1e-6
 # Larger steps than this share, without friction, are given up soon.
 _LARGE = 1 / 8
+# Residual and gaps of steps on the way to the depth, without friction.
+_ON_THE_WAY = 1e-2
 # Inactive nodes inside the tool, in units of the depth: more than corners beside active nodes have on a coarse mesh.
 _INSIDE = 0.25
 # The first step ends where the tool's normals at the nodes that it penetrates have this mean part along its way, after
@@ -46,6 +48,9 @@ class ContactPath:
     last: Stage
     before: Stage | None = None
     step: float = inf
+
+    def __post_init__(self) -> None:
+        self.start = self.last
 
     def add(self, stage: Stage) -> None:
         """Go on to a stage."""
@@ -93,11 +98,9 @@ def press(
         step = min(path.step, left)
         there = depth if step > (1 - _SLIVER) * left else path.last.depth + step
         try:
-            how = {
-                "is_patient": friction is not None or there - path.last.depth <= _LARGE * depth,
-                "roughly": friction is None and there < depth,
-            }
-            touched = _step(tissue, tool_at, path, there, friction, **how)
+            is_patient = friction is not None or there - path.last.depth <= _LARGE * depth
+            limit = _ON_THE_WAY if friction is None and there < depth else 0.0
+            touched = _step(tissue, tool_at, path, there, friction, is_patient=is_patient, limit=limit)
         except SolveError as error:
             path.step = (there - path.last.depth) / 2
             if path.step < _SMALLEST * depth:
@@ -132,7 +135,7 @@ def _end(tissue: Tissue, tool_at: Callable[[float], PlacedTool], path: ContactPa
     try:
         touched = settle(tissue, tool_at(last.depth), last.touched.active)
     except SolveError:  # settled roughly, but no better
-        path.last, path.before = Stage(0.0, np.zeros_like(last.state)), None
+        path.last, path.before = path.start, None
         tissue.state = path.last.state
         return
     path.last = Stage(last.depth, tissue.state, touched)
@@ -214,7 +217,7 @@ def _step(
     friction: Friction | None,
     *,
     is_patient: bool,
-    roughly: bool,
+    limit: float,
 ) -> Touched:
     tool, last = tool_at(depth), path.last
     active = np.zeros(len(tissue.fixed), dtype=bool) if last.touched is None else last.touched.active
@@ -226,7 +229,7 @@ def _step(
     if guess is None:
         tissue.state = path.last.state
     rubbing = None if friction is None else _rubbing(tissue, tool_at, last, depth, friction)
-    touched = settle(tissue, tool, first_set(tissue, tool, active), rubbing, is_patient=is_patient, roughly=roughly)
+    touched = settle(tissue, tool, first_set(tissue, tool, active), rubbing, is_patient=is_patient, limit=limit)
     if touched.gap.min() < -_INSIDE * depth:  # the loop went to another equilibrium, around the tool
         raise LargeError("tissue is left inside the tool")
     return touched

@@ -27,9 +27,7 @@ from pipeline.solve.contact.turned import turned_frames
 from pipeline.solve.newton import LargeError
 
 # Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
-_LEFT, _CLOSED = 1e-8, 1e-8
-# On the way to a depth, both.
-_ON_THE_WAY = 1e-2
+LEFT, _CLOSED = 1e-8, 1e-8
 # With friction: the residual of nodes that slide, whose friction is that of the iteration before, and of all others.
 _LEFT_RUBBING, _LEFT_BESIDE = 1e-4, 1e-7
 # Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
@@ -129,12 +127,12 @@ def settle(
     rubbing: Rubbing | None = None,
     *,
     is_patient: bool = True,
-    roughly: bool = False,
+    limit: float = 0.0,
 ) -> Touched:
     """Find equilibrium and contact from the tissue's state and an initial ``active`` set (n); collective.
 
     Without ``rubbing`` there is no friction. Without patience, the loop ends where smaller load steps need fewer
-    iterations. ``roughly`` is enough for a load step on the way to another one.
+    iterations. A residual and gaps below ``limit`` are enough, in units of the forces and the depth.
 
     Raises:
         LargeError: if the loop does not converge.
@@ -159,7 +157,7 @@ def settle(
         if is_same and not active.any():
             raise LargeError("the probe does not touch a single node: use smaller elements below it")
         free = forces - exerted
-        if is_same and _is_settled(tissue, tool, active, place.gap, free, pressed, rub, roughly=roughly):
+        if is_same and _is_settled(tissue, tool, active, place.gap, free, pressed, rub, limit=limit):
             if rub is not None and not rub.is_sound(active):
                 raise LargeError("the states of nodes with friction repeat")
             exerted = np.where(active[:, None], forces, 0.0)
@@ -223,13 +221,13 @@ def _is_settled(
     pressed: FloatArray,
     rub: Rub | None,
     *,
-    roughly: bool,
+    limit: float,
 ) -> bool:
     left, most = tissue.unbalanced(), np.linalg.norm(pressed)
-    if not np.abs(gap[active]).max(initial=0.0) <= (_ON_THE_WAY if roughly else _CLOSED) * tool.depth:
+    if not np.abs(gap[active]).max(initial=0.0) <= max(_CLOSED, limit) * tool.depth:
         return False
     if rub is None:
-        return bool(np.hypot(left, np.linalg.norm(free)) <= (_ON_THE_WAY if roughly else _LEFT) * most)
+        return bool(np.hypot(left, np.linalg.norm(free)) <= max(LEFT, limit) * most)
     is_close = left <= _LEFT_BESIDE * most and np.linalg.norm(free) <= _LEFT_RUBBING * most
     return bool(is_close and rub.is_same)
 

@@ -20,6 +20,7 @@ from pipeline.solve.balance import check_balance, check_work
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import ContactError, Obstacle
 from pipeline.solve.contact.contact_steps import ContactPath, Stage, press
+from pipeline.solve.contact.corrections import Corrections
 from pipeline.solve.contact.deformed import PlacedTool, Touched, first_set, settle
 from pipeline.solve.contact.elements import State
 from pipeline.solve.contact.geometry import Area, contact_area
@@ -38,6 +39,8 @@ from pipeline.stages import stage
 
 # Relative change of the displacement for the check of the work.
 _SMALL = 1e-4
+# Residual and gaps of one degree more, for the error bar.
+_FOUND_AGAIN = 1e-5
 
 
 class LargeContact:
@@ -50,6 +53,7 @@ class LargeContact:
         self._applied = None if self._loads is None else elements.displacements.applied(self._loads)
         self._sagged: Sagged | None = None
         self._path: ContactPath | None = None
+        self._corrections = Corrections()
 
     def can_reach(self, asked: Request) -> bool:
         """Return whether the load path can be continued to a request."""
@@ -85,7 +89,7 @@ class LargeContact:
         touched = self._path.last.touched
         assert touched is not None
         body.state = self._path.last.state
-        return LargeTouch(self._surface, body, self._tool, touched, depth, self._sagged), iterations
+        return LargeTouch(self._surface, body, self._tool, touched, depth, self._sagged, self._corrections), iterations
 
 
 def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError) -> LargeError:
@@ -116,7 +120,7 @@ def placed_tool(body: DeformedBody, tool: Tool, depth: float) -> PlacedTool:
 class LargeTouch:
     """Contact at a ``depth`` (m) with the state of a ``body``; methods are collective.
 
-    ``sagged`` is the body before, from whose first touch the depth counts.
+    ``sagged`` is the body before, from whose first touch the depth counts. ``corrections`` are those of the path.
     """
 
     surface: Surface
@@ -125,6 +129,7 @@ class LargeTouch:
     touched: Touched
     depth: float
     sagged: Sagged
+    corrections: Corrections
 
     @property
     def placed(self) -> Tool:
@@ -234,7 +239,13 @@ class LargeTouch:
             self.body.state = state
             self.body.show()
             body.interpolate(coarse)
+            interpolated, correction = body.state, self.corrections.at(self.depth)
+            if correction is not None:
+                body.state = interpolated + correction
+                if not body.is_sound:
+                    body.state = interpolated
             touched = self._settled_on(body, sagged)
+            self.corrections.add(self.depth, body.state - interpolated)
         except SolveError as error:
             raise LargeError(f"no error bar: elements of degree {degree} fail ({error})") from error
         return replace(self, body=body, touched=touched, sagged=sagged)
@@ -253,7 +264,7 @@ class LargeTouch:
         active = self.body.candidates.raised(self.touched.active, body.candidates)
         if body.is_sound:
             with suppress(SolveError):
-                return settle(body, there, first_set(body, there, active), is_patient=False)
+                return settle(body, there, first_set(body, there, active), is_patient=False, limit=_FOUND_AGAIN)
         path = ContactPath(Stage(0.0, sagged.state))
         press(body, tool_at, path, self.depth)
         assert path.last.touched is not None

@@ -55,7 +55,9 @@ class RubbingContact(LargeContact):
         body.state = path.last.state
         coarse, fine = touched
         path_bar = abs(float(coarse.forces[:, 2].sum() / fine.forces[:, 2].sum()) - 1)
-        found = RubbingTouch(self._surface, body, self._tool, fine, depth, smooth.sagged, smooth, state, path_bar)
+        found = RubbingTouch(
+            self._surface, body, self._tool, fine, depth, smooth.sagged, smooth.corrections, smooth, state, path_bar
+        )
         return found.equilibrium(asked.movement, iterations, stack)
 
 

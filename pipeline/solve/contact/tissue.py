@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.constraint import Constraint
+from pipeline.solve.contact.deformed import LEFT
 from pipeline.solve.contact.levels import Numbering, Surface
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.turned_tangent import FactorisedTangent, IteratedTangent, TurnedTangent
@@ -106,7 +107,8 @@ class DeformedBody:
             self._tangent.multiply(self._change, right)
             right.array[:] = -right.array - self._forces() / self._unit
             self._numbering.add_vectors(right.array, constraint.forces / self._unit)
-            self._tangent.solve(constraint, right, self._change)
+            target = LEFT * float(np.linalg.norm(self.forces())) / self._unit
+            self._tangent.solve(constraint, right, self._change, target)
             self._tangent.multiply(self._change, right)
             moved = self._numbering.gather_vectors(self._change.array[: self._space.owned])
             change = self._numbering.gather_vectors(self._unit * right.array[: self._space.owned])

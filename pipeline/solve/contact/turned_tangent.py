@@ -50,8 +50,10 @@ class TurnedTangent(ABC):
         """Write the product with a change of the state, which is zero at prescribed dofs; other rows are valid."""
 
     @abstractmethod
-    def solve(self, constraint: Constraint, right: PETSc.Vec, change: PETSc.Vec) -> None:
+    def solve(self, constraint: Constraint, right: PETSc.Vec, change: PETSc.Vec, target: float) -> None:
         """Add to ``change`` the solution for ``right`` that is zero where the constraint holds.
+
+        ``target`` is the norm of the residual at the end of Newton's method, in the unit of the forms.
 
         Raises:
             SolveError: if the solver fails.
@@ -87,7 +89,7 @@ class FactorisedTangent(TurnedTangent):
         """Write the product with a change of the state."""
         self._tangent.matrix.mult(x, result)
 
-    def solve(self, constraint: Constraint, right: PETSc.Vec, change: PETSc.Vec) -> None:
+    def solve(self, constraint: Constraint, right: PETSc.Vec, change: PETSc.Vec, target: float) -> None:
         """Add the solution that is zero where the constraint holds."""
         owned, held = self._space.owned, self._slots(constraint)
         with ExitStack() as stack, explained():
@@ -156,6 +158,7 @@ class IteratedTangent(TurnedTangent):
         elastic = elements.elastic(law)
         self._hierarchy = Hierarchy(surface, elements.degree, elastic, stack, direct=False, masks=elements.masks)
         self._solver: Solver | None = None
+        self._active = np.zeros(len(numbering.local), dtype=bool)
         self._before = 0.0  # norm of the last right-hand side
         stack.callback(self._close)
         self._work = [stack.enter_context(body.state()) for _ in range(2)]
@@ -187,22 +190,25 @@ class IteratedTangent(TurnedTangent):
         image.array[self._held] = x.array_r[self._held]
         result.array[:] = image.array
 
-    def solve(self, constraint: Constraint, right: PETSc.Vec, change: PETSc.Vec) -> None:
+    def solve(self, constraint: Constraint, right: PETSc.Vec, change: PETSc.Vec, target: float) -> None:
         """Add the solution that is zero where the constraint holds."""
         self._frames, self._held = constraint.frames[self._here], self._slots(constraint)
         with ExitStack() as stack, self._body.state() as load, self._body.state() as found, explained():
             load.array[:] = right.array
             self._rotate(load.array, "nji,nj->ni")
             load.array[self._held] = 0.0
-            self._iterate(self._preconditioner(constraint, stack), load, found, stack)
+            self._iterate(self._preconditioner(constraint, stack), load, found, target, stack)
             self._rotate(found.array, "nij,nj->ni")
             change.axpy(1.0, found)
 
-    def _iterate(self, preconditioner: object, load: PETSc.Vec, found: PETSc.Vec, stack: ExitStack) -> None:
+    def _iterate(
+        self, preconditioner: object, load: PETSc.Vec, found: PETSc.Vec, target: float, stack: ExitStack
+    ) -> None:
         is_mixed, norm = isinstance(self._elements, MixedElements), load.norm()
         gained, self._before = norm / self._before if self._before else 1.0, norm
+        tolerance = forcing(gained, target / norm if norm else 1.0)
         for kind in ("tangent, mixed",) if is_mixed else ("tangent", "tangent, mixed"):
-            how = {"ksp_rtol": forcing(gained), "ksp_max_it": _MOST_ITERATIONS}
+            how = {"ksp_rtol": tolerance, "ksp_max_it": _MOST_ITERATIONS}
             ksp = solver_of(kind, self._matrix, stack, preconditioner, **how)
             found.set(0.0)
             ksp.solve(load, found)
@@ -216,9 +222,11 @@ class IteratedTangent(TurnedTangent):
     def _preconditioner(self, constraint: Constraint, stack: ExitStack) -> object:
         """Return the preconditioner of linear elasticity with the same nodes held along z."""
         active = constraint.held[:, -1]
-        held = self._numbering.normal_dofs(active, owned=True)
-        levels = self._hierarchy.hold(active)
-        self._solver = self._elements.solver_on(levels, self._law, held, direct=False, earlier=self._solver)
+        if self._solver is None or not np.array_equal(active, self._active):
+            held = self._numbering.normal_dofs(active, owned=True)
+            levels = self._hierarchy.hold(active)
+            self._solver = self._elements.solver_on(levels, self._law, held, direct=False, earlier=self._solver)
+            self._active = active
         if isinstance(self._solver, MixedSolver):
             elements = self._solver.elements
             return self._solver.saddle.preconditioner(elements.compliance(self._law), stack)
