@@ -157,7 +157,7 @@ def rub(
     Raises:
         LargeError: if a step becomes too small; the path keeps the steps that converged.
     """
-    iterations, start = 0, path.last
+    iterations, start, farthest = 0, path.last, path.last
     for number in range(1, steps + 1):
         there = depth * (number / steps) ** 2
         if path.last.touched is None:
@@ -170,7 +170,9 @@ def rub(
         try:
             iterations += press(tissue, tool_at, path, there, friction)
         except LargeError:  # few nodes touch, whose state does not settle: contact begins with the next step
+            farthest = max(farthest, path.last, key=lambda stage: stage.depth if stage.touched else 0.0)
             if number > steps // 2:
+                path.last = farthest
                 raise
             path.last, path.before = start, None
     return iterations

@@ -94,6 +94,13 @@ class MeridianForms:
             result[number] = part.interpolate(other, solution[of_other])
         return result
 
+    def transferred(self, other: "MeridianForms", solution: FloatArray, ratio: float) -> FloatArray:
+        """Return the ``solution`` of other meshes of straight cells, whose unit is ``ratio`` times that of these."""
+        result = np.zeros(self.dofs)
+        for (part, number), (known, of_known) in zip(self._parts, other._parts, strict=True):
+            result[number] = part.transferred(known, solution[of_known], ratio)
+        return result
+
     def mean_strains(self) -> tuple[FloatArray, FloatArray]:
         """Return the largest principal strain, by magnitude, of each cell's mean strain, and its corners (m, 3, 2).
 

@@ -36,8 +36,8 @@ class Answer:
     """Result of one mesh at a depth: F/d from the energy and from the reaction, in units of μ a, and the solution.
 
     ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²), friction the part of it
-    that slides and the sum of tangential forces over d, in units of μ a, and a load path the radius (m) at rest of the
-    ``edge`` of contact. The strain energy, in units of μ a times m², is half of F d if it is not given.
+    that slides and the sum of tangential forces over d, in units of μ a. The strain energy, in units of μ a times m²,
+    is half of F d if it is not given.
     """
 
     stiffness: float
@@ -52,7 +52,6 @@ class Answer:
     area: float = nan
     slip_area: float = nan
     friction: float = nan
-    edge: float = nan
     energy: float | None = None
 
     def contact(self, scale: float) -> Contact:

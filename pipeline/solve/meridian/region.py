@@ -19,6 +19,7 @@ from pipeline.mesh.meridian import mesh_order
 from pipeline.solve.compiled import cellwise_space, form, taylor_hood_space, vector_space
 from pipeline.solve.laws import LAWS
 from pipeline.solve.laws.law import Energy
+from pipeline.solve.meridian.transfer import Pieces
 from pipeline.solve.physics import (
     MaterialLaw,
     Parameters,
@@ -151,6 +152,29 @@ class Region:
         else:
             self._solution.interpolate(coarse._solution)
         return np.array(self._solution.x.array)
+
+    def transferred(self, other: "Region", solution: FloatArray, ratio: float) -> FloatArray:
+        """Return the ``solution`` of another mesh of straight cells, whose unit is ``ratio`` times this one's."""
+        result = np.zeros(self.dofs)
+        corners = other._mesh.geometry.x[compat.geometry_dofs(other._mesh)[:, :3], :2]
+        for (numbers, space, power), (known, of_known, _) in zip(self._fields, other._fields, strict=True):
+            nodes = compat.cell_dofs(of_known)
+            places = of_known.tabulate_dof_coordinates()[nodes, :2]
+            found = Pieces(corners, places, solution[known[nodes]]).at(space.tabulate_dof_coordinates()[:, :2] / ratio)
+            result[numbers] = ratio**power * found
+        return result
+
+    @cached_property
+    def _fields(self) -> list[tuple[IntArray, Any, int]]:
+        """Dofs (n, c) of nodes, space of these nodes, and power of the unit: displacements and, if mixed, pressures."""
+        fields = [(self._numbers, self._displacements, 1)]
+        if self.is_mixed:
+            pressures = vector_space(self._mesh, self._degree - 1)
+            nodes = compat.cell_dofs(pressures)
+            numbers = np.empty((nodes.max() + 1, 1), dtype=np.int64)
+            numbers[nodes, 0] = compat.cell_dofs(self._space.sub(1))
+            fields.append((numbers, pressures, 0))
+        return fields
 
     def mean_strains(self) -> tuple[FloatArray, FloatArray]:
         """Return the largest principal strain of each cell's mean strain, and its corners (m, 3, 2)."""
