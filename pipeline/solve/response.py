@@ -55,13 +55,14 @@ class Contact:
         """Radius (m) of a disc of the same area."""
         return float(self.area / pi) ** 0.5
 
-    def with_friction(self, share: float, across: FloatArray, torque: float, mirrored: Sequence[int]) -> "Contact":
+    def with_friction(self, share: float, sizes: FloatArray, torque: float, mirrored: Sequence[int]) -> "Contact":
         """Return the contact with friction, a ``share`` of whose area slides.
 
-        Tangential forces ``across`` (n, 2 or 3) in N, and the ``torque`` (N m), are those of the part that planes of
-        symmetry, normal to the axes ``mirrored``, bound. A mirror image has the opposite torque.
+        The ``sizes`` (n) of the tangential forces at nodes (N), with the sign of the normal reaction, and the
+        ``torque`` (N m) are those of the part that planes of symmetry, normal to the axes ``mirrored``, bound. A mirror
+        image has the opposite torque.
         """
-        total = 2.0 ** len(mirrored) * float(np.linalg.norm(across, axis=1).sum())
+        total = 2.0 ** len(mirrored) * float(sizes.sum())
         whole_torque = 0.0 if mirrored else torque
         return replace(self, slip_area=share * self.area, friction_force=total, torque=whole_torque)
 

@@ -140,9 +140,10 @@ class FrictionalContact(FoundContact):
         """Return the area of the whole contact, and the part of it that slides."""
         candidates, step = self.obstacle.candidates, self.pressed
         across = step.reactions[:, 1:]
+        sizes = np.sign(step.reactions[:, 0]) * np.linalg.norm(across, axis=1)
         torque = self.tool.torque(candidates.points, across)
         share = step.slide.share(candidates.weights, step.active)
-        return super().summary(sag).with_friction(share, across, torque, self._plug.body.mirrored)
+        return super().summary(sag).with_friction(share, sizes, torque, self._plug.body.mirrored)
 
     def response(self, column: Column, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d, with its components across the axis."""

@@ -168,8 +168,9 @@ class LargeTouch:
             return contact
         places, share = body.positions(), touched.slide.share(body.candidates.weights, touched.active)
         across = touched.forces - touched.pressed[:, None] * self.placed.distance(places, self.depth).normal
+        sizes = np.sign(touched.pressed) * np.linalg.norm(across, axis=1)
         torque = self.tool.torque(places, touched.forces)
-        return contact.with_friction(share, across, torque, body.elements.body.mirrored)
+        return contact.with_friction(share, sizes, torque, body.elements.body.mirrored)
 
     def check(self) -> None:
         """Check the work, and that contact ends within the candidates.

@@ -86,8 +86,14 @@ class Rub:
         return share <= self._with.simplified or self._with.friction * share <= _NO_PART
 
     def friction(self, place: "Placed") -> FloatArray:
-        """Return the friction (n, d) N on nodes that slide, zero on others."""
-        most = largest_friction(self._simple.law(self._with.friction), self.normal)
+        """Return the friction (n, d) N on nodes that slide, zero on others.
+
+        At corners, whose normal reactions may have any sign, it has that of the reaction: the sum then obeys the law.
+        """
+        law = self._simple.law(self._with.friction)
+        most = largest_friction(law, self.normal)
+        if self._with.friction < np.inf:
+            most = np.where(self._with.neighbours.is_corner, law * self.normal, most)
         within = self.slide.trial - np.einsum("ni,ni->n", self.slide.trial, place.normal)[:, None] * place.normal
         directions = replace(self.slide, trial=np.where(self._with.fixed, 0.0, within)).directions
         return np.where(self.slide.sliding & (most < np.inf), most, 0.0)[:, None] * directions

@@ -136,7 +136,9 @@ FEATURES: dict[str, Feature] = {
         "probe.contact", lambda s: _has_edge(s) and not s.probe.is_unilateral
     ),
     "friction": Feature("probe.friction", lambda s: s.probe.friction > 0, write=_coefficient),
-    "touch beside the axis": Feature("probe.axis", _touches_beside, ("body",), list),
+    "inclined touch of a linear law": Feature(
+        "probe.axis", lambda s: _touches_beside(s) and not s.material.is_large, ("body", "material"), list
+    ),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
     "bent surface": Feature("load", lambda s: s.load.acts and s.probe.is_unilateral, ("probe",)),
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),

@@ -113,9 +113,9 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal(
         "friction",
-        "touch beside the axis",
-        "the tool touches beside its axis, where its surface is inclined: friction is computed about the axis. Turn "
-        "the axis to the surface's normal, or omit friction",
+        "inclined touch of a linear law",
+        "the tool touches beside its axis, where its surface is inclined, and with a linear law friction is across the "
+        "axis: turn the axis to the surface's normal, use a law of large displacements, or omit friction",
     ),
     Refusal("slit", "no flat top", "a slit needs the flat top of a box or a cylinder, and goes straight down"),
     Refusal(

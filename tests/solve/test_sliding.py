@@ -1,0 +1,66 @@
+"""A tool that slides, at constant depth or along an inclined path: its drag is the coefficient times the force."""
+
+from contextlib import ExitStack
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.run.meshing import mesh_case
+from pipeline.run.problem import law_of, tool_of
+from pipeline.solve.conditions import WITHOUT_FOOTPRINT
+from pipeline.solve.contact.contact_steps import ContactPath, Stage, press, rub
+from pipeline.solve.contact.large import placed_tool
+from pipeline.solve.contact.large_friction import friction_of
+from pipeline.solve.contact.levels import Surface
+from pipeline.solve.contact.tissue import DeformedBody
+from pipeline.solve.quasi_static import QuasiStaticProblem
+from pipeline.solve.spaces import Spaces
+from tests.cases import solve, study
+
+BODY = {"shape": "cylinder", "radius": "12 mm", "height": "8 mm"}
+MESH = {"fine": "6 mm", "coarse": "6 mm", "rim": "0.6 mm", "growth": 0.7}
+NEO_HOOKEAN = {"poisson": 0.45, "law": "neo-hookean"}
+DEPTH, FRICTION = 0.2e-3, 0.3
+BALL = {"shape": "sphere", "radius": "16 mm", "depth": "0.2 mm"}
+
+
+def test_drag_at_constant_depth_is_the_law_times_the_force():
+    """The tool presses, and then moves along x by three quarters of its depth, which is beyond the sticking range."""
+    (case,) = study(body=BODY, probe=BALL | {"friction": FRICTION}, mesh=MESH, material=NEO_HOOKEAN).cases()
+    with Spaces(mesh_case(case, ("y",), MPI.COMM_SELF)) as spaces, ExitStack() as stack:
+        problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.element, tool=tool_of(case))
+        body = DeformedBody(problem.elements, Surface(spaces), law_of(case), "direct", stack)
+        tool, path = tool_of(case), ContactPath(Stage(0.0, np.zeros_like(body.state)))
+        friction = friction_of(body, FRICTION, DEPTH)
+        rub(body, lambda depth: placed_tool(body, tool, depth), path, DEPTH, friction, 4)
+
+        def beside(travel):
+            shift = np.array([travel - DEPTH, 0.0, 0.0])
+            return replace(placed_tool(body, tool, DEPTH), distance=lambda points: tool.distance(points - shift, DEPTH))
+
+        along = replace(friction, advance=np.array([1.0, 0.0, 0.0]))
+        drags = []
+        for share in (0.05, 0.3, 0.75):
+            press(body, beside, path, (1 + share) * DEPTH, along)
+            touched = path.last.touched
+            across, _, up = -touched.forces.sum(axis=0)
+            drags.append(-across / up)
+    assert 0 < drags[0] < 0.8 * FRICTION
+    assert touched.slide.sliding[touched.active].all()
+    assert drags[-1] == pytest.approx(FRICTION, rel=0.005)
+
+
+def test_drag_of_an_inclined_path_is_the_law_times_the_force():
+    """An inclined axis is a path that presses and slides at once; little friction slides from the first touch on.
+
+    The slope of the ball at the edge of contact, 0.23, and the mesh change the ratio by some per cent.
+    """
+    ball = {"shape": "sphere", "radius": "8 mm", "depth": "0.4 mm", "axis": [0.242, 0, -0.970], "at": ["0 mm", "0 mm"]}
+    (found,) = solve(body=BODY, probe=ball | {"friction": 0.05}, mesh=MESH, material=NEO_HOOKEAN).values()
+    assert found.status == "ok", found.message
+    drag, _, force = found.force_vector
+    assert found.slip_area == pytest.approx(found.contact_area)
+    assert -drag == pytest.approx(0.05 * force, rel=0.04)
+    assert found.friction_force == pytest.approx(0.05 * force, rel=0.04)
