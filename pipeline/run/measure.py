@@ -102,6 +102,8 @@ def _course(case: Case, history: History | None) -> dict[str, tuple[float, ...]]
         "dissipated": history.dissipated,
         "dissipated_error": np.abs(history.imbalance),
     }
+    if case.probe.is_unilateral:
+        found["area"] = history.areas
     return {name: tuple(map(float, values)) for name, values in found.items()}
 
 

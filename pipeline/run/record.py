@@ -31,8 +31,10 @@ _POWERS = {
 }
 
 # What the course of a case has by time, each with the power of the depth that it is proportional to: time (s), force
-# against the advance, its error from the steps, its components (N), dissipated energy and its error (J).
+# against the advance, its error from the steps, its components (N), dissipated energy and its error (J); contact area
+# (m²), if it is found.
 COURSE = {"time": 0, "force": 1, "step_error": 1, "x": 1, "y": 1, "z": 1, "dissipated": 2, "dissipated_error": 2}
+COURSE |= {"area": 2}
 
 
 @dataclass(frozen=True)

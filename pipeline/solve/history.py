@@ -35,7 +35,7 @@ class History:
 
     ``forces`` (n, 3) are those of the tissue on the probe (N), with ``bars`` (n) of the time steps along the axis (N).
     ``dissipated`` (n) is the energy (J) turned into heat since the beginning, ``imbalance`` (n) the difference (J) of
-    work and of what is stored and dissipated.
+    work and of what is stored and dissipated. ``areas`` (n, m²) are those of found contact, NaN without.
     """
 
     times: FloatArray
@@ -43,6 +43,7 @@ class History:
     bars: FloatArray
     dissipated: FloatArray
     imbalance: FloatArray
+    areas: FloatArray
 
 
 def between(found: dict[int, float], count: int) -> FloatArray:

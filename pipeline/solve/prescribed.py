@@ -24,6 +24,7 @@ from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import LoadResponse, Response, load_response_of, reaction
 from pipeline.solve.solution import Request
+from pipeline.solve.time_steps import PressedFootprint
 from pipeline.stages import stage
 
 # Tolerance of each motion's own balance for the balance of both sides of a cut, as a share of the limit.
@@ -78,6 +79,15 @@ class PrescribedMotion:
                 movement = close_far(columns, movement, -float(response.stiffness[1, 0] / response.stiffness[1, 1]))
                 response = _balanced(respond(solver.products(columns), columns, law, movement)[0])
         return Equilibrium(solver, columns, movement, iterations, response, load_response)
+
+    def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> PressedFootprint:
+        """Return the body whose footprint is pressed in time steps; the ``stack`` frees it; collective."""
+        elements, solver = self._elements, found.solver
+        if isinstance(solver, LoadSteps):
+            linear = solver.linearised
+        else:
+            linear = elements.linearised(asked.law, stack, direct=elements.is_direct(asked.method))
+        return PressedFootprint(elements, asked.law, linear, found.movement, stack)
 
     def _iterate(
         self, solver: Solver, columns: list[Column], todo: list[Column], movement: Movement, tolerance: float

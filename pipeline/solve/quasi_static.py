@@ -28,14 +28,13 @@ from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.elements.fields import Column
 from pipeline.solve.estimate import error_bar, stiffness_bars
 from pipeline.solve.linear_solver import LinearSolver
-from pipeline.solve.load_steps import LoadSteps
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.prescribed import PrescribedMotion, respond
 from pipeline.solve.response import LoadResponse, Response, shares
 from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Spaces
-from pipeline.solve.time_steps import TimeSteps
+from pipeline.solve.time_steps import Pressed, TimeSteps
 from pipeline.stages import recorded, stage
 
 
@@ -48,6 +47,9 @@ class Constraint(Protocol):
         Raises:
             SolveError: if there is none, or it fails a check.
         """
+
+    def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> Pressed:
+        """Return the body in time steps up to the equilibrium that was found; collective."""
 
     def close(self) -> None:
         """Free what is kept between solves."""
@@ -142,12 +144,8 @@ class QuasiStaticProblem(Problem):
             LargeError: if the time steps do not reach its end.
         """
         assert asked.course is not None
-        solver, direct = found.solver, self.elements.is_direct(asked.method)
-        if isinstance(solver, LoadSteps):
-            linear = solver.linearised
-        else:
-            linear = self.elements.linearised(asked.law, stack, direct=direct)
-        steps = TimeSteps(self.elements, asked.law, linear, found.movement, stack)
+        pressed = self.constraint.in_time(asked, found, stack)
+        steps = TimeSteps(self.elements, asked.law, pressed, found.movement.amounts[0], stack)
         history = steps.follow(asked.course)
         return replace(solution, history=history, iterations=solution.iterations + steps.iterations)
 

@@ -1,14 +1,18 @@
 """Time steps of relaxing tissue, each solved by Newton's method: see :mod:`pipeline.solve.relaxing`.
 
+What presses is a footprint whose displacement is prescribed, or a tool whose contact is found at each time.
+
 The elastic stress is taken to be linear in time over a step. Its error falls with the square of the step. A second set
 of history variables follows every other time: the work of the difference of both stresses in the displacement gives
 what that changes of the force, about four times the error.
 """
 
+from abc import ABC, abstractmethod
 from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
+from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.balance import sums
@@ -40,24 +44,81 @@ class _Place:
     has_moved: bool = False
 
 
-class TimeSteps:
-    """Time steps of a ``movement`` in a body of a ``law`` whose regions may relax. Methods are collective."""
+class Pressed(ABC):
+    """A relaxing ``body`` and what presses it, at the equilibrium at a share of the movement. Methods are collective.
+
+    ``force`` (3), N, is that of the tool on the modelled part, ``rate`` (J) the work per share, and ``area`` (m²) the
+    contact of the whole body, NaN if it is prescribed.
+    """
+
+    body: HyperelasticBody
+    force: FloatArray
+    rate: float
+    area: float = np.nan
+
+    @abstractmethod
+    def settle(self, state: PETSc.Vec, share: float) -> None:
+        """Find the equilibrium at a ``share`` from an initial guess, ``state``.
+
+        Raises:
+            LargeError: if Newton's method does not converge; ``state`` is then undefined.
+        """
+
+    @abstractmethod
+    def guess(self, state: PETSc.Vec) -> FloatArray | None:
+        """Return the change of a state per share by the tangent there, None if there is no such guess."""
+
+    @abstractmethod
+    def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
+        """Return the displacement (owned dofs) per metre of the tool in which stresses do the work of the force."""
+
+
+class PressedFootprint(Pressed):
+    """A body whose footprint has a prescribed ``movement``."""
 
     def __init__(
         self, elements: Elements, law: MaterialLaw, linearised: Linearised, movement: Movement, stack: ExitStack
     ):
         """Set up; what is made is freed with the ``stack``."""
-        self._elements, self._law, self._movement = elements, law, movement
-        self._space, self._place = elements.displacements, _Place()
-        self._body = HyperelasticBody(elements, law, linearised.preconditioner, prestressed=True)
-        stack.callback(self._body.close)
-        self._variables = HistoryVariables(self._body.cells, [each.relaxation for each in law.parameters])
-        self._state, self._before, self._forces, self._unit = (
-            stack.enter_context(self._body.state()) for _ in range(4)
-        )
+        self._space, self._amount = elements.displacements, movement.amounts[0]
+        self.body = HyperelasticBody(elements, law, linearised.preconditioner, prestressed=True)
+        stack.callback(self.body.close)
+        self._forces, self._unit = (stack.enter_context(self.body.state()) for _ in range(2))
         owned = self._space.owned
         for motion, amount in zip(movement.motions, movement.amounts, strict=True):
             self._unit.array[:owned] += amount * self._space.held(motion)[:owned]
+        self.force, self.rate = np.zeros(3), 0.0
+
+    def settle(self, state: PETSc.Vec, share: float) -> None:
+        """Find the equilibrium at a share."""
+        held = share * self.body.held_of(self._unit)
+        state.array[self._space.prescribed_owned] = held
+        self.body.settle(state, held)
+        self.body.forces(state, self._forces)
+        residual = self._forces.array[: self._space.owned]
+        (self.force,) = sums(self._space, [residual], [self._unit.array[: self._space.owned]]).on_probe
+        self.rate = float(self._forces.dot(self._unit))
+
+    def guess(self, state: PETSc.Vec) -> FloatArray:
+        """Return the change of a state per share by the tangent there."""
+        with self.body.state() as rate:
+            self.body.move(state, self._unit, rate)
+            return np.array(rate.array)
+
+    def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
+        """Return the displacement per metre, as a secant."""
+        return np.asarray(state.array[: self._space.owned] / (share * self._amount))
+
+
+class TimeSteps:
+    """Time steps of a body of a ``law`` whose regions may relax, to a ``depth`` (m). Methods are collective."""
+
+    def __init__(self, elements: Elements, law: MaterialLaw, pressed: Pressed, depth: float, stack: ExitStack):
+        """Set up; what is made is freed with the ``stack``."""
+        self._elements, self._law, self._depth = elements, law, depth
+        self._place, self._pressed, self._body = _Place(), pressed, pressed.body
+        self._variables = HistoryVariables(self._body.cells, [each.relaxation for each in law.parameters])
+        self._state, self._before = (stack.enter_context(self._body.state()) for _ in range(2))
 
     @property
     def iterations(self) -> int:
@@ -73,7 +134,7 @@ class TimeSteps:
         """
         self._elements.set_law(self._law)
         halves, errors = course.halves(), dict[int, float]()
-        forces, heat, imbalance = [], [], []
+        forces, heat, imbalance, areas = [], [], [], []
         for number, (time, share) in enumerate(zip(course.times, course.shares, strict=True)):
             self._reach(time, share, course)
             if number in halves:
@@ -82,6 +143,7 @@ class TimeSteps:
             dissipated, stored = self._energies()
             heat.append(dissipated)
             imbalance.append(self._place.work - stored - dissipated)
+            areas.append(self._pressed.area)
         whole = 2.0 ** len(self._elements.body.mirrored)
         return History(
             times=np.array(course.times),
@@ -89,6 +151,7 @@ class TimeSteps:
             bars=_OF_DIFFERENCE * whole * between(errors, len(forces)),
             dissipated=whole * np.array(heat),
             imbalance=whole * np.array(imbalance),
+            areas=np.array(areas),
         )
 
     def _reach(self, time: float, share: float, course: Course) -> None:
@@ -121,47 +184,39 @@ class TimeSteps:
         if not (place.has_moved or share):  # at rest
             place.time = time
             return
-        prestress = self._variables.prestress(step)
-        body.impose(prestress)
+        self._body.impose(self._variables.prestress(step))
         with body.state() as trial:
             trial.array[:] = self._state.array
-            if change:
-                trial.array[:] += change * self._rate()
-            trial.array[self._space.prescribed_owned] = share * self._unit.array[self._space.prescribed_owned]
-            body.settle(trial, trial.array[self._space.prescribed_owned])
+            if change and (rate := self._rate()) is not None:
+                trial.array[:] += change * rate
+            self._pressed.settle(trial, share)
             self._before.array[:] = self._state.array
             self._state.array[:] = trial.array
-        body.forces(self._state, self._forces)
-        rate = self._forces.dot(self._unit)
-        place.work += change * (place.rate + rate) / 2
+        rate_of_work = self._pressed.rate
+        place.work += change * (place.rate + rate_of_work) / 2
         self._variables.advance(step, *body.stresses(self._state))
-        place.time, place.share, place.rate, place.has_moved = time, share, rate, True
+        place.time, place.share, place.rate, place.has_moved = time, share, rate_of_work, True
         place.changed = change or place.changed
         if not change:
             self._before.array[:] = self._state.array
             place.changed = 0.0
 
-    def _rate(self) -> FloatArray:
+    def _rate(self) -> FloatArray | None:
         """Return the change of the state per share of the movement: that of the last step, or by the tangent."""
         if self._place.changed:
             return np.asarray((self._state.array - self._before.array) / self._place.changed)
-        with self._body.state() as rate:
-            self._body.move(self._state, self._unit, rate)
-            return np.array(rate.array)
+        return self._pressed.guess(self._state)
 
     def _step_error(self) -> float:
         """Return the change (N) of the modelled part's force along the first motion by steps of twice the length."""
         stress = self._variables.advance_coarse()
         if not self._place.share:
             return 0.0
-        direction = self._state.array[: self._space.owned] / self._place.share
-        return abs(self._body.force_of(stress, self._state, direction) / self._movement.amounts[0])
+        return abs(self._body.force_of(stress, self._state, self._pressed.unit(self._state, self._place.share)))
 
     def _force(self) -> FloatArray:
         """Return the force (N) of the tissue on the probe, of the whole body."""
-        residual = self._forces.array[: self._space.owned]
-        (on_probe,) = sums(self._space, [residual], [self._unit.array[: self._space.owned]]).on_probe
-        return -whole_force(on_probe, self._elements.body.mirrored)
+        return -whole_force(self._pressed.force, self._elements.body.mirrored)
 
     def _energies(self) -> tuple[float, float]:
         """Return what is dissipated and what is stored (J) of the modelled part."""
@@ -170,13 +225,13 @@ class TimeSteps:
         self._body.impose(None, self._variables.rest)
         elastic = self._body.energy(self._state)
         own = np.array([self._variables.heat, self._variables.stored])
-        heat, stored = self._body.unit * global_sum(self._space.comm, own)
+        heat, stored = self._body.unit * global_sum(self._elements.body.comm, own)
         return float(heat), elastic + float(stored)
 
     def _stopped(self, course: Course, why: LargeError) -> LargeError:
         """Return the error of steps that end before the end of the course."""
         place, (*_, force) = self._place, self._force()
-        depth = place.share * self._movement.amounts[0]
+        depth = place.share * self._depth
         message = (
             f"time steps reached {place.time:.3g} s of {course.times[-1]:.3g} s, at a depth of {depth * 1e3:.3g} mm, "
             f"where F is {force:.4g} N (Newton's method: {why}); the tissue becomes unstable, or elements at the "

@@ -1,13 +1,15 @@
 """Stages of a history: depths at which found contact is solved, since its force is not proportional to the depth."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 from math import cos, pi, sqrt
+from types import SimpleNamespace
 from typing import Any, cast
 
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section, in_mm
 from pipeline.study.axis import Axis
+from pipeline.study.capabilities.features import Scene, needs_time_steps
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Mesh
 from pipeline.units import canonical
@@ -49,9 +51,15 @@ def _least(probe: Probe) -> float:
 def with_stages(
     sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
 ) -> tuple[dict[str, tuple[Section, ...]], tuple[Axis, ...]]:
-    """Return sections and axes in which each probe has its stages, if contact is found in a history."""
+    """Return sections and axes in which each probe has its stages, if contact is found in a history.
+
+    Where all histories are computed in time steps, which find contact at each time, there are none.
+    """
     probes = cast("tuple[Probe, ...]", sections["probe"])
-    if not any(probe.history and probe.is_unilateral for probe in probes):
+    found = [probe for probe in probes if probe.history and probe.is_unilateral]
+    parts = product(found, sections["body"], sections["material"])
+    scenes = (SimpleNamespace(probe=probe, body=body, material=material) for probe, body, material in parts)
+    if all(needs_time_steps(cast(Scene, scene)) for scene in scenes):
         return sections, axes
     meshes = cast("tuple[Mesh, ...]", sections["mesh"])
     is_shared = all(mesh.accuracy is None for mesh in meshes)

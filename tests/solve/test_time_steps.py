@@ -15,7 +15,7 @@ from pipeline.solve.history import Course, History
 from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Spaces
-from pipeline.solve.time_steps import TimeSteps
+from pipeline.solve.time_steps import PressedFootprint, TimeSteps
 from pipeline.viscoelastic import Motion, Terms, respond
 from tests.cases import study
 
@@ -46,7 +46,8 @@ def followed(motion, *terms: Terms, steps: int = 4, **changes) -> tuple[History,
         each = zip(law.parameters, of_regions, strict=True)
         law = MaterialLaw(tuple(replace(one, relaxation=own) for one, own in each))
         linear = elements.linearised(law, stack, direct=True)
-        found = TimeSteps(elements, law, linear, movement, stack).follow(course_of(motion, steps))
+        pressed = PressedFootprint(elements, law, linear, movement, stack)
+        found = TimeSteps(elements, law, pressed, movement.amounts[0], stack).follow(course_of(motion, steps))
         return found, static.reaction[2], static.energy
 
 

@@ -128,11 +128,13 @@ def settle(
     *,
     is_patient: bool = True,
     limit: float = 0.0,
+    scale: float | None = None,
 ) -> Touched:
     """Find equilibrium and contact from the tissue's state and an initial ``active`` set (n); collective.
 
     Without ``rubbing`` there is no friction. Without patience, the loop ends where smaller load steps need fewer
-    iterations. A residual and gaps below ``limit`` are enough, in units of the forces and the depth.
+    iterations. A residual and gaps below ``limit`` are enough, in units of the forces and the depth. The tool must
+    touch a node, unless the ``scale`` (N) of the contact forces is known, to which the residual is then compared.
 
     Raises:
         LargeError: if the loop does not converge.
@@ -154,10 +156,13 @@ def settle(
                 rub.follow(iteration, there, predicted, active, following)
             exerted = exerted + rub.exerted(there, forces, active)
         is_same, active = np.array_equal(following, active), following
-        if is_same and not active.any():
+        if is_same and scale is None and not active.any():
             raise LargeError("the probe does not touch a single node: use smaller elements below it")
         free = forces - exerted
-        if is_same and _is_settled(tissue, tool, active, place.gap, free, pressed, rub, limit=limit):
+        # An initial guess may be an equilibrium whose tool pulls: no reaction was predicted yet.
+        pulls = iteration == 0 and _pulls(tool, active, pressed)
+        settled = is_same and not pulls
+        if settled and _is_settled(tissue, tool, active, place.gap, free, pressed, rub, limit=limit, scale=scale):
             if rub is not None and not rub.is_sound(active):
                 raise LargeError("the states of nodes with friction repeat")
             exerted = np.where(active[:, None], forces, 0.0)
@@ -195,6 +200,12 @@ def _next_set(tool: PlacedTool, active: BoolArray, reactions: FloatArray, gap: F
     return tool.complete(following)
 
 
+def _pulls(tool: PlacedTool, active: BoolArray, pressed: FloatArray) -> bool:
+    """Return whether the tool pulls at an active node whose force ``pressed`` (n), N, means something."""
+    forces = pressed[active & ~tool.followers]
+    return bool((forces < -SLACK * np.abs(forces).mean()).any()) if len(forces) else False
+
+
 def _with_care(tool: PlacedTool, active: BoolArray, following: BoolArray, repeats: int) -> BoolArray:
     """Return the ``following`` set with fewer changes where sets repeat, of which one was solved ``repeats`` times.
 
@@ -222,8 +233,9 @@ def _is_settled(
     rub: Rub | None,
     *,
     limit: float,
+    scale: float | None,
 ) -> bool:
-    left, most = tissue.unbalanced(), np.linalg.norm(pressed)
+    left, most = tissue.unbalanced(), max(float(np.linalg.norm(pressed)), scale or 0.0)
     if not np.abs(gap[active]).max(initial=0.0) <= max(_CLOSED, limit) * tool.depth:
         return False
     if rub is None:

@@ -26,6 +26,7 @@ from pipeline.solve.contact.elements import State
 from pipeline.solve.contact.geometry import Area, contact_area
 from pipeline.solve.contact.levels import Surface
 from pipeline.solve.contact.sagged import Sagged, sagged_body
+from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.tissue import DeformedBody
 from pipeline.solve.contact.tool import Tool
 from pipeline.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
@@ -272,9 +273,13 @@ class LargeTouch:
         return path.last.touched
 
     def _area(self) -> Area:
-        """Return the contact area of the modelled part, at the deformed place and normal to the axis."""
         moved = replace(self.body.candidates, points=self.body.positions())
-        modulus = moved.from_regions(self.body.law.plane_moduli)
-        obstacle = Obstacle(moved, self.touched.gap, self.depth)
-        state = State(np.zeros(len(moved)), self.touched.forces[:, 2], nan)
-        return contact_area(obstacle, self.touched.active, state, modulus, self.body.elements.body.mirrored)
+        return touched_area(self.body, moved, self.touched, self.depth)
+
+
+def touched_area(body: DeformedBody, candidates: Candidates, touched: Touched, depth: float) -> Area:
+    """Return the contact area of the modelled part, where its ``candidates`` are, normal to the axis."""
+    modulus = candidates.from_regions(body.law.plane_moduli)
+    state = State(np.zeros(len(candidates)), touched.forces[:, 2], nan)
+    obstacle = Obstacle(candidates, touched.gap, depth)
+    return contact_area(obstacle, touched.active, state, modulus, body.elements.body.mirrored)

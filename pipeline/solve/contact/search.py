@@ -23,6 +23,7 @@ from pipeline.solve.contact.elements import ContactElements, FarShare, FreeRespo
 from pipeline.solve.contact.found import FoundContact
 from pipeline.solve.contact.frictional import rub
 from pipeline.solve.contact.geometry import Touch
+from pipeline.solve.contact.in_time import PressedTool
 from pipeline.solve.contact.large import LargeContact
 from pipeline.solve.contact.large_friction import RubbingContact
 from pipeline.solve.contact.levels import Numbering, Surface
@@ -121,6 +122,11 @@ class ContactSearch:
             kind = RubbingContact if self._tool.friction else LargeContact
             self._large = kind(self._surface, self._elements, self._tool, asked)
         return self._large.solve(asked, stack)
+
+    def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> PressedTool:
+        """Return the tissue that the tool presses in time steps; the ``stack`` frees it; collective."""
+        depth = found.movement.amounts[0]
+        return PressedTool(self._surface, self._elements, self._tool, asked.law, depth, stack)
 
     # ---- far field ------------------------------------------------------------------------------------
 

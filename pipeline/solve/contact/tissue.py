@@ -36,8 +36,12 @@ class DeformedBody:
         method: str,
         stack: ExitStack,
         applied: Applied | None = None,
+        *,
+        prestressed: bool = False,
     ):
         """Set up; collective. ``method`` is the requested solver, ``applied`` are dead loads.
+
+        ``prestressed``: the energy of ``hyperelastic`` may change; only iterations know that.
 
         Raises:
             SolveError: if the preconditioner cannot be set up.
@@ -45,7 +49,7 @@ class DeformedBody:
         self.elements, self.law, self.method = elements, law, method
         self.candidates: Candidates = surface.of(elements.degree)
         space = self._space = elements.displacements
-        self._body = HyperelasticBody(elements, law)
+        self.hyperelastic = self._body = HyperelasticBody(elements, law, prestressed=prestressed)
         stack.callback(self._body.close)
         self.applied = applied
         if applied is not None:

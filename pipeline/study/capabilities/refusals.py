@@ -151,12 +151,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "slit",
         f"the opening of the slit has no history, and the energy release rate depends on the front's speed: {_STATIC}",
     ),
-    Refusal(
-        "time steps",
-        "unilateral contact",
-        f'{_IN_STEPS}, and the contact area is not followed over them: use contact = "bonded", or a linear law and the '
-        "same relaxation in all regions",
-    ),
     Refusal("time steps", "six motions", f'{_IN_STEPS}, of one movement: use motion = "press"'),
     Refusal("time steps", "loads", f"{_IN_STEPS}, and the tissue has crept under the loads before: omit [load]"),
     Refusal("time steps", "accuracy", f"{_IN_STEPS}, which meshes for an accuracy do not cover: give sizes"),

@@ -1,0 +1,121 @@
+"""Found contact in time steps: Lee and Radok while it grows, Ting while it shrinks, and its loss."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.arrays import FloatArray
+from pipeline.run.meshing import mesh_case
+from pipeline.run.problem import law_of, movement_of, problem_of
+from pipeline.solve.history import Course, History
+from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.solution import Request, Solution
+from pipeline.solve.spaces import Spaces
+from pipeline.viscoelastic import Motion, Terms, follow
+from tests.cases import solve, study
+
+TERMS = ((0.4, 0.5), (0.2, 3.0))
+BALL = {"shape": "sphere", "radius": "4 mm", "depth": "1 mm"}
+MESH = {"rim": "0.5 mm", "fine": "4 mm", "coarse": "6 mm", "growth": 1.5}
+LINEAR, LARGE = {"poisson": 0.4}, {"poisson": 0.4, "law": "neo-hookean"}
+HOLD = (0.0, 1.0, 4.0), (0.0, 1.0, 1.0)
+BACK = (0.0, 1.0, 1.5), (0.0, 1.0, 0.0)
+
+
+def followed(motion, terms: Terms, steps: int, comm=MPI.COMM_SELF, probe=BALL, **changes) -> tuple[History, Solution]:
+    """Return the history of a ball, ``steps`` for each part of the motion, and the static solution at its depth."""
+    times = np.unique(np.concatenate([np.linspace(a, b, steps + 1) for a, b in pairwise(motion[0])]))
+    breaks = frozenset(np.flatnonzero(np.isin(times, motion[0])).tolist())
+    course = Course(tuple(times), tuple(np.interp(times, *motion)), breaks)
+    case = study(**{"probe": probe, "mesh": MESH} | changes).case(())
+    with Spaces(mesh_case(case, ("x", "y"), comm)) as spaces, problem_of(spaces, case) as problem:
+        law = law_of(case)
+        law = MaterialLaw(tuple(replace(each, relaxation=terms) for each in law.parameters))
+        solution = problem.answer(Request(law, movement_of(case), course=course))
+        assert solution.history is not None
+        return solution.history, solution
+
+
+def convolved(times: FloatArray, forces: FloatArray) -> FloatArray:
+    """Return the hereditary integral of elastic forces that are linear between times."""
+    found = np.zeros(len(times))
+    for end, time in enumerate(times):
+        for start in range(end):
+            step = times[start + 1] - times[start]
+            left = 1.0 - sum(share for share, _ in TERMS)
+            for share, tau in TERMS:
+                left += (
+                    share * tau / step * (np.exp((times[start + 1] - time) / tau) - np.exp((times[start] - time) / tau))
+                )
+            found[end] += left * (forces[start + 1] - forces[start])
+    return found
+
+
+@pytest.mark.parametrize("element", ["displacement", pytest.param("mixed", marks=pytest.mark.nightly)])
+def test_growing_contact_on_linear_tissue_is_the_hereditary_integral(element):
+    """E. H. Lee and J. R. M. Radok 1960. The static contact is found by other code."""
+    changes = {"material": LINEAR, "mesh": MESH | {"element": element}}
+    elastic, static = followed(HOLD, (), 5, **changes)
+    found, _ = followed(HOLD, TERMS, 5, **changes)
+    assert elastic.forces[5, 2] == pytest.approx(static.reaction[2], rel=2e-4)
+    assert elastic.areas[5] == pytest.approx(static.contact.area, rel=1e-3)
+    assert found.forces[:, 2] == pytest.approx(
+        convolved(found.times, elastic.forces[:, 2]), abs=1e-7 * static.reaction[2]
+    )
+    assert (np.diff(found.dissipated) >= 0).all()
+    assert found.areas[5:] == pytest.approx(found.areas[5], rel=0.01)  # it does not depend on the modulus
+
+
+def test_shrinking_contact_on_linear_tissue_is_that_of_an_earlier_time():
+    """T. C. T. Ting 1966. Contact is lost before the tool is back, and then has no force."""
+    elastic, _ = followed(BACK, (), 8, material=LINEAR)
+    found, _ = followed(BACK, TERMS, 8, material=LINEAR)
+    up = slice(1, 9)
+    depths = np.interp(elastic.times[up], *BACK)
+    known = follow(Motion(*BACK), TERMS, found.times, depths, 1.5).weights @ elastic.forces[up, 2]
+    assert elastic.forces[8:, 2] == pytest.approx(elastic.forces[8::-1, 2], abs=1e-6 * elastic.forces[8, 2])
+    assert found.forces[8:, 2] == pytest.approx(known[8:], abs=0.01 * known[8])
+    assert not found.forces[-3:].any()
+    assert not found.areas[-3:].any()
+    assert (found.forces[:, 2] >= 0).all()
+    assert (np.diff(found.dissipated) >= 0).all()
+    assert np.abs(found.imbalance).max() < 0.03 * found.dissipated[-1]
+
+
+def test_a_law_of_large_displacements_relaxes_as_linear_tissue_at_a_small_depth():
+    changes = {"material": LARGE, "mesh": MESH | {"rim": "0.25 mm"}, "probe": BALL | {"depth": "0.05 mm"}}
+    (elastic, static), (found, _) = (followed(HOLD, terms, 3, **changes) for terms in ((), TERMS))
+    assert elastic.forces[-1, 2] == pytest.approx(static.reaction[2], rel=1e-6)
+    assert found.forces[3:, 2] == pytest.approx(convolved(found.times, elastic.forces[:, 2])[3:], rel=3e-3)
+
+
+def test_a_law_of_large_displacements_relaxes_while_held_and_lets_go():
+    motion = (0.0, 1.0, 3.0, 3.5), (0.0, 1.0, 1.0, 0.0)
+    found, static = followed(motion, TERMS, 4, material=LARGE)
+    forces = found.forces[:, 2]
+    assert (np.diff(forces[:5]) > 0).all()
+    assert (np.diff(forces[4:]) <= 0).all()
+    assert forces[4] < static.reaction[2]
+    assert forces[-1] == 0
+    assert (np.diff(found.dissipated) >= 0).all()
+    assert np.abs(found.imbalance).max() < 0.1 * found.dissipated[-1]
+
+
+@pytest.mark.mpi
+@pytest.mark.nightly
+def test_ranks_agree():
+    own, shared = (followed(BACK, TERMS, 3, comm, material=LARGE)[0] for comm in (MPI.COMM_SELF, MPI.COMM_WORLD))
+    assert shared.forces[:, 2] == pytest.approx(own.forces[:, 2], abs=1e-6 * own.forces[3, 2])
+
+
+def test_a_study_of_found_contact_over_time_has_force_and_area():
+    history = {"ramp": "1 s", "hold": "2 s", "steps": 4}
+    material = LARGE | {"relaxation": [{"share": 0.4, "time": "0.5 s"}]}
+    records = solve(material=material, probe=BALL | {"history": history}, mesh=MESH)
+    last = records[max(records)]
+    assert last.status == "ok", last.message
+    assert len(last.course["area"]) == len(last.course["time"])
+    assert last.course["force"][-1] < max(last.course["force"]) < last.force
