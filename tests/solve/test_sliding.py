@@ -64,3 +64,21 @@ def test_drag_of_an_inclined_path_is_the_law_times_the_force():
     assert found.slip_area == pytest.approx(found.contact_area)
     assert -drag == pytest.approx(0.05 * force, rel=0.04)
     assert found.friction_force == pytest.approx(0.05 * force, rel=0.04)
+
+
+def test_friction_on_a_surface_that_gravity_has_bent():
+    """Without friction it is the frictionless contact; with it, friction adds what it adds to the unloaded body."""
+    gravity = {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}
+    heavy = NEO_HOOKEAN | {"poisson": 0.4, "density": "1060 kg/m^3"}
+
+    def force(friction, **load):
+        ball = {"shape": "sphere", "radius": "4 mm", "depth": "0.4 mm", "friction": friction}
+        (found,) = solve(body=BODY, probe=ball, mesh=MESH | {"rim": "0.5 mm"}, material=heavy, **load).values()
+        assert found.status == "ok", found.message
+        return found.force
+
+    smooth = force(0.0, load=gravity)
+    assert force(1e-9, load=gravity) == pytest.approx(smooth, rel=1e-6)
+    added, wanted = force(0.3, load=gravity) / smooth - 1, force(0.3) / force(0.0) - 1
+    assert added == pytest.approx(wanted, rel=0.15)
+    assert added > 4e-4

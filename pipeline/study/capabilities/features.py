@@ -140,6 +140,9 @@ FEATURES: dict[str, Feature] = {
         "probe.axis", lambda s: _touches_beside(s) and not s.material.is_large, ("body", "material"), list
     ),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
+    "bent surface of a linear law": Feature(
+        "load", lambda s: s.load.acts and s.probe.is_unilateral and not s.material.is_large, ("probe", "material")
+    ),
     "bent surface": Feature("load", lambda s: s.load.acts and s.probe.is_unilateral, ("probe",)),
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),
     "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),

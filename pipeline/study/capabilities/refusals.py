@@ -105,7 +105,12 @@ REFUSALS: tuple[Refusal, ...] = (
         'a frictionless blade slides without force: use contact = "bonded"',
     ),
     Refusal("friction", "half ball", f"the far field is known only for forces along the tool's axis: {_COARSE}"),
-    Refusal("friction", "bent surface", "the path of the tissue under loads is not known: omit [load], or friction"),
+    Refusal(
+        "friction",
+        "bent surface of a linear law",
+        "friction of linear laws is followed from the unloaded surface on: use a law of large displacements, or omit "
+        "[load] or friction",
+    ),
     Refusal(
         "friction",
         "history",
