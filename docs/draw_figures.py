@@ -7,6 +7,7 @@ no dataset yet is named. Pictures of meshes are of ``epsmesh view``, those of sc
 import sys
 from collections.abc import Callable
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import matplotlib as mpl
@@ -94,6 +95,34 @@ def closure(data: xr.Dataset) -> Figure:
     return drawn
 
 
+def deep(data: xr.Dataset) -> Figure:
+    """F/F_max against ε by depth, for each outside: the range over tools and laws, on thin and thick tissue."""
+    outsides = [str(name) for name in data["outside"].values]
+    drawn, axes = plt.subplots(1, len(outsides), figsize=(8.6, 4.2))
+    drawn.subplots_adjust(left=0.08, right=0.98, top=0.93, bottom=0.3, wspace=0.28)
+    places = range(data.sizes["epsilon"])
+    names = [f"{1e3 * value:g}" if value < float("inf") else "full" for value in data["epsilon"].values]
+    lines = dict(zip(map(str, data["body"].values), ("-", "--"), strict=True))
+    colours = dict(zip(map(float, data["depth"].values), COLOURS[::2], strict=False))
+    for ax, outside in zip(axes, outsides, strict=True):
+        for (body, line), (depth, colour) in product(lines.items(), colours.items()):
+            ratio = data["force_ratio"].sel(outside=outside, body=body, depth=depth)
+            low, high = ratio.min(["probe", "law"]), ratio.max(["probe", "law"])
+            ax.fill_between(places, low, high, color=colour, alpha=0.12, linewidth=0)
+            middle = ratio.median(["probe", "law"])
+            ax.plot(
+                places, middle, line, marker="o", markersize=4, color=colour, label=f"d = {1e3 * depth:g} mm, {body}"
+            )
+        ax.set_xticks(places, names)
+        ax.set_xlabel("radius of the fine mesh ε, mm")
+        ax.set_title(outside, fontsize=9)
+        ax.set_ylim(*((0, 1.05) if outside == "free" else (0.93, 1.07)))
+    axes[-1].plot(names.index(f"{PAPER[0]:g}"), PAPER[1], "*", markersize=11, color="#d81b60", label="paper: 80 %")
+    axes[0].set_ylabel("F/F_max")
+    drawn.legend(*axes[-1].get_legend_handles_labels(), fontsize=8, loc="lower center", ncols=3)
+    return drawn
+
+
 def path_excess(data: xr.Dataset) -> Figure:
     """By how much the tumour makes a needle's force larger, and where it is found."""
     found = data.epsmesh.locate(body="with a tumour", healthy="healthy").plot().figure
@@ -118,6 +147,7 @@ FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
     "path": ("path", of_kind("map")),
     "path_excess": ("path", path_excess),
     "retractor": ("retractor", of_kind("force")),
+    "deep": ("deep", deep),
     "large_depth": ("large_depth", of_kind("force")),
 }
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import is_direction
+from pipeline.shapes.section import words_of
 from pipeline.shapes.tissue import LAWS, MOST_TERMS, Term, Tissue
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
@@ -53,7 +54,8 @@ def _check_tissue(key: str, tissue: Tissue, problems: Problems) -> None:
     """Report missing parameters, and values with which the law is unstable."""
     for name, value in tissue.given.items():
         if value is None:
-            problems.error(f"{key}.{name}", None, f'is required with law = "{tissue.law}"')
+            example = f"{name} = {words_of(Tissue, name).example}"
+            problems.error(f"{key}.{name}", None, f'is required with law = "{tissue.law}": such as {example}')
             return
     c2, c3 = tissue.c2, tissue.given.get("c3", 0.0)
     if tissue.law == "mooney-rivlin" and c2 is not None and not 0 <= c2 <= 1:

@@ -39,6 +39,8 @@ _SKIN = {"name": "skin", "thickness": "0.6 mm", "young": "40 kPa", "poisson": 0.
 _SIZES = {"epsilon": "full", "fine": "2 mm", "coarse": "2 mm", "rim": "0.3 mm", "growth": 0.5, "degree": 2}
 # Relative difference of F between found contact and the same footprint prescribed, by the solver's tolerance.
 _SAME = 1e-7
+# χ = √(R d)/h of a ball on a thin layer, R = 10 h: relative error of the published series, by the integral equation.
+_THIN = {0.1: 2e-3, 0.25: 1.8e-2}
 _LAYER_SOURCE = "integral equation (N. N. Lebedev, Ya. S. Ufliand 1958)"
 
 
@@ -50,6 +52,7 @@ def contact_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
         yield from _finite(comm)
         yield from _flat(comm)
         yield from _solid(comm)
+        yield from _thin_layers(comm)
     yield from _layers(comm, quick)
 
 
@@ -181,3 +184,13 @@ def _solved(
 
 def _cylinder(radius: float, height: float) -> dict[str, Any]:
     return {"shape": "cylinder", "radius": f"{radius!r} mm", "height": f"{height!r} mm"}
+
+
+def _thin_layers(comm: MPI.Comm) -> Iterator[Row]:
+    """A ball on an incompressible layer of a tenth of its radius, against a published series."""
+    thick, radius = 1e-3, 10e-3
+    for chi, error in _THIN.items():
+        depth = (chi * thick) ** 2 / radius
+        record = _solved(comm, "2D", _cylinder(21, 1), {"shape": "sphere", "radius": f"{radius!r} m"}, depth, 0.5)
+        name = f"thin layer on a rigid base, sphere, R = 10 h, χ = {chi:g}, ν = 0.5"
+        yield _row(name, "2D", known.thin_layer(_YOUNG, radius, depth, thick), known.DIMITRIADIS, record, 1.1 * error)

@@ -169,13 +169,19 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         "flat tool that may lift off",
         "large displacements",
-        f'must be "bonded" {_OF_LAW}: at a sharp edge the direction of the contact force has no limit',
+        f'must be "bonded" {_OF_LAW}, or give the tool a rounded edge, such as edge = "0.2 mm": at a sharp one the '
+        "direction of the contact force has no limit",
     ),
-    Refusal("frictionless contact", "large displacements", f'must be "bonded" {_OF_LAW}'),
+    Refusal(
+        "frictionless contact",
+        "large displacements",
+        f'must be "bonded" {_OF_LAW}, or "unilateral" with a rounded edge, such as edge = "0.2 mm": a sharp edge that '
+        "slides has no direction of force",
+    ),
     Refusal("six motions", "large displacements", f'must be "press" {_OF_LAW}: there is no single stiffness'),
     Refusal("slit", "large displacements", _LINEAR),
     Refusal("slice", "large displacements", f"must be 0 mm {_OF_LAW}: the blade only presses"),
-    Refusal("half ball", "large displacements", f'must be "coarse", "free" or "fixed" {_OF_LAW}'),
+    Refusal("half ball", "large displacements", f'must be "coarse", "linear", "free" or "fixed" {_OF_LAW}'),
 )
 
 _PARTS = ("body", "material", "probe", "mesh", "load")
