@@ -23,7 +23,8 @@ _SMALLEST, _SLIVER = 1 / 64, 1e-6
 _LARGE = 1 / 8
 # Residual and gaps of steps on the way to the depth, without friction.
 _ON_THE_WAY = 1e-2
-# Inactive nodes inside the tool, in units of the depth: more than corners beside active nodes have on a coarse mesh.
+# Inactive nodes inside the tool, in units of the depth at the end: more than corners beside active nodes have on a
+# coarse mesh, but for the first steps.
 _INSIDE = 0.25
 # The first step ends where the tool's normals at the nodes that it penetrates have this mean part along its way, after
 # so many halvings at most: nodes beside the flank of a ball do not stay in contact, and would fold the tissue.
@@ -90,7 +91,7 @@ def press(
     Raises:
         LargeError: if a step becomes too small; the path keeps the steps that converged.
     """
-    iterations = 0
+    iterations, deepest = 0, depth if friction is None else friction.deepest
     if path.last.touched is None and path.step == inf and friction is None:
         path.step = _first_step(tissue, tool_at, path.last.depth, depth)
     while path.last.depth < depth:
@@ -101,6 +102,8 @@ def press(
             is_patient = friction is not None or there - path.last.depth <= _LARGE * depth
             limit = _ON_THE_WAY if friction is None and there < depth else 0.0
             touched = _step(tissue, tool_at, path, there, friction, is_patient=is_patient, limit=limit)
+            if touched.gap.min() < -_INSIDE * deepest:  # the loop went to another equilibrium, around the tool
+                raise LargeError("tissue is left inside the tool")
         except SolveError as error:
             path.step = (there - path.last.depth) / 2
             if path.step < _SMALLEST * depth:
@@ -231,7 +234,4 @@ def _step(
     if guess is None:
         tissue.state = path.last.state
     rubbing = None if friction is None else _rubbing(tissue, tool_at, last, depth, friction)
-    touched = settle(tissue, tool, first_set(tissue, tool, active), rubbing, is_patient=is_patient, limit=limit)
-    if touched.gap.min() < -_INSIDE * depth:  # the loop went to another equilibrium, around the tool
-        raise LargeError("tissue is left inside the tool")
-    return touched
+    return settle(tissue, tool, first_set(tissue, tool, active), rubbing, is_patient=is_patient, limit=limit)
