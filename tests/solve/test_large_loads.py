@@ -120,6 +120,23 @@ def test_each_layer_has_its_own_weight_and_the_linear_part_has_it_too():
     assert found["linear"].load_force == pytest.approx(found["coarse"].load_force, rel=0.01)
 
 
+@pytest.mark.parametrize(
+    "law",
+    [
+        {"law": "mooney-rivlin", "c2": 0.3},
+        pytest.param({"law": "veronda-westmann", "alpha": 1.5}, marks=pytest.mark.nightly),
+        pytest.param({"law": "yeoh", "c2": 0.4}, marks=pytest.mark.nightly),
+        pytest.param({"law": "gent", "limit": 3.0}, marks=pytest.mark.nightly),
+    ],
+)
+def test_the_linear_part_has_the_moduli_of_small_strain_of_every_law(law):
+    scene = {"load": gravity(1.0), "probe": {"depth": "0.015 mm"}, "mesh": {"outside": "linear", "epsilon": "8 mm"}}
+    found = one(material=TISSUE | law, **scene)
+    same = one(material=TISSUE | {"law": "linear"}, **scene | {"mesh": {"outside": "coarse", "epsilon": "8 mm"}})
+    for name in ("force", "load_force", "load_energy", "sag"):
+        assert getattr(found, name) == pytest.approx(getattr(same, name), rel=3e-3), name
+
+
 def test_loads_that_are_not_carried_are_told():
     (record,) = solve(material=TISSUE, load=gravity(981.0)).values()
     assert record.status == "failed"

@@ -181,6 +181,11 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("six motions", "large displacements", f'must be "press" {_OF_LAW}: there is no single stiffness'),
     Refusal("slit", "large displacements", _LINEAR),
     Refusal("slice", "large displacements", f"must be 0 mm {_OF_LAW}: the blade only presses"),
+    Refusal(
+        "linear outside",
+        "fibres",
+        f"fibres resist tension at any strain, and the linear law beyond epsilon is isotropic: {_COARSE}",
+    ),
     Refusal("half ball", "large displacements", f'must be "coarse", "linear", "free" or "fixed" {_OF_LAW}'),
 )
 
