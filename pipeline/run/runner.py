@@ -39,6 +39,7 @@ from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
 from pipeline.run.room import machine_load
 from pipeline.solve.contact.sweep import NEAR
+from pipeline.solve.newton import LargeError
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.stages import Times, recorded
@@ -220,8 +221,17 @@ class StepRunner:
 
     def _solve_meridian(self, solve: Solve, memory: PeakMemory) -> Record:
         problem = meridian_problem(solve.case)
-        record = on_first_rank(self._comm, lambda: record_of(solve, solve_problem(solve.case, problem, estimate=True)))
-        return self._stamp(self._comm.bcast(record), memory)
+
+        def compute() -> Record | LargeError:
+            try:
+                return record_of(solve, solve_problem(solve.case, problem, estimate=True))
+            except LargeError as error:
+                return error
+
+        found = self._comm.bcast(on_first_rank(self._comm, compute))
+        if isinstance(found, LargeError):  # with the depth that its path reached
+            raise found
+        return self._stamp(found, memory)
 
     def _mesh(self, solve: Solve) -> BodyMesh:
         """Return the distributed mesh of a solve; collective. Timing studies do not use the cache."""
