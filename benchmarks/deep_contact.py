@@ -28,7 +28,7 @@ from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, movement_of, tool_of
 from pipeline.solve import SolveError
 from pipeline.solve.conditions import WITHOUT_FOOTPRINT
-from pipeline.solve.contact.large_friction import RubbingContact
+from pipeline.solve.contact.large_friction import LargeFrictionalContact
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Spaces
@@ -64,12 +64,12 @@ class Trial:
 @contextmanager
 def more_steps() -> Iterator[None]:
     """Take twice as many load steps with friction."""
-    usual = RubbingContact.STEPS
-    RubbingContact.STEPS = 2 * usual
+    usual = LargeFrictionalContact.STEPS
+    LargeFrictionalContact.STEPS = 2 * usual
     try:
         yield
     finally:
-        RubbingContact.STEPS = usual
+        LargeFrictionalContact.STEPS = usual
 
 
 def truth_of(scene: Scene) -> float:

@@ -48,7 +48,7 @@ def load_in_steps(body: HyperelasticBody, applied: Applied, state: PETSc.Vec) ->
         there, before = min(1.0, share + step), state.array.copy()
         body.carry(applied, there)
         try:
-            body.settle(state, goal, LEFT if there == 1.0 else ON_THE_WAY)
+            body.equilibrate(state, goal, LEFT if there == 1.0 else ON_THE_WAY)
             share = there
         except LargeError as error:
             state.array[:] = before
@@ -93,7 +93,7 @@ def sag(elements: Elements, law: MaterialLaw, loads: Loads, guess: FloatArray | 
         else:
             state.array[:] = guess
             body.carry(applied)
-            body.settle(state, body.held_of(state))
+            body.equilibrate(state, body.held_of(state))
         body.forces(state, forces)
         own = forces.array[: space.owned].reshape(-1, 3)[space.fixed_owned].sum(axis=0)
         left = whole_force(global_sum(space.comm, own) + applied.resultant, elements.body.mirrored)
@@ -154,7 +154,7 @@ def hold_tool(
         for _ in range(_MOST_SECANTS):
             step = -found / slope
             here += step
-            body.settle(state, here * motion)
+            body.equilibrate(state, here * motion)
             body.forces(state, forces)
             before, found = found, forces.dot(unit)
             if abs(step) <= _SMALL * abs(here) or abs(found) <= _NO_FORCE * applied.size:

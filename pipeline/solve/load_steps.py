@@ -277,7 +277,7 @@ class LoadSteps(Solver):
             if not np.isfinite(self._body.energy(state)):
                 state.array[:] = load_path.state  # the first step of Newton's method then brings it there
             try:
-                return there, self._body.settle(state, goal(there), LEFT if there == depth else ON_THE_WAY)
+                return there, self._body.equilibrate(state, goal(there), LEFT if there == depth else ON_THE_WAY)
             except LargeError as error:
                 step = min(step, left) / 2
                 if step < _SMALLEST * depth:

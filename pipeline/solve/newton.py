@@ -97,7 +97,7 @@ class HyperelasticBody:
         *,
         prestressed: bool = False,
     ):
-        """Set up; collective. ``solver`` is a preconditioner, which :meth:`move` and :meth:`settle` need.
+        """Set up; collective. ``solver`` is a preconditioner, which :meth:`move` and :meth:`equilibrate` need.
 
         ``prestressed``: :meth:`impose` may change the energy.
         """
@@ -217,7 +217,7 @@ class HyperelasticBody:
             self._run(ksp, lambda: ksp.solve(load, result))
 
     @stage("Newton's method")
-    def settle(self, state: PETSc.Vec, goal: FloatArray, left: float = LEFT) -> int:
+    def equilibrate(self, state: PETSc.Vec, goal: FloatArray, left: float = LEFT) -> int:
         """Find the equilibrium from the initial guess ``state``; collective.
 
         ``goal`` (m) are the prescribed dofs there, ``left`` is the residual at the end in units of the forces at these

@@ -57,7 +57,7 @@ class Pressed(ABC):
     area: float = np.nan
 
     @abstractmethod
-    def settle(self, state: PETSc.Vec, share: float) -> None:
+    def equilibrate(self, state: PETSc.Vec, share: float) -> None:
         """Find the equilibrium at a ``share`` from an initial guess, ``state``.
 
         Raises:
@@ -89,11 +89,11 @@ class PressedFootprint(Pressed):
             self._unit.array[:owned] += amount * self._space.held(motion)[:owned]
         self.force, self.rate = np.zeros(3), 0.0
 
-    def settle(self, state: PETSc.Vec, share: float) -> None:
+    def equilibrate(self, state: PETSc.Vec, share: float) -> None:
         """Find the equilibrium at a share."""
         held = share * self.body.held_of(self._unit)
         state.array[self._space.prescribed_owned] = held
-        self.body.settle(state, held)
+        self.body.equilibrate(state, held)
         self.body.forces(state, self._forces)
         residual = self._forces.array[: self._space.owned]
         (self.force,) = sums(self._space, [residual], [self._unit.array[: self._space.owned]]).on_probe
@@ -189,7 +189,7 @@ class TimeSteps:
             trial.array[:] = self._state.array
             if change and (rate := self._rate()) is not None:
                 trial.array[:] += change * rate
-            self._pressed.settle(trial, share)
+            self._pressed.equilibrate(trial, share)
             self._before.array[:] = self._state.array
             self._state.array[:] = trial.array
         rate_of_work = self._pressed.rate

@@ -8,8 +8,8 @@ from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, movement_of, tool_of
 from pipeline.solve.conditions import WITHOUT_FOOTPRINT
 from pipeline.solve.contact import contact_steps, large
-from pipeline.solve.contact.deformed import settle
-from pipeline.solve.contact.large import LargeTouch
+from pipeline.solve.contact.deformed import solve_contact
+from pipeline.solve.contact.large import LargeContactSolution
 from pipeline.solve.contact.turned import turned_frames
 from pipeline.solve.newton import LargeError
 from pipeline.solve.quasi_static import QuasiStaticProblem
@@ -27,7 +27,7 @@ def touched(depth, model=("x", "y"), base=SPHERE, **changes):
     with Spaces(mesh_case(case, model, MPI.COMM_SELF)) as spaces:
         problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.element, tool=tool_of(case))
         found = {}
-        check = LargeTouch.check
+        check = LargeContactSolution.check
 
         def look(contact):
             found["forces"], found["gap"] = contact.touched.forces, contact.touched.gap
@@ -36,7 +36,7 @@ def touched(depth, model=("x", "y"), base=SPHERE, **changes):
             check(contact)
 
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(LargeTouch, "check", look)
+            patch.setattr(LargeContactSolution, "check", look)
             solution = problem.solve(law_of(case), movement_of(case))
     return solution, found
 
@@ -90,9 +90,9 @@ def test_a_depth_that_is_not_reached_is_partial_and_says_where(monkeypatch):
     def fails_beyond(tissue, tool, *others, **how):
         if tool.depth > 1.5e-3:
             raise LargeError("it is told to")
-        return settle(tissue, tool, *others, **how)
+        return solve_contact(tissue, tool, *others, **how)
 
-    monkeypatch.setattr(contact_steps, "settle", fails_beyond)
+    monkeypatch.setattr(contact_steps, "solve_contact", fails_beyond)
     probe = SPHERE | {"depth_range": ["1 mm", "2 mm"]}
     (record,) = solve(material=TISSUE, probe=probe | {"depth": "2 mm"}, mesh=COARSE).values()
     assert record.status == "partial"
@@ -117,7 +117,7 @@ def test_the_bar_has_a_load_path_of_its_own_where_the_next_degree_does_not_settl
 
     scene = {"material": TISSUE, "probe": SPHERE, "mesh": COARSE}
     (expected,) = solve(**scene).values()
-    monkeypatch.setattr(large, "settle", fails)
+    monkeypatch.setattr(large, "solve_contact", fails)
     (record,) = solve(**scene).values()
     assert record.status == "ok"
     assert record.force_error == pytest.approx(expected.force_error, rel=0.05)

@@ -77,7 +77,7 @@ def test_the_force_is_the_derivative_of_the_energy():
     system = LargeSystem(meshes_of(BODY.mesh(Grading(0.1))), 3, law, bonded=True)
     _, path = system.press(0.2, 0.02)
     state, _ = system.press(0.2, 0.02)
-    energies = [system.forces(system.settle(state, depth))[2] for depth in (0.199, 0.201)]
+    energies = [system.forces(system.equilibrate(state, depth))[2] for depth in (0.199, 0.201)]
     assert (energies[1] - energies[0]) / 0.002 == pytest.approx(path[-1, 1], rel=1e-5)
 
 

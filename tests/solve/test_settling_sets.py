@@ -8,7 +8,7 @@ import pytest
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.distance import Distance
 from pipeline.solve.contact.constraint import Constraint
-from pipeline.solve.contact.deformed import PlacedTool, settle
+from pipeline.solve.contact.deformed import PlacedTool, solve_contact
 
 COUNT = 9
 
@@ -72,7 +72,7 @@ def test_sets_settle_on_springs_of_any_coupling(with_followers):
         heights = 0.1 * generator.random(COUNT)
         if not (np.linalg.solve(springs.stiffness, springs.loads) > heights)[~followers].any():
             continue  # no contact
-        found = settle(springs, ceiling(heights, followers), np.ones(COUNT, dtype=bool))
+        found = solve_contact(springs, ceiling(heights, followers), np.ones(COUNT, dtype=bool))
         pressed, gap = -found.forces[:, 1], heights - springs.state
         judged = ~followers
         assert (gap[judged] > -1e-5).all()

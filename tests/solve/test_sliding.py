@@ -10,7 +10,7 @@ from mpi4py import MPI
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, tool_of
 from pipeline.solve.conditions import WITHOUT_FOOTPRINT
-from pipeline.solve.contact.contact_steps import ContactPath, Stage, press, rub
+from pipeline.solve.contact.contact_steps import ContactPath, Stage, press, press_with_friction
 from pipeline.solve.contact.large import placed_tool
 from pipeline.solve.contact.large_friction import friction_of
 from pipeline.solve.contact.levels import Surface
@@ -34,7 +34,7 @@ def test_drag_at_constant_depth_is_the_law_times_the_force():
         body = DeformedBody(problem.elements, Surface(spaces), law_of(case), "direct", stack)
         tool, path = tool_of(case), ContactPath(Stage(0.0, np.zeros_like(body.state)))
         friction = friction_of(body, FRICTION, DEPTH)
-        rub(body, lambda depth: placed_tool(body, tool, depth), path, DEPTH, friction, 4)
+        press_with_friction(body, lambda depth: placed_tool(body, tool, depth), path, DEPTH, friction, 4)
 
         def beside(travel):
             shift = np.array([travel - DEPTH, 0.0, 0.0])

@@ -13,8 +13,8 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
 from pipeline.solve.contact.coulomb import MOST_SIMPLIFIED, Neighbours, Slide
-from pipeline.solve.contact.deformed import PlacedTool, Tissue, Touched, first_set, settle
-from pipeline.solve.contact.rubbing import Rubbing, met
+from pipeline.solve.contact.deformed import ContactSolution, PlacedTool, Tissue, first_set, solve_contact
+from pipeline.solve.contact.friction_step import FrictionStep, meeting_places
 from pipeline.solve.newton import LargeError
 
 # Smallest step, as a share of the depth, and a step that leaves less than this share goes to the end.
@@ -39,7 +39,7 @@ class Stage:
 
     depth: float
     state: FloatArray
-    touched: Touched | None = None
+    touched: ContactSolution | None = None
 
 
 @dataclass(eq=False)
@@ -136,7 +136,7 @@ def _end(tissue: Tissue, tool_at: Callable[[float], PlacedTool], path: ContactPa
     if last.touched is None or friction is not None:
         return
     try:
-        touched = settle(tissue, tool_at(last.depth), last.touched.active)
+        touched = solve_contact(tissue, tool_at(last.depth), last.touched.active)
     except SolveError:  # settled roughly, but no better
         path.last, path.before = path.start, None
         tissue.state = path.last.state
@@ -144,7 +144,7 @@ def _end(tissue: Tissue, tool_at: Callable[[float], PlacedTool], path: ContactPa
     path.last = Stage(last.depth, tissue.state, touched)
 
 
-def rub(
+def press_with_friction(
     tissue: Tissue,
     tool_at: Callable[[float], PlacedTool],
     path: ContactPath,
@@ -181,9 +181,9 @@ def rub(
     return iterations
 
 
-def _rubbing(
+def _friction_step(
     tissue: Tissue, tool_at: Callable[[float], PlacedTool], last: Stage, depth: float, friction: Friction
-) -> Rubbing:
+) -> FrictionStep:
     """Return the friction of a step from the ``last`` stage to a ``depth`` (m), whose state is predicted."""
     after, guess = tissue.positions(), tissue.state
     tissue.state = last.state
@@ -193,7 +193,7 @@ def _rubbing(
     def gap(points: FloatArray, there: float) -> FloatArray:
         return tool_at(there).distance(points).gap
 
-    references = met(gap, (before, after), (last.depth, depth), friction.advance)
+    references = meeting_places(gap, (before, after), (last.depth, depth), friction.advance)
     nothing = np.zeros(len(before), dtype=bool)
     touched = last.touched
     if touched is not None:
@@ -201,7 +201,7 @@ def _rubbing(
         references = np.where(touched.active[:, None], carried, references)
     normal = np.zeros(len(before)) if touched is None else touched.pressed
     slide = None if touched is None else touched.slide
-    return Rubbing(
+    return FrictionStep(
         friction.coefficient,
         references,
         friction.penalty,
@@ -223,7 +223,7 @@ def _step(
     *,
     is_patient: bool,
     limit: float,
-) -> Touched:
+) -> ContactSolution:
     tool, last = tool_at(depth), path.last
     active = np.zeros(len(tissue.fixed), dtype=bool) if last.touched is None else last.touched.active
     guess = path.guess(depth)
@@ -233,5 +233,7 @@ def _step(
             guess = None
     if guess is None:
         tissue.state = path.last.state
-    rubbing = None if friction is None else _rubbing(tissue, tool_at, last, depth, friction)
-    return settle(tissue, tool, first_set(tissue, tool, active), rubbing, is_patient=is_patient, limit=limit)
+    friction_step = None if friction is None else _friction_step(tissue, tool_at, last, depth, friction)
+    return solve_contact(
+        tissue, tool, first_set(tissue, tool, active), friction_step, is_patient=is_patient, limit=limit
+    )

@@ -22,14 +22,14 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.contact.active_set import SLACK
 from pipeline.solve.contact.constraint import Constraint
 from pipeline.solve.contact.coulomb import Slide
-from pipeline.solve.contact.rubbing import Placed, Rub, Rubbing
+from pipeline.solve.contact.friction_step import FrictionIteration, FrictionStep, Placed
 from pipeline.solve.contact.turned import turned_frames
 from pipeline.solve.newton import LargeError
 
 # Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
 LEFT, _CLOSED = 1e-8, 1e-8
 # With friction: the residual of nodes that slide, whose friction is that of the iteration before, and of all others.
-_LEFT_RUBBING, _LEFT_BESIDE = 1e-4, 1e-7
+_LEFT_WITH_FRICTION, _LEFT_BESIDE = 1e-4, 1e-7
 # Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
 _MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
 # Without patience: the least share of the first increment that may be taken, and the number of iterations after which
@@ -100,7 +100,7 @@ class PlacedTool:
 
 
 @dataclass(frozen=True, eq=False)
-class Touched:
+class ContactSolution:
     """Contact at equilibrium: the ``active`` nodes (n), forces of the tool on the nodes (n, d), N, and gaps (n), m.
 
     ``pressed`` (n) are the normal parts of the forces (N). ``slide`` is the state of friction, None without.
@@ -120,19 +120,19 @@ def first_set(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> BoolArray:
     return tool.complete(active | through)
 
 
-def settle(
+def solve_contact(
     tissue: Tissue,
     tool: PlacedTool,
     active: BoolArray,
-    rubbing: Rubbing | None = None,
+    friction_step: FrictionStep | None = None,
     *,
     is_patient: bool = True,
     limit: float = 0.0,
     scale: float | None = None,
-) -> Touched:
+) -> ContactSolution:
     """Find equilibrium and contact from the tissue's state and an initial ``active`` set (n); collective.
 
-    Without ``rubbing`` there is no friction. Without patience, the loop ends where smaller load steps need fewer
+    Without ``friction_step`` there is no friction. Without patience, the loop ends where smaller load steps need fewer
     iterations. A residual and gaps below ``limit`` are enough, in units of the forces and the depth. The tool must
     touch a node, unless the ``scale`` (N) of the contact forces is known, to which the residual is then compared.
 
@@ -141,7 +141,8 @@ def settle(
         SolveError: if a linear solver fails.
     """
     repeats, seen, reactions = 0, Counter[bytes](), np.full(len(active), np.inf)
-    rub, predicted = None if rubbing is None else Rub(rubbing), np.zeros(tissue.fixed.shape)
+    friction = None if friction_step is None else FrictionIteration(friction_step)
+    predicted = np.zeros(tissue.fixed.shape)
     for iteration in range(_MOST + 1):
         positions = tissue.positions()
         place = tool.distance(positions)
@@ -151,10 +152,10 @@ def settle(
         pressed = np.where(active, np.einsum("ni,ni->n", forces, normal), 0.0)
         following = _with_care(tool, active, following, repeats)
         there, exerted = Placed(positions, normal), pressed[:, None] * normal
-        if rub is not None:
+        if friction is not None:
             if iteration:
-                rub.follow(iteration, there, predicted, active, following)
-            exerted = exerted + rub.exerted(there, forces, active)
+                friction.update(iteration, there, predicted, active, following)
+            exerted = exerted + friction.exerted(there, forces, active)
         is_same, active = np.array_equal(following, active), following
         if is_same and scale is None and not active.any():
             raise LargeError("the probe does not touch a single node: use smaller elements below it")
@@ -162,21 +163,25 @@ def settle(
         # An initial guess may be an equilibrium whose tool pulls: no reaction was predicted yet.
         pulls = iteration == 0 and _pulls(tool, active, pressed)
         settled = is_same and not pulls
-        if settled and _is_settled(tissue, tool, active, place.gap, free, pressed, rub, limit=limit, scale=scale):
-            if rub is not None and not rub.is_sound(active):
+        if settled and _is_converged(
+            tissue, tool, active, place.gap, free, pressed, friction, limit=limit, scale=scale
+        ):
+            if friction is not None and not friction.is_sound(active):
                 raise LargeError("the states of nodes with friction repeat")
             exerted = np.where(active[:, None], forces, 0.0)
-            return Touched(active, exerted, place.gap, iteration, pressed, None if rub is None else rub.slide)
+            return ContactSolution(
+                active, exerted, place.gap, iteration, pressed, None if friction is None else friction.slide
+            )
         if not is_patient and iteration >= _SOON and np.abs(place.gap[active]).max() > _NEARLY_CLOSED * tool.depth:
             raise LargeError(f"no equilibrium is near after {iteration} iterations")
         if not is_same:
             seen[active.tobytes()] += 1
             repeats = max(repeats, seen[active.tobytes()])
-            if repeats >= _MOST_REPEATS and rub is None:  # friction leaves nodes that do not settle
+            if repeats >= _MOST_REPEATS and friction is None:  # friction leaves nodes that do not settle
                 raise LargeError("active sets repeat")
         constraint = _constraint(place, normal, np.where(active, pressed, 0.0), active)
-        if rub is not None:
-            constraint = rub.constrain(constraint, there, active)
+        if friction is not None:
+            constraint = friction.constrain(constraint, there, active)
         predicted = np.where(tissue.fixed, 0.0, tissue.linearise(constraint))
         reactions = np.einsum("ni,ni->n", predicted, normal)
         if _advance(tissue) < _WHOLE and iteration == 0 and not is_patient:
@@ -223,14 +228,14 @@ def _with_care(tool: PlacedTool, active: BoolArray, following: BoolArray, repeat
     return following
 
 
-def _is_settled(
+def _is_converged(
     tissue: Tissue,
     tool: PlacedTool,
     active: BoolArray,
     gap: FloatArray,
     free: FloatArray,
     pressed: FloatArray,
-    rub: Rub | None,
+    friction: FrictionIteration | None,
     *,
     limit: float,
     scale: float | None,
@@ -238,10 +243,10 @@ def _is_settled(
     left, most = tissue.unbalanced(), max(float(np.linalg.norm(pressed)), scale or 0.0)
     if not np.abs(gap[active]).max(initial=0.0) <= max(_CLOSED, limit) * tool.depth:
         return False
-    if rub is None:
+    if friction is None:
         return bool(np.hypot(left, np.linalg.norm(free)) <= max(LEFT, limit) * most)
-    is_close = left <= _LEFT_BESIDE * most and np.linalg.norm(free) <= _LEFT_RUBBING * most
-    return bool(is_close and rub.is_same)
+    is_close = left <= _LEFT_BESIDE * most and np.linalg.norm(free) <= _LEFT_WITH_FRICTION * most
+    return bool(is_close and friction.is_same)
 
 
 def _advance(tissue: Tissue) -> float:

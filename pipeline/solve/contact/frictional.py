@@ -117,14 +117,14 @@ class FrictionalContact(FoundContact):
     """Contact with the friction of a ``tool``, beside the frictionless one that was ``found``.
 
     ``pressed`` is its equilibrium, nodes in the order of the candidates; ``path_bar`` the change of the force from half
-    as many load steps, relative. ``smooth`` and ``rubbed`` are the unknowns without and with friction.
+    as many load steps, relative. ``smooth`` and ``frictional`` are the unknowns without and with friction.
     """
 
     tool: Tool
     pressed: Step
     path_bar: float
     smooth: Unknowns
-    rubbed: Unknowns
+    frictional: Unknowns
 
     @property
     def stored(self) -> float:
@@ -164,7 +164,7 @@ class FrictionalContact(FoundContact):
         (depth,) = movement.amounts
         self._plug.put(columns[0], self.smooth, depth)
         found = super().hierarchical_estimate(columns, movement, stack, keep=keep)
-        self._plug.put(columns[0], self.rubbed, depth)
+        self._plug.put(columns[0], self.frictional, depth)
         return with_friction(found, self.path_bar, added=self.force / super().force - 1)
 
     def _touching(self) -> tuple[BoolArray, State]:
@@ -182,7 +182,7 @@ def with_friction(found: HierarchicalEstimate, path_bar: float, *, added: float)
     return replace(found, relative=found.relative + of_friction, friction_bar=of_friction)
 
 
-def rub(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: ExitStack) -> FrictionalContact:
+def add_friction(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: ExitStack) -> FrictionalContact:
     """Return the contact with the friction of a ``tool``, from the one without, whose unknowns are ``smooth``.
 
     Collective.
@@ -202,7 +202,7 @@ def rub(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: ExitStack) -
         surface = _condensed(body, obstacle, nodes, is_free)
         steps = [press(surface, obstacle.depth, tool.friction, count) for count in (STEPS, STEPS // 2)]
         pressed, coarse = (_of_all(candidates, nodes, step) for step in steps)
-        moved, rubbed = body.moved(pressed.reactions)
+        moved, frictional = body.moved(pressed.reactions)
         through = (-obstacle.bounds - moved[:, 0] > SLACK * obstacle.depth) & ~pressed.active & reachable
         through[nodes] = False
         if not through.any():
@@ -211,7 +211,12 @@ def rub(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: ExitStack) -
     path_bar = abs(coarse.force / pressed.force - 1)
     known = {name: getattr(contact, name) for name in ("sweep", "obstacle", "found", "loaded", "obstacle_above")}
     return FrictionalContact(
-        **known, tool=tool, pressed=replace(pressed, moved=moved), path_bar=path_bar, smooth=smooth, rubbed=rubbed
+        **known,
+        tool=tool,
+        pressed=replace(pressed, moved=moved),
+        path_bar=path_bar,
+        smooth=smooth,
+        frictional=frictional,
     )
 
 

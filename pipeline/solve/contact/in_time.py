@@ -15,7 +15,7 @@ from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import ContactError
-from pipeline.solve.contact.deformed import Distance, Touched, first_set, settle
+from pipeline.solve.contact.deformed import ContactSolution, Distance, first_set, solve_contact
 from pipeline.solve.contact.large import placed_tool, touched_area
 from pipeline.solve.contact.levels import Surface
 from pipeline.solve.contact.tissue import DeformedBody
@@ -64,7 +64,7 @@ class PressedTool(Pressed):
         self._last = self._tissue.state
         self.force, self.rate, self.area = np.zeros(3), 0.0, 0.0
 
-    def settle(self, state: PETSc.Vec, share: float) -> None:
+    def equilibrate(self, state: PETSc.Vec, share: float) -> None:
         """Find equilibrium and contact at a share.
 
         Raises:
@@ -77,7 +77,7 @@ class PressedTool(Pressed):
             tissue.state = self._last
         placed = replace(placed_tool(tissue, self._tool, share * self._depth), depth=self._depth)
         try:
-            touched = settle(tissue, placed, first_set(tissue, placed, self._active), scale=_SCALE * self._scale)
+            touched = solve_contact(tissue, placed, first_set(tissue, placed, self._active), scale=_SCALE * self._scale)
         except LargeError:
             raise
         except SolveError as error:
@@ -100,7 +100,7 @@ class PressedTool(Pressed):
             self.area = 2.0 ** len(tissue.elements.body.mirrored) * area
         state.array[:] = self._last
 
-    def _left(self, touched: Touched) -> float:
+    def _left(self, touched: ContactSolution) -> float:
         """Return the work of the forces in the displacement, over that of the elastic forces; collective."""
         tissue, body = self._tissue, self.body
         work = float((touched.forces * (tissue.positions() - tissue.candidates.points)).sum())

@@ -21,7 +21,7 @@ from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import ContactError, Obstacle
 from pipeline.solve.contact.contact_steps import ContactPath, Stage, press
 from pipeline.solve.contact.corrections import Corrections
-from pipeline.solve.contact.deformed import PlacedTool, Touched, first_set, settle
+from pipeline.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
 from pipeline.solve.contact.elements import State
 from pipeline.solve.contact.geometry import Area, contact_area
 from pipeline.solve.contact.levels import Surface
@@ -74,7 +74,7 @@ class LargeContact:
         found, iterations = self.find(asked, stack)
         return found.equilibrium(asked.movement, iterations, stack)
 
-    def find(self, asked: Request, stack: ExitStack) -> "tuple[LargeTouch, int]":
+    def find(self, asked: Request, stack: ExitStack) -> "tuple[LargeContactSolution, int]":
         """Return contact at the depth of the movement, and Newton's iterations; see :meth:`solve`."""
         (depth,) = asked.movement.amounts
         body = DeformedBody(self._elements, self._surface, self._law, asked.method, stack, self._applied)
@@ -90,7 +90,9 @@ class LargeContact:
         touched = self._path.last.touched
         assert touched is not None
         body.state = self._path.last.state
-        return LargeTouch(self._surface, body, self._tool, touched, depth, self._sagged, self._corrections), iterations
+        return LargeContactSolution(
+            self._surface, body, self._tool, touched, depth, self._sagged, self._corrections
+        ), iterations
 
 
 def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError) -> LargeError:
@@ -118,7 +120,7 @@ def placed_tool(body: DeformedBody, tool: Tool, depth: float) -> PlacedTool:
 
 
 @dataclass(frozen=True, eq=False)
-class LargeTouch:
+class LargeContactSolution:
     """Contact at a ``depth`` (m) with the state of a ``body``; methods are collective.
 
     ``sagged`` is the body before, from whose first touch the depth counts. ``corrections`` are those of the path.
@@ -127,7 +129,7 @@ class LargeTouch:
     surface: Surface
     body: DeformedBody
     tool: Tool
-    touched: Touched
+    touched: ContactSolution
     depth: float
     sagged: Sagged
     corrections: Corrections
@@ -228,7 +230,7 @@ class LargeTouch:
         )
 
     @stage("contact sets")
-    def _found_again(self, loads: Loads | None, stack: ExitStack) -> "LargeTouch":
+    def _found_again(self, loads: Loads | None, stack: ExitStack) -> "LargeContactSolution":
         coarse, degree = self.body.elements, self.body.elements.degree + 1
         finer = self.surface.elements(degree, coarse.element, stack)
         applied, state = None if loads is None else finer.displacements.applied(loads), self.body.state
@@ -252,7 +254,7 @@ class LargeTouch:
             raise LargeError(f"no error bar: elements of degree {degree} fail ({error})") from error
         return replace(self, body=body, touched=touched, sagged=sagged)
 
-    def _settled_on(self, body: DeformedBody, sagged: Sagged) -> Touched:
+    def _settled_on(self, body: DeformedBody, sagged: Sagged) -> ContactSolution:
         """Return contact on a ``body`` of another degree: from its state, or along a load path where that fails.
 
         Raises:
@@ -266,7 +268,7 @@ class LargeTouch:
         active = self.body.candidates.raised(self.touched.active, body.candidates)
         if body.is_sound:
             with suppress(SolveError):
-                return settle(body, there, first_set(body, there, active), is_patient=False, limit=_FOUND_AGAIN)
+                return solve_contact(body, there, first_set(body, there, active), is_patient=False, limit=_FOUND_AGAIN)
         path = ContactPath(Stage(0.0, sagged.state))
         press(body, tool_at, path, self.depth)
         assert path.last.touched is not None
@@ -277,7 +279,7 @@ class LargeTouch:
         return touched_area(self.body, moved, self.touched, self.depth)
 
 
-def touched_area(body: DeformedBody, candidates: Candidates, touched: Touched, depth: float) -> Area:
+def touched_area(body: DeformedBody, candidates: Candidates, touched: ContactSolution, depth: float) -> Area:
     """Return the contact area of the modelled part, where its ``candidates`` are, normal to the axis."""
     modulus = candidates.from_regions(body.law.plane_moduli)
     state = State(np.zeros(len(candidates)), touched.forces[:, 2], nan)

@@ -12,10 +12,10 @@ from typing import ClassVar
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.contact.contact_steps import ContactPath, Friction, Stage, rub
+from pipeline.solve.contact.contact_steps import ContactPath, Friction, Stage, press_with_friction
 from pipeline.solve.contact.coulomb import Neighbours
 from pipeline.solve.contact.frictional import with_friction
-from pipeline.solve.contact.large import LargeContact, LargeTouch, placed_tool, stopped
+from pipeline.solve.contact.large import LargeContact, LargeContactSolution, placed_tool, stopped
 from pipeline.solve.contact.tissue import DeformedBody
 from pipeline.solve.elements.base import Equilibrium, HierarchicalEstimate
 from pipeline.solve.elements.fields import Column
@@ -25,7 +25,7 @@ from pipeline.solve.physics import of_regions
 from pipeline.solve.solution import Request
 
 
-class RubbingContact(LargeContact):
+class LargeFrictionalContact(LargeContact):
     """Contact with a tool that has friction; each depth has a path of its own.
 
     ``STEPS`` is the number of load steps: enough for a bar of some tenths of a per cent where tissue sticks.
@@ -47,7 +47,9 @@ class RubbingContact(LargeContact):
         for steps in (self.STEPS // 2, self.STEPS):
             path = ContactPath(Stage(0.0, smooth.sagged.state))
             try:
-                iterations += rub(body, lambda there: placed_tool(body, tool, there), path, depth, friction, steps)
+                iterations += press_with_friction(
+                    body, lambda there: placed_tool(body, tool, there), path, depth, friction, steps
+                )
             except LargeError as error:
                 raise stopped(body, path, depth, error) from error
             assert path.last.touched is not None
@@ -55,7 +57,7 @@ class RubbingContact(LargeContact):
         body.state = path.last.state
         coarse, fine = touched
         path_bar = abs(float(coarse.forces[:, 2].sum() / fine.forces[:, 2].sum()) - 1)
-        found = RubbingTouch(
+        found = LargeFrictionalSolution(
             self._surface, body, self._tool, fine, depth, smooth.sagged, smooth.corrections, smooth, state, path_bar
         )
         return found.equilibrium(asked.movement, iterations, stack)
@@ -76,13 +78,13 @@ def friction_of(body: DeformedBody, coefficient: float, depth: float) -> Frictio
 
 
 @dataclass(frozen=True, eq=False)
-class RubbingTouch(LargeTouch):
+class LargeFrictionalSolution(LargeContactSolution):
     """Contact with friction, beside the frictionless one, ``smooth``, with its state.
 
     ``path_bar`` is the change of the force from half as many load steps, relative.
     """
 
-    smooth: LargeTouch
+    smooth: LargeContactSolution
     smooth_state: FloatArray
     path_bar: float
 

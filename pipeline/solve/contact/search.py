@@ -21,11 +21,11 @@ from pipeline.solve.contact.active_set import ContactError, Found, Obstacle, fin
 from pipeline.solve.contact.condensed import CondensedElements, suits
 from pipeline.solve.contact.elements import ContactElements, FarShare, FreeResponse
 from pipeline.solve.contact.found import FoundContact
-from pipeline.solve.contact.frictional import rub
+from pipeline.solve.contact.frictional import add_friction
 from pipeline.solve.contact.geometry import Touch
 from pipeline.solve.contact.in_time import PressedTool
 from pipeline.solve.contact.large import LargeContact
-from pipeline.solve.contact.large_friction import RubbingContact
+from pipeline.solve.contact.large_friction import LargeFrictionalContact
 from pipeline.solve.contact.levels import Numbering, Surface
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.sweep import Sweep
@@ -105,8 +105,8 @@ class ContactSearch:
             obstacle_above=lambda: self._obstacle(self._surface.of(self._elements.degree + 1), depth, loaded),
         )
         if self._tool.friction:
-            self.contact = contact = rub(contact, self._tool, unknowns, stack)
-            self._elements.put(columns[0], contact.rubbed, depth)
+            self.contact = contact = add_friction(contact, self._tool, unknowns, stack)
+            self._elements.put(columns[0], contact.frictional, depth)
             found = replace(found, sets=found.sets + contact.pressed.iterations)
         response = contact.response(columns[0], movement)
         check_balance(response.balance)
@@ -119,7 +119,7 @@ class ContactSearch:
     def _solve_large(self, asked: Request, stack: ExitStack) -> Equilibrium:
         """Find contact at large displacements: see :class:`LargeContact`."""
         if self._large is None or not (self._reuse and self._large.can_reach(asked)):
-            kind = RubbingContact if self._tool.friction else LargeContact
+            kind = LargeFrictionalContact if self._tool.friction else LargeContact
             self._large = kind(self._surface, self._elements, self._tool, asked)
         return self._large.solve(asked, stack)
 

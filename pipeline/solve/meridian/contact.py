@@ -57,7 +57,7 @@ class MeridianContact(MeridianSolver):
         return replace(found, iterations=search.punches.count)
 
     def _settled(self, search: "_Search", patch: "_Patch", depth: float) -> Answer:
-        return self._best(lambda grading: search.settle(patch, depth, grading, self._degree))
+        return self._best(lambda grading: search.contact_at(patch, depth, grading, self._degree))
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class _Search:
         step = max((float(radii[i + 1] - radii[i]) for i in changes), default=0.0)
         return tuple(zip(edges[::2], edges[1::2], strict=True)), step
 
-    def settle(self, patch: _Patch, depth: float, grading: Grading, degree: int) -> Answer:
+    def contact_at(self, patch: _Patch, depth: float, grading: Grading, degree: int) -> Answer:
         """Return the contact at a depth, from solutions of two degrees with nearly the right radii.
 
         The error bar is that of :func:`error_bar`, plus the squares of the radii's errors.

@@ -70,7 +70,7 @@ class LargeSystem(System):
         while (reached := path[-1][0]) < depth:
             there = depth if step > 0.99 * (depth - reached) else reached + step
             try:
-                state = self.settle(state, there)
+                state = self.equilibrate(state, there)
             except LargeError as error:
                 step = (there - reached) / 2
                 if step < shortest * depth:
@@ -81,7 +81,7 @@ class LargeSystem(System):
             step = min(1.5 * step, longest)
         return state, np.array(path)
 
-    def settle(self, state: FloatArray, depth: float) -> FloatArray:
+    def equilibrate(self, state: FloatArray, depth: float) -> FloatArray:
         """Return the equilibrium with the probe at a ``depth``, from an initial guess ``state``.
 
         Raises:
@@ -169,7 +169,7 @@ class LargeMeridian(LargeSolver):
         except LargeError as stop:
             raise stopped(stop, arrays, law, depth) from stop
         check_path(path, _ROUNDING * arrays.points.ptp(axis=0).prod())
-        state = fine.settle(fine.forms.interpolate(coarse.forms, state), deep)
+        state = fine.equilibrate(fine.forms.interpolate(coarse.forms, state), deep)
         on_probe, on_support, energy = fine.forces(state)
         balance = abs(on_probe + on_support) / abs(on_probe)
         check_balance(balance)

@@ -108,9 +108,9 @@ class LargeMeridianContact(LargeSolver):
         """
         coarse, fine, bar = at(self._degree - 1), at(self._degree), 0.0
         if self._tool.friction:
-            rough = coarse.rubbed(depth, steps // 2).force
-            coarse = coarse.rubbed(depth, steps)
-            fine, bar = fine.rubbed(depth, steps), abs(rough / coarse.force - 1)
+            rough = coarse.pressed_with_friction(depth, steps // 2).force
+            coarse = coarse.pressed_with_friction(depth, steps)
+            fine, bar = fine.pressed_with_friction(depth, steps), abs(rough / coarse.force - 1)
         else:
             coarse = coarse.pressed(depth)
             try:

@@ -19,9 +19,9 @@ from pipeline.scene.model import FREE, PROBE
 from pipeline.shapes.distance import Distance
 from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance, check_work
-from pipeline.solve.contact.contact_steps import ContactPath, Friction, Stage, press, rub
+from pipeline.solve.contact.contact_steps import ContactPath, Friction, Stage, press, press_with_friction
 from pipeline.solve.contact.coulomb import Neighbours
-from pipeline.solve.contact.deformed import PlacedTool, Touched, first_set, settle
+from pipeline.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
 from pipeline.solve.meridian.forms import Meshes
 from pipeline.solve.meridian.punch import RoundTool
 from pipeline.solve.meridian.signs import seen_from_above
@@ -53,7 +53,7 @@ class MeridianTouch:
     law: MaterialLaw
     unit: float
     volume: float
-    touched: Touched | None = None
+    touched: ContactSolution | None = None
 
     @staticmethod
     def of(arrays: MeridianArrays, meshes: Meshes, degree: int, law: MaterialLaw, tool: RoundTool) -> "MeridianTouch":
@@ -77,14 +77,16 @@ class MeridianTouch:
         """
         return self._at_end(lambda path, there: press(self.tissue, self._placed, path, there), depth)
 
-    def rubbed(self, depth: float, steps: int) -> "MeridianTouch":
+    def pressed_with_friction(self, depth: float, steps: int) -> "MeridianTouch":
         """Return the contact with friction at the end of a load path of at least so many ``steps`` to a ``depth`` (m).
 
         Raises:
             LargeError: if the path ends before; ``reached`` are the depth and the force there.
         """
         friction = self._friction(depth / self.unit)
-        return self._at_end(lambda path, there: rub(self.tissue, self._placed, path, there, friction, steps), depth)
+        return self._at_end(
+            lambda path, there: press_with_friction(self.tissue, self._placed, path, there, friction, steps), depth
+        )
 
     def _at_end(self, follow: Callable[[ContactPath, float], int], depth: float) -> "MeridianTouch":
         path = ContactPath(Stage(0.0, np.zeros_like(self.tissue.state)))
@@ -121,7 +123,7 @@ class MeridianTouch:
             raise LargeError("tissue is turned inside out")
         tool = self._placed(depth / self.unit)
         active = first_set(self.tissue, tool, self.tissue.places[:, 0] * self.unit < other.edge * other.unit)
-        return replace(self, touched=settle(self.tissue, tool, active))
+        return replace(self, touched=solve_contact(self.tissue, tool, active))
 
     def _placed(self, depth: float) -> PlacedTool:
         """Return the tool at a ``depth`` (units of the mesh)."""
@@ -163,7 +165,7 @@ class MeridianTouch:
         return Friction(self.tool.friction, _DOWN, penalty, neighbours, deepest)
 
     @property
-    def _contact(self) -> Touched:
+    def _contact(self) -> ContactSolution:
         assert self.touched is not None
         return self.touched
 

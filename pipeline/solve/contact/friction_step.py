@@ -21,7 +21,7 @@ _NO_PART = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Rubbing:
+class FrictionStep:
     """Friction between n nodes and a tool at one depth: its coefficient ``friction``, infinite for tissue that sticks.
 
     ``references`` (n, d) are places on the tool at this depth (m); ``penalty`` (n) is the parameter c (N/m). ``slide``
@@ -40,26 +40,26 @@ class Rubbing:
     simplified: float
 
 
-class Rub:
+class FrictionIteration:
     """The state of friction during the iterations of one equilibrium."""
 
-    def __init__(self, rubbing: Rubbing):
-        self._with, self.slide, self.normal = rubbing, rubbing.slide, rubbing.normal
-        self._simple = Simplified.none(len(rubbing.normal))
+    def __init__(self, friction_step: FrictionStep):
+        self._with, self.slide, self.normal = friction_step, friction_step.slide, friction_step.normal
+        self._simple = Simplified.none(len(friction_step.normal))
         self._share, self._swing = 1.0, np.inf
         self._seen, self._single = set[bytes](), False
         self.is_same = False
 
-    def follow(self, iteration: int, place: "Placed", predicted: FloatArray, before: BoolArray, now: BoolArray) -> None:
+    def update(self, iteration: int, place: "Placed", predicted: FloatArray, before: BoolArray, now: BoolArray) -> None:
         """Take the next state from ``predicted`` forces (n, d) N; active sets (n) are those ``before`` and ``now``."""
         self.normal = np.einsum("ni,ni->n", predicted, place.normal)
-        rubbing, law = self._with, self._simple.law(self._with.friction)
+        friction_step, law = self._with, self._simple.law(self._with.friction)
         across = predicted - self.normal[:, None] * place.normal
-        trial = across - rubbing.penalty[:, None] * place.slips(rubbing.references)
+        trial = across - friction_step.penalty[:, None] * place.slips(friction_step.references)
         most = largest_friction(law, self.normal)
         state = before.tobytes() + self.slide.sliding.tobytes()
         self._single = self._single or state in self._seen
-        following = self.slide.following(trial, most, now, rubbing.neighbours, single=self._single)
+        following = self.slide.following(trial, most, now, friction_step.neighbours, single=self._single)
         after = self._simple.sliding(following, now)
         moves = before != now
         turns = (after.sliding != self.slide.sliding) & ~moves
@@ -134,7 +134,7 @@ class Placed:
         return np.asarray(moved - np.einsum("ni,ni->n", moved, self.normal)[:, None] * self.normal)
 
 
-def met(
+def meeting_places(
     gap: Callable[[FloatArray, float], FloatArray],
     paths: tuple[FloatArray, FloatArray],
     depths: tuple[float, float],
