@@ -35,11 +35,11 @@ class Sphere(RoundIndenter):
 
     def check(self, problems: Problems) -> None:
         """Report a ball pressed in past its equator."""
-        if (depth := max(self.depth, self.depths[1])) >= self.radius:
+        if (depth := max(self.depth, self.depths[1])) > self.radius:
             problems.error(
                 "probe.depth",
                 in_mm(depth),
-                f"must be less than the sphere's radius {in_mm(self.radius)}: past its equator contact does not grow",
+                f"must be at most the sphere's radius {in_mm(self.radius)}: past its equator contact does not grow",
             )
             return
         super().check(problems)

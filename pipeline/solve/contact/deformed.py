@@ -14,7 +14,8 @@ The loop knows only nodes of a surface: a body in three dimensions and one in th
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from math import hypot, inf
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -28,6 +29,8 @@ from pipeline.solve.newton import LargeError
 
 # Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
 LEFT, _CLOSED = 1e-8, 1e-8
+# A residual below this that no longer falls is the rounding error of a body that is large compared with the contact.
+_ROUNDING = 1e-6
 # With friction: the residual of nodes that slide, whose friction is that of the iteration before, and of all others.
 _LEFT_WITH_FRICTION, _LEFT_BESIDE = 1e-4, 1e-7
 # Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
@@ -114,6 +117,18 @@ class ContactSolution:
     slide: Slide | None = None
 
 
+class Residual(NamedTuple):
+    """Norms (N) of the residual inside the body, and at the nodes that the tool may touch."""
+
+    inside: float
+    on_surface: float
+
+    @property
+    def size(self) -> float:
+        """The norm (N) of all."""
+        return hypot(self.inside, self.on_surface)
+
+
 def first_set(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> BoolArray:
     """Return an initial active set: ``active`` nodes and all that the tool penetrates; collective."""
     through = tool.distance(tissue.positions()).gap < -SLACK * tool.depth
@@ -142,7 +157,7 @@ def solve_contact(
     """
     repeats, seen, reactions = 0, Counter[bytes](), np.full(len(active), np.inf)
     friction = None if friction_step is None else FrictionIteration(friction_step)
-    predicted = np.zeros(tissue.fixed.shape)
+    predicted, before = np.zeros(tissue.fixed.shape), inf
     for iteration in range(_MOST + 1):
         positions = tissue.positions()
         place = tool.distance(positions)
@@ -162,9 +177,13 @@ def solve_contact(
         free = forces - exerted
         # An initial guess may be an equilibrium whose tool pulls: no reaction was predicted yet.
         pulls = iteration == 0 and _pulls(tool, active, pressed)
-        settled = is_same and not pulls
-        if settled and _is_converged(
-            tissue, tool, active, place.gap, free, pressed, friction, limit=limit, scale=scale
+        residual = Residual(tissue.unbalanced(), float(np.linalg.norm(free)))
+        enough = max(limit, _ROUNDING) if residual.size > before / 2 else limit
+        before = residual.size
+        if (
+            is_same
+            and not pulls
+            and _is_converged(residual, tool, active, place.gap, pressed, friction, limit=enough, scale=scale)
         ):
             if friction is not None and not friction.is_sound(active):
                 raise LargeError("the states of nodes with friction repeat")
@@ -229,24 +248,23 @@ def _with_care(tool: PlacedTool, active: BoolArray, following: BoolArray, repeat
 
 
 def _is_converged(
-    tissue: Tissue,
+    residual: Residual,
     tool: PlacedTool,
     active: BoolArray,
     gap: FloatArray,
-    free: FloatArray,
     pressed: FloatArray,
     friction: FrictionIteration | None,
     *,
     limit: float,
     scale: float | None,
 ) -> bool:
-    left, most = tissue.unbalanced(), max(float(np.linalg.norm(pressed)), scale or 0.0)
+    most = max(float(np.linalg.norm(pressed)), scale or 0.0)
     if not np.abs(gap[active]).max(initial=0.0) <= max(_CLOSED, limit) * tool.depth:
         return False
     if friction is None:
-        return bool(np.hypot(left, np.linalg.norm(free)) <= max(LEFT, limit) * most)
-    is_close = left <= _LEFT_BESIDE * most and np.linalg.norm(free) <= _LEFT_WITH_FRICTION * most
-    return bool(is_close and friction.is_same)
+        return residual.size <= max(LEFT, limit) * most
+    is_close = residual.inside <= _LEFT_BESIDE * most and residual.on_surface <= _LEFT_WITH_FRICTION * most
+    return is_close and friction.is_same
 
 
 def _advance(tissue: Tissue) -> float:
