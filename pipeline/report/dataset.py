@@ -58,7 +58,7 @@ _PARTS = (
         of=lambda case: case.probe.is_unilateral,
     ),
     _Part(("slip_area", "friction_force", "torque"), of=lambda case: case.probe.friction > 0),
-    _Part(("depth_reached", "force_reached"), of=lambda case: case.material.is_large),
+    _Part(("depth_reached", "force_reached"), of=lambda case: case.has_load_steps or case.is_stepped),
     _Part(("surface_deviation",), of=lambda case: isinstance(case.body, Scanned)),
     _Part((*LARGEST, *_COUNTS)),
     _Part(("force_exact", "force_exact_error"), is_exact=True),

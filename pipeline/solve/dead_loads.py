@@ -10,6 +10,7 @@ to the body before the loads act.
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 from petsc4py import PETSc
@@ -30,9 +31,9 @@ from pipeline.stages import stage
 
 # Smallest load step, as a share of the loads.
 _SMALLEST = 1 / 64
-# The sag of a tool: most steps of the secant method, the change (relative) and the force (in units of the loads) at
-# which it ends.
-_MOST_SECANTS, _SMALL, _NO_FORCE = 12, 1e-6, 1e-9
+# The sag of a tool: most steps of the secant method, most halvings of one, and the change (relative) and the force (in
+# units of the loads) at which it ends.
+_MOST_SECANTS, _HALVINGS, _SMALL, _NO_FORCE = 20, 6, 1e-6, 1e-9
 
 
 def load_in_steps(body: HyperelasticBody, applied: Applied, state: PETSc.Vec) -> None:
@@ -120,7 +121,7 @@ class HeldTool:
 
     Of the modelled part: the ``state``, ``on_probe`` (3), N, the sum of the residual on the probe's dofs, the ``force``
     (N) conjugate to the motion, the ``stored`` and the total ``energy`` (J). ``sag`` (m) is the amount of the motion at
-    which that force is zero.
+    which that force is zero, NaN if it is not found.
     """
 
     state: FloatArray
@@ -140,7 +141,7 @@ def hold_tool(
     ``unit`` is the prescribed displacement per unit of the motion, ``stiffness`` (N/m) an estimate of that motion's.
 
     Raises:
-        LargeError: if there is no equilibrium.
+        LargeError: if there is no equilibrium of a tool that is held.
     """
     space = elements.displacements
     with body.state() as state, body.state() as forces:
@@ -149,15 +150,42 @@ def hold_tool(
         residual, held = forces.array[: space.owned], state.array.copy()
         on_probe, work = residual.reshape(-1, 3)[space.probe_owned].sum(axis=0), held[: space.owned] @ applied.forces
         *on_probe, work = global_sum(space.comm, np.array([*on_probe, work]))
-        force, energy, motion = forces.dot(unit), body.energy(state), body.held_of(unit)
-        found, here, slope = force, 0.0, stiffness
+        force, energy = forces.dot(unit), body.energy(state)
+        try:
+            found = _sag_of_tool(body, state, unit, -force / stiffness, _NO_FORCE * applied.size)
+        except LargeError:
+            found = nan
+        return HeldTool(held, np.array(on_probe), force, energy + work, energy, found)
+
+
+def _sag_of_tool(body: HyperelasticBody, state: PETSc.Vec, unit: PETSc.Vec, step: float, no_force: float) -> float:
+    """Return the amount (m) of the motion ``unit`` at which the force (N) is at most ``no_force``; collective.
+
+    It is found by the secant method from an equilibrium, ``state``, and a first ``step`` (m). Steps are halved where
+    Newton's method does not converge.
+
+    Raises:
+        LargeError: if it is not found.
+    """
+    motion, here = body.held_of(unit), 0.0
+    with body.state() as forces, body.state() as last:
+        body.forces(state, forces)
+        force = forces.dot(unit)
         for _ in range(_MOST_SECANTS):
-            step = -found / slope
+            state.copy(last)
+            for _ in range(_HALVINGS):
+                try:
+                    body.equilibrate(state, (here + step) * motion)
+                    break
+                except LargeError:
+                    last.copy(state)
+                    step /= 2
+            else:
+                break
             here += step
-            body.equilibrate(state, here * motion)
             body.forces(state, forces)
-            before, found = found, forces.dot(unit)
-            if abs(step) <= _SMALL * abs(here) or abs(found) <= _NO_FORCE * applied.size:
-                return HeldTool(held, np.array(on_probe), force, energy + work, energy, here)
-            slope = (found - before) / step
+            before, force = force, forces.dot(unit)
+            if abs(step) <= _SMALL * abs(here) or abs(force) <= no_force:
+                return here
+            step *= -force / (force - before)
     raise LargeError("no sag of the tool was found under the loads")

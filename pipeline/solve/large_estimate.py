@@ -85,6 +85,13 @@ class FinerResiduals:
         return found
 
 
+def difference(fields: Fields, other: Fields) -> Fields:
+    """Return ``fields`` less ``other``, which is overwritten."""
+    for part, own in zip(fields, other, strict=True):
+        own.aypx(-1.0, part)
+    return other
+
+
 def subtract(fields: Fields, other: Fields) -> Fields:
     """Subtract ``other`` from ``fields``, which are returned."""
     for part, own in zip(fields, other, strict=True):

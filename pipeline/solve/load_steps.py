@@ -19,7 +19,7 @@ from pipeline.solve.compiled import global_sum
 from pipeline.solve.dead_loads import HeldTool, hold_tool
 from pipeline.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Products, Solver
 from pipeline.solve.elements.fields import Column, Fields
-from pipeline.solve.large_estimate import Decrements, FinerResiduals, subtract
+from pipeline.solve.large_estimate import Decrements, FinerResiduals, difference, subtract
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.newton import LEFT, ON_THE_WAY, HyperelasticBody, LargeError
@@ -81,7 +81,7 @@ class LoadPath:
         return np.asarray(np.tensordot(weights, states, axes=1))
 
     def can_reach(self, law: MaterialLaw, movement: Movement, applied: Applied | None) -> bool:
-        """Return whether this path can be continued to the movement under this law and these loads."""
+        """Return whether this path can be continued to the movement under this law and these loads; collective."""
         is_same = applied is None if self.applied is None else self.applied.is_same(applied)
         return is_same and (self.law, (self.motion,)) == (law, movement.motions) and self.reached <= movement.amounts[0]
 
@@ -196,7 +196,7 @@ class LoadSteps(Solver):
         if held is not None:
             state.array[:] = self._load_path.start
             rate_there, there = at()
-            found = [found[0], subtract(found[1], there), subtract(rate_there, found[0]), there]
+            found = [found[0], subtract(found[1], there), difference(found[0], rate_there), there]
             state.array[:] = held.state
             found.append(residuals.at(state))
         estimate = Decrements(self._linear, found)

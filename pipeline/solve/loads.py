@@ -12,6 +12,7 @@ from typing import Any
 
 import basix
 import numpy as np
+from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array
@@ -38,13 +39,15 @@ class Applied:
     ``size`` (N) is the integral of the loads' magnitude, ``resultant`` (3), in N, that of the loads; both global.
     """
 
+    comm: MPI.Comm
     forces: FloatArray
     size: float
     resultant: FloatArray
 
     def is_same(self, other: "Applied | None") -> bool:
-        """Return whether ``other`` loads have the same nodal forces on this rank."""
-        return other is not None and np.array_equal(self.forces, other.forces)
+        """Return whether ``other`` loads have the same nodal forces on all ranks; collective."""
+        is_here = other is not None and np.array_equal(self.forces, other.forces)
+        return bool(self.comm.allreduce(is_here, op=MPI.LAND))
 
 
 def apply_loads(loads: Loads, body: BodyMesh, space: Any) -> Applied:
@@ -65,7 +68,7 @@ def apply_loads(loads: Loads, body: BodyMesh, space: Any) -> Applied:
         totals = global_sum(body.comm, np.array(found).reshape(-1, 5))
         if len(totals) and not np.all(totals[:, 4] > 0):
             raise SolveError("the traction acts on no free surface: its area is under the probe, or fixed")
-        return Applied(forces.array.copy(), float(totals[:, 3].sum()), totals[:, :3].sum(axis=0))
+        return Applied(body.comm, forces.array.copy(), float(totals[:, 3].sum()), totals[:, :3].sum(axis=0))
 
 
 def _add_weights(

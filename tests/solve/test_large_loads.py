@@ -95,6 +95,13 @@ def test_a_tool_at_the_sag_of_a_bonded_tool_has_no_force():
     assert alone == pytest.approx(-record.load_force, rel=0.02)  # the law is nonlinear
 
 
+def test_the_sag_of_a_tool_on_tissue_as_soft_as_brain_is_reached_in_short_steps():
+    """The first step of the secant method, the sag of linear tissue, would turn elements at the edge inside out."""
+    record = one(material=TISSUE | {"young": "1 kPa"}, load=gravity(9.81))
+    stiffer = one(load=gravity(9.81))
+    assert 5 * stiffer.sag < record.sag < 20 * stiffer.sag
+
+
 def test_depths_share_the_sagged_body():
     depths = ["0.1 mm", "0.2 mm"]
     first, second = solve(material=TISSUE, load=gravity(9.81), probe={"depth": depths}).values()
@@ -204,3 +211,17 @@ def test_ranks_agree_on_contact_under_loads():
             solution = problem.solve(law_of(case), movement_of(case))
             found.append([solution.reaction[2], solution.contact.sag])
     assert found[0] == pytest.approx(found[1], rel=1e-6)
+
+
+@pytest.mark.mpi
+def test_ranks_agree_that_another_traction_is_another_problem():
+    """The cap is on few facets: a rank without any has the same nodal forces under both tractions."""
+    found, tractions = [], ("1 kPa", "2 kPa")
+    for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        load = {"traction": [{"name": "pull", "on": CAP, "pressure": list(tractions)}]}
+        first, second = study(material=TISSUE, load=load).cases()
+        with Spaces(mesh_case(first, (), comm)) as spaces, problem_of(spaces, first) as problem:
+            solutions = [problem.solve(law_of(case), movement_of(case)) for case in (first, second)]
+            found.append([solution.load_force[2] for solution in solutions])
+    assert found[0] == pytest.approx(found[1], rel=1e-6)
+    assert found[0][1] / found[0][0] == pytest.approx(2.0, rel=0.05)

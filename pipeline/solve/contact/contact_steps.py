@@ -92,6 +92,7 @@ def press(
         LargeError: if a step becomes too small; the path keeps the steps that converged.
     """
     iterations, deepest = 0, depth if friction is None else friction.deepest
+    path.start, tissue.state = path.last, path.last.state
     if path.last.touched is None and path.step == inf and friction is None:
         path.step = _first_step(tissue, tool_at, path.last.depth, depth)
     while path.last.depth < depth:
@@ -102,8 +103,7 @@ def press(
             is_patient = friction is not None or there - path.last.depth <= _LARGE * depth
             limit = _ON_THE_WAY if friction is None and there < depth else 0.0
             touched = _step(tissue, tool_at, path, there, friction, is_patient=is_patient, limit=limit)
-            if touched.gap.min() < -_INSIDE * deepest:  # the loop went to another equilibrium, around the tool
-                raise LargeError("tissue is left inside the tool")
+            check_outside(tissue, touched, deepest)
         except SolveError as error:
             path.step = (there - path.last.depth) / 2
             if path.step < _SMALLEST * depth:
@@ -115,6 +115,16 @@ def press(
         path.add(Stage(there, tissue.state, touched))
         path.step = step * (_LONGER if touched.iterations <= _EASY else 1.0)
     return iterations
+
+
+def check_outside(tissue: Tissue, touched: ContactSolution, deepest: float) -> None:
+    """Check that no tissue is left inside the tool: such an equilibrium goes round a tool that is ``deepest`` (m) deep.
+
+    Raises:
+        LargeError: if nodes that are not of the support are inside.
+    """
+    if touched.gap[~tissue.fixed.all(axis=1)].min() < -_INSIDE * deepest:
+        raise LargeError("tissue is left inside the tool")
 
 
 def _first_step(tissue: Tissue, tool_at: Callable[[float], PlacedTool], start: float, depth: float) -> float:

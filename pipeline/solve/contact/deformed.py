@@ -191,7 +191,11 @@ def solve_contact(
             return ContactSolution(
                 active, exerted, place.gap, iteration, pressed, None if friction is None else friction.slide
             )
-        if not is_patient and iteration >= _SOON and np.abs(place.gap[active]).max() > _NEARLY_CLOSED * tool.depth:
+        if (
+            not is_patient
+            and iteration >= _SOON
+            and np.abs(place.gap[active]).max(initial=0.0) > _NEARLY_CLOSED * tool.depth
+        ):
             raise LargeError(f"no equilibrium is near after {iteration} iterations")
         if not is_same:
             seen[active.tobytes()] += 1

@@ -6,16 +6,18 @@ force. With a linear law the gap is that along the axis, above the undeformed pl
 """
 
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
+from pipeline.shapes.distance import Distance
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import ContactError
-from pipeline.solve.contact.deformed import ContactSolution, Distance, first_set, solve_contact
+from pipeline.solve.contact.contact_steps import check_outside
+from pipeline.solve.contact.deformed import ContactSolution, first_set, solve_contact
 from pipeline.solve.contact.large import placed_tool, touched_area
 from pipeline.solve.contact.levels import Surface
 from pipeline.solve.contact.tissue import DeformedBody
@@ -29,22 +31,13 @@ from pipeline.solve.time_steps import Pressed
 _SCALE = 1e-2
 
 
-@dataclass(frozen=True, eq=False)
-class _Along:
-    """Distance along the axis: see :class:`.deformed.Distance`."""
-
-    gap: FloatArray
-    normal: FloatArray
-    curvature: FloatArray
-
-
 def along_axis(tool: Tool, places: FloatArray) -> Tool:
     """Return a tool whose gaps to nodes are those along −z, above their undeformed ``places`` (n, 3)."""
     heights, down = tool.height(places) - tool.first, np.broadcast_to([0.0, 0.0, -1.0], places.shape)
     flat = np.zeros((*places.shape, 3))
 
     def distance(points: FloatArray, depth: float) -> Distance:
-        return _Along(heights - depth - (points - places)[:, 2], down, flat)
+        return Distance(heights - depth - (points - places)[:, 2], down, flat)
 
     return replace(tool, distance=distance)
 
@@ -78,6 +71,7 @@ class PressedTool(Pressed):
         placed = replace(placed_tool(tissue, self._tool, share * self._depth), depth=self._depth)
         try:
             touched = solve_contact(tissue, placed, first_set(tissue, placed, self._active), scale=_SCALE * self._scale)
+            check_outside(tissue, touched, self._depth)
         except LargeError:
             raise
         except SolveError as error:

@@ -19,7 +19,7 @@ from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance, check_work
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import ContactError, Obstacle
-from pipeline.solve.contact.contact_steps import ContactPath, Stage, press
+from pipeline.solve.contact.contact_steps import ContactPath, Stage, check_outside, press
 from pipeline.solve.contact.corrections import Corrections
 from pipeline.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
 from pipeline.solve.contact.elements import State
@@ -57,7 +57,7 @@ class LargeContact:
         self._corrections = Corrections()
 
     def can_reach(self, asked: Request) -> bool:
-        """Return whether the load path can be continued to a request."""
+        """Return whether the load path can be continued to a request; collective."""
         loads, reached = asked.movement.loads, 0.0 if self._path is None else self._path.last.depth
         is_same = loads is None
         if self._applied is not None:
@@ -268,7 +268,10 @@ class LargeContactSolution:
         active = self.body.candidates.raised(self.touched.active, body.candidates)
         if body.is_sound:
             with suppress(SolveError):
-                return solve_contact(body, there, first_set(body, there, active), is_patient=False, limit=_FOUND_AGAIN)
+                first = first_set(body, there, active)
+                touched = solve_contact(body, there, first, is_patient=False, limit=_FOUND_AGAIN)
+                check_outside(body, touched, self.depth)
+                return touched
         path = ContactPath(Stage(0.0, sagged.state))
         press(body, tool_at, path, self.depth)
         assert path.last.touched is not None
