@@ -26,8 +26,8 @@ from pipeline.solve.newton import LEFT, ON_THE_WAY, HyperelasticBody, LargeError
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import LoadResponse, Response, whole_force
 
-# Fewest load steps, and the smallest step as a share of the depth.
-_FEWEST, _SMALLEST = 3, 1 / 100
+# Fewest load steps, fewest where the check of the work needs more, and the smallest step as a share of the depth.
+_FEWEST, _MANY, _SMALLEST = 3, 12, 1 / 100
 # A step that would leave less than this share of the depth goes to the end.
 _SLIVER = 1e-6
 # States besides the last one that the initial guess continues.
@@ -72,6 +72,10 @@ class LoadPath:
         self.earlier = [*self.earlier, self.state][-_CONTINUED:]
         self.state = state.copy()
         self.path.append((depth, force, energy))
+
+    def restart(self) -> None:
+        """Go back to the start."""
+        self.state, self.path, self.earlier = self.start, [(0.0, 0.0, 0.0)], []
 
     def continued(self, depth: float) -> FloatArray:
         """Return the polynomial through the last states, at a ``depth`` (m)."""
@@ -127,10 +131,8 @@ class LoadSteps(Solver):
         (column, *loaded), before, load_path = columns, self._body.iterations, self._load_path
         self.elements.set_law(self._law)
         with self._body.state() as state:
-            path = self._press(state, column)
+            path = self._checked_path(state, column)
             self.elements.put(column, self._body.split(state.array - load_path.start, column.unknown), column.amount)
-            state.array[:] = load_path.start
-            check_path(path, _ROUNDING * (max(self._law.lame_mu) * self._volume() + abs(self._body.energy(state))))
             self.stored = float(path[-1, 2])
             if load_path.applied is not None and load_path.held is None:
                 self._put_unit(column, state)
@@ -233,8 +235,22 @@ class LoadSteps(Solver):
         """Write the prescribed displacement per unit of the motion into ``state``."""
         state.array[: self._space.owned] = column.prescribed[: self._space.owned]
 
-    def _press(self, state: PETSc.Vec, column: Column) -> FloatArray:
-        """Continue ``state`` along the load path to the depth of a column.
+    def _checked_path(self, state: PETSc.Vec, column: Column) -> FloatArray:
+        """Continue ``state`` as :meth:`_press`, in many steps if the force of a few does not tell the work."""
+        with self._body.state() as start:
+            start.array[:] = self._load_path.start
+            size = max(self._law.lame_mu) * self._volume() + abs(self._body.energy(start))
+        path = self._press(state, column, _FEWEST)
+        try:
+            check_path(path, _ROUNDING * size)
+        except LargeError:
+            self._load_path.restart()
+            path = self._press(state, column, _MANY)
+            check_path(path, _ROUNDING * size)
+        return path
+
+    def _press(self, state: PETSc.Vec, column: Column, fewest: int) -> FloatArray:
+        """Continue ``state`` along the load path to the depth of a column, in at least ``fewest`` steps from its start.
 
         Return the path: depth, force and energy of each step. A step is halved where Newton's method does not converge.
 
@@ -245,7 +261,7 @@ class LoadSteps(Solver):
         state.array[:] = load_path.start
         begun, base = self._body.energy(state), self._body.held_of(state)
         state.array[:] = load_path.state
-        longest = depth / _FEWEST
+        longest = depth / fewest
         with self._body.state() as unit, self._body.state() as forces:
             self._put_unit(column, unit)
             held = self._body.held_of(unit)

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
-from pipeline.solve.contact.coulomb import MOST_SIMPLIFIED, Neighbours, Slide
+from pipeline.solve.contact.coulomb import Neighbours, Slide, most_simplified
 from pipeline.solve.contact.deformed import ContactSolution, PlacedTool, Tissue, first_set, solve_contact
 from pipeline.solve.contact.friction_step import FrictionStep, meeting_places
 from pipeline.solve.newton import LargeError
@@ -23,8 +23,8 @@ _SMALLEST, _SLIVER = 1 / 64, 1e-6
 _LARGE = 1 / 8
 # Residual and gaps of steps on the way to the depth, without friction.
 _ON_THE_WAY = 1e-2
-# Inactive nodes inside the tool, in units of the depth at the end: more than corners beside active nodes have on a
-# coarse mesh, but for the first steps.
+# Depth of inactive nodes inside the tool, in units of the depth at the end. Corners beside active nodes are less deep,
+# even on a coarse mesh.
 _INSIDE = 0.25
 # The first step ends where the tool's normals at the nodes that it penetrates have this mean part along its way, after
 # so many halvings at most: nodes beside the flank of a ball do not stay in contact, and would fold the tissue.
@@ -219,8 +219,7 @@ def _friction_step(
         slide or Slide(nothing, np.zeros(before.shape)),
         normal,
         tissue.fixed,
-        # At a smaller depth, where few nodes touch, the share may be larger, since that force is smaller.
-        MOST_SIMPLIFIED * friction.deepest / depth,
+        most_simplified(depth, friction.deepest),
     )
 
 

@@ -20,7 +20,7 @@ from pipeline.arrays import BoolArray, FloatArray, IntArray
 _SLACK = 1e-6
 _TINY = 1e-300
 # Largest share of the force on simplified nodes: friction then changes by about as much, half of the bar on it.
-MOST_SIMPLIFIED = 0.1
+_MOST_SIMPLIFIED = 0.1
 # Changes of a node's state after which it is simplified.
 _CHANGES = 3
 
@@ -138,6 +138,14 @@ class Simplified:
     def sliding(self, slide: Slide, active: BoolArray) -> Slide:
         """Return ``slide`` with these nodes sliding, if they are ``active``."""
         return replace(slide, sliding=(slide.sliding | self.nodes) & active)
+
+
+def most_simplified(depth: float, deepest: float) -> float:
+    """Return the largest share of the force on simplified nodes at a ``depth`` of a path to the ``deepest`` one (m).
+
+    At a smaller depth, where few nodes touch, the share may be larger, since that force is smaller.
+    """
+    return _MOST_SIMPLIFIED * deepest / depth
 
 
 def largest_friction(law: FloatArray, normal: FloatArray) -> FloatArray:

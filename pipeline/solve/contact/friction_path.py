@@ -18,7 +18,7 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.contact.active_set import SLACK, ContactError
-from pipeline.solve.contact.coulomb import MOST_SIMPLIFIED, Neighbours, Simplified, Slide, largest_friction
+from pipeline.solve.contact.coulomb import Neighbours, Simplified, Slide, largest_friction, most_simplified
 
 # Steps of a load path, and further ones before the first.
 STEPS, _BEFORE = 16, (0.25, 0.5, 0.75)
@@ -86,13 +86,6 @@ class _Course:
 
     friction: float
     deepest: float
-
-    def most_simplified(self, depth: float) -> float:
-        """Return the largest share of the force on simplified nodes at a ``depth`` (m).
-
-        At a smaller depth, where few nodes touch, the share may be larger, since that force is smaller.
-        """
-        return MOST_SIMPLIFIED * self.deepest / depth
 
 
 def press(surface: CondensedSurface, depth: float, friction: float, steps: int = STEPS) -> Step:
@@ -166,7 +159,7 @@ def _settled(
         moves = after.active != step.active
         turns = (after.slide.sliding != step.slide.sliding) & ~moves
         if not moves.any() and not turns.any() and _is_close(surface, step, after.slide, law, simple):
-            if _share(surface, step, simple) > course.most_simplified(step.depth):
+            if _share(surface, step, simple) > most_simplified(step.depth, course.deepest):
                 break
             return step
         if not after.active.any():

@@ -1,4 +1,4 @@
-"""Unilateral contact with unknown area, without friction, tension or penetration.
+"""Unilateral contact with unknown area, without tension or penetration.
 
 The active set is found on elements of degree 1 first, at little cost, then on higher degrees. F is the sum of the
 reactions K u of its nodes. F is no bound: a coarse contact area may be too large or too small.

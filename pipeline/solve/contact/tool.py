@@ -20,8 +20,8 @@ class Tool:
 
     ``height`` gives the initial height of the probe above points (n, 3) of the undeformed surface (m), infinite where
     there is no probe. ``ends_at`` is a mask of points (n, 3) on the edge of the candidates: true where the probe itself
-    ends. Elsewhere contact must not reach that edge. ``first`` (m) is the smallest height; None if the probe touches on
-    its axis first. ``friction`` is Coulomb's coefficient, infinite for tissue that sticks. ``distance`` is that of
+    ends. Elsewhere contact must not reach that edge. ``first`` (m) is the smallest height, zero on the
+    axis. ``friction`` is Coulomb's coefficient, infinite for tissue that sticks. ``distance`` is that of
     points (n, 3) to the probe pressed in by a depth (m) from the first touch, for contact at large displacements.
     ``foot`` (m) are x and y of its axis.
     """

@@ -92,7 +92,7 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         "unilateral contact",
         "slice",
-        'unilateral contact has no friction, and so no slice: use contact = "bonded"',
+        'only tissue that is bonded to the blade is carried along by a slice: use contact = "bonded"',
     ),
     Refusal(
         "unilateral contact",
