@@ -130,13 +130,6 @@ MISTAKES = {
         },
         ["probe.history.table", "does not pull"],
     ),
-    "a history of found contact at large displacements": (
-        {
-            "material": {"law": "neo-hookean"},
-            "probe": {"shape": "sphere", "radius": "5 mm", "depth": "0.2 mm", "history": {"ramp": "1 s"}},
-        },
-        ["probe.history", "in time steps, and the contact area is not followed over them"],
-    ),
     "a speed": ({"probe": {"speed": "1 mm/s"}}, ["probe.speed", "`ramp` in [probe.history]"]),
     "a radius beside an accuracy": (
         {
