@@ -21,8 +21,9 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 class Distance:
     """Signed distance of n points to a tool, with its derivatives.
 
-    ``gap`` (n,), in m, is > 0 outside the tool and < 0 inside. ``normal`` (n, 3) is its gradient: the tool's outward
-    unit normal at the nearest point of its surface. ``curvature`` (n, 3, 3), in 1/m, is its Hessian.
+    ``gap`` (n,), in m, is > 0 outside the tool and < 0 inside. ``normal`` (n, d) is its gradient: the tool's outward
+    unit normal at the nearest point of its surface. ``curvature`` (n, d, d), in 1/m, is its Hessian. In a plane through
+    the tool's axis d is 2, else 3.
 
     All are finite. Where the gradient is not unique - on the axis above a sharp tip, or above the centre of a rounded
     one - the gap is the distance along the axis, and the normal is the axis. Deeper in a rounding than half its radius
@@ -33,6 +34,12 @@ class Distance:
     gap: FloatArray
     normal: FloatArray
     curvature: FloatArray
+
+    @staticmethod
+    def along_axis(gap: FloatArray, dim: int) -> "Distance":
+        """Return the distance of linear elasticity in ``dim`` dimensions: ``gap`` is that along the last axis."""
+        down, count = -np.eye(dim)[-1], len(gap)
+        return Distance(gap, np.broadcast_to(down, (count, dim)), np.broadcast_to(0.0, (count, dim, dim)))
 
     def turned(self, axes: FloatArray) -> "Distance":
         """Return it from coordinates with the unit vectors ``axes``, in rows (3, 3), in those of these vectors."""

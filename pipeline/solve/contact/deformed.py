@@ -20,6 +20,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
+from pipeline.shapes.distance import Distance
 from pipeline.solve.contact.active_set import SLACK
 from pipeline.solve.contact.constraint import Constraint
 from pipeline.solve.contact.coulomb import Slide
@@ -40,20 +41,6 @@ _MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
 _WHOLE, _SOON, _NEARLY_CLOSED = 0.5, 10, 1e-3
 # A set that is solved so often ends the entry of followers, and then changes of many nodes at once.
 _WITHOUT_FOLLOWERS, _ONE_BY_ONE = 2, 3
-
-
-class Distance(Protocol):
-    """Signed distance of n points to a tool: ``gap`` (n), m, ``normal`` (n, d), ``curvature`` (n, d, d), 1/m.
-
-    The normal is the tool's outward one, the gradient of the gap; the curvature is its Hessian.
-    """
-
-    @property
-    def gap(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def normal(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def curvature(self) -> FloatArray: ...  # noqa: D102
 
 
 class Tissue(Protocol):

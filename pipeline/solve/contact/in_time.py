@@ -33,11 +33,10 @@ _SCALE = 1e-2
 
 def along_axis(tool: Tool, places: FloatArray) -> Tool:
     """Return a tool whose gaps to nodes are those along −z, above their undeformed ``places`` (n, 3)."""
-    heights, down = tool.height(places) - tool.first, np.broadcast_to([0.0, 0.0, -1.0], places.shape)
-    flat = np.zeros((*places.shape, 3))
+    heights = tool.height(places) - tool.first
 
     def distance(points: FloatArray, depth: float) -> Distance:
-        return Distance(heights - depth - (points - places)[:, 2], down, flat)
+        return Distance.along_axis(heights - depth - (points - places)[:, 2], 3)
 
     return replace(tool, distance=distance)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
-from pipeline.solve.contact.deformed import Distance
+from pipeline.shapes.distance import Distance
 
 
 def _no_distance(points: FloatArray, depth: float) -> Distance:

@@ -13,9 +13,9 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading, MeridianArrays
+from pipeline.shapes.distance import Distance
 from pipeline.shapes.rounded import quarter_turn
 from pipeline.solve import SolveError
-from pipeline.solve.contact.deformed import Distance
 from pipeline.solve.meridian.forms import MeridianForms, Meshes
 from pipeline.solve.meridian.system import HalfPlane, System, meshes_of
 from pipeline.solve.physics import MaterialLaw

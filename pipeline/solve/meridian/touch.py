@@ -146,8 +146,7 @@ class MeridianTouch:
 
     def _along_axis(self, points: FloatArray, depth: float) -> Distance:
         moved = points[:, 1] - self.tissue.places[:, 1]
-        count = len(points)
-        return Distance(self._heights - depth - moved, np.tile(_DOWN, (count, 1)), np.zeros((count, 2, 2)))
+        return Distance.along_axis(self._heights - depth - moved, 2)
 
     @cached_property
     def _heights(self) -> FloatArray:
