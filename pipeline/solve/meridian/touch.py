@@ -65,7 +65,7 @@ class MeridianTouch:
         places = np.vstack([places for _, places in groups])[first]
         order = np.argsort(places[:, 0], kind="stable")
         order = order[seen_from_above(arrays, places[order])]
-        wide, high = arrays.points.ptp(axis=0)
+        wide, high = np.ptp(arrays.points, axis=0)
         tissue = MeridianTissue(system, dofs[order], places[order])
         return MeridianTouch(tissue, tool, law, arrays.unit, pi * wide**2 * high)
 
