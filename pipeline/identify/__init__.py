@@ -1,0 +1,1 @@
+"""Material parameters from measured force curves, with error bars."""

@@ -1,0 +1,1 @@
+"""Forces over ranges of parameters: few solves on chosen points, interpolated with an error."""
