@@ -67,18 +67,22 @@ def test_drag_of_an_inclined_path_is_the_law_times_the_force():
 
 
 def test_friction_on_a_surface_that_gravity_has_bent():
-    """Without friction it is the frictionless contact; with it, friction adds what it adds to the unloaded body."""
+    """Without friction it is the frictionless contact; with it, friction adds what it adds to the unloaded body.
+
+    Tissue of this ν moves inwards below the tool, so friction adds per cents; gravity adds 0.8 %.
+    """
     gravity = {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}
-    heavy = NEO_HOOKEAN | {"poisson": 0.4, "density": "1060 kg/m^3"}
+    heavy = NEO_HOOKEAN | {"young": "1 kPa", "poisson": 0.2, "density": "1060 kg/m^3"}
 
     def force(friction, **load):
-        ball = {"shape": "sphere", "radius": "4 mm", "depth": "0.4 mm", "friction": friction}
-        (found,) = solve(body=BODY, probe=ball, mesh=MESH | {"rim": "0.5 mm"}, material=heavy, **load).values()
+        ball = {"shape": "sphere", "radius": "4 mm", "depth": "0.2 mm", "friction": friction}
+        (found,) = solve(body=BODY, probe=ball, mesh=MESH | {"rim": "0.3 mm"}, material=heavy, **load).values()
         assert found.status == "ok", found.message
         return found.force
 
-    smooth = force(0.0, load=gravity)
+    smooth, unloaded = force(0.0, load=gravity), force(0.0)
     assert force(1e-9, load=gravity) == pytest.approx(smooth, rel=1e-6)
-    added, wanted = force(0.3, load=gravity) / smooth - 1, force(0.3) / force(0.0) - 1
-    assert added == pytest.approx(wanted, rel=0.15)
-    assert added > 4e-4
+    added, wanted = force(0.3, load=gravity) / smooth - 1, force(0.3) / unloaded - 1
+    assert added == pytest.approx(wanted, rel=0.02)
+    assert added > 0.01
+    assert smooth > 1.005 * unloaded

@@ -8,6 +8,8 @@ not change (M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 865, 200
 
 A uniform pressure on quadratic facets has nodal forces at their mid nodes only, on cubic facets hardly any at their
 corners. The sign of a corner's reaction then means nothing: a corner is active if all its neighbours along edges are.
+Other corners follow the two conditions. (In :mod:`.deformed`, other corners of quadratic facets are inactive; F differs
+by about 1e-4.)
 """
 
 from collections.abc import Sequence
