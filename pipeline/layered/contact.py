@@ -1,0 +1,143 @@
+"""A frictionless round tool on elastic layers, by an integral equation: depth, force and stiffness at contact radii.
+
+The pressure p(r) = (E*/2) ∫ ξ A(ξ) J₀(ξ r) dξ, with A(ξ) = ∫ φ(t) cos(ξ t) dt for 0 < t < a, displaces the surface by
+∫ A(ξ) L(ξ) J₀(ξ r) dξ. Below the tool this is d - f(r):
+
+    φ(x) - (2/π) ∫ φ(t) K(x, t) dt = (2/π) (d - x ∫ f'(x sin s) ds),    K = ∫ (1 - L(ξ)) cos(ξ x) cos(ξ t) dξ,
+
+for 0 < s < π/2. The force is π E* ∫ φ dt; if the contact radius is free, φ(a) = 0. (N. N. Lebedev and Ya. S. Ufliand,
+J. Appl. Math. Mech. 22, 442, 1958; I. N. Sneddon, Mixed Boundary Value Problems in Potential Theory, 1966.) E* and L
+are those of the top. The kernel is smooth, so Gauss' points converge to round-off.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from math import ceil, inf, log2, pi
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.layered.compliance import Layer, Solid, compliance
+
+# 1 - L falls like (ξ h)² exp(-2 ξ h), h the top layer's thickness: below round-off from ξ h here on.
+_LAST = 20.0
+# Gauss' points of a panel of waves, which is at most twice as far from 0 as it is long, and spans at most one wave.
+_PANEL = 16
+# Waves that are so much longer than all layers together see a base only.
+_LONGEST = 1e-3
+# Gauss' points along a contact radius, at least, and more for each thickness of the top layer.
+_LEAST, _MORE = 20, 8
+# Widest contact, in thicknesses of the top layer: beyond, the equation would take minutes.
+WIDEST = 100.0
+# Gauss' points over a quarter of a turn, of each part between kinks.
+_TURN = 32
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The section of a round tool: its ``slope`` (n,) at distances (n,) from the axis (m).
+
+    The tool ends at the radius ``limit`` (m). It is flat up to the radius ``flat`` (m), all of it if that is its limit.
+    ``kinks`` are radii (m) at which the slope is not smooth.
+    """
+
+    slope: Callable[[FloatArray], FloatArray]
+    limit: float = inf
+    flat: float = 0.0
+    kinks: tuple[float, ...] = ()
+
+    def sneddon(self, x: FloatArray) -> FloatArray:
+        """Return x ∫ f'(x sin s) ds over a quarter turn: the depths (m) of contact radii x (n,) on a half-space."""
+        if self.flat >= self.limit:
+            return np.zeros_like(x)
+        nodes, weights = _gauss(_TURN)
+        breaks = sorted({radius for radius in (*self.kinks, self.flat) if radius > 0})
+        ends = np.stack([np.arcsin(np.minimum(1.0, radius / x)) for radius in breaks] + [np.full_like(x, pi / 2)])
+        total, start = np.zeros_like(x), np.zeros_like(x)
+        for end in ends:
+            half = (end - start) / 2
+            angles = start[:, None] + half[:, None] * (nodes + 1)
+            total += half * (self.slope(x[:, None] * np.sin(angles)) @ weights)
+            start = end
+        return x * total
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Depth (m), F / E* (m²) and its slope over depth (m) at contact radii (m), all (n,)."""
+
+    radius: FloatArray
+    depth: FloatArray
+    force: FloatArray
+    stiffness: FloatArray
+
+
+def touch(layers: tuple[Layer, ...], base: Solid, profile: Profile, radius: FloatArray) -> Touch:
+    """Return depth, force and stiffness of a tool in contact up to each ``radius`` (n,), in m.
+
+    The force is relative to E* of the top. As contact grows, F changes as if its edge did not move: the stiffness is
+    that of a flat punch. If ``profile`` is flat, depths are 0: F is its stiffness times the depth.
+    """
+    top = layers[0].thickness if layers else inf
+    if (widest := float(np.max(radius))) > WIDEST * top:
+        raise ValueError(
+            f"contact of radius {widest:.3g} m is too wide for a top layer of {top:.3g} m: at most 100 times"
+        )
+    waves, weights = _waves(layers, widest)
+    weights = weights * (1 - compliance(layers, base, waves))
+    results = np.array([_at(profile, float(a), waves, weights, top) for a in radius]).T
+    return Touch(radius, *results)
+
+
+def _at(
+    profile: Profile, radius: float, waves: FloatArray, weights: FloatArray, top: float
+) -> tuple[float, float, float]:
+    points = _LEAST + ceil(_MORE * radius / top)
+    x, w = _along(profile, radius, points)
+    # φ = d φ₁ - φ₂: φ₁ for a flat punch at unit depth, φ₂ for the tool's shape.
+    at = np.append(x, radius)
+    shape = profile.sneddon(at)
+    cosine = np.cos(np.outer(at, waves))
+    kernel = 2 / pi * (cosine * weights) @ cosine[:-1].T * w
+    right = 2 / pi * np.column_stack([np.ones_like(x), shape[:-1]])
+    punch, shaped = np.linalg.solve(np.eye(len(x)) - kernel[:-1], right).T
+    stiffness = pi * float(w @ punch)
+    if profile.flat >= profile.limit:
+        return 0.0, 0.0, stiffness
+    depth = float((2 / pi * shape[-1] + kernel[-1] @ shaped) / (2 / pi + kernel[-1] @ punch))
+    return depth, depth * stiffness - pi * float(w @ shaped), stiffness
+
+
+def _along(profile: Profile, radius: float, points: int) -> tuple[FloatArray, FloatArray]:
+    """Return points and weights from 0 to ``radius``, in parts between kinks."""
+    nodes, weights = _gauss(points)
+    within = {kink for kink in (*profile.kinks, profile.flat) if 0 < kink < radius}
+    ends = [0.0, *sorted(within), radius]
+    parts = [(start, (end - start) / 2) for start, end in pairwise(ends)]
+    return (
+        np.concatenate([start + half * (nodes + 1) for start, half in parts]),
+        np.concatenate([half * weights for _, half in parts]),
+    )
+
+
+def _waves(layers: tuple[Layer, ...], widest: float) -> tuple[FloatArray, FloatArray]:
+    """Return points and weights of a quadrature over the wavenumbers (1/m) that a base changes."""
+    if not layers:
+        return np.zeros(0), np.zeros(0)
+    first = _LONGEST / sum(layer.thickness for layer in layers)
+    last = _LAST / layers[0].thickness
+    doubled = first * 2 ** np.arange(ceil(log2(last / first)) + 1)
+    ends = [0.0]
+    for end in doubled:
+        panels = ceil((end - ends[-1]) * widest / pi)
+        ends.extend(np.linspace(ends[-1], end, panels + 1)[1:])
+    nodes, weights = _gauss(_PANEL)
+    half = np.diff(ends) / 2
+    return (ends[:-1] + half + np.multiply.outer(nodes, half)).T.ravel(), np.multiply.outer(half, weights).ravel()
+
+
+@lru_cache
+def _gauss(points: int) -> tuple[FloatArray, FloatArray]:
+    return np.polynomial.legendre.leggauss(points)
