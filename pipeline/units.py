@@ -64,6 +64,9 @@ _KINDS = {
     "rad": _Kind("an angle", "60 deg", {"deg": pi / 180, "°": pi / 180, "rad": 1.0}),
     "kg/m^3": _Kind("a density", "1060 kg/m^3", {"kg/m^3": 1.0, "g/cm^3": 1e3}),
     "m/s^2": _Kind("an acceleration", "-9.81 m/s^2", {"m/s^2": 1.0, "mm/s^2": 1e-3}),
+    "N": _Kind("a force", "10 mN", {"N": 1.0, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9, "kN": 1e3}),
+    "N/m": _Kind("a stiffness", "60 N/mm", {"N/m": 1.0, "N/mm": 1e3, "mN/mm": 1.0, "N/µm": 1e6}),
+    "N/s": _Kind("a rate of force", "1 mN/s", {"N/s": 1.0, "mN/s": 1e-3, "µN/s": 1e-6}),
 }
 # Pure numbers by another name: alone they are a unit, within another one they would hide a factor.
 _PURE = {"": ("%", "percent"), "rad": ("deg", "degree", "°", "rad", "radian")}
@@ -163,6 +166,15 @@ def _factor(text: str, unit: str) -> float:
     if not quantity.is_compatible_with(unit) or (not is_pure and unit in _PURE):
         raise _refusal(unit, f"`{text}` is no unit of {kind.name}; {allowed}")
     return float(quantity.to(unit).magnitude)
+
+
+def unit_factor(text: str, unit: str) -> float:
+    """Return what a number in the unit ``text`` is multiplied with to be one in the SI ``unit``.
+
+    Raises:
+        ValueError: if ``text`` is no unit of that kind, with those that are.
+    """
+    return _factor(text.translate(_SPELLINGS).strip(), unit)
 
 
 def _foreign(text: str) -> str:

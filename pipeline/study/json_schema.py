@@ -15,9 +15,10 @@ from pydantic.json_schema import models_json_schema
 
 from pipeline.shapes.history import History, Sine
 from pipeline.shapes.section import Section, words_of
+from pipeline.study.measurement import Identify
 from pipeline.study.named import SCHEMA
 from pipeline.study.ranges import KEYS
-from pipeline.study.schema import NESTED, SECTIONS, SINGLE, TABLES
+from pipeline.study.schema import EXPERIMENT, NESTED, SECTIONS, SINGLE, TABLES
 
 Schema = dict[str, Any]
 
@@ -31,11 +32,25 @@ _QUANTITIES = {
     "Hz": ("frequency", "frequencies"),
     "kg/m^3": ("density", "densities"),
     "m/s^2": ("acceleration", "accelerations"),
+    "N/m": ("stiffness", "stiffnesses"),
     "": ("number", "numbers"),
 }
 _NAMES = {name for name, _ in _QUANTITIES.values()}
 # A range of values: see pipeline/study/ranges.py. Its keys are no properties, or editors would complete them alone.
 _RANGE: Schema = {"propertyNames": {"enum": [*KEYS]}, "required": [*KEYS]}
+# An unknown of [identify]: a range, or a value with its error.
+_PLAIN_VALUE: Schema = {"type": ["string", "number"]}
+_SOUGHT: Schema = {
+    "anyOf": [
+        {"type": "array", "items": _PLAIN_VALUE, "minItems": 2, "maxItems": 2},
+        {
+            "type": "object",
+            "properties": {"value": _PLAIN_VALUE, "error": _PLAIN_VALUE},
+            "required": ["value", "error"],
+            "additionalProperties": False,
+        },
+    ]
+}
 # Arrays of tables, and tables, within sections.
 _INNER = (*chain.from_iterable(NESTED.values()), *chain.from_iterable(TABLES.values()))
 _PLAIN = {"boolean": "true | false", "integer": "whole number", "string": "text"}
@@ -56,7 +71,7 @@ def study_schema() -> Schema:
 
     It has few ``anyOf``: there, editors do not name the key that is wrong, and repeat each completion.
     """
-    sections = {name: _models(name) for name in SECTIONS}
+    sections = {name: _models(name) for name in (*SECTIONS, *EXPERIMENT)}
     tables = [model for inner in TABLES.values() for model in inner.values()]
     _, schema = models_json_schema([(m, "validation") for m in (*chain(*sections.values()), *tables)])
     definitions: Schema = schema["$defs"]
@@ -72,6 +87,7 @@ def study_schema() -> Schema:
         properties = definition.get("properties", {})
         for key, value in properties.items():
             properties[key] = _described(_in_file(value, name in swept, key), words.get(name), key)
+    definitions[Identify.__name__]["additionalProperties"] = _SOUGHT
     found = {name: _section(name, models, definitions) for name, models in sections.items()}
     title = {"description": "Title of the study, in figures and reports.", "type": "string"}
     return {
@@ -111,7 +127,9 @@ def _section(name: str, models: tuple[type[Section], ...], definitions: Schema) 
         table = {"$ref": f"#/$defs/{name.capitalize()}"}
     for model in models:  # of what is no table, a section says it
         definitions[model.__name__].pop("type", None)
-    if name in SINGLE:
+    if name == "measurement":
+        return {"type": "array", "minItems": 1, "items": {"type": "object", "allOf": [table]}}
+    if name in (*SINGLE, *EXPERIMENT):
         return {"type": "object", "allOf": [table]}
     return {"type": ["object", "array"], "allOf": [table], "minItems": 1, "items": {"type": "object", "allOf": [table]}}
 
@@ -127,7 +145,7 @@ def _schema_of(model: type[BaseModel]) -> Schema:
 
 
 def _models(section: str) -> tuple[type[Section], ...]:
-    models = SECTIONS[section]
+    models = (SECTIONS | EXPERIMENT)[section]
     return tuple(models.values()) if isinstance(models, Mapping) else (models,)
 
 

@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from pipeline.shapes.section import Words, words_of
 from pipeline.study.json_schema import takes_of
-from pipeline.study.schema import NESTED, SECTIONS, TABLES
+from pipeline.study.schema import EXPERIMENT, NESTED, SECTIONS, TABLES
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,18 @@ SECTION_TEXTS = {
     "named traction can be swept.",
     "plan": "Work that may be skipped. Optional; its lists are no sweeps.",
     "figure": "Main figure of the study. Forces do not depend on it. Optional; its lists are no sweeps.",
+    "measurement": "Measured force curves, one table each, for `epsmesh identify`. Forces do not depend on them. "
+    "Optional; their lists are no sweeps.",
+    "measurement.columns": "Columns of the file, by header or by number from 1. A header's unit is read: `depth / nm`, "
+    "`load (µN)`, `Z [mm]`. Optional; columns that are not named are found where unmistakable, and told.",
+    "measurement.units": "Units of columns whose headers have none. Optional; a unit that contradicts the header is "
+    "an error.",
+    "measurement.sign": "Signs of recorded values. Optional; a sign that is not given is found, and told.",
+    "identify": "Unknowns that `epsmesh identify` finds from the measurements. Besides the keys below, the name of a "
+    "parameter is a key: `young`, `poisson`, `thickness`, `radius`, `friction`, `skin_young`, `skin_thickness`, a "
+    "parameter of the law, `contact_point`, `baseline`, `drift`, `machine_stiffness`, `relaxation_share_1`, "
+    "`relaxation_time_1`. It has a range, or a value with its error (95 %). What is not named is known. Optional; its "
+    "lists are no sweeps.",
 }
 
 
@@ -83,7 +95,8 @@ def keys_of(section: str) -> tuple[Key, ...]:
 
 def all_sections() -> tuple[str, ...]:
     """Return the names of all sections, those of arrays of tables within one after it."""
-    return tuple(name for section in SECTIONS for name in (section, *(f"{section}.{key}" for key in _inner(section))))
+    sections = (*SECTIONS, *EXPERIMENT)
+    return tuple(name for section in sections for name in (section, *(f"{section}.{key}" for key in _inner(section))))
 
 
 def heading(section: str) -> str:
@@ -97,14 +110,14 @@ def _inner(section: str) -> dict[str, type[BaseModel]]:
 
 
 def _labelled() -> set[str]:
-    """Return the arrays of tables within sections: their tables have names."""
-    return {f"{section}.{key}" for section, pieces in NESTED.items() for key in pieces}
+    """Return the arrays of tables whose tables have names: those within sections, and measurements."""
+    return {"measurement", *(f"{section}.{key}" for section, pieces in NESTED.items() for key in pieces)}
 
 
 def shapes_of(section: str) -> dict[str, type[BaseModel]]:
     """Return the models of a section by shape. A section without shapes has the single shape ''."""
     outer, _, piece = section.partition(".")
-    model = _inner(outer)[piece] if piece else SECTIONS[section]
+    model = _inner(outer)[piece] if piece else (SECTIONS | EXPERIMENT)[section]
     return dict(model) if isinstance(model, Mapping) else {"": model}
 
 

@@ -6,14 +6,20 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
+from pipeline.shapes.body import Body
+from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
 from pipeline.study.check import check_sense
 from pipeline.study.check_loads import check_loads
+from pipeline.study.identification import Identification, read_identify, read_measurements
 from pipeline.study.loads import Load
+from pipeline.study.measurement import Measurement
+from pipeline.study.parameters import parameters_of
 from pipeline.study.problems import Problem, Problems, StudyError, nearest
 from pipeline.study.regions import check_regions, material_without_section
-from pipeline.study.schema import NESTED, SECTIONS, Mesh
+from pipeline.study.scenes import scene_mapping
+from pipeline.study.schema import EXPERIMENT, NESTED, SECTIONS, Material, Mesh
 from pipeline.study.stages import with_stages
 from pipeline.study.sweep import Study
 from pipeline.study.tables import MOST_CASES, read_section
@@ -62,7 +68,7 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
     ``file`` is for messages, and the files of bodies are looked for from its folder.
     """
     problems = Problems(tables=_names_of(raw))
-    raw = _beside(raw, Path(file).parent)
+    given, raw = raw, _beside(raw, Path(file).parent)
     _check_top(raw, problems)
     axes: list[Axis] = []
     sections: dict[str, tuple[Section, ...]] = {}
@@ -78,12 +84,62 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
         )
     if all(problem.key != "study" for problem in problems.errors):
         _check_together(sections, tuple(axes), problems)
+    measurements, identification = _read_experiment(given, sections, file, problems)
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))
     sections, every_axis = with_stages(sections, tuple(axes))
     warnings = tuple(f"{file}: {warning}" for warning in problems.told_once())
     title = str(raw.get("title", Path(file).stem))
-    return Study(file, Path(file).stem, title, text, every_axis, sections, warnings)
+    return Study(
+        file, Path(file).stem, title, text, every_axis, sections, warnings, given, measurements, identification
+    )
+
+
+def scene_of(study: Study, measurement: Measurement) -> Study:
+    """Return the study of one scene that a measurement of ``study`` was made on, without its experiments.
+
+    Raises:
+        StudyError: if a value is swept that the scene depends on: there must be one, or it must be an unknown.
+    """
+    where, problems = f"measurement[{study.measurements.index(measurement) + 1}]", Problems()
+    scene = _scene(study.raw, measurement, where, study.file, problems)
+    unknown = {one.parameter.name for one in study.identification.sought}
+    for axis in scene.axes if scene else ():
+        if axis.section != "mesh" and axis.name not in (*unknown, "depth"):
+            problems.error(axis.path, None, f"is swept: {where} needs one value, or `{axis.name}` in [identify]")
+    if problems.errors or scene is None:
+        raise StudyError(study.file, problems.errors)
+    return scene
+
+
+def _scene(raw: Mapping[str, Any], measurement: Measurement, where: str, file: str, problems: Problems) -> Study | None:
+    """Return the scene of a measurement; None if there are problems, which are reported at its keys."""
+    before = len(problems.errors)
+    content = scene_mapping(raw, measurement, where, problems)
+    if len(problems.errors) > before:
+        return None
+    try:
+        return parse(content, file=file, text=to_toml(content, file))
+    except StudyError as error:
+        for problem in error.problems:
+            problems.error(f"{where}.{problem.key}", problem.value, problem.allowed)
+        return None
+
+
+def _read_experiment(
+    raw: dict[str, Any], sections: dict[str, tuple[Section, ...]], file: str, problems: Problems
+) -> tuple[tuple[Measurement, ...], Identification]:
+    """Return the measurements of a study, and what is to be found from them."""
+    measurements = read_measurements(raw["measurement"], problems) if "measurement" in raw else ()
+    if problems.errors or not (measurements or "identify" in raw):
+        return measurements, Identification()
+    for number, measurement in enumerate(measurements, start=1):
+        if measurement.probe or measurement.body:
+            _scene(raw, measurement, f"measurement[{number}]", file, problems)
+    body, material, probe = (sections[name][0] for name in ("body", "material", "probe"))
+    assert isinstance(body, Body) and isinstance(material, Material) and isinstance(probe, Probe)
+    known = parameters_of(body, material, probe)
+    return measurements, read_identify(raw.get("identify", {}), measurements, known, problems)
 
 
 def _check_together(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -126,7 +182,7 @@ def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 def _check_top(raw: dict[str, Any], problems: Problems) -> None:
     for key, value in raw.items():
-        if key not in (*SECTIONS, "title"):
+        if key not in (*SECTIONS, *EXPERIMENT, "title"):
             problems.error(key, None, f"unknown section; {_meant(key)}")
         elif key == "title" and not isinstance(value, str):
             problems.error(key, value, "must be text")
@@ -151,4 +207,4 @@ def _meant(key: str) -> str:
     pieces = {piece: section for section, inner in NESTED.items() for piece in inner}
     if close := difflib.get_close_matches(key, pieces, n=1, cutoff=0.6):
         return f"it is part of another section: write [[{pieces[close[0]]}.{close[0]}]]"
-    return nearest(key, [*SECTIONS, "title"])
+    return nearest(key, [*SECTIONS, *EXPERIMENT, "title"])

@@ -16,6 +16,7 @@ from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.tissue import LAWS, Fibres, Relaxation, Term, Tissue
 from pipeline.study.loads import Load, Traction
+from pipeline.study.measurement import Columns, ColumnUnits, Identify, Measurement, Sign
 from pipeline.study.path import Path
 from pipeline.study.vocabulary import FIGURES, REDUCTIONS
 from pipeline.units import Length, Pressure, Share, parse_quantity
@@ -281,6 +282,8 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "load": Load,
     "figure": Drawing,
 }
+# Sections about experiments, on which no case depends: see pipeline/study/identification.py.
+EXPERIMENT: dict[str, type[Section]] = {"measurement": Measurement, "identify": Identify}
 # Arrays of tables within a section: pieces of it, each with keys that can be swept.
 NESTED: dict[str, dict[str, type[Section]]] = {
     "body": {"layer": Layer, "inclusion": Inclusion},
@@ -293,4 +296,5 @@ SINGLE = ("solve", "plan", "figure")
 TABLES: dict[str, dict[str, type[BaseModel]]] = {
     "probe": {"path": Path, "history": History},
     "material": {"fibres": Fibres},
+    "measurement": {"columns": Columns, "units": ColumnUnits, "sign": Sign},
 }

@@ -4,6 +4,7 @@ import json
 import textwrap
 
 from pipeline.study.keys import SECTION_TEXTS, Key, all_sections, heading, keys_of
+from pipeline.study.schema import EXPERIMENT
 
 _WIDTH = 110
 
@@ -16,7 +17,7 @@ def starter(name: str) -> str:
         f"title = {json.dumps(name, ensure_ascii=False)}",
     ]
     for section in all_sections():
-        is_piece = "." in section
+        is_piece = "." in section or section in EXPERIMENT
         lines += ["", *_comment(SECTION_TEXTS.get(section, "")), f"{'# ' if is_piece else ''}{heading(section)}"]
         keys = keys_of(section)
         chosen = next((json.loads(key.words.example) for key in keys if key.name == "shape"), "")

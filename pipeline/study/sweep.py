@@ -1,8 +1,8 @@
 """Sweeps: a study file's axes, and the cases that they become."""
 
 import itertools
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import prod
 from typing import Any, TypeVar
@@ -12,6 +12,8 @@ from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
 from pipeline.study.case import Case
+from pipeline.study.identification import Identification
+from pipeline.study.measurement import Measurement
 from pipeline.study.schema import Drawing, Material, Planning, Solving, material_of
 
 _PARTS = ("body", "material", "probe", "mesh", "solve", "load")
@@ -29,6 +31,9 @@ class Study:
     axes: tuple[Axis, ...]
     sections: dict[str, tuple[Section, ...]]  # every combination of a section's own axes, last axis fastest
     warnings: tuple[str, ...] = ()
+    raw: Mapping[str, Any] = field(default_factory=dict, repr=False)  # the file's TOML
+    measurements: tuple[Measurement, ...] = ()
+    identification: Identification = field(default_factory=Identification)
 
     @property
     def shape(self) -> tuple[int, ...]:

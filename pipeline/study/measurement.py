@@ -1,0 +1,293 @@
+"""``[[measurement]]`` and ``[identify]``: measured force curves, and what is to be found from them.
+
+Forces do not depend on these sections: they neither sweep nor change cases.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic_core import PydanticCustomError
+
+from pipeline.shapes.section import Section, Words
+from pipeline.units import parse_quantity, unit_factor
+
+Stiffness = float | tuple[float, float] | Literal["unknown"]
+Hidden = Literal["layer", "base", "strain"]
+Segment = Literal["approach", "hold", "approach+hold", "retract"]
+
+_RIGID = "rigid"
+
+
+@dataclass(frozen=True)
+class Window:
+    """A range of depth (m) or of time (s), by its SI ``unit``."""
+
+    low: float
+    high: float
+    unit: Literal["m", "s"]
+
+
+def _refused(allowed: str) -> PydanticCustomError:
+    return PydanticCustomError("not_supported", "{allowed}", {"allowed": f"must be {allowed}"})
+
+
+def _column(value: Any) -> str | int:
+    """Return the header of a column, or its number."""
+    is_number = isinstance(value, int) and not isinstance(value, bool) and value > 0
+    if not is_number and not (isinstance(value, str) and value):
+        raise _refused('the header of a column as text, such as "depth (mm)", or its number from 1')
+    found: str | int = value
+    return found
+
+
+Column = Annotated[
+    str | int,
+    BeforeValidator(_column),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "integer", "minimum": 1}]}),
+]
+
+
+def _window(value: Any) -> Window | None:
+    """Return a range of depth or of time; None for "auto"."""
+    allowed = '"auto", or a range of depth or time as recorded, such as ["0 mm", "0.5 mm"] or ["0 s", "12 s"]'
+    if value == "auto":
+        return None
+    if not (isinstance(value, tuple) and len(value) == 2):
+        raise _refused(allowed)
+    for unit in ("m", "s"):
+        try:
+            low, high = (parse_quantity(end, unit) for end in value)
+        except PydanticCustomError:
+            continue
+        if low >= high:
+            raise _refused(f"{allowed}; its first end is not below its second")
+        return Window(low, high, "m" if unit == "m" else "s")
+    raise _refused(allowed)
+
+
+def _stiffness(value: Any) -> Stiffness:
+    """Return a stiffness (N/m), infinite if it is rigid; or its lowest and highest value; or "unknown"."""
+    allowed = '"rigid", a stiffness such as "60 N/mm", a range such as ["50 N/mm", "64 N/mm"], or "unknown"'
+    if value in (_RIGID, "unknown"):
+        return inf if value == _RIGID else "unknown"
+    try:
+        if isinstance(value, tuple) and len(value) == 2:
+            low, high = (parse_quantity(end, "N/m") for end in value)
+            if not 0 < low < high:
+                raise _refused(f"{allowed}; a range rises, and is above 0")
+            return low, high
+        stiffness = parse_quantity(value, "N/m")
+    except PydanticCustomError as error:
+        raise error if error.type == "not_supported" else _refused(f"{allowed}: {error.message()}") from None
+    if stiffness <= 0:
+        raise _refused(f"{allowed}; it is above 0")
+    return stiffness
+
+
+def _unit(kind: str) -> Callable[[str], str]:
+    """Return the check of a unit of the same kind as the SI unit ``kind``."""
+
+    def check(text: str) -> str:
+        unit_factor(text, kind)
+        return text
+
+    return check
+
+
+def _spring(value: Any) -> float:
+    return parse_quantity(value, "N/m")
+
+
+class Columns(BaseModel):
+    """Names or numbers of the columns of a file."""
+
+    model_config = Section.model_config
+
+    depth: Annotated[
+        Column | None,
+        Words(
+            "Column of the depth: its header, or its number from 1.", '"indentation / nm"', default="found, and told"
+        ),
+    ] = None
+    force: Annotated[Column | None, Words("Column of the force.", '"load (µN)"', default="found, and told")] = None
+    time: Annotated[Column | None, Words("Column of the time.", '"time [s]"', default="found, and told")] = None
+    piezo: Annotated[
+        Column | None,
+        Words(
+            "Column of the way of the piezo, instead of the depth, which is this way less the deflection.",
+            '"Z / nm"',
+            default="none",
+        ),
+    ] = None
+    deflection: Annotated[
+        Column | None,
+        Words("Column of the deflection of a spring, instead of the force.", '"deflection / nm"', default="none"),
+    ] = None
+    spring: Annotated[
+        Annotated[float, Field(gt=0, json_schema_extra={"unit": "N/m"})] | None,
+        BeforeValidator(lambda value: None if value is None else _spring(value)),
+        Words("Stiffness of this spring: the force is stiffness times deflection.", '"0.02 N/m"', default="none"),
+    ] = None
+
+    @model_validator(mode="after")
+    def _of_one_kind(self) -> "Columns":
+        of_spring = {"piezo", "deflection", "spring"} & self.model_fields_set
+        if of_spring and len(of_spring) < 3:
+            raise PydanticCustomError("not_supported", "must have piezo, deflection and spring together")
+        if of_spring and {"depth", "force"} & self.model_fields_set:
+            raise PydanticCustomError("not_supported", "must have depth and force, or piezo, deflection and spring")
+        return self
+
+
+LengthUnit = Annotated[str, AfterValidator(_unit("m"))]
+ForceUnit = Annotated[str, AfterValidator(_unit("N"))]
+TimeUnit = Annotated[str, AfterValidator(_unit("s"))]
+_OF_HEADER = "that of the header"
+
+
+class ColumnUnits(BaseModel):
+    """Units of columns whose headers have none."""
+
+    model_config = Section.model_config
+
+    depth: Annotated[LengthUnit | None, Words("Unit of the depth.", '"mm"', default=_OF_HEADER)] = None
+    force: Annotated[ForceUnit | None, Words("Unit of the force.", '"mN"', default=_OF_HEADER)] = None
+    time: Annotated[TimeUnit | None, Words("Unit of the time.", '"s"', default=_OF_HEADER)] = None
+    piezo: Annotated[LengthUnit | None, Words("Unit of the way of the piezo.", '"nm"', default=_OF_HEADER)] = None
+    deflection: Annotated[LengthUnit | None, Words("Unit of the deflection.", '"nm"', default=_OF_HEADER)] = None
+
+
+class Sign(BaseModel):
+    """Signs of recorded values: 1 as they are, -1 if deeper or pressed is negative."""
+
+    model_config = Section.model_config
+
+    depth: Annotated[Literal[1, -1] | None, Words("-1 if the recorded depth falls as the tool advances.", "-1")] = None
+    force: Annotated[Literal[1, -1] | None, Words("-1 if the recorded force is negative under pressure.", "-1")] = None
+
+
+_TABLE = WithJsonSchema({"type": "object"})
+
+
+class Measurement(Section):
+    """One measured force curve, or a folder of them, and the scene it was measured on."""
+
+    name: Annotated[
+        str,
+        Field(exclude=True, min_length=1),
+        Words("Name of the measurement, in messages, figures and the dataset.", '"punch 2 mm"'),
+    ]
+    file: Annotated[
+        str,
+        Field(min_length=1),
+        Words(
+            "File with the curve: CSV, TSV or other text in columns. Its path is relative to the study's folder. A "
+            "pattern such as curves/*.csv is many specimens: a dimension of the results.",
+            '"curves/punch2.csv"',
+        ),
+    ]
+    columns: Annotated[
+        Columns | None,
+        Words("Columns of the file.", '{depth = "depth (mm)", force = "force (N)"}', default="found, and told"),
+    ] = None
+    units: Annotated[
+        ColumnUnits | None,
+        Words("Units of columns, where headers have none.", '{depth = "mm", force = "N"}', default="those of headers"),
+    ] = None
+    segment: Annotated[
+        Segment,
+        Words("Part of the curve. Relaxation needs approach+hold, and a column of time.", '"approach+hold"'),
+    ] = "approach"
+    cycle: Annotated[int, Field(ge=1), Words("Number of the cycle, of a file that has several.", "1")] = 1
+    window: Annotated[
+        Window | None,
+        BeforeValidator(_window),
+        WithJsonSchema({"anyOf": [{"const": "auto"}, {"type": "array", "items": {"type": "string"}}]}),
+        Words(
+            "Range of depth as recorded, or of time since the first row, that is used. Include the approach through "
+            "air: it has the baseline. auto: the whole segment, without air far longer than the contact.",
+            '["0 mm", "0.5 mm"]',
+            default='"auto"',
+            takes='"auto" | 2 lengths | 2 times',
+        ),
+    ] = None
+    sign: Annotated[
+        Sign | None,
+        Words("Signs of depth and force, 1 or -1.", "{depth = -1, force = 1}", default="found, and told"),
+    ] = None
+    depth_is: Annotated[
+        Literal["machine", "tool"],
+        Words(
+            "What the depth is: the way of the machine, of which `machine_stiffness` takes its share, or of the tool.",
+            '"tool"',
+        ),
+    ] = "machine"
+    machine_stiffness: Annotated[
+        Stiffness,
+        BeforeValidator(_stiffness),
+        WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+        Words(
+            "Stiffness of machine, load cell and holder together: rigid, a value, a range, or unknown. A range and "
+            'unknown are found with the rest: "machine_stiffness" of [identify].',
+            '["50 N/mm", "64 N/mm"]',
+            default='"rigid"',
+            takes='"rigid" | stiffness > 0 | 2 stiffnesses | "unknown"',
+        ),
+    ] = inf
+    probe: Annotated[
+        dict[str, Any] | None,
+        _TABLE,
+        Words(
+            "Keys of [probe] that differ for this measurement. Of [[probe]] tables, `name` chooses one.",
+            '{radius = "2 mm"}',
+            default="the study's",
+        ),
+    ] = None
+    body: Annotated[
+        dict[str, Any] | None,
+        _TABLE,
+        Words(
+            "Keys of [body] that differ for this measurement. Of [[body]] tables, `name` chooses one.",
+            '{size = ["40 mm", "40 mm", "8 mm"]}',
+            default="the study's",
+        ),
+    ] = None
+
+    @model_validator(mode="after")
+    def _of_one_way(self) -> "Measurement":
+        if self.depth_is == "tool" and self.machine_stiffness != inf:
+            raise PydanticCustomError(
+                "not_supported", 'depth_is = "tool" excludes `machine_stiffness`: the tool\'s way has no machine in it'
+            )
+        return self
+
+    @property
+    def machine_compliance(self) -> float | None:
+        """What the machine yields (m/N): 0 if it is rigid; None if it is to be found."""
+        return 1 / self.machine_stiffness if isinstance(self.machine_stiffness, float) else None
+
+
+class Identify(Section):
+    """Keys of ``[identify]`` besides the unknowns."""
+
+    unknown: Annotated[
+        tuple[Annotated[str, Field(min_length=1)], ...],
+        Words(
+            "Names of unknowns with a default range. Others are keys of this section: a range, such as "
+            'young = ["1 kPa", "1 MPa"], or a value with an error, such as skin_thickness = {value = "2 mm", error = '
+            '"5 %"}. Contact point and baseline are always unknown.',
+            '["young", "poisson", "drift"]',
+            default="Young's moduli, contact_point and baseline",
+        ),
+    ] = ()
+    may_hide: Annotated[
+        tuple[Hidden, ...],
+        Words(
+            "What the body may have that is not declared: a layer, a stiff base, stiffening with strain. The second "
+            "error bar includes it. []: the body is as declared.",
+            '["layer", "strain"]',
+        ),
+    ] = ("layer", "base", "strain")

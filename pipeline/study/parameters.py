@@ -1,0 +1,132 @@
+"""Parameters of a scene that can be identified: their names, units, bounds, and their places in a study."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf, nan
+
+from pipeline.shapes.body import Body, Layered
+from pipeline.shapes.probe import MOST_FRICTION, Probe
+from pipeline.shapes.tissue import Tissue
+from pipeline.study.schema import Material
+from pipeline.study.swept import Place
+
+# A modulus that F is proportional to may have any value: the softest gel to the stiffest metal (Pa).
+_MODULI = (1e-2, 1e12)
+_WIDEST = (10.0, 1e11)
+# Default ranges: factors of the value that the study declares.
+_OF_MODULUS, _OF_LENGTH, _OF_TOOL = 30.0, 2.0, 1.1
+# Springs of force microscopes to frames of testing machines (N/m).
+_STIFFNESSES = (1e-4, 1e12)
+_SPRINGS = (1e-3, 1e9)
+# Terms of relaxation that can be found, and their times (s).
+MOST_RELAXATIONS = 3
+_TIMES = (1e-3, 1e5)
+# Bounds and default ranges of the parameters of laws: those of their keys, and those that tissues have.
+_OF_LAWS = {
+    "c2": (-1000.0, 1000.0, 0.0, 1.0),
+    "c3": (0.0, 1000.0, 0.0, 10.0),
+    "limit": (0.01, 1e6, 0.1, 100.0),
+    "alpha": (0.25, 100.0, 0.25, 30.0),
+    "k1": (0.0, 1000.0, 0.0, 10.0),
+    "k2": (1e-3, 1000.0, 0.1, 100.0),
+    "dispersion": (0.0, 1 / 3, 0.0, 1 / 3),
+    "share": (0.0, 1.0, 0.0, 1.0),
+    "exponent": (-50.0, 50.0, 1.0, 30.0),
+}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a scene or of a measurement.
+
+    ``least`` and ``most`` are what it may be at all, ``low`` and ``high`` its default range (SI units, ``unit`` "1" for
+    plain numbers). ``value`` is what the study declares, NaN if it declares none. ``place`` is its place in the study:
+    section, then keys and numbers of tables from 0; empty for those that are no part of a scene. ``is_logarithmic``
+    tells those of which only the order of magnitude may be known.
+    """
+
+    name: str
+    unit: str
+    least: float
+    most: float
+    low: float
+    high: float
+    value: float = nan
+    place: Place = ()
+    is_logarithmic: bool = False
+
+
+def parameters_of(body: Body, material: Material, probe: Probe) -> dict[str, Parameter]:
+    """Return every parameter by name that can be identified with a body, its material and a probe."""
+    found = [*_of_tissues(body, material), *_of_body(body), *_of_probe(probe), *_of_measurements()]
+    return {parameter.name: parameter for parameter in found}
+
+
+def _of_tissues(body: Body, material: Material) -> Iterator[Parameter]:
+    tissues: list[tuple[str, Place, Tissue | Material]] = []
+    if not body.is_filled:
+        tissues.append(("", ("material",), material))
+    layers = body.layer if isinstance(body, Layered) else ()
+    for kind, pieces in (("layer", layers), ("inclusion", body.inclusion)):
+        tissues += [(f"{piece.name}_", ("body", kind, number), piece) for number, piece in enumerate(pieces)]
+    for prefix, place, tissue in tissues:
+        value, is_alone = tissue.young, len(tissues) == 1
+        low, high = _WIDEST if is_alone else (value / _OF_MODULUS, value * _OF_MODULUS)
+        yield Parameter(f"{prefix}young", "Pa", *_MODULI, low, high, value, (*place, "young"), is_logarithmic=True)
+        least = Material.LEAST_OF_LARGE if tissue.completed(material).is_large else 0.0
+        yield Parameter(f"{prefix}poisson", "1", least, 0.5, least, 0.5, tissue.poisson, (*place, "poisson"))
+        yield from _of_law(prefix, place, tissue)
+
+
+def _of_law(prefix: str, place: Place, tissue: Tissue) -> Iterator[Parameter]:
+    """Yield the numbers of a tissue's own law."""
+    for key, value in tissue.given.items():
+        if key in _OF_LAWS and value is not None:
+            yield Parameter(f"{prefix}{key}", "1", *_OF_LAWS[key], value, (*place, key))
+    if tissue.fibres is not None:
+        for key in ("k1", "k2", "dispersion"):
+            value = getattr(tissue.fibres, key)
+            yield Parameter(f"{prefix}{key}", "1", *_OF_LAWS[key], value, (*place, "fibres", key))
+    for number, term in enumerate(tissue.terms):
+        name = f"{prefix}{term.name}_alpha" if term.name else f"{prefix}alpha_{number + 1}"
+        bounds = _OF_LAWS["exponent"]
+        yield Parameter(name, "1", *bounds, term.alpha, (*place, "terms", number, "alpha"))
+        if term.share is not None:
+            name = f"{prefix}{term.name}_share" if term.name else f"{prefix}share_{number + 1}"
+            yield Parameter(name, "1", *_OF_LAWS["share"], term.share, (*place, "terms", number, "share"))
+
+
+def _of_body(body: Body) -> Iterator[Parameter]:
+    height = body.heights[1] - body.heights[0]
+    for number, layer in enumerate(body.layer if isinstance(body, Layered) else ()):
+        if layer.thickness is not None:
+            yield _length(f"{layer.name}_thickness", layer.thickness, ("body", "layer", number, "thickness"), height)
+    for number, inclusion in enumerate(body.inclusion):
+        if inclusion.radius is not None:
+            yield _length(f"{inclusion.name}_radius", inclusion.radius, ("body", "inclusion", number, "radius"), height)
+    place: Place = {"box": ("body", "size", 2), "cylinder": ("body", "height")}.get(body.shape, ())
+    if place and not body.is_filled:
+        yield _length("thickness", height, place, inf)
+
+
+def _length(name: str, value: float, place: Place, most: float) -> Parameter:
+    high = min(value * _OF_LENGTH, most)
+    return Parameter(name, "m", 0.0, most, value / _OF_LENGTH, high, value, place, is_logarithmic=True)
+
+
+def _of_probe(probe: Probe) -> Iterator[Parameter]:
+    radius = getattr(probe, "radius", None)
+    if isinstance(radius, float):
+        yield Parameter("radius", "m", 0.0, inf, radius / _OF_TOOL, radius * _OF_TOOL, radius, ("probe", "radius"))
+    if probe.is_unilateral and "friction" in type(probe).model_fields:
+        yield Parameter("friction", "1", 0.0, MOST_FRICTION, 0.0, 1.0, probe.friction, ("probe", "friction"))
+
+
+def _of_measurements() -> Iterator[Parameter]:
+    """Yield what is no part of a scene. Infinite ranges are those of the recorded curve."""
+    for name, unit in (("contact_point", "m"), ("baseline", "N"), ("drift", "N/s")):
+        yield Parameter(name, unit, -inf, inf, -inf, inf)
+    yield Parameter("machine_stiffness", "N/m", *_STIFFNESSES, *_SPRINGS, is_logarithmic=True)
+    for number in range(1, MOST_RELAXATIONS + 1):
+        yield Parameter(f"relaxation_share_{number}", "1", 0.0, 1.0, 0.0, 0.99)
+        yield Parameter(f"relaxation_time_{number}", "s", 0.0, inf, *_TIMES, is_logarithmic=True)
