@@ -91,12 +91,12 @@ def prepare(
             declared = make_plan(study, without=without, shard=shard)
             if not fresh:
                 keys = () if study.solve.timing else declared.keys
-                wanted = {*keys, *declared.reference_keys}
+                wanted = {*keys, *(declared.all_keys - {*declared.keys})}
                 found = opened.store.get(wanted)
                 opened.records = {key: record for key, record in found.items() if record.is_ok}
                 for path in beside if shard else ():
                     opened.records = _known_beside(path, wanted) | opened.records
-            ended = fail_begun(opened.store, {*declared.keys, *declared.reference_keys})
+            ended = fail_begun(opened.store, declared.all_keys)
             left_out = _what_ended(len(ended.keys() - opened.records.keys()))
             opened.records = ended | opened.records
             problems = [problem for source in merged for problem in source.problems]

@@ -100,7 +100,7 @@ def _merged(paths: list[Path], path: Path, plan: "Plan") -> "tuple[tuple[Source,
         if store.notice:
             error(store.notice)
         sources = merging.merge(paths, store)
-        records = store.get({*plan.keys, *plan.reference_keys})
+        records = store.get(plan.all_keys)
         store.close()
     return sources, records | skipped(plan, records)
 

@@ -10,9 +10,10 @@ from pipeline.plan.reductions import REDUCTIONS, strike_stored
 from pipeline.plan.shard import Shard, take
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import is_round, model_planes
-from pipeline.plan.work import NO_RECORD, Plan, Struck
+from pipeline.plan.work import NO_RECORD, EndPlans, Plan, Struck
 from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.case import Case
+from pipeline.study.ends import ends_of_bars
 from pipeline.study.schema import Mesh, Solving
 from pipeline.study.sweep import Study
 
@@ -59,8 +60,7 @@ def make_plan(
                 plan = reduction(plan)
                 plan = replace(plan, used=plan.used | {name})
     plan = ask_for_exact(plan)
-    if shard is not None:
-        plan = take(plan, shard)
+    plan = take(plan, shard) if shard is not None else ask_for_ends(plan, without)
     return plan if left_out & {"stored", "all"} else strike_stored(plan, frozenset(stored))
 
 
@@ -111,6 +111,19 @@ def ask_for_exact(plan: Plan) -> Plan:
     if not any(keys):
         return plan
     return replace(plan, solves=(*plan.solves, *found.values()), reference_keys=tuple(keys))
+
+
+def ask_for_ends(plan: Plan, without: Collection[str] = ()) -> Plan:
+    """Add the cases with each identified parameter at the ends of its bar, on the meshes of the study."""
+    ends = []
+    solves = {solve.key: solve for solve in plan.solves}
+    for end in ends_of_bars(plan.study):
+        low, high = (make_plan(study, without=without) if study else None for study in (end.low, end.high))
+        ends.append(EndPlans(end.unknown, low, high))
+        for found in (low, high):
+            for solve in found.solves if found else ():
+                solves.setdefault(solve.key, replace(solve, serves=(), end_of=end.unknown))
+    return replace(plan, solves=tuple(solves.values()), ends=tuple(ends)) if ends else plan
 
 
 def _reference(key: str, case: Case, accuracy: float) -> Solve:

@@ -210,7 +210,7 @@ def condense_sweeps(plan: Plan) -> Plan:
 def strike_stored(plan: Plan, stored: frozenset[str]) -> Plan:
     """Stored cases are read, not computed again."""
     if plan.study.solve.timing:
-        stored &= frozenset(plan.reference_keys)
+        stored &= plan.all_keys - frozenset(plan.keys)
     kept = tuple(solve for solve in plan.solves if solve.key not in stored)
     found = frozenset(solve.key for solve in plan.solves) & stored
     plan = replace(plan, solves=kept, stored=found)

@@ -23,7 +23,7 @@ class Solve:
     ``mirrors`` are the planes of symmetry ("x": x = 0), so that half or a quarter of the body is solved;
     ``axisymmetric`` solves the meridian; ``reduced`` allows a reduced basis. With a ``goal``, a relative error, the
     case is solved on the meshes of ``later``, in turn, until its error bar is below the goal; ``expected`` is the
-    expected error bar of its present mesh.
+    expected error bar of its present mesh. ``end_of`` is the identified parameter that is at an end of its bar.
     """
 
     key: str
@@ -35,6 +35,7 @@ class Solve:
     later: tuple[Rung, ...] = ()
     expected: float = nan
     is_reference: bool = False
+    end_of: str = ""
     reduced: bool = False
 
     @property
@@ -47,7 +48,8 @@ class Solve:
     @property
     def label(self) -> str:
         """The name for messages."""
-        return f"F_exact of {self.case}" if self.is_reference else str(self.case)
+        moved = f", {self.end_of} at an end of its bar" if self.end_of else ""
+        return f"F_exact of {self.case}" if self.is_reference else f"{self.case}{moved}"
 
     def again(self, bar: float = nan) -> "Solve":
         """Return the next attempt at the goal.

@@ -43,6 +43,7 @@ class Plan:
         unasked: the solves for F_exact that are left out because `solve.exact` is off by default.
         equivalent: by index of a case, the equivalent place that is solved instead.
         proportional: by index of a case, the proportional depth that is solved instead.
+        ends: the plans of the study at the ends of the bars of an identified material; their solves are among these.
     """
 
     study: Study
@@ -60,11 +61,18 @@ class Plan:
     unasked: tuple[Solve, ...] = ()
     equivalent: Mapping[tuple[int, ...], EquivalentPlace] = field(default_factory=dict)
     proportional: Mapping[tuple[int, ...], ProportionalDepth] = field(default_factory=dict)
+    ends: tuple["EndPlans", ...] = ()
 
     def scale_of(self, case: Case) -> Scale:
         """Return the scale of a case, by which its record is multiplied."""
         depth = self.proportional.get(case.index)
         return replace(case.scale, length=depth.times * case.scale.length) if depth else case.scale
+
+    @property
+    def all_keys(self) -> frozenset[str]:
+        """The keys of all records that the dataset is made of."""
+        ends = (plan.all_keys for end in self.ends for plan in (end.low, end.high) if plan)
+        return frozenset((*self.keys, *self.reference_keys)).union(*ends) - {NO_RECORD}
 
     @property
     def meshes(self) -> tuple[MeshStep, ...]:
@@ -79,6 +87,15 @@ class Plan:
     def struck_by(self, name: str, count: int, reason: str) -> "Plan":
         """Return the plan with a record of a reduction, if it struck out anything."""
         return replace(self, struck=(*self.struck, Struck(name, count, reason))) if count else self
+
+
+@dataclass(frozen=True)
+class EndPlans:
+    """The plans of a study with one identified parameter at either end of its bar; None where that makes no study."""
+
+    unknown: str
+    low: Plan | None
+    high: Plan | None
 
 
 def reason_of(reduction: Callable[..., Plan]) -> str:

@@ -9,7 +9,7 @@ import pandas as pd
 from pipeline.printable import counted
 from pipeline.quantities import readable
 from pipeline.report.compare import Comparison, Pair, worded
-from pipeline.report.guide_text import percent
+from pipeline.report.words import percent
 
 # Cases that a list names; the JSON has all of them.
 _MOST = 20

@@ -11,16 +11,15 @@ from pipeline.report.guideline import Guideline
 from pipeline.report.laws import Law
 from pipeline.report.table import EXACT, Labels
 from pipeline.report.verdict import Verdict
-from pipeline.report.words import choices
+from pipeline.report.words import choices, percent
 
-_NOUGHT = 1e-9  # what rounding leaves of no error
 _MOST_NAMED = 4
 
 
 def text(guide: Guideline, *, verbose: bool = False) -> str:
     """Return title, answer, worst case, cost, mesh, and ε by depth and law; ``verbose`` adds corrections and others."""
     lines = [guide.title, answer(guide), *(f"{name}: {words}" for name, words in details(guide))]
-    lines += gaps(guide)[:1] + by_scene(guide)
+    lines += ([guide.tissue] if guide.tissue else []) + gaps(guide)[:1] + by_scene(guide)
     if not verbose:
         return "\n".join(lines)
     table = of_each_outside(guide)
@@ -264,15 +263,6 @@ def cost(verdict: Verdict) -> str:
     """Return unknowns, elements and time, the largest over the scenes."""
     size = f"up to {verdict.dofs:,.0f} unknowns, {verdict.cells:,.0f} elements"
     return f"{size}, {time(verdict.seconds)} a case (median {time(verdict.usual)})"
-
-
-def percent(share: float) -> str:
-    """Write a share as people read it; nothing for what is not known."""
-    if not isfinite(share):
-        return ""
-    if abs(share) < _NOUGHT:
-        return "0 %"
-    return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
 
 
 def time(seconds: float) -> str:

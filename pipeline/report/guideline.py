@@ -16,6 +16,7 @@ from pipeline.report.laws import Laws
 from pipeline.report.sinking import tools
 from pipeline.report.table import Table
 from pipeline.report.times import doubts
+from pipeline.report.uncertainty import tissue
 from pipeline.report.verdict import Verdict, choose, judge, keeps, most_accurate
 
 # Settings that are chosen from the verdicts.
@@ -33,13 +34,14 @@ class Guideline:
     the budget; None if there is none. ``lean`` has the fewest unknowns of those that keep the accuracy. ``left_out``
     counts the cases of the scenes ``lost`` to every setting, by reason, ``unjudged`` those that keep settings from
     being judged, ``no_law`` the scenes in which no law adds compliances. ``tools`` are those that laws were fitted to.
-    ``reference`` names what F is compared with; ``parts`` are the answers by depth and law.
+    ``reference`` names what F is compared with; ``parts`` are the answers by depth and law. ``tissue`` says what is not
+    known of the material, if it was identified.
     """
 
     def __init__(self, dataset: xr.Dataset, table: Table, accuracy: float, budget: float):
         self.title, self.coordinates = str(dataset.attrs.get("title", "")), dataset.coords
         self.accuracy, self.budget, self.reference = accuracy, budget, table.reference
-        self.timing, self.doubts = _timing(dataset), doubts(dataset)
+        self.timing, self.doubts, self.tissue = _timing(dataset), doubts(dataset), tissue(dataset)
         self.axes = {name: len(np.unique(labels)) for name, labels in table.axes.items()}
         self.scenes = int((~table.lost).sum())
         self.lost = [scene for scene, lost in zip(table.scenes, table.lost, strict=True) if lost]

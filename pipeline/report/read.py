@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from math import prod
 from pathlib import Path
 from shlex import quote
@@ -12,6 +13,10 @@ import xarray as xr
 from pipeline.printable import printable, printable_lines
 from pipeline.report.table import DatasetError, warnings_of
 from pipeline.report.values import with_words
+from pipeline.study.identified import FROM
+from pipeline.study.problems import StudyError
+from pipeline.study.read import read_study
+from pipeline.study.text import read_toml
 
 # What every dataset of a study has, and figures and report are made from.
 _NEEDED = (
@@ -110,7 +115,11 @@ def _described(path: Path) -> tuple[int, set[str]]:
 
 
 def _text_of(study: Path) -> str:
-    return study.read_text(encoding="utf-8-sig", errors="replace")
+    """Return the text of a study, with what it reads from an identification, if that is there."""
+    with suppress(StudyError):
+        text = read_toml(study)[0]
+        return read_study(study).text if FROM.search(text) else text
+    return ""
 
 
 def _shown(dataset: xr.Dataset) -> xr.Dataset:

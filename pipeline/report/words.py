@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import xarray as xr
 
 from pipeline import quantities
 
+_NOUGHT = 1e-9  # what rounding leaves of no error
 _NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 # Of sizes and semi-axes, the last word of their dimensions' names.
 _SIZES = ("size", "axes")
@@ -30,6 +32,15 @@ def choice(coordinate: xr.DataArray, value: Any) -> str:
     if isinstance(value, str):
         return value if coordinate.name in ("probe", "body") else f"{symbol(coordinate)} {lengths(coordinate, value)}"
     return f"{symbol(coordinate)} = {re.sub(r'^-', '−', number(coordinate, value))}"
+
+
+def percent(share: float) -> str:
+    """Write a share as people read it; nothing for what is not known."""
+    if not isfinite(share):
+        return ""
+    if abs(share) < _NOUGHT:
+        return "0 %"
+    return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
 
 
 def choices(coordinates: Mapping[Any, xr.DataArray], selection: Mapping[str, Any]) -> str:

@@ -43,7 +43,7 @@ def known_of(path: Path, plan: Plan) -> tuple[dict[str, Record], CostModel]:
     if not path.exists():
         return {}, CostModel()
     with open_to_read(path) as store:
-        return store.get({*plan.keys, *plan.reference_keys}), store.cost_model()
+        return store.get(plan.all_keys), store.cost_model()
 
 
 def plan_the_rest(study: Study, path: Path, without: Collection[str] = ()) -> tuple[Plan, dict[str, Record]]:

@@ -15,6 +15,7 @@ from pydantic.json_schema import models_json_schema
 
 from pipeline.shapes.history import History, Sine
 from pipeline.shapes.section import Section, words_of
+from pipeline.study.identified import WORDS as IDENTIFIED
 from pipeline.study.measurement import Identify
 from pipeline.study.named import SCHEMA
 from pipeline.study.ranges import KEYS
@@ -88,6 +89,9 @@ def study_schema() -> Schema:
         for key, value in properties.items():
             properties[key] = _described(_in_file(value, name in swept, key), words.get(name), key)
     definitions[Identify.__name__]["additionalProperties"] = _SOUGHT
+    material = definitions["Material"]
+    material["properties"]["from"] = {"description": IDENTIFIED.text, "type": "string"}
+    del material["required"]  # `from` has them, too
     found = {name: _section(name, models, definitions) for name, models in sections.items()}
     title = {"description": "Title of the study, in figures and reports.", "type": "string"}
     return {

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from pipeline.shapes.section import Words, words_of
+from pipeline.study.identified import WORDS as IDENTIFIED
 from pipeline.study.json_schema import takes_of
 from pipeline.study.schema import EXPERIMENT, NESTED, SECTIONS, TABLES
 
@@ -90,6 +91,8 @@ def keys_of(section: str) -> tuple[Key, ...]:
         keys.append(
             Key(name, own, takes, words.default or _default(models[shapes[0]].model_fields[name], takes), words)
         )
+    if section == "material":
+        keys.append(Key("from", (), IDENTIFIED.takes, IDENTIFIED.default, IDENTIFIED))
     return tuple(keys)
 
 

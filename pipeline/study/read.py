@@ -13,6 +13,7 @@ from pipeline.study.axis import Axis
 from pipeline.study.check import check_sense
 from pipeline.study.check_loads import check_loads
 from pipeline.study.identification import Identification, read_identify, read_measurements
+from pipeline.study.identified import with_identified
 from pipeline.study.loads import Load
 from pipeline.study.measurement import Measurement
 from pipeline.study.parameters import parameters_of
@@ -68,7 +69,8 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
     ``file`` is for messages, and the files of bodies are looked for from its folder.
     """
     problems = Problems(tables=_names_of(raw))
-    given, raw = raw, _beside(raw, Path(file).parent)
+    given, text, identified = with_identified(raw, text, file, problems)
+    raw = _beside(given, Path(file).parent)
     _check_top(raw, problems)
     axes: list[Axis] = []
     sections: dict[str, tuple[Section, ...]] = {}
@@ -90,9 +92,8 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
     sections, every_axis = with_stages(sections, tuple(axes))
     warnings = tuple(f"{file}: {warning}" for warning in problems.told_once())
     title = str(raw.get("title", Path(file).stem))
-    return Study(
-        file, Path(file).stem, title, text, every_axis, sections, warnings, given, measurements, identification
-    )
+    experiment = (given, measurements, identification, identified)
+    return Study(file, Path(file).stem, title, text, every_axis, sections, warnings, *experiment)
 
 
 def scene_of(study: Study, measurement: Measurement) -> Study:

@@ -13,6 +13,7 @@ from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
 from pipeline.study.case import Case
 from pipeline.study.identification import Identification
+from pipeline.study.identified import NOTHING, Identified
 from pipeline.study.measurement import Measurement
 from pipeline.study.schema import Drawing, Material, Planning, Solving, material_of
 
@@ -34,6 +35,7 @@ class Study:
     raw: Mapping[str, Any] = field(default_factory=dict, repr=False)  # the file's TOML
     measurements: tuple[Measurement, ...] = ()
     identification: Identification = field(default_factory=Identification)
+    identified: Identified = NOTHING
 
     @property
     def shape(self) -> tuple[int, ...]:

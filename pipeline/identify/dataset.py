@@ -1,0 +1,115 @@
+"""The dataset of an identification: estimates, bars by source, profiles, and each curve with its fit."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline.identify.parts import SOURCES, CurveFit, Estimate
+from pipeline.netcdf import write_netcdf
+
+_WORDS: dict[str, tuple[str, str]] = {
+    "unknown": ("", "parameter that was identified"),
+    "unknown_2": ("", "parameter that was identified"),
+    "source": ("", "source of an error"),
+    "measurement": ("", "measured curve"),
+    "estimate": ("", "most probable value, in the unit of its parameter"),
+    "low": ("", "lower end of the 95 % error bar, if the body is as declared"),
+    "high": ("", "upper end of the 95 % error bar, if the body is as declared"),
+    "low_hidden": ("", "lower end of the 95 % error bar, if the body hides what it may hide"),
+    "high_hidden": ("", "upper end of the 95 % error bar, if the body hides what it may hide"),
+    "part": ("", "half width of the 95 % error bar by each source; they add up as squares"),
+    "unit": ("", "unit of each parameter"),
+    "correlation": ("1", "correlation of the errors of two parameters"),
+    "seen": ("1", "whether the curves tell the parameter: 0 if any value of its range fits them"),
+    "profile_value": ("", "values of a parameter at which all others were fitted anew"),
+    "profile": ("1", "twice the fall of the logarithm of the likelihood; 3.84 at the ends of a 95 % bar"),
+    "depth": ("m", "depth of the tool below the surface"),
+    "force": ("N", "measured force"),
+    "fit": ("N", "force of the model, with baseline and drift"),
+    "band": ("N", "95 % error bar of the fit"),
+    "residual": ("N", "measured force less that of the model"),
+    "noise_correlation": ("1", "correlation of the noise from one point to the next"),
+    "noise_deviation": ("N", "standard deviation of the noise at no force"),
+    "window_depth": ("m", "largest depth of a fit to a part of the curves"),
+    "window_young": ("Pa", "Young's modulus of that fit"),
+    "evidence": ("1", "logarithm of the evidence for a deviation from the law, relative to that for none"),
+}
+_OF_CURVES = ("depth", "force", "fit", "band", "residual")
+
+
+def dataset_of(found: Estimate, attributes: Mapping[str, Any]) -> xr.Dataset:
+    """Return an estimate as a dataset; ``attributes`` tell of the study.
+
+    Curves have different lengths: the dimension ``sample`` is that of the longest, and the others end in NaN.
+    """
+    names = [unknown.name for unknown in found.unknowns]
+    values: dict[str, Any] = {
+        "unit": ("unknown", np.array([unknown.unit for unknown in found.unknowns], dtype=object)),
+        **{
+            name: ("unknown", np.asarray(getattr(found, name), dtype=float))
+            for name in ("estimate", "low", "high", "low_hidden", "high_hidden")
+        },
+        "part": (("unknown", "source"), found.part),
+        "correlation": (("unknown", "unknown_2"), found.correlation),
+        "seen": ("unknown", found.seen.astype(np.int8)),
+        **_profiles(found, names),
+        **_curves(found.curves),
+        "evidence": ((), found.evidence),
+    }
+    if found.windows:
+        values["window_depth"] = ("window", [window.depth for window in found.windows])
+        values["window_young"] = ("window", [window.young for window in found.windows])
+    coordinates = {
+        "unknown": names,
+        "unknown_2": names,
+        "source": list(SOURCES),
+        "measurement": [curve.name for curve in found.curves],
+    }
+    dataset = xr.Dataset(values, coordinates)
+    for name in dataset.variables:
+        unit, meaning = _WORDS[str(name)]
+        dataset[name].attrs = {"long_name": meaning} | ({"units": unit} if unit else {})
+    told = {"told": "\n".join(found.told)} if found.told else {}
+    return dataset.assign_attrs({"Conventions": "CF-1.8", "verdict": found.verdict, **told, **attributes})
+
+
+def _profiles(found: Estimate, names: Sequence[str]) -> dict[str, Any]:
+    longest = max((profile.value.size for profile in found.profiles.values()), default=0)
+    if not longest:
+        return {}
+    columns = {"profile_value": "value", "profile": "fall"}
+    rows = {
+        name: [_padded(getattr(found.profiles[one], own), longest) if one in found.profiles else _padded([], longest)
+               for one in names]
+        for name, own in columns.items()
+    }  # fmt: skip
+    return {name: (("unknown", "point"), np.array(values)) for name, values in rows.items()}
+
+
+def _curves(curves: Sequence[CurveFit]) -> dict[str, Any]:
+    longest = max(curve.depth.size for curve in curves)
+    found: dict[str, Any] = {
+        name: (("measurement", "sample"), np.array([_padded(getattr(curve, name), longest) for curve in curves]))
+        for name in _OF_CURVES
+    }
+    for name in ("correlation", "deviation"):
+        found[f"noise_{name}"] = ("measurement", [getattr(curve.noise, name) for curve in curves])
+    return found
+
+
+def _padded(values: Any, length: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    padded = np.full(length, np.nan)
+    padded[: len(values)] = values
+    return padded
+
+
+def write(dataset: xr.Dataset, path: Path) -> None:
+    """Write ``dataset`` to ``path`` as netCDF4: whole, or not at all.
+
+    Raises:
+        OSError: if it cannot be written.
+    """
+    write_netcdf(dataset, path, "NETCDF4")
