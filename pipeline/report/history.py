@@ -31,7 +31,7 @@ _STAGE, _MANY = "stage", 10_000
 
 
 @dataclass(frozen=True)
-class Course:
+class Convolution:
     """What a case does over time (n,), NaN after the end of its history.
 
     The force is ``weights`` (n, k) times the elastic forces of its k stages; ``others`` are those of other
@@ -66,48 +66,52 @@ def over_time(dataset: xr.Dataset, study: Study, cases: Sequence[Case], records:
     if len(dims) < len(study.axes):
         depths = np.moveaxis(depths, [axis.is_stage for axis in study.axes].index(True), -1)
     depths = depths.reshape(len(whole), -1)
-    courses = [course_of(case, times, tuple(own)) for case, own in zip(whole, depths, strict=True)]
+    convolutions = [convolution_of(case, times, tuple(own)) for case, own in zip(whole, depths, strict=True)]
     last = _last_stage(dataset)
     found = {"force_elastic": last["force"].assign_attrs(attributes("force_elastic"))}
     for name in (name for name in OVER_TIME if name in dataset):
-        found[name] = _transformed(dataset, name, dims, courses)
+        found[name] = _transformed(dataset, name, dims, convolutions)
     for name in (name for name in _CONTACT if name in dataset):
-        found |= _contact(dataset, name, dims, whole, courses, depths)
-    peaks = _variable(last, "force", dims, [np.array(course.peak) for course in courses])
+        found |= _contact(dataset, name, dims, whole, convolutions, depths)
+    peaks = _variable(last, "force", dims, [np.array(convolution.peak) for convolution in convolutions])
     found |= {name: (last[name] * peaks).assign_attrs(last[name].attrs) for name in LARGEST if name in last}
-    found["tool_depth"] = _variable(last, "tool_depth", dims, [course.depth for course in courses], "time")
-    found |= _dissipated(dataset, last, dims, courses)
+    found["tool_depth"] = _variable(
+        last, "tool_depth", dims, [convolution.depth for convolution in convolutions], "time"
+    )
+    found |= _dissipated(dataset, last, dims, convolutions)
     own = [records[-1] for records in study.by_case(records)]
     stepped = [record if case.is_stepped else None for case, record in zip(whole, own, strict=True)]
     found |= stepped_values(found, dims, stepped, times)
     if "load_force" in last:
-        found |= _crept(last.assign(found), dims, whole, courses)
+        found |= _crept(last.assign(found), dims, whole, convolutions)
     coordinate = ("time", times, attributes("time"))
     return last.drop_vars(_STAGE, errors="ignore").assign(found).assign_coords(time=coordinate)
 
 
-def course_of(case: Case, times: FloatArray, depths: tuple[float, ...]) -> Course:
+def convolution_of(case: Case, times: FloatArray, depths: tuple[float, ...]) -> Convolution:
     """Return what a case does at ``times``, solved at ``depths`` (m); one without a history does not change."""
     depth, history = case.probe.depth, case.probe.history
     only_last = np.arange(len(depths)) == len(depths) - 1
     if history is None:
         ones = np.ones(len(times))
         alone = np.outer(ones, only_last).astype(float)
-        return Course(alone, (alone,), depth * ones, 0.0 * ones, 0.0 * alone, 1.0, depth * ones)
+        return Convolution(alone, (alone,), depth * ones, 0.0 * ones, 0.0 * alone, 1.0, depth * ones)
     motion, terms = history.motion(depth), case.relaxations[0]
     if case.is_stepped:  # the record has the values
         unknown = np.full(len(times), np.nan)
         weights = np.outer(unknown, only_last)
-        return Course(weights, (weights,), motion.at(times), unknown, weights, np.nan, unknown)
+        return Convolution(weights, (weights,), motion.at(times), unknown, weights, np.nan, unknown)
     if case.probe.is_unilateral:
         contact = _follow(motion, terms, tuple(times), depths, _power(case.probe))
         none = np.zeros(len(times))
-        return Course(contact.weights, contact.others, motion.at(times), none, contact.dissipated, 1.0, contact.depth)
+        return Convolution(
+            contact.weights, contact.others, motion.at(times), none, contact.dissipated, 1.0, contact.depth
+        )
     force, lost = respond(motion, terms, times)
     weights = np.outer(force / depth, only_last)
     # Energies are half of stiffness times depth squared.
     at, scaled = motion.at(times), 2 * lost / depth**2
-    return Course(weights, (weights,), at, scaled, 0.0 * weights, motion.largest / depth, at)
+    return Convolution(weights, (weights,), at, scaled, 0.0 * weights, motion.largest / depth, at)
 
 
 def _power(probe: Probe) -> float:
@@ -123,33 +127,35 @@ def _follow(
     return follow(motion, terms, np.array(times), np.array(depths), exponent)
 
 
-def _transformed(dataset: xr.Dataset, name: str, dims: list[str], courses: Sequence[Course]) -> xr.DataArray:
+def _transformed(dataset: xr.Dataset, name: str, dims: list[str], convolutions: Sequence[Convolution]) -> xr.DataArray:
     """Return a force or its error bar over time. The error bar includes that of the elastic curve's interpolation."""
     values = _table(dataset, name, dims)
     more = [str(dim) for dim in dataset[name].dims if dim not in (*dims, _STAGE)]
     if not name.endswith("_error"):
-        found = [np.tensordot(course.weights, own, 1) for course, own in zip(courses, values, strict=True)]
+        found = [
+            np.tensordot(convolution.weights, own, 1) for convolution, own in zip(convolutions, values, strict=True)
+        ]
     else:
         forces = _table(dataset, name.removesuffix("_error"), dims)
         found = [
-            abs(np.tensordot(course.others[0], bars, 1))
-            + sum(abs(np.tensordot(course.weights - other, own, 1)) for other in course.others)
-            for course, bars, own in zip(courses, values, forces, strict=True)
+            abs(np.tensordot(convolution.others[0], bars, 1))
+            + sum(abs(np.tensordot(convolution.weights - other, own, 1)) for other in convolution.others)
+            for convolution, bars, own in zip(convolutions, values, forces, strict=True)
         ]
     found = [np.moveaxis(one, 0, -1) for one in found]
     return _variable(dataset, name, dims, found, *more, "time")
 
 
 def _dissipated(
-    dataset: xr.Dataset, last: xr.Dataset, dims: list[str], courses: Sequence[Course]
+    dataset: xr.Dataset, last: xr.Dataset, dims: list[str], convolutions: Sequence[Convolution]
 ) -> dict[str, xr.DataArray]:
     """Return the dissipated energy over time, and its error bar."""
     forces, bars = (_table(dataset, name, dims) for name in ("force", "force_error"))
     energies, shares = last["energy"].values.ravel(), abs(last["force_error"] / last["force"]).values.ravel()
     lost, error = [], []
-    for course, force, bar, energy, share in zip(courses, forces, bars, energies, shares, strict=True):
-        lost.append(course.dissipated * energy + course.spent @ force)
-        error.append(share * course.dissipated * energy + abs(course.spent) @ bar)
+    for convolution, force, bar, energy, share in zip(convolutions, forces, bars, energies, shares, strict=True):
+        lost.append(convolution.dissipated * energy + convolution.spent @ force)
+        error.append(share * convolution.dissipated * energy + abs(convolution.spent) @ bar)
     return {
         "dissipated_energy": _variable(last, "dissipated_energy", dims, lost, "time"),
         "dissipated_energy_error": _variable(last, "dissipated_energy_error", dims, error, "time"),
@@ -157,7 +163,7 @@ def _dissipated(
 
 
 def _crept(
-    last: xr.Dataset, dims: list[str], cases: Sequence[Case], courses: Sequence[Course]
+    last: xr.Dataset, dims: list[str], cases: Sequence[Case], convolutions: Sequence[Convolution]
 ) -> dict[str, xr.DataArray]:
     """Return what loads do to relaxing tissue on which they have acted for long; their force does not change.
 
@@ -165,7 +171,7 @@ def _crept(
     """
     shares = [sum(share for share, _ in case.relaxations[0]) for case in cases]
     softer = 1 / (1 - _variable(last, "sag", dims, [np.array(share) for share in shares]))
-    peaks = _variable(last, "sag", dims, [np.array(course.peak) for course in courses])
+    peaks = _variable(last, "sag", dims, [np.array(convolution.peak) for convolution in convolutions])
     found = {name: (softer * last[name]).assign_attrs(last[name].attrs) for name in ("sag", "load_energy")}
     alone = ((softer == 1) & (peaks == 1)) | (last["load_energy"] == 0)
     return found | {name: last[name].where(alone) for name in LARGEST if name in last}
@@ -176,20 +182,20 @@ def _contact(
     name: str,
     dims: list[str],
     cases: Sequence[Case],
-    courses: Sequence[Course],
+    convolutions: Sequence[Convolution],
     depths: FloatArray,
 ) -> dict[str, xr.DataArray]:
     """Return area or radius of contact over time, and the error bar."""
     parts = [_table(dataset, part, dims) for part in (name, f"{name}_error")]
     found: list[list[FloatArray]] = [[], []]
-    for number, (case, course, own) in enumerate(zip(cases, courses, depths, strict=True)):
+    for number, (case, convolution, own) in enumerate(zip(cases, convolutions, depths, strict=True)):
         if case.probe.history is None or not case.probe.is_unilateral:
-            weights = course.weights
+            weights = convolution.weights
         else:
             power = 0.0 if case.probe.has_singular_edge else _CONTACT[name]
-            weights = interpolation(np.nan_to_num(course.contact), own, power, "linear")
-            weights[course.contact == 0] = 0.0
-            weights[np.isnan(course.contact)] = np.nan
+            weights = interpolation(np.nan_to_num(convolution.contact), own, power, "linear")
+            weights[convolution.contact == 0] = 0.0
+            weights[np.isnan(convolution.contact)] = np.nan
         for part, values in zip(found, parts, strict=True):
             part.append(weights @ values[number])
     names = (name, f"{name}_error")

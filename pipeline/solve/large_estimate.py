@@ -85,26 +85,19 @@ class FinerResiduals:
         return found
 
 
-def difference(fields: Fields, other: Fields) -> Fields:
-    """Return ``fields`` less ``other``, which is overwritten."""
-    for part, own in zip(fields, other, strict=True):
-        own.aypx(-1.0, part)
-    return other
-
-
-def subtract(fields: Fields, other: Fields) -> Fields:
-    """Subtract ``other`` from ``fields``, which are returned."""
-    for part, own in zip(fields, other, strict=True):
-        part.axpy(-1.0, own)
+def combine(own: float, fields: Fields, share: float, other: Fields) -> Fields:
+    """Return own·fields + share·other, which overwrites ``fields``."""
+    for part, added in zip(fields, other, strict=True):
+        part.axpby(share, own, added)
     return fields
 
 
 class Decrements:
-    """The products r_i·K⁻¹·r_j (J) of residuals by a ``linearised`` problem, and its iterations; collective."""
+    """The products r_i·K⁻¹·r_j (J) of residuals by a ``linearised`` problem; collective."""
 
     def __init__(self, linearised: Linearised, residuals: Sequence[Fields]):
         """Solve for all ``residuals``."""
-        self.products, self._unseen, self.iterations = linearised.decrements(residuals)
+        self.products, self._unseen = linearised.decrements(residuals)
 
     def between(self, rate: int, change: int) -> tuple[float, float]:
         """Return the decrement (J) that two residuals give, an upper bound if elements have one, and their N (J)."""

@@ -19,7 +19,7 @@ from pipeline.solve.compiled import global_sum
 from pipeline.solve.dead_loads import HeldTool, hold_tool
 from pipeline.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Products, Solver
 from pipeline.solve.elements.fields import Column, Fields
-from pipeline.solve.large_estimate import Decrements, FinerResiduals, difference, subtract
+from pipeline.solve.large_estimate import Decrements, FinerResiduals, combine
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.newton import LEFT, ON_THE_WAY, HyperelasticBody, LargeError
@@ -198,7 +198,8 @@ class LoadSteps(Solver):
         if held is not None:
             state.array[:] = self._load_path.start
             rate_there, there = at()
-            found = [found[0], subtract(found[1], there), difference(found[0], rate_there), there]
+            changes = combine(1.0, found[1], -1.0, there), combine(-1.0, rate_there, 1.0, found[0])
+            found = [found[0], *changes, there]
             state.array[:] = held.state
             found.append(residuals.at(state))
         estimate = Decrements(self._linear, found)
@@ -218,7 +219,6 @@ class LoadSteps(Solver):
         return HierarchicalEstimate(
             finer,
             [],
-            estimate.iterations,
             decrements=decrements,
             unseen=None if estimate.is_bound else unseen,
         )

@@ -190,7 +190,6 @@ class QuasiStaticProblem(Problem):
             unseen=None if unseen is None else unseen[: len(movement.motions)],
             front=front,
             tip=tip,
-            estimate_iterations=finer.iterations,
         )
 
     @stage("energy release")

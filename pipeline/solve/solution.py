@@ -42,7 +42,6 @@ class Solution:
     bars: FloatArray | None = None
     plain: float = nan
     unseen: FloatArray | None = None
-    estimate_iterations: int = 0
 
     contact: Contact | None = None  # unilateral contact only
 

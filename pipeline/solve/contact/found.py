@@ -99,11 +99,11 @@ class FoundContact:
 
         Each depth has its own bar where loads act, or where the surface is not condensed.
         """
-        sweep, depth, iterations, at_edge = self.sweep, self.obstacle.depth, 0, self._area().bar
+        sweep, depth, at_edge = self.sweep, self.obstacle.depth, self._area().bar
         known = sweep.bar(depth, movement.far) if self.loaded is None else None
         if known is None:
             self._plug.show(columns[:1])
-            taken, share, iterations = self._estimated(at_edge)
+            taken, share = self._estimated(at_edge)
             if self.loaded is None:
                 sweep.keep_bar(depth, taken, share, movement.far)
         else:
@@ -111,26 +111,24 @@ class FoundContact:
         return HierarchicalEstimate(
             self._plug,
             [],
-            iterations,
             decrements=np.array([[taken * self.force / depth]]),
             relative=np.array([share]),
             area_bar=at_edge + share,
         )
 
-    def _estimated(self, area_bar: float) -> tuple[float, float, int]:
-        """Return the share of the energy that one degree more removes, the share for the bar, and the iterations."""
+    def _estimated(self, area_bar: float) -> tuple[float, float]:
+        """Return the share of the energy that one degree more removes, and the share for the bar."""
         candidates, found, elements = self.obstacle.candidates, self.found, self.sweep.elements
         touching = float(candidates.weights[found.active].sum())
         covered = float(candidates.areas[candidates.closed(found.active)].sum())
         if covered < _COVERED * touching:
-            share, more = _found_again(elements, self.obstacle_above(), found)
-            return *found_again_bar(share, area_bar), more
-        taken, unseen, more = _decrement(elements, candidates.held_facets(found.active))
+            return found_again_bar(_found_again(elements, self.obstacle_above(), found), area_bar)
+        taken, unseen = _decrement(elements, candidates.held_facets(found.active))
         share, unseen = taken / found.state.energy, unseen / found.state.energy
         if (found.active & candidates.is_edge).any():  # the probe ends there, and the pressure is singular
             degree, element, plain = self._plug.degree, self._plug.element, plain_share(self._plug.body)
-            return share, error_bar(share, degree, element, plain=plain, unseen=unseen), more
-        return share, found_bar(share, unseen, area_bar), more
+            return share, error_bar(share, degree, element, plain=plain, unseen=unseen)
+        return share, found_bar(share, unseen, area_bar)
 
     def _area(self) -> Area:
         """Return the contact area of the modelled part."""
@@ -147,8 +145,8 @@ def _force(found: Found) -> float:
     return float(-found.state.reactions[found.active].sum())
 
 
-def _decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, float, int]:
-    """Return how much one degree more lowers twice the energy (J) of the modelled part, N (J), and the iterations.
+def _decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, float]:
+    """Return how much one degree more lowers twice the energy (J) of the modelled part, and N (J).
 
     N is the energy norm squared of the first correction of mixed elements, zero for others. Collective. The local
     ``facets`` are fixed; the fields are those of the forms of ``elements``.
@@ -158,11 +156,10 @@ def _decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, fl
     """
     if elements.plug.element == "mixed":
         return _mixed_decrement(elements, facets)
-    taken, iterations = _displacement_decrement(elements, facets)
-    return taken, 0.0, iterations
+    return _displacement_decrement(elements, facets), 0.0
 
 
-def _displacement_decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, int]:
+def _displacement_decrement(elements: ContactElements, facets: Int32Array) -> float:
     finer, law = elements.surface.spaces.get(elements.space.degree + 1, WITHOUT_FOOTPRINT), elements.law
     with ExitStack() as stack, vector(finer.space) as residual:
         levels = elements.held_levels(facets, stack)
@@ -173,23 +170,23 @@ def _displacement_decrement(elements: ContactElements, facets: Int32Array) -> tu
         finer.residual_of(elements.space, law, residual)
         held = levels[-1].prescribed
         residual.array[held[held < finer.owned]] = 0.0
-        decrements, _, iterations = energy_decrements(solver, [residual])
-    return float(decrements[0, 0]), iterations
+        decrements, *_ = energy_decrements(solver, [residual])
+    return float(decrements[0, 0])
 
 
-def _mixed_decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, float, int]:
+def _mixed_decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, float]:
     elements.close()
     with ExitStack() as stack:
         finer = elements.finer(stack)
         finer.hold_facets(facets)
         before = finer.energy()
-        iterations = finer.approach(np.zeros(len(finer.candidates)), _ESTIMATE_TOLERANCE, None)  # fixed nodes stay
+        finer.approach(np.zeros(len(finer.candidates)), _ESTIMATE_TOLERANCE, None)  # fixed nodes stay
         assert isinstance(finer.solver, MixedSolver)
-        return before - finer.energy(), float(finer.solver.first_energies[0]), iterations
+        return before - finer.energy(), float(finer.solver.first_energies[0])
 
 
-def _found_again(elements: ContactElements, obstacle: Obstacle, found: Found) -> tuple[float, int]:
-    """Solve contact again in one degree more: return the share of the force that it removes, and the sets; collective.
+def _found_again(elements: ContactElements, obstacle: Obstacle, found: Found) -> float:
+    """Solve contact again in one degree more: return the share of the force that it removes; collective.
 
     ``obstacle`` is the obstacle of that degree, without the far field.
 
@@ -202,4 +199,4 @@ def _found_again(elements: ContactElements, obstacle: Obstacle, found: Found) ->
         finer = elements.finer(stack)
         active = elements.candidates.raised(found.active, finer.candidates)
         again = find_set(finer, obstacle, active, _AGAIN, found.state.energy)
-    return 1 - _force(again) / _force(found), again.sets
+    return 1 - _force(again) / _force(found)

@@ -81,10 +81,10 @@ class Step:
 
 
 @dataclass(frozen=True)
-class _Course:
-    """The coefficient of ``friction``, and the depth (m) at the end of the path."""
+class _Friction:
+    """The ``coefficient`` of friction, and the depth (m) at the end of the path."""
 
-    friction: float
+    coefficient: float
     deepest: float
 
 
@@ -98,32 +98,32 @@ def press(surface: CondensedSurface, depth: float, friction: float, steps: int =
     nothing = np.zeros(count, dtype=bool)
     free = np.zeros((count, components))
     step = Step(0.0, free, free, nothing, Slide(nothing, free[:, 1:]))
-    iterations, course = 0, _Course(friction, depth)
+    iterations, law = 0, _Friction(friction, depth)
     for number in (*_BEFORE, *range(1, steps + 1)):
-        step = _reach(surface, step, depth * (number / steps) ** 2, course, _MOST_HALVINGS)
+        step = _reach(surface, step, depth * (number / steps) ** 2, law, _MOST_HALVINGS)
         iterations += step.iterations
     if not step.active.any():
         raise ContactError("the probe does not touch a single node: use smaller elements below it")
     return replace(step, iterations=iterations)
 
 
-def _reach(surface: CondensedSurface, before: Step, depth: float, course: _Course, halvings: int) -> Step:
+def _reach(surface: CondensedSurface, before: Step, depth: float, friction: _Friction, halvings: int) -> Step:
     """Return the equilibrium at a ``depth`` (m), in one step or in halves of it."""
     try:
-        return _advance(surface, before, depth, course)
+        return _advance(surface, before, depth, friction)
     except Unsettled:
         if not halvings:
             raise
-        halfway = _reach(surface, before, (before.depth + depth) / 2, course, halvings - 1)
-        return _reach(surface, halfway, depth, course, halvings - 1)
+        halfway = _reach(surface, before, (before.depth + depth) / 2, friction, halvings - 1)
+        return _reach(surface, halfway, depth, friction, halvings - 1)
 
 
-def _advance(surface: CondensedSurface, before: Step, depth: float, course: _Course) -> Step:
+def _advance(surface: CondensedSurface, before: Step, depth: float, friction: _Friction) -> Step:
     pressed = depth - surface.heights
     active = before.active
     references = before.moved[:, 1:].copy()
     if active.any():
-        law = np.full(len(surface), course.friction)
+        law = np.full(len(surface), friction.coefficient)
         _, moved = _solved(surface, pressed, references, law, before)
         gap, closing = surface.heights - before.depth + before.moved[:, 0], before.moved[:, 0] - moved[:, 0]
         closing = closing + depth - before.depth
@@ -135,11 +135,11 @@ def _advance(surface: CondensedSurface, before: Step, depth: float, course: _Cou
         active = active | surface.neighbours.enclosed(active) & np.isfinite(pressed)
     if not active.any():
         return replace(before, depth=depth)
-    return _settled(surface, replace(before, depth=depth, active=active), pressed, references, course)
+    return _settled(surface, replace(before, depth=depth, active=active), pressed, references, friction)
 
 
 def _settled(
-    surface: CondensedSurface, guess: Step, pressed: FloatArray, references: FloatArray, course: _Course
+    surface: CondensedSurface, guess: Step, pressed: FloatArray, references: FloatArray, friction: _Friction
 ) -> Step:
     """Return the equilibrium with the tool ``pressed`` (n, m) below the nodes, and slip from ``references`` (n, t, m).
 
@@ -149,7 +149,7 @@ def _settled(
     step, simple = replace(guess, iterations=0), Simplified.none(len(surface))
     seen, single = set[bytes](), False
     for iteration in range(1, _MOST_ITERATIONS + 1):
-        law = simple.law(course.friction)
+        law = simple.law(friction.coefficient)
         step = replace(step, slide=simple.sliding(step.slide, step.active), iterations=iteration)
         reactions, moved = _solved(surface, pressed, references, law, step)
         step = replace(step, reactions=reactions, moved=moved)
@@ -159,7 +159,7 @@ def _settled(
         moves = after.active != step.active
         turns = (after.slide.sliding != step.slide.sliding) & ~moves
         if not moves.any() and not turns.any() and _is_close(surface, step, after.slide, law, simple):
-            if _share(surface, step, simple) > most_simplified(step.depth, course.deepest):
+            if _share(surface, step, simple) > most_simplified(step.depth, friction.deepest):
                 break
             return step
         if not after.active.any():

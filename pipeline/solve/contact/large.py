@@ -223,7 +223,6 @@ class LargeContactSolution:
         return HierarchicalEstimate(
             finer.body.elements,
             [],
-            finer.touched.iterations,
             decrements=np.array([[taken * self.force / self.depth]]),
             relative=np.array([bar]),
             area_bar=at_edge + bar,

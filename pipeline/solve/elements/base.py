@@ -52,7 +52,6 @@ class HierarchicalEstimate:
 
     elements: "Elements"
     columns: list[Column]
-    iterations: int
     decrements: FloatArray | None = None
     unseen: FloatArray | None = None
     relative: FloatArray | None = None
@@ -147,10 +146,10 @@ class Linearised(ABC):
         """Return the elements of one degree more."""
 
     @abstractmethod
-    def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, FloatArray | None, int]:
+    def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, FloatArray | None]:
         """Return r_i·K⁻¹·r_j (n, n), J, of n residuals in the elements of one degree more.
 
-        In mixed elements N of each (n), J, follows, otherwise None; the last number are the iterations.
+        In mixed elements N of each (n), J, follows, otherwise None.
         """
 
 

@@ -152,13 +152,13 @@ class DisplacementSolver(Solver):
             if movement.loads is not None and column.applied is not None:
                 space.put(residual, space.applied(movement.loads))
             residuals.append(residual)
-        decrements, corrections, iterations = energy_decrements(solver, residuals)
+        decrements, corrections, _ = energy_decrements(solver, residuals)
         kept = []
         for solution, correction in zip(solutions, corrections, strict=False):
             (values,) = fields = stack.enter_context(finer.fields())
             values.array[:] = solution + correction
             kept.append(Column(np.zeros(len(space.forms.displacement.x.array)), None, (), fields))
-        return HierarchicalEstimate(finer, kept, iterations, decrements=decrements)
+        return HierarchicalEstimate(finer, kept, decrements=decrements)
 
 
 class LinearisedDisplacement(Linearised):
@@ -177,7 +177,7 @@ class LinearisedDisplacement(Linearised):
         finer, self._above = self._elements.finer(self._law, self._levels, self._stack)
         return finer
 
-    def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, None, int]:
-        """Return decrements and iterations."""
-        found, _, iterations = energy_decrements(self._above, [residual[0] for residual in residuals])
-        return found, None, iterations
+    def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, None]:
+        """Return decrements."""
+        found, *_ = energy_decrements(self._above, [residual[0] for residual in residuals])
+        return found, None

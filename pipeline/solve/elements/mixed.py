@@ -269,8 +269,8 @@ class MixedSolver(Solver):
             coarse.show([column], [1.0])
             finer.start_from(coarse, fine.unknown, fine.prescribed)
             finer.lift(fine, self.law, checked=False)
-        iterations = above.solve(found, _ESTIMATE_TOLERANCE)
-        return HierarchicalEstimate(finer, found, iterations, unseen=above.first_energies)
+        above.solve(found, _ESTIMATE_TOLERANCE)
+        return HierarchicalEstimate(finer, found, unseen=above.first_energies)
 
 
 class LinearisedMixed(Linearised):
@@ -286,21 +286,21 @@ class LinearisedMixed(Linearised):
         """Return the elements of one degree more."""
         return self._elements.finer()
 
-    def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, FloatArray, int]:
-        """Return decrements, N and iterations."""
+    def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, FloatArray]:
+        """Return decrements and N."""
         finer, law = self._elements.finer(), self._law
         below = self._elements._solvers.get(False, (None, None))[0]
         saddle = finer._solver(self._elements.elastic(law), direct=False, below=below)
         fixed = np.zeros(len(finer.displacements.forms.displacement.x.array))
         found = [Column(fixed, None, residual, self._stack.enter_context(finer.fields())) for residual in residuals]
-        iterations = MixedSolver(finer, law, saddle, is_exact=False).solve(found, _ESTIMATE_TOLERANCE)
+        MixedSolver(finer, law, saddle, is_exact=False).solve(found, _ESTIMATE_TOLERANCE)
         unit = finer.unit(law)
         # x_i·r_j + x_j·r_i − x_i·K x_j: its error is the product of both solutions' errors.
         works = np.array(
             [[sum(x.dot(r) for x, r in zip(i.unknown, j.right, strict=True)) for j in found] for i in found]
         )
         energies = finer.products(law, found, checked=False).stationary
-        return unit * (works + works.T) - energies, unit * np.array(saddle.first_energies), iterations
+        return unit * (works + works.T) - energies, unit * np.array(saddle.first_energies)
 
 
 def _check_ratio(law: MaterialLaw) -> None:
