@@ -19,6 +19,7 @@ from pipeline.solve.compiled import global_sum
 from pipeline.solve.dead_loads import HeldTool, hold_tool
 from pipeline.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Products, Solver
 from pipeline.solve.elements.fields import Column, Fields
+from pipeline.solve.ended import ended
 from pipeline.solve.large_estimate import Decrements, FinerResiduals, combine
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import Motion, Movement
@@ -303,12 +304,7 @@ class LoadSteps(Solver):
         """Return the error of a path that ends before ``depth`` (m)."""
         reached, force, _ = load_path.path[-1]
         whole = 2.0 ** len(self.elements.body.mirrored) * force
-        message = (
-            f"load steps reached {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {whole:.4g} N "
-            f"(Newton's method: {why}); the tissue becomes unstable, or elements at the probe's edge are flattened; "
-            "use a smaller depth, or a larger rim"
-        )
-        return LargeError(message, (reached, whole) if reached else None)
+        return ended(why, self._law, (reached, whole), depth, is_found=False)
 
     def _volume(self) -> float:
         body = self.elements.body

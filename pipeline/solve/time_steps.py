@@ -10,6 +10,7 @@ what that changes of the force, about four times the error.
 from abc import ABC, abstractmethod
 from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -18,6 +19,7 @@ from pipeline.arrays import FloatArray
 from pipeline.solve.balance import sums
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.elements.base import Elements, Linearised
+from pipeline.solve.ended import ended
 from pipeline.solve.history import Course, History, between
 from pipeline.solve.movement import Movement
 from pipeline.solve.newton import HyperelasticBody, LargeError
@@ -48,8 +50,10 @@ class Pressed(ABC):
     """A relaxing ``body`` and what presses it, at the equilibrium at a share of the movement. Methods are collective.
 
     ``force`` (3), N, is that of the tool on the modelled part, ``rate`` (J) the work per share, and ``area`` (m²) the
-    contact of the whole body, NaN if it is prescribed.
+    contact of the whole body, NaN unless it ``is_found``.
     """
+
+    is_found: ClassVar[bool]
 
     body: HyperelasticBody
     force: FloatArray
@@ -75,6 +79,8 @@ class Pressed(ABC):
 
 class PressedFootprint(Pressed):
     """A body whose footprint has a prescribed ``movement``."""
+
+    is_found = False
 
     def __init__(
         self, elements: Elements, law: MaterialLaw, linearised: Linearised, movement: Movement, stack: ExitStack
@@ -231,10 +237,5 @@ class TimeSteps:
     def _stopped(self, course: Course, why: LargeError) -> LargeError:
         """Return the error of steps that end before the end of the course."""
         place, (*_, force) = self._place, self._force()
-        depth = place.share * self._depth
-        message = (
-            f"time steps reached {place.time:.3g} s of {course.times[-1]:.3g} s, at a depth of {depth * 1e3:.3g} mm, "
-            f"where F is {force:.4g} N (Newton's method: {why}); the tissue becomes unstable, or elements at the "
-            "probe's edge are flattened; use a smaller depth, or a larger rim"
-        )
-        return LargeError(message, (depth, float(force)) if place.has_moved else None)
+        reached, times = (place.share * self._depth, float(force)), (place.time, course.times[-1])
+        return ended(why, self._law, reached, self._depth, is_found=self._pressed.is_found, times=times)

@@ -44,6 +44,8 @@ def along_axis(tool: Tool, places: FloatArray) -> Tool:
 class PressedTool(Pressed):
     """Relaxing tissue of a ``law`` and a tool that is pressed in by shares of a ``depth`` (m)."""
 
+    is_found = True
+
     def __init__(
         self, surface: Surface, elements: Elements, tool: Tool, law: MaterialLaw, depth: float, stack: ExitStack
     ):

@@ -31,6 +31,7 @@ from pipeline.solve.contact.tissue import DeformedBody
 from pipeline.solve.contact.tool import Tool
 from pipeline.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
 from pipeline.solve.elements.fields import Column
+from pipeline.solve.ended import ended
 from pipeline.solve.estimate import AT_EDGE_LARGE, found_again_bar
 from pipeline.solve.movement import Loads, Movement
 from pipeline.solve.newton import LargeError
@@ -95,16 +96,11 @@ class LargeContact:
         ), iterations
 
 
-def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError) -> LargeError:
+def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError, friction: float = 0.0) -> LargeError:
     """Return the error of a ``path`` that ends before ``depth`` (m)."""
     last, whole = path.last, 2.0 ** len(body.elements.body.mirrored)
-    force = 0.0 if last.touched is None else -whole * float(last.touched.forces[:, 2].sum())
-    message = (
-        f"load steps reached {last.depth * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {force:.4g} N "
-        f"(Newton's method: {why}); the tissue becomes unstable, or elements are flattened; "
-        "use a smaller depth, or smaller elements below the probe"
-    )
-    return LargeError(message, (last.depth, force) if last.depth else None)
+    reached = last.depth, 0.0 if last.touched is None else -whole * float(last.touched.forces[:, 2].sum())
+    return ended(why, body.law, reached, depth, is_found=True, friction=friction)
 
 
 def placed_tool(body: DeformedBody, tool: Tool, depth: float) -> PlacedTool:

@@ -51,7 +51,7 @@ class LargeFrictionalContact(LargeContact):
                     body, lambda there: placed_tool(body, tool, there), path, depth, friction, steps
                 )
             except LargeError as error:
-                raise stopped(body, path, depth, error) from error
+                raise stopped(body, path, depth, error, self._tool.friction) from error
             assert path.last.touched is not None
             touched.append(path.last.touched)
         body.state = path.last.state

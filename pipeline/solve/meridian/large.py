@@ -20,6 +20,7 @@ from pipeline.mesh.meridian import Grading, MeridianArrays
 from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance
 from pipeline.solve.conditions import Conditions
+from pipeline.solve.ended import ended
 from pipeline.solve.load_steps import check_path
 from pipeline.solve.meridian.problem import Answer, MeridianSolver, best_of, error_bar
 from pipeline.solve.meridian.system import HalfPlane, System, max_strain, meshes_of
@@ -97,7 +98,7 @@ class LargeSystem(System):
             left = np.linalg.norm(residual[unknown]) / np.linalg.norm(residual[self.probe])
             if share == 1.0 and left < _LEFT:
                 return state
-        raise LargeError(f"Newton's method did not converge in {_MOST_ITERATIONS} iterations")
+        raise LargeError(f"no equilibrium after {_MOST_ITERATIONS} iterations")
 
     def _newton(self, state: FloatArray, residual: FloatArray, unknown: IntArray, moved: FloatArray) -> FloatArray:
         """Return Newton's change of a ``state`` with a ``residual``, whose probe is ``moved``."""
@@ -167,7 +168,7 @@ class LargeMeridian(LargeSolver):
         try:
             state, path = coarse.press(deep, _SHORTEST if before is None else _SHORTEST_OF_FINER)
         except LargeError as stop:
-            raise stopped(stop, arrays, law, depth) from stop
+            raise stopped(stop, arrays, law, depth, is_found=False) from stop
         check_path(path, _ROUNDING * arrays.points.ptp(axis=0).prod())
         state = fine.equilibrate(fine.forms.interpolate(coarse.forms, state), deep)
         on_probe, on_support, energy = fine.forces(state)
@@ -196,13 +197,11 @@ class LargeMeridian(LargeSolver):
         )
 
 
-def stopped(error: LargeError, arrays: MeridianArrays, law: MaterialLaw, depth: float) -> LargeError:
+def stopped(
+    error: LargeError, arrays: MeridianArrays, law: MaterialLaw, depth: float, *, is_found: bool, friction: float = 0.0
+) -> LargeError:
     """Return the error of a path that ends before ``depth`` (m), in N and metres."""
     if error.reached is None:
         return error
-    reached, force = error.reached[0] * arrays.unit, error.reached[1] * law.lame_mu[0] * arrays.unit**2
-    message = (
-        f"load steps reached {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {force:.4g} N (Newton's "
-        f"method: {error}); the tissue becomes unstable, or folds at the probe's edge; use a smaller depth"
-    )
-    return LargeError(message, (reached, force))
+    reached = error.reached[0] * arrays.unit, error.reached[1] * law.lame_mu[0] * arrays.unit**2
+    return ended(error, law, reached, depth, is_found=is_found, friction=friction, has_own_mesh=True)

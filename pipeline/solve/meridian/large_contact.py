@@ -63,7 +63,7 @@ class LargeMeridianContact(LargeSolver):
         try:
             fine, bar = self._from(begins_with, at, depth) or self._along_path(at, depth, _STEPS.get(grading, 0))
         except LargeError as stop:
-            raise stopped(stop, arrays, law, depth) from stop
+            raise stopped(stop, arrays, law, depth, is_found=True, friction=self._tool.friction) from stop
         fine.check()
         deep, force, balance = depth / arrays.unit, fine.force, fine.balance
         return _Found(
