@@ -9,13 +9,14 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.shard import Shard
+from pipeline.report.dataset import build
 from pipeline.report.publish import ResultsError, publish
 from pipeline.run.begun import ENDING, Begun, fail_begun
 from pipeline.run.merge import merge
@@ -28,6 +29,9 @@ from pipeline.solve import CompilerError
 from pipeline.stages import stage
 from pipeline.states import SKIPPED
 from pipeline.study.sweep import Study
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Seconds that the first rank has, when a parallel run is interrupted, to write what is finished.
 _GRACE = 15
@@ -117,14 +121,8 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
     Raises:
         ResultsError: if the results cannot be written.
     """
-    start, interrupted = _now(), False
-    if plan.solves:
-        load_solvers()  # before signals are handled
-    try:
-        with _interruptible() as signals:
-            _execute(plan, opened, comm, progress, signals)
-    except KeyboardInterrupt:
-        interrupted = True
+    start = _now()
+    interrupted = _compute(plan, opened, comm, progress)
     files: tuple[Path, ...] = ()
     wrong: ResultsError | None = None
     if opened.store is not None:
@@ -141,6 +139,27 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
     if wrong:
         raise wrong
     return Outcome(counts, failures(plan, opened.records), files, interrupted)
+
+
+def solve(study: Study, comm: MPI.Comm, store: Path, progress: Terminal | None = None) -> "xr.Dataset":
+    """Return the dataset of a study on every rank, without writing it: of forces that another result is made of.
+
+    Cases are read from the store, and kept in it, as those of a run; collective.
+
+    Raises:
+        StoreError: on every rank, if the store cannot be used.
+        KeyboardInterrupt: if it was interrupted; what was finished is on record.
+    """
+    plan, opened = prepare(study, comm, store)
+    with abort_on_exception(comm):
+        interrupted = _compute(plan, opened, comm, progress)
+        if opened.store is not None:
+            opened.store.close()
+        if interrupted:
+            end_ranks(comm, 130)
+            raise KeyboardInterrupt
+        dataset: xr.Dataset = comm.bcast(build(plan, opened.records) if comm.rank == 0 else None)
+    return dataset
 
 
 def load_solvers() -> None:
@@ -187,6 +206,18 @@ def ended_soon() -> Iterator[None]:
 
     with _heard_by(interrupt):
         yield
+
+
+def _compute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None) -> bool:
+    """Carry out ``plan``, and return whether it was interrupted; collective."""
+    if plan.solves:
+        load_solvers()  # before signals are handled
+    try:
+        with _interruptible() as signals:
+            _execute(plan, opened, comm, progress, signals)
+    except KeyboardInterrupt:
+        return True
+    return False
 
 
 def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None, signals: list[int]) -> None:

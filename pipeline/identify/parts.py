@@ -37,8 +37,10 @@ class Unknown:
 class Forward(Protocol):
     """The force of one scene without noise, baseline and machine, as a function of depth and material."""
 
-    names: tuple[str, ...]
-    """Unknowns that the force depends on, such as young, poisson, skin_young and skin_thickness."""
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Unknowns that the force depends on, such as young, poisson, skin_young and skin_thickness."""
+        ...
 
     def force(self, depth: FloatArray, values: Values) -> FloatArray:
         """Return the instantaneous elastic force (N) at depths (m) of the tool below the surface; 0 above it."""

@@ -1,0 +1,34 @@
+"""The force of a measurement's scene as a function of depth and unknowns: which model it is computed with."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.identify.parts import Forward, Unknown
+from pipeline.study.sweep import Study
+from pipeline.surrogate.build import build
+from pipeline.surrogate.cases import Solve, domain_of
+from pipeline.surrogate.derived import parameters
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+def forward_of(scene: Study, unknowns: Sequence[Unknown], deepest: float, solve: Solve) -> Forward:
+    """Return the force of a scene down to a depth (m), over the ranges of those unknowns that are keys of its study.
+
+    Raises:
+        StudyError: if the study cannot be run, or is not one scene.
+        SurrogateError: if a case that it needs has no force.
+    """
+    of_scene = parameters(scene)
+    bounds = {unknown.name: (unknown.low, unknown.high) for unknown in unknowns if unknown.name in of_scene}
+    return build(domain_of(scene, bounds, deepest), solve)
+
+
+def stored_in(store: Path, comm: "MPI.Comm | None" = None) -> Solve:
+    """Return what solves studies on the ranks of ``comm`` (all there are), with their cases in a store."""
+    from pipeline import workflow  # noqa: PLC0415 (MPI starts as it is imported)
+
+    return partial(workflow.solve, comm=workflow.world() if comm is None else comm, store=store)

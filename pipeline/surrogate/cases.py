@@ -1,0 +1,124 @@
+"""Cases of a surrogate: the study of a block of points and depths, and the logarithms of its forces."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.plan.plan import make_plan
+from pipeline.states import OK
+from pipeline.study.capabilities.obstacles import obstacle
+from pipeline.study.parameters import Parameter
+from pipeline.study.problems import Problem, StudyError
+from pipeline.study.sweep import Study
+from pipeline.surrogate.depths import Depths
+from pipeline.surrogate.derived import DEPTH, IN_SPACE, ON_MERIDIAN, derive, has_mesh, in_order
+from pipeline.surrogate.moduli import Bounds, Reference, ranges_of, reference_of
+from pipeline.surrogate.ranges import Range, trend_of
+from pipeline.surrogate.sparse import Block, points_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Solve = Callable[[Study], "xr.Dataset"]
+"""What returns the dataset of a study: it runs it, or reads it from a store."""
+
+
+class SurrogateError(Exception):
+    """A surrogate cannot be made: a case that it needs has no force."""
+
+
+@dataclass(frozen=True)
+class Domain:
+    """What a surrogate spans: a scene, ranges of its parameters, and depths down to the ``deepest`` (m).
+
+    Meshes have an ``accuracy``; None for that of the scene's own mesh. Forces are divided by the depth to the power of
+    ``exponent``; ``is_proportional`` tells that nothing else is left of the depth.
+    """
+
+    scene: Study
+    ranges: tuple[Range, ...]
+    reference: Reference
+    deepest: float
+    accuracy: float | None = None
+    exponent: float = 1.0
+    is_proportional: bool = False
+    is_on_meridian: bool = False
+
+    def study(self, values: Sequence[FloatArray], depths: FloatArray) -> Study:
+        """Return the study of the product of values of all ranges, ratios among them, and depths (m).
+
+        Raises:
+            StudyError: if it cannot be run.
+        """
+        lists: dict[Parameter, Sequence[float]] = {self.reference.parameter: [self.reference.young]}
+        for one, own in zip(self.ranges, values, strict=True):
+            lists[one.parameter] = (own * (self.reference.young if one.is_ratio else 1.0)).tolist()
+        return derive(self.scene, lists | {DEPTH: depths.tolist()}, self.accuracy)
+
+    @property
+    def middle(self) -> Block:
+        """The middle of every range, in [-1, 1]."""
+        return tuple(np.zeros(1) for _ in self.ranges)
+
+    @property
+    def order(self) -> list[Parameter]:
+        """The parameters of its studies, in the order of its ranges; the depth is the last."""
+        return [self.reference.parameter, *(one.parameter for one in self.ranges), DEPTH]
+
+
+def domain_of(scene: Study, bounds: Bounds, deepest: float) -> Domain:
+    """Return the domain of a surrogate between bounds of parameters, and down to a depth (m).
+
+    Raises:
+        StudyError: if the study cannot be run, or its forces are not proportional to its moduli.
+    """
+    reference = reference_of(scene, bounds)
+    found = Domain(scene, ranges_of(scene, bounds, reference), reference, deepest)
+    found = found if has_mesh(scene) else replace(found, accuracy=ON_MERIDIAN)
+    study = found.study([one.value(np.zeros(1)) for one in found.ranges], np.array([deepest]))
+    case = study.case((0,) * len(study.axes))
+    if reason := obstacle("scaling", case):
+        raise StudyError(scene.file, [Problem("load", None, f"forces must be proportional to young: {reason}")])
+    if all(solve.axisymmetric for solve in make_plan(study).solves):
+        found = replace(found, is_on_meridian=True)
+    elif found.accuracy is not None:
+        found = replace(found, accuracy=IN_SPACE)
+    exponent = (case.probe.force_exponent if case.probe.is_unilateral else None) or 1.0
+    return replace(found, exponent=exponent, is_proportional="depth" in case.moves_in_proportion)
+
+
+@dataclass
+class Cases:
+    """Solved cases of a domain, by a function that returns datasets; it keeps the relative error bar of each."""
+
+    domain: Domain
+    solve: Solve
+    bars: list[float] = field(default_factory=list)
+
+    def logs(self, block: Block, depths: Depths) -> FloatArray:
+        """Return ln F (1 - ν²)/(E d^p) at the points of a block (points, depths).
+
+        Raises:
+            SurrogateError: if a case has no force.
+        """
+        domain, depth = self.domain, depths.values
+        study = domain.study([one.value(x) for one, x in zip(domain.ranges, block, strict=True)], depth)
+        dataset = self.solve(study)
+        _check(dataset, study)
+        names = ("force", "force_error")
+        force, bar = (in_order(study, domain.order, dataset[name]).reshape(-1, len(depth)) for name in names)
+        self.bars += (bar / force).ravel().tolist()
+        logs = np.log(force / (domain.reference.young * depths.power(depth)))
+        return np.asarray(logs - trend_of(domain.ranges, points_of(block)))
+
+
+def _check(dataset: "xr.Dataset", study: Study) -> None:
+    """Raise an exception if a case has no force."""
+    status, force = np.ravel(dataset["status"]), np.ravel(dataset["force"])
+    if (wrong := np.flatnonzero((status != OK) | ~(force > 0))).size:
+        case = list(study.cases())[int(wrong[0])]
+        why = str(np.ravel(dataset["message"])[wrong[0]]) or str(status[wrong[0]])
+        raise SurrogateError(f"{study.file}: {case}: no force: {why}; a smaller range may avoid this case")

@@ -1,0 +1,95 @@
+"""Studies whose cases a surrogate is made of: a scene with lists of values, run and stored as any other study."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.shapes.body import Body
+from pipeline.shapes.probe import Probe
+from pipeline.study.parameters import Parameter, parameters_of
+from pipeline.study.problems import Problem, StudyError
+from pipeline.study.read import parse
+from pipeline.study.schema import SECTIONS, Material
+from pipeline.study.sweep import Study
+from pipeline.study.swept import Place, placed, written
+from pipeline.study.toml import to_toml
+
+# Error bars asked of cases whose study has none: those of the meridian cost little.
+ON_MERIDIAN, IN_SPACE = 1e-3, 1e-2
+DEPTH = Parameter("depth", "m", 0.0, np.inf, 0.0, np.inf, place=("probe", "depth"))
+
+
+def parameters(scene: Study) -> dict[str, Parameter]:
+    """Return the parameters of a scene by name, with their places in its file."""
+    body, material, probe = (scene.sections[name][0] for name in ("body", "material", "probe"))
+    assert isinstance(body, Body) and isinstance(material, Material) and isinstance(probe, Probe)
+    return {name: one for name, one in parameters_of(body, material, probe).items() if one.place}
+
+
+def has_mesh(scene: Study) -> bool:
+    """Return whether a study has one mesh, and not a comparison of several."""
+    mesh = scene.raw.get("mesh")
+    return isinstance(mesh, Mapping) and not any(isinstance(value, list) for value in mesh.values())
+
+
+def derive(scene: Study, values: Mapping[Parameter, Sequence[float]], accuracy: float | None) -> Study:
+    """Return the study whose cases are the product of ``values`` (SI units), with meshes for an ``accuracy`` if given.
+
+    The elastic force is computed: relaxation is a factor of its own, that of the time.
+
+    Raises:
+        StudyError: with every problem of it, such as sweeps of the scene.
+    """
+    raw = _elastic(scene.raw)
+    if accuracy is not None:
+        raw["mesh"] = {"accuracy": f"{accuracy:g}"}
+    if arrays := [name for name in ("body", "material", "probe") if isinstance(raw.get(name), list)]:
+        raise StudyError(scene.file, [Problem(name, None, "is an array of tables: one is needed") for name in arrays])
+    for parameter, found in values.items():
+        raw = placed(raw, [(_sweep(parameter.place), [_written(raw, parameter, value) for value in found])])
+    study = parse(raw, file=scene.file, text=to_toml(raw, scene.file))
+    own = {_path(parameter) for parameter in values}
+    if swept := [axis for axis in study.axes if axis.path not in own]:
+        problems = [Problem(axis.path, None, f"is a list of {len(axis)}: one value is needed") for axis in swept]
+        raise StudyError(scene.file, problems)
+    return study
+
+
+def in_order(study: Study, order: Sequence[Parameter], values: Any) -> FloatArray:
+    """Return an array of a dataset (xarray) with the dimensions of parameters in their order."""
+    names = {axis.path: axis.name for axis in study.axes}
+    return np.asarray(values.transpose(*(names[_path(parameter)] for parameter in order)), dtype=float)
+
+
+def _elastic(raw: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a study without what the elastic force does not depend on."""
+    found = {name: section for name, section in raw.items() if name in SECTIONS and name != "figure"}
+    for section, key in (("probe", "history"), ("material", "relaxation")):
+        if isinstance(table := found.get(section), dict):
+            found[section] = {name: value for name, value in table.items() if name != key}
+    found["solve"] = {**found.get("solve", {}), "exact": False, "timing": False}
+    return found
+
+
+def _sweep(place: Place) -> Place:
+    """Return the place of the list: that of a part of a size is the size's."""
+    return place[:-1] if isinstance(place[-1], int) else place
+
+
+def _path(parameter: Parameter) -> str:
+    """Return a parameter's place as the axes of studies have it."""
+    section, *rest = _sweep(parameter.place)
+    return f"{section}.{written(tuple(rest))}"
+
+
+def _written(raw: Mapping[str, Any], parameter: Parameter, value: float) -> Any:
+    """Return a value as a study has it."""
+    text = f"{value:.12g} {parameter.unit}" if parameter.unit != "1" else float(f"{value:.12g}")
+    if not isinstance(number := parameter.place[-1], int):
+        return text
+    whole: Any = raw
+    for step in parameter.place[:-1]:
+        whole = whole[step]
+    return [*whole[:number], text, *whole[number + 1 :]]
