@@ -13,7 +13,6 @@ are those of the top. The kernel is smooth, so Gauss' points converge to round-o
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 from math import ceil, inf, log2, pi
 
 import numpy as np
@@ -29,6 +28,8 @@ _PANEL = 16
 _LONGEST = 1e-3
 # Gauss' points along a contact radius, at least, and more for each thickness of the top layer.
 _LEAST, _MORE = 20, 8
+# So many radii are solved for at once, with the points that the largest needs.
+_AT_ONCE = 8
 # Widest contact, in thicknesses of the top layer: beyond, the equation would take minutes.
 WIDEST = 100.0
 # Gauss' points over a quarter of a turn, of each part between kinks.
@@ -48,15 +49,19 @@ class Profile:
     flat: float = 0.0
     kinks: tuple[float, ...] = ()
 
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Radii (m) off the axis at which the slope is not smooth, in order."""
+        return tuple(sorted({radius for radius in (*self.kinks, self.flat) if radius > 0}))
+
     def sneddon(self, x: FloatArray) -> FloatArray:
         """Return x ∫ f'(x sin s) ds over a quarter turn: the depths (m) of contact radii x (n,) on a half-space."""
         if self.flat >= self.limit:
             return np.zeros_like(x)
         nodes, weights = _gauss(_TURN)
-        breaks = sorted({radius for radius in (*self.kinks, self.flat) if radius > 0})
-        ends = np.stack([np.arcsin(np.minimum(1.0, radius / x)) for radius in breaks] + [np.full_like(x, pi / 2)])
         total, start = np.zeros_like(x), np.zeros_like(x)
-        for end in ends:
+        for radius in (*self.breaks, inf):
+            end = np.arcsin(np.minimum(1.0, radius / x))
             half = (end - start) / 2
             angles = start[:, None] + half[:, None] * (nodes + 1)
             total += half * (self.slope(x[:, None] * np.sin(angles)) @ weights)
@@ -87,39 +92,41 @@ def touch(layers: tuple[Layer, ...], base: Solid, profile: Profile, radius: Floa
         )
     waves, weights = _waves(layers, widest)
     weights = weights * (1 - compliance(layers, base, waves))
-    results = np.array([_at(profile, float(a), waves, weights, top) for a in radius]).T
-    return Touch(radius, *results)
+    parts = [
+        _solved(profile, some, waves, weights, _LEAST + ceil(_MORE * float(np.max(some)) / top))
+        for some in np.split(radius, range(_AT_ONCE, len(radius), _AT_ONCE))
+    ]
+    return Touch(radius, *np.concatenate(parts, axis=1))
 
 
-def _at(
-    profile: Profile, radius: float, waves: FloatArray, weights: FloatArray, top: float
-) -> tuple[float, float, float]:
-    points = _LEAST + ceil(_MORE * radius / top)
+def _solved(
+    profile: Profile, radius: FloatArray, waves: FloatArray, weights: FloatArray, points: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return depth, force and stiffness (n,), with ``points`` along each part of the radius (n,)."""
     x, w = _along(profile, radius, points)
     # φ = d φ₁ - φ₂: φ₁ for a flat punch at unit depth, φ₂ for the tool's shape.
-    at = np.append(x, radius)
-    shape = profile.sneddon(at)
-    cosine = np.cos(np.outer(at, waves))
-    kernel = 2 / pi * (cosine * weights) @ cosine[:-1].T * w
-    right = 2 / pi * np.column_stack([np.ones_like(x), shape[:-1]])
-    punch, shaped = np.linalg.solve(np.eye(len(x)) - kernel[:-1], right).T
-    stiffness = pi * float(w @ punch)
+    at = np.append(x, radius[:, None], axis=1)
+    cosine = np.cos(np.multiply.outer(at, waves))
+    kernel = 2 / pi * (cosine * weights) @ cosine[:, :-1].swapaxes(1, 2) * w[:, None]
+    shape = 2 / pi * profile.sneddon(at.ravel()).reshape(at.shape)
+    right = np.stack([np.full_like(x, 2 / pi), shape[:, :-1]], axis=2)
+    phi = np.linalg.solve(np.eye(x.shape[1]) - kernel[:, :-1], right)
+    punch, shaped = pi * np.einsum("ni,nij->jn", w, phi)
     if profile.flat >= profile.limit:
-        return 0.0, 0.0, stiffness
-    depth = float((2 / pi * shape[-1] + kernel[-1] @ shaped) / (2 / pi + kernel[-1] @ punch))
-    return depth, depth * stiffness - pi * float(w @ shaped), stiffness
+        return np.zeros_like(radius), np.zeros_like(radius), punch
+    edge = np.einsum("ni,nij->jn", kernel[:, -1], phi)
+    depth = (shape[:, -1] + edge[1]) / (2 / pi + edge[0])
+    return depth, depth * punch - shaped, punch
 
 
-def _along(profile: Profile, radius: float, points: int) -> tuple[FloatArray, FloatArray]:
-    """Return points and weights from 0 to ``radius``, in parts between kinks."""
+def _along(profile: Profile, radius: FloatArray, points: int) -> tuple[FloatArray, FloatArray]:
+    """Return points and weights (n, m) from 0 to each radius (n,), in parts between kinks; those beyond weigh 0."""
     nodes, weights = _gauss(points)
-    within = {kink for kink in (*profile.kinks, profile.flat) if 0 < kink < radius}
-    ends = [0.0, *sorted(within), radius]
-    parts = [(start, (end - start) / 2) for start, end in pairwise(ends)]
-    return (
-        np.concatenate([start + half * (nodes + 1) for start, half in parts]),
-        np.concatenate([half * weights for _, half in parts]),
-    )
+    within = [kink for kink in profile.breaks if kink < np.max(radius)]
+    ends = np.stack([np.minimum(end, radius) for end in (0.0, *within, inf)])
+    half = np.diff(ends, axis=0).T / 2
+    x = (ends[:-1].T + half)[:, :, None] + np.multiply.outer(half, nodes)
+    return x.reshape(len(radius), -1), np.multiply.outer(half, weights).reshape(len(radius), -1)
 
 
 def _waves(layers: tuple[Layer, ...], widest: float) -> tuple[FloatArray, FloatArray]:
