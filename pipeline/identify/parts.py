@@ -57,11 +57,15 @@ class Hidden(Protocol):
     The factor tends to 1 where the hidden part does not matter. Its unknowns are shared by all curves.
     """
 
-    kind: str
-    """One of the words of ``may_hide``: layer, base or strain."""
+    @property
+    def kind(self) -> str:
+        """One of the words of ``may_hide``: layer, base or strain."""
+        ...
 
-    unknowns: tuple[Unknown, ...]
-    """Its parameters, with the range that they may have."""
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Its parameters, with the range that they may have."""
+        ...
 
     def factor(self, depth: FloatArray, values: Values) -> FloatArray:
         """Return the factor (n,) of the force at depths (m) of the tool below the surface."""
