@@ -142,61 +142,123 @@ def solve_contact(
         LargeError: if the loop does not converge.
         SolveError: if a linear solver fails.
     """
-    repeats, seen, reactions = 0, Counter[bytes](), np.full(len(active), np.inf)
-    friction = None if friction_step is None else FrictionIteration(friction_step)
-    predicted, before = np.zeros(tissue.fixed.shape), inf
+    loop = _Loop(tissue, tool, active, friction_step, is_patient=is_patient, limit=limit, scale=scale)
     for iteration in range(_MOST + 1):
-        positions = tissue.positions()
-        place = tool.distance(positions)
-        normal = _within_planes(place.normal, tissue.fixed)
-        forces = tissue.forces()
-        following = _next_set(tool, active, reactions, place.gap)
-        pressed = np.where(active, np.einsum("ni,ni->n", forces, normal), 0.0)
-        following = _with_care(tool, active, following, repeats)
-        there, exerted = Placed(positions, normal), pressed[:, None] * normal
-        if friction is not None:
-            if iteration:
-                friction.update(iteration, there, predicted, active, following)
-            exerted = exerted + friction.exerted(there, forces, active)
-        is_same, active = np.array_equal(following, active), following
-        if is_same and scale is None and not active.any():
-            raise LargeError("the probe does not touch a single node: use smaller elements below it")
-        free = forces - exerted
-        # An initial guess may be an equilibrium whose tool pulls: no reaction was predicted yet.
-        pulls = iteration == 0 and _pulls(tool, active, pressed)
-        residual = Residual(tissue.unbalanced(), float(np.linalg.norm(free)))
-        enough = max(limit, _ROUNDING) if residual.size > before / 2 else limit
-        before = residual.size
-        if (
-            is_same
-            and not pulls
-            and _is_converged(residual, tool, active, place.gap, pressed, friction, limit=enough, scale=scale)
-        ):
-            if friction is not None and not friction.is_sound(active):
-                raise LargeError("the states of nodes with friction repeat")
-            exerted = np.where(active[:, None], forces, 0.0)
-            return ContactSolution(
-                active, exerted, place.gap, iteration, pressed, None if friction is None else friction.slide
-            )
-        if (
-            not is_patient
-            and iteration >= _SOON
-            and np.abs(place.gap[active]).max(initial=0.0) > _NEARLY_CLOSED * tool.depth
-        ):
-            raise LargeError(f"no equilibrium is near after {iteration} iterations")
-        if not is_same:
-            seen[active.tobytes()] += 1
-            repeats = max(repeats, seen[active.tobytes()])
-            if repeats >= _MOST_REPEATS and friction is None:  # friction leaves nodes that do not settle
-                raise LargeError("active sets repeat")
-        constraint = _constraint(place, normal, np.where(active, pressed, 0.0), active)
-        if friction is not None:
-            constraint = friction.constrain(constraint, there, active)
-        predicted = np.where(tissue.fixed, 0.0, tissue.linearise(constraint))
-        reactions = np.einsum("ni,ni->n", predicted, normal)
-        if _advance(tissue) < _WHOLE and iteration == 0 and not is_patient:
-            raise LargeError("the load step turns tissue inside out")
+        found = loop.judge(iteration)
+        if found is not None:
+            return found
+        loop.step(iteration)
     raise LargeError(f"no equilibrium after {_MOST} iterations")
+
+
+class _Loop:
+    """The iterations of :func:`solve_contact`: the ``active`` set, what was predicted, and the sets seen."""
+
+    def __init__(
+        self,
+        tissue: Tissue,
+        tool: PlacedTool,
+        active: BoolArray,
+        friction_step: FrictionStep | None,
+        *,
+        is_patient: bool,
+        limit: float,
+        scale: float | None,
+    ):
+        self._tissue, self._tool, self._active = tissue, tool, active
+        self._friction = None if friction_step is None else FrictionIteration(friction_step)
+        self._is_patient, self._limit, self._scale = is_patient, limit, scale
+        self._predicted, self._reactions = np.zeros(tissue.fixed.shape), np.full(len(active), np.inf)
+        self._before, self._repeats, self._seen = inf, 0, Counter[bytes]()
+
+    def judge(self, iteration: int) -> ContactSolution | None:
+        """Evaluate the state and take the next set; return the solution if that is one; collective.
+
+        Raises:
+            LargeError: if the loop will not converge.
+        """
+        tissue, tool, before = self._tissue, self._tool, self._active
+        positions, forces = tissue.positions(), tissue.forces()
+        self._place = tool.distance(positions)
+        normal = _within_planes(self._place.normal, tissue.fixed)
+        self._there = Placed(positions, normal)
+        following = _next_set(tool, before, self._reactions, self._place.gap)
+        self._pressed = np.where(before, np.einsum("ni,ni->n", forces, normal), 0.0)
+        self._active = active = _with_care(tool, before, following, self._repeats)
+        exerted = self._exerted(iteration, forces, before)
+        is_same = np.array_equal(active, before)
+        if is_same and self._scale is None and not active.any():
+            raise LargeError("the probe does not touch a single node: use smaller elements below it")
+        residual = Residual(tissue.unbalanced(), float(np.linalg.norm(forces - exerted)))
+        enough = max(self._limit, _ROUNDING) if residual.size > self._before / 2 else self._limit
+        self._before = residual.size
+        # An initial guess may be an equilibrium whose tool pulls: no reaction was predicted yet.
+        pulls = iteration == 0 and _pulls(tool, active, self._pressed)
+        if is_same and not pulls and self._is_converged(residual, enough):
+            return self._solution(iteration, forces)
+        self._check_patience(iteration)
+        if not is_same:
+            self._count()
+        return None
+
+    def step(self, iteration: int) -> None:
+        """Take Newton's step with the set; collective.
+
+        Raises:
+            LargeError: if it turns tissue inside out.
+            SolveError: if a linear solver fails.
+        """
+        active, normal = self._active, self._there.normal
+        constraint = _constraint(self._place, normal, np.where(active, self._pressed, 0.0), active)
+        if self._friction is not None:
+            constraint = self._friction.constrain(constraint, self._there, active)
+        self._predicted = np.where(self._tissue.fixed, 0.0, self._tissue.linearise(constraint))
+        self._reactions = np.einsum("ni,ni->n", self._predicted, normal)
+        if _advance(self._tissue) < _WHOLE and iteration == 0 and not self._is_patient:
+            raise LargeError("the load step turns tissue inside out")
+
+    def _exerted(self, iteration: int, forces: FloatArray, before: BoolArray) -> FloatArray:
+        """Return the forces (n, d) of the tool on nodes of the set ``before``; the state of friction follows."""
+        exerted = self._pressed[:, None] * self._there.normal
+        if self._friction is None:
+            return exerted
+        if iteration:
+            self._friction.update(iteration, self._there, self._predicted, before, self._active)
+        return np.asarray(exerted + self._friction.exerted(self._there, forces, before))
+
+    def _is_converged(self, residual: Residual, limit: float) -> bool:
+        most = max(float(np.linalg.norm(self._pressed)), self._scale or 0.0)
+        if not self._open <= max(_CLOSED, limit) * self._tool.depth:
+            return False
+        if self._friction is None:
+            return residual.size <= max(LEFT, limit) * most
+        is_close = residual.inside <= _LEFT_BESIDE * most and residual.on_surface <= _LEFT_WITH_FRICTION * most
+        return is_close and self._friction.is_same
+
+    @property
+    def _open(self) -> float:
+        """The largest gap (m) of active nodes."""
+        return float(np.abs(self._place.gap[self._active]).max(initial=0.0))
+
+    def _solution(self, iteration: int, forces: FloatArray) -> ContactSolution:
+        active, friction = self._active, self._friction
+        if friction is not None and not friction.is_sound(active):
+            raise LargeError("the states of nodes with friction repeat")
+        exerted, slide = np.where(active[:, None], forces, 0.0), None if friction is None else friction.slide
+        return ContactSolution(active, exerted, self._place.gap, iteration, self._pressed, slide)
+
+    def _check_patience(self, iteration: int) -> None:
+        is_late = not self._is_patient and iteration >= _SOON
+        if is_late and self._open > _NEARLY_CLOSED * self._tool.depth:
+            raise LargeError(f"no equilibrium is near after {iteration} iterations")
+
+    def _count(self) -> None:
+        """Count how often a new set was seen; friction leaves nodes that do not settle."""
+        key = self._active.tobytes()
+        self._seen[key] += 1
+        self._repeats = max(self._repeats, self._seen[key])
+        if self._repeats >= _MOST_REPEATS and self._friction is None:
+            raise LargeError("active sets repeat")
 
 
 def _constraint(place: Distance, normal: FloatArray, pressed: FloatArray, active: BoolArray) -> Constraint:
@@ -236,26 +298,6 @@ def _with_care(tool: PlacedTool, active: BoolArray, following: BoolArray, repeat
     if repeats >= _WITHOUT_FOLLOWERS:
         following = following & (active | ~tool.followers)
     return following
-
-
-def _is_converged(
-    residual: Residual,
-    tool: PlacedTool,
-    active: BoolArray,
-    gap: FloatArray,
-    pressed: FloatArray,
-    friction: FrictionIteration | None,
-    *,
-    limit: float,
-    scale: float | None,
-) -> bool:
-    most = max(float(np.linalg.norm(pressed)), scale or 0.0)
-    if not np.abs(gap[active]).max(initial=0.0) <= max(_CLOSED, limit) * tool.depth:
-        return False
-    if friction is None:
-        return residual.size <= max(LEFT, limit) * most
-    is_close = residual.inside <= _LEFT_BESIDE * most and residual.on_surface <= _LEFT_WITH_FRICTION * most
-    return is_close and friction.is_same
 
 
 def _advance(tissue: Tissue) -> float:
