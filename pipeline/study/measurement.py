@@ -4,30 +4,20 @@ Forces do not depend on these sections: they neither sweep nor change cases.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import inf
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
+from pipeline.experiment.reading import UNITS, Reading, Segment, Window
 from pipeline.shapes.section import Section, Words
 from pipeline.units import parse_quantity, unit_factor
 
 Stiffness = float | tuple[float, float] | Literal["unknown"]
 Hidden = Literal["layer", "base", "strain"]
-Segment = Literal["approach", "hold", "approach+hold", "retract"]
 
 _RIGID = "rigid"
-
-
-@dataclass(frozen=True)
-class Window:
-    """A range of depth (m) or of time (s), by its SI ``unit``."""
-
-    low: float
-    high: float
-    unit: Literal["m", "s"]
 
 
 def _refused(allowed: str) -> PydanticCustomError:
@@ -268,6 +258,21 @@ class Measurement(Section):
     def machine_compliance(self) -> float | None:
         """What the machine yields (m/N): 0 if it is rigid; None if it is to be found."""
         return 1 / self.machine_stiffness if isinstance(self.machine_stiffness, float) else None
+
+    @property
+    def reading(self) -> Reading:
+        """How its file is read."""
+        columns = self.columns.model_dump(exclude_none=True, include=set(UNITS)) if self.columns else {}
+        return Reading(
+            columns=columns,
+            units=self.units.model_dump(exclude_none=True) if self.units else {},
+            spring=self.columns.spring if self.columns else None,
+            segment=self.segment,
+            cycle=self.cycle,
+            window=self.window,
+            depth_sign=self.sign.depth if self.sign else None,
+            force_sign=self.sign.force if self.sign else None,
+        )
 
 
 class Identify(Section):

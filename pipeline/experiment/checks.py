@@ -1,0 +1,132 @@
+"""Checks of a recorded curve: what cannot be one is an error, what is doubtful is told."""
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.experiment.columns import Recorded
+from pipeline.experiment.reading import ExperimentError
+from pipeline.experiment.segments import turning_points
+
+FEWEST = 10
+# Turns of the depth, by more than a twentieth of its range, of rows that are in no order: this share of the rows.
+_JUMP, _MOST_TURNS = 0.05, 0.2
+# A step this many times the usual one, and at least this share of all, is a gap.
+_GAP, _SHARE = 10.0, 0.02
+# Rows at one largest force, while the depth rises by this share of its range, that are a saturated load cell.
+_PLATEAU, _RISE = 5, 0.01
+# Sizes (m, N) of what is measured: from atomic force microscopes to crash tests.
+_DEPTHS, _FORCES = (1e-9, 0.2), (1e-12, 1e5)
+# A rise of the force by less than this many standard deviations of its noise is none.
+_NOISE = 3.0
+# Contact begins, roughly, where this share of the force's rise is exceeded.
+_BEGUN = 0.02
+# Air, in lengths of the contact, that is too long, and what is left of it. Less than this share of a curve is no air:
+# a ball without any exceeds the share above at this depth.
+_LONG, _LEFT, _NONE = 3.0, 2.0, 0.1
+
+
+def check_order(found: Recorded) -> Recorded:
+    """Return the curve; report rows that are in no order, and tell gaps in time."""
+    if np.ptp(found.depth) == 0:
+        raise ExperimentError(found.file, "the depth never changes", column=_depth_name(found))
+    if np.ptp(found.force) == 0:
+        raise ExperimentError(found.file, "the force never changes", column=_force_name(found))
+    if found.time is not None:
+        _check_time(found, found.time)
+    turns = turning_points(found.depth, _JUMP * float(np.ptp(found.depth)))
+    if len(turns) > max(_MOST_TURNS * len(found.depth), 5):
+        line = int(found.lines[turns[1]])
+        why = "the depth jumps to and fro: rows are not in the order of time, or this column is not the depth"
+        raise ExperimentError(found.file, why, column=_depth_name(found), line=line)
+    return found if found.time is None else found.tell(*_gaps(found, found.time, "time", "s"))
+
+
+def _check_time(found: Recorded, time: FloatArray) -> None:
+    """Report times that fall."""
+    steps = np.diff(time)
+    if (steps < 0).any():
+        row = int(np.flatnonzero(steps < 0)[0]) + 1
+        falls = int((steps < 0).sum())
+        why = f"time falls from {time[row - 1]:g} s to {time[row]:g} s: "
+        why += "a second test begins here: write each to its own file" if falls == 1 else (
+            f"it falls in {falls} rows, so these are in no order, or depth and time are swapped")  # fmt: skip
+        raise ExperimentError(found.file, why, column=found.names["time"], line=int(found.lines[row]))
+
+
+def _gaps(found: Recorded, values: FloatArray, what: str, unit: str) -> list[str]:
+    """Say where the largest step of a column is much larger than the usual one."""
+    steps = np.abs(np.diff(values))
+    row = int(np.argmax(steps))
+    if steps[row] <= max(_GAP * float(np.median(steps)), _SHARE * float(np.ptp(values))):
+        return []
+    return [f"gap of {steps[row]:.3g} {unit} in {what} before line {found.lines[row + 1]}"]
+
+
+def check_size(found: Recorded) -> Recorded:
+    """Tell depths and forces that hardly anyone measures: their unit may be another."""
+    told = []
+    depth, force = float(np.ptp(found.depth)), float(np.abs(found.force).max())
+    if not _DEPTHS[0] <= depth <= _DEPTHS[1]:
+        told.append(f"the depth changes by {depth:.3g} m: is its unit right?")
+    if not _FORCES[0] <= force <= _FORCES[1]:
+        told.append(f"the force is up to {force:.3g} N: is its unit right?")
+    return found.tell(*told)
+
+
+def without_saturation(found: Recorded) -> Recorded:
+    """Return the curve without rows in which the load cell is at its end, which are told."""
+    largest = found.force.max()
+    rows = np.flatnonzero(found.force == largest)
+    rise = float(np.ptp(found.depth[rows]))
+    if len(rows) < _PLATEAU or rise < _RISE * np.ptp(found.depth) or len(rows) <= 2 * _usual_run(found.force, largest):
+        return found
+    kept = found.part(found.force < largest)
+    return kept.tell(
+        f"force stays at its largest value {largest:.4g} N in {len(rows)} rows, from line {found.lines[rows[0]]} on, "
+        f"while the depth rises by {rise:.3g} m: the load cell is saturated; these rows are left out"
+    )
+
+
+def _usual_run(force: FloatArray, largest: float) -> int:
+    """Return the largest number of rows in the upper half of a curve with one and the same force below its largest."""
+    upper = force[(force > largest / 2) & (force < largest)]
+    return int(np.unique(upper, return_counts=True)[1].max()) if upper.size else 0
+
+
+def check_contact(found: Recorded) -> Recorded:
+    """Return an approach without air far longer than the contact; report one without contact, tell one without air."""
+    depth, force = found.depth, found.force
+    told = _gaps(found, depth, "depth", "m")
+    air = np.median(force[: max(3, len(force) // 20)])
+    end = np.median(force[-max(3, len(force) // 20) :])
+    noise = float(np.median(np.abs(np.diff(force)))) * 1.4826 / np.sqrt(2)
+    if end - air <= _NOISE * noise:
+        why = f"the force never rises: from {air:.3g} N to {end:.3g} N at a noise of {noise:.2g} N, so there is no "
+        why += "contact in this part; check the signs and the columns"
+        raise ExperimentError(found.file, why, column=_force_name(found))
+    begun = air + _BEGUN * (end - air)
+    below = np.flatnonzero(force < begun)
+    touch = int(below[-1]) + 1 if below.size else 0
+    way, contact = float(depth[min(touch, len(depth) - 1)] - depth[0]), float(depth[-1] - depth[touch - 1])
+    if way < _NONE * np.ptp(depth):
+        told.append("little or no air before the contact: contact point and baseline are hardly known")
+    elif way > _LONG * contact > 0:
+        kept = depth >= depth[touch] - _LEFT * contact
+        told.append(f"{int((~kept).sum())} rows of air, far longer than the contact, are left out")
+        return found.part(kept).tell(*told)
+    return found.tell(*told)
+
+
+def check_count(found: Recorded, what: str) -> Recorded:
+    """Report a part of a curve with too few rows."""
+    if len(found.depth) < FEWEST:
+        raise ExperimentError(found.file, f"{what} has {len(found.depth)} rows: at least {FEWEST} are needed")
+    return found
+
+
+def _depth_name(found: Recorded) -> str:
+    return found.names.get("depth") or found.names.get("piezo", "")
+
+
+def _force_name(found: Recorded) -> str:
+    return found.names.get("force") or found.names.get("deflection", "")

@@ -1,0 +1,49 @@
+"""Headers of columns, and the units in them."""
+
+import re
+from dataclasses import dataclass
+
+from pipeline.units import unit_factor
+
+# A header's name and unit: "load (N)", "Z [mm]", "depth / nm", "t {s}", "depth in mm"; then "force_mN".
+_BRACKETED = re.compile(r"(?P<name>.*?)\s*[(\[{]\s*(?P<unit>[^()\[\]{}]*?)\s*[)\]}]\s*")
+_DIVIDED = re.compile(r"(?P<name>.*?)(?:\s*/\s*|\s+in\s+|,\s*|\s+|_)(?P<unit>[^\s/,_]+)\s*")
+_SI = ("m", "N", "s")
+# Units of other quantities: a column that has one is neither depth, force nor time.
+_OTHERS = frozenset({
+    "-", "%", "1", "V", "mV", "µV", "A", "mA", "Pa", "kPa", "MPa", "GPa", "psi", "°C", "K", "Hz", "deg", "rad",
+    "g", "kg", "gf", "kgf", "lbf", "lb", "in", "inch", "ft", "counts", "a.u.", "mm/s", "mm/min", "N/mm",
+    "mm/mm", "J",
+})  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Header:
+    """A header: all of it, its name, and its unit ("": none)."""
+
+    text: str
+    name: str
+    unit: str = ""
+
+
+def is_unit(text: str) -> bool:
+    """Tell whether a text is a unit of length, force or time."""
+    return any(is_unit_of(text, kind) for kind in _SI)
+
+
+def is_unit_of(text: str, kind: str) -> bool:
+    """Tell whether a text is a unit of the same kind as an SI unit."""
+    try:
+        return unit_factor(text, kind) > 0
+    except ValueError:
+        return False
+
+
+def header_of(text: str) -> Header:
+    """Return a header with its unit, where it has one."""
+    found = _BRACKETED.fullmatch(text)
+    if found and found["name"] and (is_unit(found["unit"]) or found["unit"] in _OTHERS):
+        return Header(text, found["name"], found["unit"])
+    if (found := _DIVIDED.fullmatch(text)) and found["name"] and is_unit(found["unit"]):
+        return Header(text, found["name"], found["unit"])
+    return Header(text, text)

@@ -1,0 +1,72 @@
+"""Signs of depth and force: deeper and pressed are positive."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.experiment.columns import Recorded
+from pipeline.experiment.reading import Reading
+
+# Shares of the depth at both ends of a curve that are compared, and by how much the contact's end must differ more.
+_END, _CLEAR = 0.25, 2.0
+_FEWEST = 4
+
+
+def signed(found: Recorded, reading: Reading) -> Recorded:
+    """Return the curve with depth and force positive where the tool presses.
+
+    Force varies where there is contact, and not in air: this end of the depths is the deep one, and the force there
+    is pressure. Where both ends vary alike, the tool is taken to advance from the first row on.
+    """
+    own = _deep_end(found.depth, found.force)
+    depth_sign = reading.depth_sign or own or _by_time(found.depth, found.force)
+    force_sign = reading.force_sign or _force_sign(found.depth * depth_sign, found.force)
+    told = []
+    if reading.depth_sign is None and depth_sign < 0:
+        told.append(f"depth falls as the tool advances (column `{_name(found, 'depth')}`): its sign is changed")
+    if reading.force_sign is None and force_sign < 0:
+        told.append(f"force is negative under pressure (column `{_name(found, 'force')}`): its sign is changed")
+    if own and reading.depth_sign == -own:
+        told.append(f"sign.depth = {reading.depth_sign} makes the end with constant force the deep one: is it {own}?")
+    force = found.force * force_sign
+    if found.deflection is not None:  # the depth is the piezo's way less what the spring yields
+        return replace(
+            found, depth=found.depth * depth_sign - found.deflection * force_sign, force=force, deflection=None
+        ).tell(*told)
+    return replace(found, depth=found.depth * depth_sign, force=force).tell(*told)
+
+
+def _name(found: Recorded, kind: str) -> str:
+    return found.names.get(kind) or found.names["piezo" if kind == "depth" else "deflection"]
+
+
+def _deep_end(depth: FloatArray, force: FloatArray) -> int:
+    """Return 1 if the force varies at the largest depths, -1 if it does at the smallest; 0 if that is not clear."""
+    low, high = (_spread(depth, force, end) for end in (-1, 1))
+    if max(low, high) == 0:
+        return 0
+    return 1 if high > _CLEAR * low else -1 if low > _CLEAR * high else 0
+
+
+def _spread(depth: FloatArray, force: FloatArray, end: int) -> float:
+    """Return by how much the force varies with the depth in the last quarter of the depths towards an ``end``."""
+    along = end * depth
+    near = along >= along.max() - _END * np.ptp(along)
+    if near.sum() < _FEWEST or np.ptp(along[near]) == 0:
+        return 0.0
+    slope = np.polyfit(along[near] - along[near].mean(), force[near], 1)[0]
+    return float(abs(slope) * np.ptp(along[near]))
+
+
+def _by_time(depth: FloatArray, force: FloatArray) -> int:
+    """Return the sign with which the depth rises from the first row to the one of the largest change of force."""
+    turn = int(np.argmax(np.abs(force - force[0])))
+    return -1 if depth[turn] < depth[0] else 1
+
+
+def _force_sign(depth: FloatArray, force: FloatArray) -> int:
+    """Return the sign with which the force at the deep end is pressure."""
+    span = np.ptp(depth)
+    deep, shallow = depth >= depth.max() - 0.05 * span, depth <= depth.min() + _END * span
+    return -1 if np.median(force[deep]) < np.median(force[shallow]) else 1

@@ -1,0 +1,183 @@
+"""The table of numbers in a text: its headers with their units, its values, and the lines they are from."""
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from io import StringIO
+
+import numpy as np
+import pandas as pd
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.experiment.header import Header, header_of, is_unit
+from pipeline.experiment.layout import MISSING, Layout, find_layout
+from pipeline.experiment.reading import ExperimentError
+
+# Lines of other widths among the rows, beyond which a file is more than one table.
+_MOST_ODD = 0.05
+# The separator of fields that ASCII has: no text has it.
+_UNIT = "\x1f"
+_COMMENT = re.compile(r"\s*(#|%|//|!|')\s*")
+_PURE = ("%", "1", "-", "")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Values (rows × columns; NaN where missing) and the numbers of their lines, from 1.
+
+    ``strange`` has, by column, the first line and text of a value that is no number. ``told`` says what was found.
+    """
+
+    file: str
+    headers: tuple[Header, ...]
+    values: FloatArray
+    lines: IntArray
+    strange: dict[int, tuple[int, str]] = field(default_factory=dict)
+    told: tuple[str, ...] = ()
+    layout: Layout = field(default_factory=lambda: Layout(",", ".", 0))
+
+
+def table_of(lines: Sequence[str], file: str) -> Table:
+    """Return the table in the ``lines`` of a file; ``file`` is for messages.
+
+    Raises:
+        ExperimentError: if there is none, or more than one.
+    """
+    layout = find_layout(lines)
+    if layout is None:
+        raise ExperimentError(file, "has no table of numbers: no two lines have the same number of numeric columns")
+    begin = next((n for n, line in enumerate(lines) if _is_data(layout, line)), None)
+    if begin is None:
+        raise ExperimentError(file, "has no row of numbers")
+    kept, odd = _rows(lines, begin, layout)
+    headers = _headers(lines[:begin], layout)
+    _check_decimals(headers, lines[:begin], layout, file, begin)
+    if len(odd) > max(1, _MOST_ODD * len(kept)):
+        width = len(layout.fields(lines[odd[0]]))
+        raise ExperimentError(file, f"has {width} columns, others have {layout.width}", line=odd[0] + 1)
+    told = [f"{_of_lines(odd)} no row of {layout.width} columns: left out"] if odd else []
+    numbers = np.array(kept) + 1
+    values, strange = _values([lines[n] for n in kept], layout, numbers)
+    return Table(file, headers, values, numbers, strange, tuple(told), layout)
+
+
+def _is_data(layout: Layout, line: str) -> bool:
+    """Tell a row of numbers; where a column has text, one of numbers for the most part."""
+    fields = layout.fields(line)
+    if len(fields) != layout.width:
+        return False
+    return layout.is_row(fields) or sum(map(layout.is_number, fields)) > max(1, layout.width / 2)
+
+
+def _rows(lines: Sequence[str], begin: int, layout: Layout) -> tuple[list[int], list[int]]:
+    """Return which lines from ``begin`` on have the right number of columns, and which others have text."""
+    kept: list[int] = []
+    odd: list[int] = []
+    for number in range(begin, len(lines)):
+        line = lines[number]
+        if not line.strip():
+            continue
+        is_plain = '"' not in line and layout.separator != " "
+        width = line.count(layout.separator) + 1 if is_plain else len(layout.fields(line))
+        (kept if width == layout.width else odd).append(number)
+    return kept, odd
+
+
+def _of_lines(odd: Sequence[int]) -> str:
+    if len(odd) == 1:
+        return f"line {odd[0] + 1} is"
+    return f"{len(odd)} lines, such as line {odd[0] + 1}, are"
+
+
+def _values(rows: Sequence[str], layout: Layout, lines: IntArray) -> tuple[FloatArray, dict[int, tuple[int, str]]]:
+    """Return the numbers of rows, and the first text that is none of each column."""
+    separator = r"\s+" if layout.separator == " " else layout.separator
+    if any('"' in row for row in rows):
+        rows, separator = [_UNIT.join(layout.fields(row)) for row in rows], _UNIT
+    frame = pd.read_csv(
+        StringIO("\n".join(rows)),
+        sep=separator,
+        quoting=csv.QUOTE_NONE,
+        decimal=layout.decimal,
+        header=None,
+        names=range(layout.width),
+        index_col=False,
+        skipinitialspace=True,
+        skip_blank_lines=False,
+        low_memory=False,
+    )
+    found = np.empty(frame.shape)
+    strange = {}
+    for number in range(layout.width):
+        column = frame[number]
+        if column.dtype in (object, bool):
+            text = column.astype(str).str.strip()
+            plain = text.str.replace(",", ".", regex=False) if layout.decimal == "," else text
+            numbers = pd.to_numeric(plain, errors="coerce")
+            wrong = numbers.isna() & column.notna() & ~text.str.lower().isin(MISSING)
+            if wrong.any():
+                first = int(np.argmax(wrong.to_numpy()))
+                strange[number] = (int(lines[first]), str(text.iloc[first]))
+            column = numbers
+        found[:, number] = column.to_numpy(float)
+    found[~np.isfinite(found)] = np.nan
+    return found, strange
+
+
+def _headers(before: Sequence[str], layout: Layout) -> tuple[Header, ...]:
+    """Return the headers, from the lines before the rows: names, and units there or in a row of their own."""
+    near = [line for line in before if line.strip()][-3:]
+    rows = [row for row in (_header_fields(line, layout) for line in near) if row]
+    if not rows:
+        return tuple(Header("", "") for _ in range(layout.width))
+    units = None
+    if len(rows) > 1 and _are_units(rows[-1]):
+        units = rows.pop()
+    found = []
+    for number, text in enumerate(rows[-1]):
+        header = header_of(text)
+        if units is not None and units[number].strip("()[]{} ") and not header.unit:
+            unit = units[number].strip("()[]{} ")
+            header = Header(f"{text} ({unit})", text, unit)
+        found.append(header)
+    return tuple(found)
+
+
+def _header_fields(line: str, layout: Layout) -> list[str] | None:
+    """Return the fields of a line of headers; None if it has another number of columns."""
+    for text in (line, _COMMENT.sub("", line, count=1)):
+        fields = layout.fields(text)
+        if len(fields) == layout.width and not all(map(layout.is_number, fields)):
+            return fields
+        if layout.separator == " " and text.strip():
+            joined = re.sub(r"\s+([(\[{/])\s*", r"\1", text)  # "depth (mm)" is one header
+            fields = joined.split()
+            for other in ("\t", ";", ",", "  "):
+                if len(fields) != layout.width and other in text.strip():
+                    fields = [field.strip() for field in text.strip().split(other) if field.strip()]
+            if len(fields) == layout.width:
+                return fields
+    return None
+
+
+def _are_units(fields: Sequence[str]) -> bool:
+    """Tell a row of units."""
+    bare = [field.strip("()[]{} ") for field in fields]
+    return any(map(is_unit, bare)) and all(is_unit(unit) or unit in _PURE or len(unit) <= 6 for unit in bare)
+
+
+def _check_decimals(headers: tuple[Header, ...], before: Sequence[str], layout: Layout, file: str, begin: int) -> None:
+    """Report numbers with decimal commas between which there are commas, too."""
+    if layout.separator != "," or any(header.text for header in headers):
+        return
+    for line in before:
+        fields = layout.fields(line)
+        is_header = len(fields) > 1 and not any(map(layout.is_number, fields))
+        if is_header and len(fields) < layout.width <= 2 * len(fields):
+            raise ExperimentError(
+                file,
+                f"has {layout.width} columns, and a header of {len(fields)}: decimal commas cannot be told from commas "
+                "between columns; save it with semicolons",
+                line=begin + 1,
+            )

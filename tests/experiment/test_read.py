@@ -1,0 +1,200 @@
+"""Files of testing machines become the curves that were measured, whatever their layout."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.experiment.read import files_of, read_curve, read_curves
+from pipeline.experiment.reading import ExperimentError, Reading, Window
+from tests.experiment.curves import AIR, DEEP, RAMP, approach, cycle, write
+
+TIME, DEPTH, FORCE = approach()
+IN_MM = {"time (s)": TIME, "depth (mm)": 1e3 * DEPTH, "force (mN)": 1e3 * FORCE}
+
+
+def read(path, **given):
+    return read_curve(path, Reading(**given))
+
+
+def is_the_approach(curve) -> bool:
+    """Tell whether a curve is the one that was written, but for an offset of the depth."""
+    assert curve.time is not None
+    np.testing.assert_allclose(curve.time, TIME, atol=1e-4)
+    np.testing.assert_allclose(curve.depth - curve.depth[0], DEPTH, atol=1e-8)
+    np.testing.assert_allclose(curve.force, FORCE, atol=1e-7)
+    return True
+
+
+LAYOUTS = {
+    "csv": {},
+    "tabs": {"separator": "\t"},
+    "semicolons and decimal commas": {"separator": ";", "decimal": ","},
+    "tabs and decimal commas": {"separator": "\t", "decimal": ","},
+    "comma and space": {"separator": ", "},
+    "aligned": {"separator": "\t  "},
+    "bars": {"separator": " | "},
+    "UTF-16": {"encoding": "utf-16"},
+    "UTF-8 with its mark": {"encoding": "utf-8-sig", "separator": ";"},
+    "preamble": {"before": "Machine: press 7;\nOperator,me\nBall (mm),3\nSpeed 0.1 mm/s, twice\n\n"},
+    "preamble as long as rows": {"before": "Date,2025-10-30,12:21\nWell,E5,x\n\n"},
+    "comment": {"before": "# made by hand\n# "},
+    "Excel's separator": {"before": "sep=;\n", "separator": ";"},
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_layouts(tmp_path, layout):
+    path = write(tmp_path / "a.csv", IN_MM, **LAYOUTS[layout])
+    assert is_the_approach(read(path))
+
+
+HEADERS = [
+    ("t / s", "z / mm", "F / mN"),
+    ("Time [s]", "Indentation [mm]", "Load [mN]"),
+    ("time_s", "displacement_mm", "force_mN"),
+    ("Zeit in s", "Weg in mm", "Kraft in mN"),
+    ("Timestamp(s)", "Z_Position(mm)", "Normal Force(mN)"),
+    ("elapsed {s}", "Extension {mm}", "Load {mN}"),
+]
+
+
+@pytest.mark.parametrize("names", HEADERS)
+def test_headers_with_units(tmp_path, names):
+    curve = read(write(tmp_path / "a.csv", dict(zip(names, IN_MM.values(), strict=True))))
+    assert is_the_approach(curve)
+    assert any(f"depth is column `{names[1]}`" in told for told in curve.told)
+
+
+def test_units_in_a_row_of_their_own(tmp_path):
+    columns = dict(zip(("Time", "Extension", "Load"), IN_MM.values(), strict=True))
+    assert is_the_approach(read(write(tmp_path / "a.csv", columns, change=lambda x: [x[0], "(s),(mm),(mN)", *x[1:]])))
+
+
+def test_micro_in_a_western_encoding(tmp_path):
+    columns = {"Zeit (s)": TIME, "Weg (µm)": 1e6 * DEPTH, "Kraft (mN)": 1e3 * FORCE}
+    assert is_the_approach(read(write(tmp_path / "a.txt", columns, encoding="latin-1", separator=";", decimal=",")))
+
+
+def test_no_header_but_numbers_and_units(tmp_path):
+    path = write(tmp_path / "a.txt", IN_MM, separator=" ", change=lambda lines: lines[1:])
+    columns, units = {"time": 1, "depth": 2, "force": 3}, {"time": "s", "depth": "mm", "force": "mN"}
+    assert is_the_approach(read(path, columns=columns, units=units))
+
+
+def test_columns_by_name_without_their_unit_or_with_it(tmp_path):
+    columns = {"t": TIME, "z": 1e3 * DEPTH, "raw": 0 * TIME, "F": 1e3 * FORCE}
+    path = write(tmp_path / "a.csv", columns)
+    assert is_the_approach(read(path, columns={"depth": "z / mm", "force": "F (mN)", "time": "T [s]"}))
+    path = write(tmp_path / "b.csv", IN_MM | {"other (mm)": TIME})
+    assert is_the_approach(read(path, columns={"depth": "depth", "force": "Force (mN)"}))
+
+
+def test_signs_are_found_and_told(tmp_path):
+    curve = read(write(tmp_path / "a.csv", {"time (s)": TIME, "z (mm)": -74 - 1e3 * DEPTH, "F (mN)": -1e3 * FORCE}))
+    assert is_the_approach(curve)
+    assert sum("sign is changed" in told for told in curve.told) == 2
+
+
+def test_a_spring_and_its_deflection(tmp_path):
+    stiffness = 50.0
+    deflection = FORCE / stiffness
+    columns = {"t (s)": TIME, "Z (mm)": 1e3 * (DEPTH + deflection), "deflection (mm)": 1e3 * deflection}
+    names = {"piezo": "Z", "deflection": "deflection", "time": "t"}
+    assert is_the_approach(read(write(tmp_path / "a.csv", columns), columns=names, spring=stiffness))
+
+
+def test_two_forces_that_differ_by_a_constant_are_one(tmp_path):
+    curve = read(write(tmp_path / "a.csv", IN_MM | {"less baseline (mN)": 1e3 * FORCE - 3}, change=lambda lines: [
+        lines[0].replace("less baseline", "corrected force"), *lines[1:]]))  # fmt: skip
+    assert is_the_approach(curve)
+    assert any("no more than a constant" in told for told in curve.told)
+
+
+def test_segments_of_a_ramp_and_hold(tmp_path):
+    time, depth, force = cycle(hold=100)
+    path = write(tmp_path / "a.csv", {"time (s)": time, "depth (mm)": 1e3 * depth, "force (mN)": 1e3 * force})
+    up, hold, both, down = (read(path, segment=s) for s in ("approach", "hold", "approach+hold", "retract"))
+    assert abs(len(up.depth) - 200) <= 3 and abs(len(hold.depth) - 100) <= 6 and abs(len(down.depth) - 200) <= 3
+    assert len(both.depth) == len(up.depth) + len(hold.depth)
+    assert np.ptp(hold.depth) < 0.02 * DEEP
+    assert up.time is not None and hold.time is not None and hold.time[0] == pytest.approx(RAMP, abs=0.5)
+    assert hold.force[-1] < 0.8 * up.force[-1]
+
+
+def test_without_a_hold_approach_and_retract_meet_at_the_deepest_row(tmp_path):
+    time, depth, force = cycle()
+    path = write(tmp_path / "a.csv", {"time (s)": time, "depth (mm)": 1e3 * depth, "force (mN)": 1e3 * force})
+    assert read(path).depth[-1] == pytest.approx(depth.max())
+    assert len(read(path, segment="retract").depth) == pytest.approx(200, abs=2)
+    with pytest.raises(ExperimentError, match="no hold"):
+        read(path, segment="hold")
+
+
+def test_a_noisy_depth_turns_once(tmp_path):
+    time, depth, force = cycle(hold=100)
+    noisy = depth + np.random.default_rng(2).normal(0, 5e-6, len(depth))
+    path = write(tmp_path / "a.csv", {"time (s)": time, "depth (µm)": 1e6 * noisy, "force (mN)": 1e3 * force})
+    assert len(read(path).depth) == pytest.approx(200, abs=8)
+    assert len(read(path, segment="hold").depth) == pytest.approx(100, abs=15)
+
+
+def test_cycles_are_apart(tmp_path):
+    time, depth, force = cycle()
+    columns = {
+        "time (s)": np.concatenate([time, time + time[-1] + 0.1, time + 2 * time[-1] + 0.2]),
+        "depth (mm)": 1e3 * np.tile(depth, 3),
+        "force (mN)": np.concatenate([1e3 * force, 900 * force, 800 * force]),
+    }
+    path = write(tmp_path / "a.csv", columns)
+    curves = [read(path, cycle=number) for number in (1, 2, 3)]
+    assert [round(c.force.max() / force.max(), 2) for c in curves] == [1.0, 0.9, 0.8]
+    assert any("3 cycles" in told for told in curves[0].told)
+    with pytest.raises(ExperimentError, match="it has 3"):
+        read(path, cycle=4)
+
+
+def test_a_window_of_depth_or_time_as_recorded(tmp_path):
+    path = write(tmp_path / "a.csv", {"time (s)": TIME + 1000, "z (mm)": -1e3 * DEPTH, "F (mN)": 1e3 * FORCE})
+    curve = read(path, window=Window(-1.5e-3, -0.5e-3, "m"))
+    assert np.ptp(curve.depth) == pytest.approx(1e-3, rel=0.02)
+    curve = read(path, window=Window(0.0, 15.0, "s"))
+    assert curve.time is not None and curve.time[-1] == pytest.approx(15, abs=0.1)
+
+
+def test_air_far_longer_than_contact_is_cut(tmp_path):
+    far = np.linspace(-9e-3, 0, 900, endpoint=False)
+    noise = np.random.default_rng(3).normal(0, 2e-5, len(far))
+    depth, force = np.concatenate([far, DEPTH]), np.concatenate([noise, FORCE])
+    curve = read(write(tmp_path / "a.csv", {"depth (mm)": 1e3 * depth, "force (mN)": 1e3 * force}))
+    air = AIR - (curve.depth[0])
+    assert DEEP < air < 3 * DEEP
+    assert any("air" in told for told in curve.told)
+
+
+def test_a_folder_of_curves_in_the_order_of_their_numbers(tmp_path):
+    (tmp_path / "curves").mkdir()
+    for number in (1, 2, 10):
+        write(tmp_path / "curves" / f"well_{number}.csv", IN_MM | {"force (mN)": number * 1e3 * FORCE})
+    curves = read_curves("curves/*.csv", Reading(), tmp_path)
+    assert [curve.name for curve in curves] == ["well_1", "well_2", "well_10"]
+    assert [round(curve.force.max() / FORCE.max()) for curve in curves] == [1, 2, 10]
+    assert files_of(str(tmp_path / "curves" / "*.csv"), Path("elsewhere")) == files_of("curves/*.csv", tmp_path)
+    (tmp_path / "curves" / "well_2.csv").write_text("nothing")
+    with pytest.raises(ExperimentError, match="well_2"):
+        read_curves("curves/*.csv", Reading(), tmp_path)
+
+
+REAL = Path(os.environ.get("EPSMESH_CURVES", "nowhere"))
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason="EPSMESH_CURVES names no folder of measured curves")
+def test_measured_curves_are_read_as_they_are():
+    for well, force in (("E5", 10.0), ("E6", 10.3), ("E7", 10.2)):
+        curve = read(REAL / "asmi" / f"well_{well}.csv")
+        assert curve.time is not None and 0.15e-2 < np.ptp(curve.depth) < 0.2e-2
+        assert np.ptp(curve.force) == pytest.approx(force, rel=0.02)
+    for curve in read_curves("ecoflex/EF*.csv", Reading(), REAL):
+        assert np.ptp(curve.depth) == pytest.approx(20e-3, rel=1e-3)
+        assert len(curve.depth) == 1202
