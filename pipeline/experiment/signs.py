@@ -13,28 +13,31 @@ _END, _CLEAR = 0.25, 2.0
 _FEWEST = 4
 
 
-def signed(found: Recorded, reading: Reading) -> Recorded:
-    """Return the curve with depth and force positive where the tool presses.
+def signs_of(found: Recorded, reading: Reading) -> tuple[int, int]:
+    """Return the signs of depth and force with which both are positive where the tool presses.
 
     Force varies where there is contact, and not in air: this end of the depths is the deep one, and the force there
     is pressure. Where both ends vary alike, the tool is taken to advance from the first row on.
     """
-    own = _deep_end(found.depth, found.force)
-    depth_sign = reading.depth_sign or own or _by_time(found.depth, found.force)
-    force_sign = reading.force_sign or _force_sign(found.depth * depth_sign, found.force)
+    depth = reading.depth_sign or _deep_end(found.depth, found.force) or _by_time(found.depth, found.force)
+    return depth, reading.force_sign or _force_sign(found.depth * depth, found.force)
+
+
+def signed(found: Recorded, reading: Reading) -> Recorded:
+    """Return the curve with depth and force positive where the tool presses: see :func:`signs_of`."""
+    depth_sign, force_sign = signs_of(found, reading)
     told = []
     if reading.depth_sign is None and depth_sign < 0:
         told.append(f"depth falls as the tool advances (column `{_name(found, 'depth')}`): its sign is changed")
     if reading.force_sign is None and force_sign < 0:
         told.append(f"force is negative under pressure (column `{_name(found, 'force')}`): its sign is changed")
+    own = _deep_end(found.depth, found.force)
     if own and reading.depth_sign == -own:
         told.append(f"sign.depth = {reading.depth_sign} makes the end with constant force the deep one: is it {own}?")
-    force = found.force * force_sign
+    depth, force = found.depth * depth_sign, found.force * force_sign
     if found.deflection is not None:  # the depth is the piezo's way less what the spring yields
-        return replace(
-            found, depth=found.depth * depth_sign - found.deflection * force_sign, force=force, deflection=None
-        ).tell(*told)
-    return replace(found, depth=found.depth * depth_sign, force=force).tell(*told)
+        depth = depth - found.deflection * force_sign
+    return replace(found, depth=depth, force=force, deflection=None).tell(*told)
 
 
 def _name(found: Recorded, kind: str) -> str:

@@ -1,0 +1,136 @@
+"""What is in the file of a force curve, in words, and the part of a study file that reads it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.experiment.columns import Recorded
+from pipeline.experiment.read import read_curve, whole_curve
+from pipeline.experiment.reading import UNITS, ExperimentError, Reading
+from pipeline.experiment.segments import cycles_of
+from pipeline.experiment.signs import signed, signs_of
+from pipeline.experiment.table import Table, table_of
+from pipeline.experiment.text import read_lines
+from pipeline.experiment.words import is_called
+
+_SEPARATORS = {" ": "spaces", "\t": "tabs", ",": "commas", ";": "semicolons", "|": "bars"}
+# Units that people read, from the largest on: the first of which there is one at least.
+_READ = {
+    "depth": ((1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")),
+    "force": ((1.0, "N"), (1e-3, "mN"), (1e-6, "µN"), (1e-9, "nN")),
+    "time": ((1.0, "s"), (1e-3, "ms")),
+}
+
+
+def describe(path: Path, reading: Reading | None = None) -> str:
+    """Return what a file has: its table, columns, segments, what was found, and a ``[[measurement]]`` to paste.
+
+    A curve that cannot be read without the user's choice is described as far as it is known, with the reason.
+
+    Raises:
+        ExperimentError: if it has no table of numbers.
+    """
+    reading = reading or Reading()
+    table = table_of(read_lines(path), str(path))
+    lines = [_of_table(table, path.name), *_of_columns(table)]
+    try:
+        whole = whole_curve(path, reading)
+        curve = read_curve(path, reading)
+    except ExperimentError as error:
+        return "\n".join([*lines, "", f"not read yet: {error}", "", *_to_choose(table, path.name)])
+    lines += ["", *_of_segments(signed(whole, reading)), *(f"- {told}" for told in curve.told)]
+    return "\n".join([*lines, "", *_block(whole, path.name, signs_of(whole, reading))])
+
+
+def _of_table(table: Table, name: str) -> str:
+    separator = _SEPARATORS[table.layout.separator]
+    return (
+        f"{name}: {len(table.lines)} rows of {table.layout.width} columns in lines {table.lines[0]} to "
+        f"{table.lines[-1]}, separated by {separator}, decimal {'commas' if table.layout.decimal == ',' else 'points'}"
+    )
+
+
+def _of_columns(table: Table) -> list[str]:
+    """Return a line for each column: number, header, and range of values."""
+    rows = []
+    for number, header in enumerate(table.headers):
+        values = table.values[:, number]
+        values = values[~np.isnan(values)]
+        extent = f"{values.min():.10g} to {values.max():.10g}" if values.size else "no values"
+        text = f', and text: "{table.strange[number][1]}"' if number in table.strange else ""
+        rows.append((str(number + 1), header.text or "(no header)", f"{extent}{text}"))
+    widths = [max(len(row[place]) for row in rows) for place in (0, 1)]
+    return [f"  {number:>{widths[0]}}  {header:<{widths[1]}}  {extent}" for number, header, extent in rows]
+
+
+def _of_segments(found: Recorded) -> list[str]:
+    """Return a line for each cycle: what its segments are."""
+    lines = []
+    cycles = cycles_of(found.depth, found.time)
+    for number, cycle in enumerate(cycles, start=1):
+        parts = []
+        for segment in ("approach", "hold", "retract"):
+            rows = cycle.rows(segment)
+            if rows.stop > rows.start:
+                parts.append(f"{segment} {_of_part(found.part(rows))}")
+        lines.append(f"{f'cycle {number}: ' if len(cycles) > 1 else ''}{'; '.join(parts)}")
+    return lines
+
+
+def _of_part(found: Recorded) -> str:
+    """Say how many rows a part has, and over which depths, forces and times."""
+    values = {"depth": found.depth, "force": found.force, "time": found.time}
+    extents = []
+    for kind, column in values.items():
+        if column is not None:
+            extent = float(np.ptp(column))
+            factor, unit = next((one for one in _READ[kind] if extent >= one[0]), _READ[kind][-1])
+            extents.append(f"{extent / factor:.4g} {unit}")
+    return f"of {len(found.depth)} rows over {', '.join(extents)}"
+
+
+def _block(found: Recorded, name: str, signs: tuple[int, int]) -> list[str]:
+    """Return the table of a study that reads the file so."""
+    columns = ", ".join(
+        f"{kind} = {header if header.isdecimal() else _text(header)}" for kind, header in found.names.items()
+    )
+    return [
+        *_heading(name),
+        f"columns = {{{columns}}}",
+        *([f"sign = {{depth = {signs[0]}, force = {signs[1]}}}"] if min(signs) < 0 else []),
+        *_TO_ADD,
+    ]
+
+
+def _to_choose(table: Table, name: str) -> list[str]:
+    """Return the table of a study in which columns are to be chosen: the likely ones are written."""
+    columns, units = [], []
+    for kind in ("depth", "force", "time"):
+        likely = [n for n, header in enumerate(table.headers) if is_called(header.name, kind)]
+        number = likely[0] if likely else ("time", "depth", "force").index(kind)
+        if number >= len(table.headers) or (kind == "time" and not likely):
+            continue
+        header = table.headers[number]
+        columns.append(f"{kind} = {_text(header.text) if header.text else number + 1}")
+        if not header.unit:
+            units.append(f'{kind} = "{ {"m": "mm", "N": "N", "s": "s"}[UNITS[kind]] }"')
+    return [
+        *_heading(name),
+        f"columns = {{{', '.join(columns)}}} # check: header or number of each column",
+        *([f"units = {{{', '.join(units)}}} # check"] if units else []),
+        *_TO_ADD,
+    ]
+
+
+_TO_ADD = [
+    '# machine_stiffness = "60 N/mm" # of machine and load cell; or a range, or "unknown"; rigid without it',
+]
+
+
+def _heading(name: str) -> list[str]:
+    return ["[[measurement]]", f"name = {_text(Path(name).stem)}", f"file = {_text(name)}"]
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

@@ -1,0 +1,60 @@
+"""What is said of a file is what a study needs to read it."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from pipeline.experiment.describe import describe
+from pipeline.experiment.read import read_curve
+from pipeline.experiment.reading import ExperimentError, Reading
+from pipeline.study.curves import curves_of
+from pipeline.study.read import parse
+from tests.cases import raw
+from tests.experiment.curves import cycle, write
+
+TIME, DEPTH, FORCE = cycle(hold=100)
+COLUMNS = {"t (s)": TIME, "Z (mm)": -1e3 * DEPTH, "raw force (mN)": -1e3 * FORCE}
+
+
+def block(said):
+    """Return the part of a study in what is said."""
+    return tomllib.loads(said[said.rindex("[[measurement]]") :])
+
+
+@pytest.mark.parametrize("segment", ["approach", "approach+hold"])
+def test_a_pasted_block_reads_what_was_found(tmp_path, segment):
+    path = write(tmp_path / "curve 1.csv", COLUMNS, separator=";", decimal=",", before='made "by hand"\n')
+    said = describe(path)
+    assert "500 rows of 3 columns in lines 3 to 502, separated by semicolons, decimal commas" in said
+    content = raw() | block(said)
+    content["measurement"][0]["segment"] = segment
+    study = parse(content, file=str(tmp_path / "study.toml"))
+    (curve,) = curves_of(study, study.measurements[0])
+    found = read_curve(path, Reading(segment=segment))
+    np.testing.assert_array_equal(curve.depth, found.depth)
+    np.testing.assert_array_equal(curve.force, found.force)
+    assert not any("sign is changed" in told for told in curve.told)  # it is given
+
+
+def test_segments_are_listed(tmp_path):
+    said = describe(write(tmp_path / "a.csv", COLUMNS))
+    assert "approach of 2" in said and "hold of " in said and "retract of 2" in said
+    assert "2 mm" in said
+
+
+def test_a_choice_is_left_to_the_user(tmp_path):
+    said = describe(write(tmp_path / "a.csv", {"t": TIME, "z": 1e3 * DEPTH, "F": 1e3 * FORCE}))
+    assert "not read yet" in said and "no unit" in said
+    (table,) = block(said)["measurement"]
+    assert table["columns"] == {"depth": "z", "force": "F", "time": "t"}
+    assert set(table["units"]) == {"depth", "force", "time"}
+    parse(raw() | block(said))
+    said = describe(write(tmp_path / "b.csv", COLUMNS, change=lambda lines: lines[1:]))
+    assert block(said)["measurement"][0]["columns"] == {"depth": 2, "force": 3}
+
+
+def test_what_is_no_table_is_refused(tmp_path):
+    (tmp_path / "a.csv").write_text("Dear all,\nno curves today.\n")
+    with pytest.raises(ExperimentError):
+        describe(tmp_path / "a.csv")
