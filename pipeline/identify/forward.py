@@ -10,13 +10,19 @@ from pipeline.study.sweep import Study
 from pipeline.surrogate.build import build
 from pipeline.surrogate.cases import Solve, domain_of
 from pipeline.surrogate.derived import parameters
+from pipeline.surrogate.wide import wide_solve
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+# Most points of a surrogate by the integral equation, which takes 20 ms for one.
+_MANY = 800
+
 
 def forward_of(scene: Study, unknowns: Sequence[Unknown], deepest: float, solve: Solve) -> Forward:
     """Return the force of a scene down to a depth (m), over the ranges of those unknowns that are keys of its study.
+
+    If its body is wide, the integral equation of layered bodies replaces all but three solves.
 
     Raises:
         StudyError: if the study cannot be run, or is not one scene.
@@ -24,7 +30,10 @@ def forward_of(scene: Study, unknowns: Sequence[Unknown], deepest: float, solve:
     """
     of_scene = parameters(scene)
     bounds = {unknown.name: (unknown.low, unknown.high) for unknown in unknowns if unknown.name in of_scene}
-    return build(domain_of(scene, bounds, deepest), solve)
+    domain = domain_of(scene, bounds, deepest)
+    if wide := wide_solve(domain, solve):
+        return build(domain, wide, most=_MANY)
+    return build(domain, solve)
 
 
 def stored_in(store: Path, comm: "MPI.Comm | None" = None) -> Solve:

@@ -1,24 +1,12 @@
-"""What the equations of layered bodies need to know of a probe."""
+"""How wide contact is below a probe."""
 
 from collections.abc import Callable
 from math import sqrt
 
 from pipeline.arrays import FloatArray
-from pipeline.layered.contact import Profile
 from pipeline.layered.hiding import Tip, flat_tip, tip_of
 from pipeline.shapes.probe import Probe
-from pipeline.shapes.probes._round import RoundIndenter
-from pipeline.shapes.probes.disc import Disc
-
-
-def profile_of(probe: Probe) -> Profile | None:
-    """Return the section of a round tool; None for any other."""
-    if isinstance(probe, Disc):
-        return Profile(lambda distance: 0 * distance, limit=probe.radius, flat=probe.radius)
-    if isinstance(probe, RoundIndenter):
-        section = probe.section
-        return Profile(section.slope, limit=probe.limit, flat=section.flat, kinks=probe.kinks)
-    return None
+from pipeline.surrogate.wide import profile_of
 
 
 def tip_of_probe(probe: Probe, deepest: float) -> Callable[[FloatArray], Tip]:

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from pipeline.identify.may_hide import KINDS, hidden_parts
-from pipeline.identify.tools import profile_of, tip_of_probe
+from pipeline.identify.tools import tip_of_probe
 from pipeline.layered.body import LayeredBody
 from pipeline.layered.compliance import Solid
 from pipeline.shapes.rounded import Rounded
 from pipeline.study.read import parse
+from pipeline.surrogate.wide import profile_of
 from tests.cases import raw
 
 NOTHING = {

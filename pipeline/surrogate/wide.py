@@ -1,0 +1,135 @@
+"""Forces of scenes whose body is as good as endless sidewards, by the integral equation of layered bodies.
+
+The equation has round frictionless tools on flat layers of linear elasticity, but not the body's sides. Three cases
+that are solved with their sides tell whether it replaces solves, in a surrogate of hundreds of cases.
+"""
+
+from collections.abc import Hashable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline.layered.body import RIGID, LayeredBody
+from pipeline.layered.compliance import Layer
+from pipeline.layered.contact import Profile
+from pipeline.shapes.body import Layered
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.probes._round import RoundIndenter
+from pipeline.shapes.probes.disc import Disc
+from pipeline.states import OK
+from pipeline.study.case import Case
+from pipeline.study.sweep import Study
+from pipeline.surrogate.cases import Domain, Solve
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Relative error of forces between the depths that are computed, and of the integral equation itself.
+_ERROR = 1e-5
+# The equation replaces solves if it differs by less from three cases with their sides.
+_ACCEPTED = 1e-3
+# Supports below the whole tissue. Sides, fixed or free, are far away.
+_SUPPORTS = ("bottom", "bottom+sides")
+
+
+def profile_of(probe: Probe) -> Profile | None:
+    """Return the section of a round tool; None for any other."""
+    if isinstance(probe, Disc):
+        return Profile(lambda distance: 0 * distance, limit=probe.radius, flat=probe.radius)
+    if isinstance(probe, RoundIndenter):
+        section = probe.section
+        return Profile(section.slope, limit=probe.limit, flat=section.flat, kinks=probe.kinks)
+    return None
+
+
+def layered_body(case: Case) -> LayeredBody | None:
+    """Return the layers of a case on their rigid base; None if the equation does not have what the case has."""
+    body, frame = case.body, case.frame
+    is_flat = isinstance(body, Layered) and not body.inclusion and body.fixed in _SUPPORTS
+    is_on_top = frame.is_upright and frame.point[2] == body.heights[1]
+    is_elastic = not (case.material.is_large or any(region.is_large for region in body.regions))
+    if not (isinstance(body, Layered) and is_flat and is_on_top and is_elastic and _slides(case.probe)):
+        return None
+    if case.load.acts or case.is_truncated:
+        return None
+    return LayeredBody(tuple(_layers(case, body)), RIGID)
+
+
+def _slides(probe: Probe) -> bool:
+    """Return whether contact is that of a round tool without friction, and cannot lift off in its middle."""
+    if profile_of(probe) is None or probe.motion != "press" or probe.slit is not None:
+        return False
+    contact = "frictionless" if isinstance(probe, Disc) else "unilateral"
+    return probe.contact == contact and probe.friction == 0
+
+
+def _layers(case: Case, body: Layered) -> list[Layer]:
+    rest = body.heights[1] - body.heights[0]
+    found = []
+    for layer in body.layer:
+        thickness = min(layer.thickness or rest, rest)
+        found.append(Layer(layer.young, layer.poisson, thickness))
+        rest -= thickness
+    if not body.is_filled:
+        found.append(Layer(case.material.young, case.material.poisson, rest))
+    return found
+
+
+def solve_wide(study: Study, error: float = _ERROR) -> "xr.Dataset":
+    """Return force, force_error, status and message of a study of such cases, as a run returns them.
+
+    The error bar is ``error`` times the force.
+
+    Raises:
+        ValueError: if :func:`layered_body` has no body for a case.
+    """
+    import xarray as xr  # noqa: PLC0415 (slow to import, and only needed here)
+
+    force = np.full(study.shape, np.nan)
+    for (body, profile), cases in _by_scene(study):
+        depth = np.array([case.probe.depth for case in cases])
+        for case, value in zip(cases, body.force(profile, depth), strict=True):
+            force[case.index] = value
+    data = {
+        "force": force,
+        "force_error": error * force,
+        "status": np.full(study.shape, OK, dtype=object),
+        "message": np.full(study.shape, "", dtype=object),
+    }
+    return xr.Dataset({name: ([axis.name for axis in study.axes], values) for name, values in data.items()})
+
+
+def _by_scene(study: Study) -> list[tuple[tuple[LayeredBody, Profile], list[Case]]]:
+    """Return the cases of each body and tool, which differ in depth only."""
+    scenes: dict[Hashable, tuple[tuple[LayeredBody, Profile], list[Case]]] = {}
+    for case in study.cases():
+        body, profile = layered_body(case), profile_of(case.probe)
+        if body is None or profile is None:
+            raise ValueError(f"{study.file}: {case}: is no round frictionless tool on flat linear elastic layers")
+        key = body, case.probe.model_copy(update={"depth": 1.0}).model_dump_json()
+        scenes.setdefault(key, ((body, profile), []))[1].append(case)
+    return list(scenes.values())
+
+
+def wide_solve(domain: Domain, solve: Solve) -> Solve | None:
+    """Return what solves the cases of a surrogate by the equation; None if it does not have their scene or its sides.
+
+    Three cases are solved by ``solve``, at the largest depth: in the middle of all ranges, and at both ends. The error
+    bars of all cases are then the largest sum of theirs and of what the equation differs there.
+    """
+    middle = np.zeros(len(domain.ranges))
+    error = _ERROR
+    for place in (middle, middle - 1, middle + 1):
+        values = [one.value(np.array([x])) for one, x in zip(domain.ranges, place, strict=True)]
+        study = domain.study(values, np.array([domain.deepest]))
+        if any(layered_body(case) is None for case in study.cases()):
+            return None
+        solved = solve(study)
+        force, bar = (np.ravel(solved[name]) for name in ("force", "force_error"))
+        wide = np.ravel(solve_wide(study)["force"])
+        differs = float(np.abs(wide / force - 1).max())
+        if not differs <= _ACCEPTED:
+            return None
+        error = max(error, differs + float((bar / force).max()))
+    return partial(solve_wide, error=error)
