@@ -19,6 +19,7 @@ from pipeline.cli.words import (
     faults_of_machine,
     read_dataset,
 )
+from pipeline.files import FIGURE_FORMATS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,7 +65,7 @@ def report(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Write the report of a dataset beside it: one HTML page, <study>.html.
+    """Write the report of a dataset beside it, or of an identification: one HTML page, <study>.html.
 
     It has the figures, a table of cases to sort and filter, failed and skipped cases with reasons, the study file, and
     the command to run it again. With --figures, the figures are drawn as files instead.
@@ -75,9 +76,14 @@ def report(
 
     Example: epsmesh report studies/figure3.toml --figures --kind error --kind force
     """
+    from pipeline.report.identified import is_identification
+
     if not figures and (kind or rest):
         fail("--kind and --rest say which figures are drawn: give --figures, too")
-    path, dataset = read_dataset(file, output)
+    path, dataset = read_dataset(file, output, any_kind=True)
+    if is_identification(dataset):
+        _write_identification(path, dataset, figures=figures)
+        return
     if figures:
         _draw(path, dataset, kind, rest=rest)
         return
@@ -90,6 +96,18 @@ def report(
     shown = "" if wanted == _NONE else _scene_of(path, dataset, wanted) if wanted else _scene_at_hand(dataset)
     page = write_page(dataset, path.with_suffix(".html"), shown)
     say({"file": str(path), "page": str(page)}, str(page))
+
+
+def _write_identification(path: Path, dataset: "xr.Dataset", *, figures: bool) -> None:
+    """Write the page of an identification beside its dataset, or its figure."""
+    from pipeline.report.figures.identification import draw
+    from pipeline.report.page.identification import write_page
+
+    stem = path.with_suffix("")
+    check_output(*(stem.with_suffix(f".{ending}") for ending in (FIGURE_FORMATS if figures else ("html",))))
+    written = draw(dataset, stem) if figures else [write_page(dataset, path.with_suffix(".html"))]
+    say({"file": str(path), **({"files": list(map(str, written))} if figures else {"page": str(written[0])})},
+        *map(str, written))  # fmt: skip
 
 
 def _draw(path: Path, dataset: "xr.Dataset", kind: list[str] | None, *, rest: bool) -> None:

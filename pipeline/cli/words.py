@@ -114,13 +114,16 @@ def meant(file: Path) -> str:
     return f"; did you mean {known[close[0]]}?" if close else "; `epsmesh new NAME` makes one"
 
 
-def read_dataset(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":
-    """Return the path of the dataset that ``file`` names, and the dataset in memory; exit if there is none."""
-    from pipeline.report.read import dataset_path, read
+def read_dataset(file: Path, output: Path, *, any_kind: bool = False) -> "tuple[Path, xr.Dataset]":
+    """Return the path of the dataset that ``file`` names, and the dataset in memory; exit if there is none.
+
+    It is a study's, or with ``any_kind`` that of an identification, too.
+    """
+    from pipeline.report.read import dataset_path, read, read_any
     from pipeline.report.table import DatasetError
 
     with refusing(DatasetError, file=file):
-        return dataset_path(file, output), read(file, output, warning)
+        return dataset_path(file, output), (read_any if any_kind else read)(file, output, warning)
 
 
 def check_store(path: Path) -> None:

@@ -24,6 +24,9 @@ _WORDS: dict[str, tuple[str, str]] = {
     "unit": ("", "unit of each parameter"),
     "correlation": ("1", "correlation of the errors of two parameters"),
     "seen": ("1", "whether the curves tell the parameter: 0 if any value of its range fits them"),
+    "wanted": ("1", "whether the study asks for the parameter; others widen the bars of these"),
+    "verdict": ("", "whether the declared law fits the curves"),
+    "file": ("", "file of the curve"),
     "profile_value": ("", "values of a parameter at which all others were fitted anew"),
     "profile": ("1", "twice the fall of the logarithm of the likelihood; 3.84 at the ends of a 95 % bar"),
     "depth": ("m", "depth of the tool below the surface"),
@@ -55,6 +58,7 @@ def dataset_of(found: Estimate, attributes: Mapping[str, Any]) -> xr.Dataset:
         "part": (("unknown", "source"), found.part),
         "correlation": (("unknown", "unknown_2"), found.correlation),
         "seen": ("unknown", found.seen.astype(np.int8)),
+        "wanted": ("unknown", [np.int8(unknown.is_wanted) for unknown in found.unknowns]),
         **_profiles(found, names),
         **_curves(found.curves),
         "evidence": ((), found.evidence),
@@ -74,6 +78,29 @@ def dataset_of(found: Estimate, attributes: Mapping[str, Any]) -> xr.Dataset:
         dataset[name].attrs = {"long_name": meaning} | ({"units": unit} if unit else {})
     told = {"told": "\n".join(found.told)} if found.told else {}
     return dataset.assign_attrs({"Conventions": "CF-1.8", "verdict": found.verdict, **told, **attributes})
+
+
+def joined(found: Sequence[xr.Dataset], files: Sequence[str]) -> xr.Dataset:
+    """Return identifications of many files as one dataset with the dimension `file`."""
+    longest = {dim: max(one.sizes.get(dim, 0) for one in found) for dim in ("sample", "point", "window")}
+    padded = [
+        _one_of_many(one).pad({dim: (0, length - one.sizes[dim]) for dim, length in longest.items() if dim in one.dims})
+        for one in found
+    ]
+    whole = xr.concat(padded, "file", data_vars="all", coords="minimal", compat="override", combine_attrs="drop")
+    for name, variable in whole.variables.items():
+        variable.attrs = found[0][name].attrs if name in found[0].variables else {}
+    whole = whole.assign({name: found[0][name] for name in ("unit", "wanted")})
+    whole["file"] = ("file", np.array(files, dtype=object))
+    for name in ("file", "verdict"):
+        whole[name].attrs["long_name"] = _WORDS[name][1]
+    return whole.assign_attrs({key: value for key, value in found[0].attrs.items() if key not in ("verdict", "told")})
+
+
+def _one_of_many(one: xr.Dataset) -> xr.Dataset:
+    """Return an identification with its verdict as a variable, and names of curves that all files share."""
+    names = [f"{number}" for number in range(1, one.sizes["measurement"] + 1)]
+    return one.assign(verdict=((), one.attrs["verdict"])).assign_coords(measurement=names)
 
 
 def _profiles(found: Estimate, names: Sequence[str]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.printable import printable, printable_lines
+from pipeline.report.identified import is_identification
 from pipeline.report.table import DatasetError, warnings_of
 from pipeline.report.values import with_words
 from pipeline.study.identified import FROM
@@ -65,8 +66,24 @@ def read(file: str | Path, output: str | Path = "results", warn: Callable[[str],
     Raises:
         DatasetError: if there is none, or if it is not a study's.
     """
+    dataset = read_any(file, output, warn)
+    if is_identification(dataset):
+        raise DatasetError(f"{file}: is an identification, not a study's dataset: `epsmesh report` shows it")
+    return dataset
+
+
+def read_any(
+    file: str | Path, output: str | Path = "results", warn: Callable[[str], None] = warnings.warn
+) -> xr.Dataset:
+    """Return the dataset of a study, see :func:`read`, or that of an identification.
+
+    Raises:
+        DatasetError: if there is none, or if it is neither.
+    """
     path = dataset_path(file, output)
     dataset = _shown(read_file(path))
+    if is_identification(dataset):
+        return dataset
     if missing := [name for name in _NEEDED if name not in {*dataset.data_vars, *dataset.attrs}]:
         raise DatasetError(f"{path}: not a study's dataset: it has no {', '.join(missing)}")
     for warning in warnings_of(dataset):

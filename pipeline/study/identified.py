@@ -32,9 +32,9 @@ WORDS = Words(
 FROM = re.compile(r"\bfrom\b")
 _COMMAND = "`epsmesh identify STUDY` writes it"
 FITS = "fits"  # the verdict of a model that suits the curves
-_TIME = "time"  # of a term of relaxation
-# Keys of layers and inclusions that are filled in, and how their values and those of [material] are written.
-_UNITS = {"young": " Pa", "thickness": " m", _TIME: " s"}
+# Keys that are filled in, of [material] or of a layer or an inclusion by its name, and units of values.
+_KEYS = ("young", "poisson", "thickness", "radius", "c2", "c3", "limit")
+_UNITS = {"young": " Pa", "thickness": " m", "radius": " m", "time": " s"}
 
 
 class Identified(BaseModel):
@@ -130,9 +130,9 @@ def _material(values: Mapping[str, float]) -> dict[str, Any]:
     for name, value in values.items():
         kind, _, rest = name.partition("_")
         key, _, number = rest.partition("_")
-        if kind == "relaxation" and number:
+        if kind == "relaxation":
             terms.setdefault(number, {})[key] = _written(key, value)
-        elif not rest:
+        elif name in _KEYS:
             found[name] = _written(name, value)
     return found | ({"relaxation": [terms[number] for number in sorted(terms)]} if terms else {})
 
@@ -153,6 +153,10 @@ def _piece(piece: dict[str, Any], values: Mapping[str, float]) -> dict[str, Any]
     start = f"{piece.get('name', '')}_"
     own = {name.removeprefix(start): value for name, value in values.items() if name.startswith(start)}
     return {key: _written(key, value) for key, value in own.items()} | piece
+
+
+def _is_relaxation(name: str) -> bool:
+    return name.startswith("relaxation_")
 
 
 def _written(key: str, value: float) -> Any:
@@ -209,8 +213,11 @@ def _table(path: str, dataset: "xr.Dataset") -> dict[str, Any]:
         raise _UnusableError(f"{what}give a value in the study of the identification, or add a curve that tells it")
     ends = {end: own.get(f"{end}_hidden", own[end]) for end in ("low", "high")}
     ends = {end: values.where(values.notnull(), own[end]) for end, values in ends.items()}
+    if unknown := [name for name in tissue if name.rpartition("_")[2] not in _KEYS and not _is_relaxation(name)]:
+        raise _UnusableError(f"{', '.join(unknown)} cannot be passed on: write the values into [material]")
     material = toml_of(str(dataset.attrs.get("study", "")), path).get("material", {})
-    known = {key: value for key, value in material.items() if key not in (*tissue, "young", "from")}
+    own_keys = (*tissue, "young", "from", *(("relaxation",) if any(map(_is_relaxation, tissue)) else ()))
+    known = {key: value for key, value in material.items() if key not in own_keys}
     return {
         "file": path,
         "unknown": tissue,
@@ -221,8 +228,9 @@ def _table(path: str, dataset: "xr.Dataset") -> dict[str, Any]:
 
 
 def _is_of_test(name: str) -> bool:
-    """Return whether an unknown belongs to the experiment, not to the tissue."""
-    return name in _OF_TEST or name.startswith(tuple(f"{one}_" for one in _OF_TEST))
+    """Return whether an unknown belongs to the experiment or its specimen, not to the tissue."""
+    return name in ("friction", "radius", "thickness") or name.startswith(_OF_TEST)
 
 
-_OF_TEST = ("contact_point", "machine_stiffness", "baseline", "drift", "friction", "radius")
+# Several curves have one each, with the name of the curve behind.
+_OF_TEST = ("contact_point", "machine_stiffness", "baseline", "drift", "hidden_")

@@ -3,50 +3,20 @@
 import numpy as np
 import pytest
 
-from pipeline.identify.dataset import dataset_of, write
-from pipeline.identify.parts import CurveFit, Estimate, NoiseFound, Unknown
+from pipeline.identify.dataset import write
 from pipeline.plan.plan import make_plan
 from pipeline.report.uncertainty import tissue
 from pipeline.study.identified import NOTHING
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_mapping, read_text
 from tests.cases import raw
+from tests.identifications import VALUES, identification
 from tests.report.synthetic import dataset
 
-STUDY = '[material]\nyoung = "1 kPa"\nlaw = "linear"\n'
-UNKNOWNS = (
-    Unknown("young", 1e3, 1e6, "Pa", is_logarithmic=True),
-    Unknown("poisson", 0.2, 0.5, "1"),
-    Unknown("skin_young", 1e3, 1e6, "Pa", is_logarithmic=True),
-    Unknown("skin_thickness", 1e-4, 1e-2, "m", is_logarithmic=True),
-    Unknown("contact_point", -1e-3, 1e-3, "m"),
-)
-VALUES = {
-    "young": (12e3, 10e3, 14e3),
-    "poisson": (0.4, 0.3, 0.44),
-    "skin_young": (90e3, 80e3, 99e3),
-    "skin_thickness": (1e-3, 0.9e-3, 1.1e-3),
-    "contact_point": (0.0, -1e-5, 1e-5),
-}
 
-
-def identification(path, names=("young", "poisson", "contact_point"), study=STUDY, correlation=-0.5, **changes):
-    """Write the dataset of an identification, and return its name."""
-    unknowns = tuple(unknown for unknown in UNKNOWNS if unknown.name in names)
-    value, low, high = np.array([VALUES[unknown.name] for unknown in unknowns]).T
-    size = len(unknowns)
-    depth = np.linspace(0, 1e-3, 20)
-    curve = CurveFit("one", depth, 3 * depth, 3 * depth, 0.1 * depth, NoiseFound(0.5, 0.1, 0.0, 1e-3))
-    matrix = np.eye(size) * (1 - correlation) + correlation
-    found = {
-        "estimate": value, "low": value, "high": value, "low_hidden": low, "high_hidden": high,
-        "part": np.ones((size, 6)), "correlation": matrix, "seen": np.full(size, True), "verdict": "fits",
-    }  # fmt: skip
-    write(
-        dataset_of(Estimate(unknowns, **(found | changes), curves=(curve,), profiles={}), {"study": study}),
-        path / "one.nc",
-    )
-    return "one.nc"
+def write_one(path, **changes):
+    """Write the dataset of an identification to a folder."""
+    write(identification(**changes), path / "one.nc")
 
 
 def using(folder, **changes):
@@ -56,13 +26,13 @@ def using(folder, **changes):
 
 
 def test_a_study_has_the_values_that_were_found(tmp_path):
-    identification(tmp_path)
+    write_one(tmp_path)
     (case,) = using(tmp_path).cases()
     assert (case.material.young, case.material.poisson, case.material.law) == (12e3, 0.4, "linear")
 
 
 def test_layers_have_the_values_found_under_their_names(tmp_path):
-    identification(tmp_path, VALUES)
+    write_one(tmp_path, names=[name for name in VALUES if not name.startswith("relaxation")])
     layer = [{"name": "skin", "poisson": 0.3}, {"name": "fat", "young": "5 kPa", "poisson": 0.3, "thickness": "3 mm"}]
     (case,) = using(tmp_path, body={"layer": layer}).cases()
     assert [one.young for one in case.body.layer] == [90e3, 5e3]
@@ -70,12 +40,12 @@ def test_layers_have_the_values_found_under_their_names(tmp_path):
 
 
 def test_the_text_of_the_study_holds_what_was_read(tmp_path):
-    identification(tmp_path)
+    write_one(tmp_path)
     study = using(tmp_path)
     (tmp_path / "one.nc").unlink()
     again = read_text(study.text, study.file)
     assert again == study
-    identification(tmp_path, estimate=np.array([13e3, 0.4, 0.0]))
+    write_one(tmp_path, estimate=np.array([13e3, 0.4, 0.0]))
     assert using(tmp_path).text != study.text
 
 
@@ -88,7 +58,7 @@ def test_the_text_of_the_study_holds_what_was_read(tmp_path):
     ],
 )
 def test_what_gives_no_material_is_refused(tmp_path, changes, told):
-    identification(tmp_path, **changes)
+    write_one(tmp_path, **changes)
     with pytest.raises(StudyError, match=told) as error:
         using(tmp_path)
     assert "material.from" in str(error.value)
@@ -103,10 +73,10 @@ def test_files_that_are_no_identification_are_refused(tmp_path):
 
 
 def test_values_beside_those_found_are_refused(tmp_path):
-    identification(tmp_path)
+    write_one(tmp_path)
     with pytest.raises(StudyError, match="excludes `from`"):
         using(tmp_path, material={"poisson": 0.3})
-    identification(tmp_path, ("young",), '[material]\nyoung = "1 kPa"\npoisson = 0.45\n')
+    write_one(tmp_path, names=("young",), study='[material]\nyoung = "1 kPa"\npoisson = 0.45\n')
     with pytest.raises(StudyError, match=r"0\.45, with which"):
         using(tmp_path, material={"poisson": 0.3})
     assert using(tmp_path).identified.known == {"poisson": 0.45}
@@ -124,7 +94,7 @@ def test_a_table_that_the_program_did_not_write_is_refused(tmp_path):
 
 
 def test_the_ends_of_the_bars_are_solved_once_where_f_is_not_proportional(tmp_path):
-    identification(tmp_path)
+    write_one(tmp_path)
     plan = make_plan(using(tmp_path))
     assert len(plan.solves) == 3  # both ends of ν; those of E are the case itself
     assert {solve.end_of for solve in plan.solves} == {"", "poisson"}
@@ -135,7 +105,7 @@ def test_the_ends_of_the_bars_are_solved_once_where_f_is_not_proportional(tmp_pa
 @pytest.mark.parametrize("correlation", [-0.5, 0.0, 1.0])
 def test_forces_carry_the_bars_of_the_tissue(tmp_path, monkeypatch, correlation):
     monkeypatch.chdir(tmp_path)
-    identification(tmp_path, correlation=correlation)
+    write_one(tmp_path, correlation=correlation)
     found = dataset(material={"from": "one.nc", "young": None, "poisson": None})
     force = float(found["force"])
     # The synthetic force goes as E (1 + ν).
@@ -144,3 +114,10 @@ def test_forces_carry_the_bars_of_the_tissue(tmp_path, monkeypatch, correlation)
     assert float(found["force_uncertainty"]) / force == pytest.approx(expected, rel=1e-9)
     share = float(found["force_error"]) / (force * expected)
     assert f"the mesh is {100 * share:.2g} % of what you do not know" in tissue(found)
+
+
+def test_relaxation_is_read_into_its_terms(tmp_path):
+    write_one(tmp_path, names=("young", "relaxation_share_1", "relaxation_time_1"), study="[material]\npoisson = 0.4\n")
+    history = {"ramp": "1 s", "hold": "10 s"}
+    (term,) = next(using(tmp_path, probe={"history": history}).cases()).material.relaxation
+    assert (term.share, term.time) == (0.4, 2.0)

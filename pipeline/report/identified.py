@@ -1,0 +1,206 @@
+"""An identification in words: values with both error bars, what the curves do not tell, and the material to paste."""
+
+import json
+from collections.abc import Iterator
+from math import floor, isfinite, log10
+
+import numpy as np
+import xarray as xr
+
+from pipeline.printable import counted
+from pipeline.quantities import quantity_of
+from pipeline.report.words import percent
+from pipeline.study.identified import FITS
+
+# What a body may hide, in words.
+_HIDDEN = {"layer": "a layer", "base": "a stiff base", "strain": "stiffening with strain"}
+_SOURCES = {
+    "noise": "noise",
+    "contact": "contact point and baseline",
+    "machine": "machine",
+    "thickness": "thickness and radius",
+    "law": "law",
+    "mesh": "mesh",
+}
+_NAMES = {
+    "contact_point": "contact point",
+    "machine_stiffness": "stiffness of the machine",
+    "baseline": "baseline",
+    "drift": "drift",
+}
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+# Unknowns whose error is told as a number, not as a share of their value: it may be 0, or is a share itself.
+_ABSOLUTE = ("poisson", "friction", "baseline", "drift", "contact_point", "share")
+# Error bars whose sides differ by more than this share have no ±.
+_UNEVEN = 0.25
+# Names of files that are listed.
+_MOST = 10
+
+
+def is_identification(dataset: xr.Dataset) -> bool:
+    """Tell the dataset of an identification from that of a study."""
+    return {"estimate", "part", "seen"} <= {*dataset.data_vars}
+
+
+def wanted(dataset: xr.Dataset) -> list[str]:
+    """Return the unknowns that were asked for, the moduli first."""
+    names: list[str] = dataset["unknown"].values[dataset["wanted"].values.astype(bool)].astype(str).tolist()
+    return sorted(names, key=lambda name: not name.endswith("young"))
+
+
+def answer(dataset: xr.Dataset) -> list[str]:
+    """Return what was found, in sentences."""
+    if "file" in dataset.dims:
+        return [*_of_files(dataset), *told(dataset)]
+    if dataset.attrs["verdict"] != FITS:
+        return [*_without_bars(dataset), *told(dataset)]
+    return [*(of_unknown(dataset, name) for name in wanted(dataset)), *told(dataset)]
+
+
+def told(dataset: xr.Dataset) -> list[str]:
+    """Return what the fit has to say, in sentences."""
+    return [line for line in str(dataset.attrs.get("told", "")).splitlines() if line]
+
+
+def of_unknown(dataset: xr.Dataset, name: str) -> str:
+    """Say what one unknown is, with both error bars."""
+    one = dataset.sel(unknown=name)
+    what = title(name)
+    if not bool(one["seen"]):
+        ends = f"{written(dataset, name, float(one['low']))} to {written(dataset, name, float(one['high']))}"
+        return f"{what} is not in {_curves(dataset)}: all values from {ends} fit."
+    value = f"{what} = {written(dataset, name, float(one['estimate']))}"
+    first, second = bar(dataset, name), bar(dataset, name, hidden=True)
+    if not second or second == first:
+        return f"{value} {first}."
+    return f"{value} {first} if the body is as declared; {second} if it may hide {hidden_words(dataset)}."
+
+
+def hidden_words(dataset: xr.Dataset) -> str:
+    """Return what the second error bar includes."""
+    kinds = [_HIDDEN.get(kind, kind) for kind in str(dataset.attrs.get("may_hide", "")).split()]
+    return " or ".join(filter(None, (", ".join(kinds[:-1]), *kinds[-1:])))
+
+
+def bar(dataset: xr.Dataset, name: str, *, hidden: bool = False) -> str:
+    """Write the error bar of an unknown: ``± 5 %``, or its ends where they are not even; "" for none."""
+    value, low, high = _ends(dataset, name, hidden=hidden)
+    if not (isfinite(low) and isfinite(high)):
+        return ""
+    half = (high - low) / 2
+    if abs(high + low - 2 * value) > 2 * _UNEVEN * half:
+        return f"({written(dataset, name, low)} to {written(dataset, name, high)})"
+    if name.endswith(_ABSOLUTE) or value == 0:
+        return f"± {written(dataset, name, half, 2)}"
+    return f"± {percent(half / abs(value))}"
+
+
+def parts(dataset: xr.Dataset, name: str) -> str:
+    """Say of which sources the first error bar of an unknown is, the largest first."""
+    one = dataset.sel(unknown=name)
+    shares = [(float(one["part"].sel(source=source)), words) for source, words in _SOURCES.items()]
+    whole = float((one["high"] - one["low"]) / 2)
+    known = sorted((share, words) for share, words in shares if isfinite(share) and share > 0.005 * whole)[::-1]
+    absolute = name.endswith(_ABSOLUTE)
+    size = abs(float(one["estimate"]))
+    of = (f"{words} {written(dataset, name, s, 2) if absolute else percent(s / size)}" for s, words in known)
+    return f"{title(name)}: {', '.join(of)}"
+
+
+def mesh_share(dataset: xr.Dataset, name: str) -> float:
+    """Return the mesh's part of the first error bar, as a share of it."""
+    one = dataset.sel(unknown=name)
+    return float(one["part"].sel(source="mesh") / ((one["high"] - one["low"]) / 2))
+
+
+def title(name: str) -> str:
+    """Return the name of an unknown for people: ``E``, ``E of skin``, ``contact point``."""
+    owner, _, key = name.rpartition("_")
+    if name in _NAMES or owner.startswith("relaxation"):
+        return _NAMES.get(name, name.replace("_", " "))
+    known = quantity_of(key)
+    if owner and known:
+        return f"{known.symbol or key} of {owner}"
+    return (known.symbol if known else "") or name.replace("_", " ")
+
+
+def written(dataset: xr.Dataset, name: str, value: float, digits: int = 3) -> str:
+    """Write a value of an unknown with its unit, and a prefix that suits it."""
+    return engineering(value, str(dataset["unit"].sel(unknown=name).values), digits)
+
+
+def engineering(value: float, unit: str, digits: int = 3) -> str:
+    """Write an SI value with a prefix: ``12.3 kPa``, ``4.5 mm``; plain numbers without one."""
+    if unit in ("", "1") or not isfinite(value):
+        return f"{value:.{digits}g}"
+    power = 3 * floor(log10(abs(float(f"{value:.{digits}g}"))) / 3) if value else 0
+    power = max(min(power, max(_PREFIXES)), min(_PREFIXES))
+    scaled = f"{value / 10.0**power:#.{digits}g}".rstrip(".")
+    return f"{scaled} {_PREFIXES[power]}{unit}"
+
+
+def material(dataset: xr.Dataset) -> str:
+    """Return what was found as lines of a study file; "" if there is no one material."""
+    if "file" in dataset.dims or dataset.attrs["verdict"] != FITS:
+        return ""
+    lines: dict[str, list[str]] = {"[material]": []}
+    for name in wanted(dataset):
+        owner, _, key = name.rpartition("_")
+        if not bool(dataset["seen"].sel(unknown=name)) or owner.startswith("relaxation"):
+            continue
+        value = written(dataset, name, float(dataset["estimate"].sel(unknown=name)), 4)
+        text = value if name.endswith(_ABSOLUTE) else json.dumps(value, ensure_ascii=False)
+        second = bar(dataset, name, hidden=True)
+        comment = f"{bar(dataset, name)}{f'; {second} with what it may hide' if second else ''}"
+        heading = f"[[body.layer]]  # {owner}" if owner else "[material]"
+        lines.setdefault(heading, []).append(f"{key} = {text}  # {comment}")
+    return "\n".join("\n".join((heading, *rows)) for heading, rows in lines.items() if rows)
+
+
+def _ends(dataset: xr.Dataset, name: str, *, hidden: bool) -> tuple[float, float, float]:
+    one, end = dataset.sel(unknown=name), "_hidden" if hidden else ""
+    return float(one["estimate"]), float(one[f"low{end}"]), float(one[f"high{end}"])
+
+
+def _curves(dataset: xr.Dataset) -> str:
+    return "this curve" if dataset.sizes["measurement"] == 1 else "these curves"
+
+
+def _without_bars(dataset: xr.Dataset) -> Iterator[str]:
+    """Yield that the law does not fit, and E by depth."""
+    yield f"The declared law {dataset.attrs['verdict']}. No value has an error bar."
+    if "window" in dataset.dims:
+        ends = (dataset.isel(window=number) for number in (0, -1))
+        words = (
+            f"{engineering(float(one['window_young']), 'Pa')} to a depth of "
+            f"{engineering(float(one['window_depth']), 'm')}"
+            for one in ends
+        )
+        yield f"E by the depth that is fitted: {', '.join(words)}."
+
+
+def _of_files(dataset: xr.Dataset) -> Iterator[str]:
+    """Yield how many of many curves the law fits, and medians over these."""
+    fits = (dataset["verdict"] == FITS).values
+    yield f"{counted(dataset.sizes['file'], 'file')}: the declared law fits {int(fits.sum())}."
+    if not fits.all():
+        names = [str(name) for name in dataset["file"].values[~fits]]
+        more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
+        yield f"It does not fit {', '.join(names[:_MOST])}{more}."
+    own = dataset.isel(file=np.flatnonzero(fits))
+    for name in wanted(dataset) if fits.any() else ():
+        one = own.sel(unknown=name)
+        low, middle, high = (written(own, name, float(one["estimate"].quantile(q))) for q in (0.1, 0.5, 0.9))
+        yield f"{title(name)}: median {middle}; of ten curves, eight have {low} to {high}{_median_bars(own, name)}."
+
+
+def _median_bars(dataset: xr.Dataset, name: str) -> str:
+    one = dataset.sel(unknown=name)
+    halves = [(one[f"high{end}"] - one[f"low{end}"]) / 2 for end in ("", "_hidden")]
+    if name.endswith(_ABSOLUTE):
+        words = [written(dataset, name, float(half.median()), 2) for half in halves]
+    else:
+        words = [percent(float((half / abs(one["estimate"])).median())) for half in halves]
+    first, second = (f"± {word}" if word not in ("", "nan") else "" for word in words)
+    beside = f", {second} if the body may hide {hidden_words(dataset)}" if second and second != first else ""
+    return f". Median error bar: {first} if the body is as declared{beside}" if first else ""
