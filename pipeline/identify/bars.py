@@ -1,0 +1,29 @@
+"""Bars of 95 % from mixtures of Student's distributions, and their parts by source."""
+
+import numpy as np
+from scipy.special import stdtr
+
+from pipeline.arrays import FloatArray
+from pipeline.identify.fit import Mixture
+
+# Probability of each side beyond a bar.
+TAIL = 0.025
+_BISECTIONS = 60
+
+
+def interval(mixture: Mixture, place: int) -> tuple[float, float]:
+    """Return the coordinates between which an unknown is with 95 %, not cut at the ends of its range."""
+    mean, deviation = mixture.mean[:, place], np.sqrt(mixture.covariance[:, place, place])
+    return _quantile(mixture, mean, deviation, TAIL), _quantile(mixture, mean, deviation, 1 - TAIL)
+
+
+def _quantile(mixture: Mixture, mean: FloatArray, deviation: FloatArray, share: float) -> float:
+    """Return the quantile of a mixture with these means and standard deviations (c,), by bisection."""
+    low, high = float((mean - 60 * deviation).min()), float((mean + 60 * deviation).max())
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        if mixture.weight @ stdtr(mixture.freedom, (middle - mean) / deviation) < share:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2

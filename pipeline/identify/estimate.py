@@ -1,0 +1,167 @@
+"""From measured curves to estimates: the fit, its verdict, both bars, their parts, and profiles."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import stdtrit
+
+from pipeline.arrays import FloatArray
+from pipeline.identify.bars import TAIL, interval
+from pipeline.identify.fit import Fit, fit
+from pipeline.identify.hidden import hidden_bars
+from pipeline.identify.model import Model
+from pipeline.identify.noise import GRID
+from pipeline.identify.parts import SOURCES, CurveFit, Estimate, Measured, NoiseFound, Profile, Unknown, Window
+from pipeline.identify.profiles import Likelihood, ends, profile
+from pipeline.identify.sources import mesh, shares
+from pipeline.identify.start import start
+
+# A law does not fit if a smooth deviation from it is so much more likely, as logarithm of the ratio of the evidence:
+# on synthetic curves of the right law this happens to less than 2 % (docs/identification.md).
+MISFIT = 1.5
+# An unknown is not seen if its bar covers this share of its range, or of what was known before.
+_BLIND = 0.75
+# Unknowns that are far from normal whatever the fit says.
+_CURVED = ("poisson", "relaxation_")
+_WINDOWS = (0.25, 0.5, 1.0)
+
+
+def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estimate:
+    """Return the unknowns of one or several curves with their 95 % bars.
+
+    Contact point and baseline of each curve are always unknown. Ranges with an infinite end are those of the curve.
+    """
+    model = Model.of(measured, unknowns)
+    found = fit(model, start(model))
+    x, low, high, profiles = _bars(found)
+    ours = mesh(found)
+    low, high = x - np.hypot(x - low, ours), x + np.hypot(high - x, ours)
+    wanted = tuple(k for k, unknown in enumerate(model.space.unknowns) if unknown.is_wanted)
+    hidden_low, hidden_high = hidden_bars(found, wanted)
+    sides = [low, high, np.fmin(low, hidden_low), np.fmax(high, hidden_high)]
+    estimate, low, high, low_hidden, high_hidden = (_values(model, np.clip(side, 0.0, 1.0)) for side in [x, *sides])
+    does_fit = found.misfit <= MISFIT
+    seen = _seen(model, sides[0], sides[1])
+    scale = np.sqrt(np.diag(found.mixture.spread))
+    nothing = np.full(len(x), np.nan)
+    return Estimate(
+        unknowns=model.space.unknowns,
+        estimate=estimate,
+        low=low if does_fit else nothing,
+        high=high if does_fit else nothing,
+        low_hidden=low_hidden if does_fit else nothing,
+        high_hidden=high_hidden if does_fit else nothing,
+        part=_parts(found, sides[0], sides[1], ours) * ((high - low) / 2)[:, None],
+        correlation=found.mixture.spread / np.outer(scale, scale),
+        seen=seen,
+        verdict="fits" if does_fit else _refusal(found),
+        curves=tuple(_curve(found, number) for number in range(len(measured))),
+        profiles=profiles,
+        windows=() if does_fit else _windows(measured, unknowns, found),
+        evidence=found.misfit,
+        told=tuple(_told(model, seen)),
+    )
+
+
+def _values(model: Model, x: FloatArray) -> FloatArray:
+    return np.array([float(model.space.value(k, at)) for k, at in enumerate(x)])
+
+
+def _bars(found: Fit) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, Profile]]:
+    """Return estimates and bars (u,) in coordinates: those of the mixture, or of profiles where it is not normal."""
+    model, mixture = found.model, found.mixture
+    x = mixture.middle
+    low, high = np.array([interval(mixture, place) for place in range(len(x))]).T
+    shared = [k for k, unknown in enumerate(model.space.unknowns) if " of " not in unknown.name and unknown.is_wanted]
+    is_cut = any(low[k] < 0 or high[k] > 1 for k in shared)
+    if not is_cut and not any(model.names[k].startswith(_CURVED) for k in shared):
+        return x, low, high, {}
+    # The profile has the most probable noise: its threshold is raised as bars of all noises are wider than that one's.
+    top = mixture.covariance[int(np.argmax(mixture.weight))]
+    student = float(stdtrit(mixture.freedom, 1 - TAIL))
+    wider = float(np.median((high - low) / 2 / np.sqrt(np.diag(top)) / student))
+    squared = (student * max(wider, 1.0)) ** 2
+    threshold = mixture.freedom * np.log1p(squared / mixture.freedom)
+    likelihood, profiles = Likelihood(found), {}
+    for place in shared:
+        spread = float(np.sqrt(top[place, place]))
+        curve, best = profile(likelihood, np.clip(found.x, 0.0, 1.0), place, spread, threshold)
+        low[place], high[place] = ends(curve, threshold)
+        x[place] = best
+        values = np.array([float(model.space.value(place, at)) for at in curve.value])
+        profiles[model.names[place]] = Profile(values, curve.fall * float(student**2) / threshold)
+    return x, low, high, profiles
+
+
+def _parts(found: Fit, low: FloatArray, high: FloatArray, ours: FloatArray) -> FloatArray:
+    """Return parts (u, len(SOURCES)) of the bars, as shares of their half widths: squares add up to 1."""
+    of_mesh = np.minimum((ours / ((high - low) / 2)) ** 2, 1.0)
+    squares = shares(found) * (1 - of_mesh)[:, None]
+    squares[:, SOURCES.index("mesh")] = of_mesh
+    return np.sqrt(np.maximum(squares, 0.0))
+
+
+def _seen(model: Model, low: FloatArray, high: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return which unknowns (u,) the curves see: bars are well within the range, or within what was known before."""
+    _, precision = model.space.prior
+    before = np.where(precision > 0, 2 * 1.96 / np.sqrt(np.maximum(precision, 1e-300)), 1.0)
+    return np.asarray(np.clip(high, 0, 1) - np.clip(low, 0, 1) < _BLIND * before)
+
+
+def _curve(found: Fit, number: int) -> CurveFit:
+    model, belief = found.model, found.beliefs[number]
+    values = model.space.values(found.x)
+    best = int(np.argmax(belief.weight))
+    noise, force = GRID[belief.noise[best]], found.force[number]
+    jacobian = found.jacobian[number]
+    variance = np.einsum("ni,ij,nj->n", jacobian, found.mixture.spread, jacobian)
+    return CurveFit(
+        name=model.measured[number].curve.name,
+        depth=model.depth(number, values, force),
+        force=model.measured[number].curve.force,
+        fit=force,
+        band=1.96 * np.sqrt(np.maximum(variance, 0.0)),
+        noise=NoiseFound(noise.correlation, noise.white, noise.growth, float(belief.scale[best])),
+    )
+
+
+def _refusal(found: Fit) -> str:
+    """Return in words by how much, and where, the law does not fit."""
+    number = int(np.argmax([belief.misfit for belief in found.beliefs]))
+    force, measured = found.force[number], found.model.measured[number]
+    residual = measured.curve.force - force
+    largest = float(np.abs(residual).max() / np.ptp(measured.curve.force))
+    name = f' of "{measured.curve.name}"' if len(found.force) > 1 else ""
+    return (
+        f"does not fit: the force{name} differs from the law's by a smooth curve, up to {100 * largest:.2g} % of the "
+        "largest force; the modulus of small depths is the one to use"
+    )
+
+
+def _windows(measured: Sequence[Measured], unknowns: Sequence[Unknown], found: Fit) -> tuple[Window, ...]:
+    """Return the modulus by least squares, without deviations from the law, up to larger and larger depths."""
+    if "young" not in found.model.names:
+        return ()
+    place, values = found.model.names.index("young"), found.model.space.values(found.x)
+    depths = [found.model.depth(number, values, force) for number, force in enumerate(found.force)]
+    most = max(float(depth.max()) for depth in depths)
+    windows = []
+    for share in _WINDOWS:
+        cut = [_cut(one, depth <= share * most) for one, depth in zip(measured, depths, strict=True)]
+        model = Model.of(cut, unknowns)
+        windows.append(Window(share * most, float(model.space.value(place, start(model)[place]))))
+    return tuple(windows)
+
+
+def _cut(measured: Measured, keep: npt.NDArray[np.bool_]) -> Measured:
+    curve = measured.curve
+    time = None if curve.time is None else curve.time[keep]
+    return replace(measured, curve=replace(curve, depth=curve.depth[keep], force=curve.force[keep], time=time))
+
+
+def _told(model: Model, seen: npt.NDArray[np.bool_]) -> list[str]:
+    blind = [unknown.name for unknown, is_seen in zip(model.space.unknowns, seen, strict=True)
+             if unknown.is_wanted and not is_seen]  # fmt: skip
+    return [f"{name} is not in these curves: any value of its range fits them" for name in blind]

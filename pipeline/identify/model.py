@@ -1,0 +1,215 @@
+"""The model of measured force curves: F(t) = baseline + drift t + Relax[F_elastic(d)], d = z - contact point - F/k.
+
+z is the recorded depth and k the stiffness of the machine. The force that bends the machine is that of the model, so
+that noise of the measured force does not enter the depth. Several curves share all unknowns but contact point,
+baseline and drift.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import isfinite
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.identify.parts import Measured, Unknown, Values
+from pipeline.identify.relaxing import relaxed
+
+OF_CURVE = ("contact_point", "baseline", "drift")
+"""Unknowns of which every curve has its own."""
+
+ALWAYS = ("contact_point", "baseline")
+"""Unknowns of every fit, named or not."""
+
+# Step of finite differences, as a share of an unknown's range, and of the largest depth.
+_STEP = 1e-6
+# Longer curves are averaged over blocks of neighbours: their noise is then correlated and white noise as before.
+LONGEST = 1500
+# Newton steps to the force that bends the machine: quadratic from the measured force, which is near.
+_NEWTON = 2
+
+
+def default_unknown(name: str, measured: Measured) -> Unknown:
+    """Return contact point, baseline or drift with a range wide enough for any curve that can be used."""
+    curve = measured.curve
+    depth, force = float(np.ptp(curve.depth)), float(np.ptp(curve.force))
+    least, most = float(curve.depth.min()), float(curve.depth.max())
+    if name == "contact_point":
+        return Unknown(name, least - depth / 2, most, "m", is_wanted=False)
+    if name == "baseline":
+        return Unknown(name, float(curve.force.min()) - force, float(curve.force.max()) + force, "N", is_wanted=False)
+    duration = float(np.ptp(times_of(measured)))
+    return Unknown(name, -force / duration, force / duration, "N/s", is_wanted=False)
+
+
+def times_of(measured: Measured) -> FloatArray:
+    """Return the time (s) since the first point; the number of the point if no time was recorded."""
+    time = measured.curve.time
+    return np.arange(len(measured.curve.force), dtype=float) if time is None else np.asarray(time - time[0])
+
+
+def own_name(name: str, number: int, measured: Sequence[Measured]) -> str:
+    """Return the name of an unknown of curve ``number``: with the curve's name if there are several."""
+    return name if len(measured) == 1 else f"{name} of {measured[number].curve.name}"
+
+
+@dataclass(frozen=True)
+class Space:
+    """Unknowns in coordinates from 0 to 1 over their ranges, logarithmic where they are."""
+
+    unknowns: tuple[Unknown, ...]
+
+    def value(self, place: int, at: FloatArray | float) -> FloatArray:
+        """Return values (SI) of one unknown at coordinates."""
+        unknown, share = self.unknowns[place], np.asarray(at)
+        if unknown.is_logarithmic:
+            return np.asarray(unknown.low * (unknown.high / unknown.low) ** share)
+        return np.asarray(unknown.low + (unknown.high - unknown.low) * share)
+
+    def coordinate(self, place: int, value: float) -> float:
+        """Return the coordinate of a value (SI) of one unknown."""
+        unknown = self.unknowns[place]
+        if unknown.is_logarithmic:
+            return float(np.log(value / unknown.low) / np.log(unknown.high / unknown.low))
+        return (value - unknown.low) / (unknown.high - unknown.low)
+
+    def values(self, x: FloatArray) -> dict[str, float]:
+        """Return all values (SI) by name at coordinates (u,)."""
+        return {unknown.name: float(self.value(k, x[k])) for k, unknown in enumerate(self.unknowns)}
+
+    @cached_property
+    def prior(self) -> tuple[FloatArray, FloatArray]:
+        """Mean and precision (u,) of normal priors in coordinates; precision 0 without one."""
+        mean, precision = np.full(len(self.unknowns), 0.5), np.zeros(len(self.unknowns))
+        for k, unknown in enumerate(self.unknowns):
+            if unknown.prior is not None:
+                middle, deviation = unknown.prior
+                span = np.log(unknown.high / unknown.low) * middle if unknown.is_logarithmic else (
+                    unknown.high - unknown.low)  # fmt: skip
+                mean[k], precision[k] = self.coordinate(k, middle), (span / deviation) ** 2
+        return mean, precision
+
+
+class Model:
+    """Forces of ``measured`` curves as a function of coordinates x (u,) of the unknowns, see ``Space``."""
+
+    def __init__(self, measured: Sequence[Measured], space: Space):
+        self.measured, self.space = tuple(measured), space
+        self.names = tuple(unknown.name for unknown in self.space.unknowns)
+        self.times = tuple(times_of(one) for one in self.measured)
+        self._terms = sum(name.startswith("relaxation_time_") for name in self.names)
+
+    @classmethod
+    def of(cls, measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> "Model":
+        """Return the model with these unknowns, and contact point and baseline of each curve."""
+        return cls(measured, Space(_all_unknowns(measured, unknowns)))
+
+    def with_unknowns(self, unknowns: Sequence[Unknown]) -> "Model":
+        """Return the model with further shared unknowns after its own, such as those of a hidden layer."""
+        return Model(self.measured, Space((*self.space.unknowns, *unknowns)))
+
+    def thinned(self, columns: FloatArray) -> FloatArray:
+        """Return means over blocks of ``columns`` (n, ...) if a curve has more points than are needed."""
+        block = -(-len(columns) // LONGEST)
+        if block == 1:
+            return columns
+        starts = np.arange(0, len(columns), block)
+        counts = np.diff(np.append(starts, len(columns)))
+        return np.asarray((np.add.reduceat(columns, starts).T / counts).T)
+
+    def own(self, name: str, number: int) -> str:
+        """Return the name of an unknown of curve ``number``."""
+        return own_name(name, number, self.measured)
+
+    def depth(self, number: int, values: Values, force: FloatArray) -> FloatArray:
+        """Return the depth (m) of the tool below the surface when curve ``number`` has this ``force`` (N)."""
+        depth = self.measured[number].curve.depth - values[self.own("contact_point", number)]
+        compliance = self._compliance(number, values)
+        return np.asarray(depth - compliance * (force - self.offset(number, values)) if compliance else depth)
+
+    def predict(self, number: int, values: Values) -> FloatArray:
+        """Return the force (N) of curve ``number`` for ``values`` of all unknowns."""
+        offset, compliance = self.offset(number, values), self._compliance(number, values)
+        if not compliance:
+            return np.asarray(offset + self._contact(number, values, self.depth(number, values, offset)))
+        force = self.measured[number].curve.force
+        for _ in range(_NEWTON):
+            depth = self.depth(number, values, force)
+            step = _STEP * float(np.ptp(depth))
+            contact = self._contact(number, values, depth)
+            stiffness = self._elastic(number, values, depth + step) - self._elastic(number, values, depth)
+            force = force + (offset + contact - force) / (1 + compliance * np.maximum(stiffness, 0.0) / step)
+        return np.asarray(force)
+
+    def jacobian(self, number: int, x: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the derivatives (n, u) of the force of curve ``number`` by coordinates; ``force`` is that at x."""
+        found = np.zeros((len(force), len(x)))
+        for k, unknown in enumerate(self.space.unknowns):
+            span = unknown.high - unknown.low
+            if unknown.name == self.own("baseline", number):
+                found[:, k] = span
+            elif unknown.name == self.own("drift", number):
+                found[:, k] = span * self.times[number]
+            elif self._concerns(unknown.name, number):
+                step = -_STEP if x[k] > 0.5 else _STEP
+                moved = x.copy()
+                moved[k] += step
+                found[:, k] = (self.predict(number, self.space.values(moved)) - force) / step
+        return found
+
+    def _concerns(self, name: str, number: int) -> bool:
+        measured = self.measured[number]
+        if name == "machine_stiffness":
+            return measured.machine_compliance is None
+        is_shared = not name.startswith(OF_CURVE)
+        return name == self.own("contact_point", number) or (
+            is_shared and (name in measured.forward.names or name.startswith(("relaxation_", "hidden_")))
+        )
+
+    def offset(self, number: int, values: Values) -> FloatArray:
+        """Return baseline and drift (n,) of curve ``number``, in N."""
+        drift = values.get(self.own("drift", number), 0.0)
+        return np.asarray(values[self.own("baseline", number)] + drift * self.times[number])
+
+    def _compliance(self, number: int, values: Values) -> float:
+        compliance = self.measured[number].machine_compliance
+        return 1 / values["machine_stiffness"] if compliance is None else compliance
+
+    def _elastic(self, number: int, values: Values, depth: FloatArray) -> FloatArray:
+        measured = self.measured[number]
+        force = measured.forward.force(depth, values)
+        for hidden in measured.hidden:
+            if all(unknown.name in values for unknown in hidden.unknowns):
+                force = force * hidden.factor(depth, values)
+        return force
+
+    def _contact(self, number: int, values: Values, depth: FloatArray) -> FloatArray:
+        force = self._elastic(number, values, depth)
+        if not self._terms:
+            return force
+        terms = tuple(
+            (values[f"relaxation_share_{k}"], values[f"relaxation_time_{k}"]) for k in range(1, self._terms + 1)
+        )
+        return relaxed(force, self.times[number], terms)
+
+
+def _all_unknowns(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
+    """Return shared unknowns, then those of each curve: a finite range holds for all, others are those of the curve."""
+    named = {unknown.name: unknown for unknown in unknowns}
+
+    def ranged(name: str, one: Measured) -> Unknown:
+        given, usual = named.get(name), default_unknown(name, one)
+        if given is None:
+            return usual
+        low, high = (own if isfinite(own) else by for own, by in ((given.low, usual.low), (given.high, usual.high)))
+        return replace(given, low=low, high=high)
+
+    shared = [unknown for unknown in unknowns if unknown.name not in OF_CURVE]
+    own = [
+        replace(ranged(name, one), name=own_name(name, number, measured))
+        for number, one in enumerate(measured)
+        for name in OF_CURVE
+        if name in named or name in ALWAYS
+    ]
+    return (*shared, *own)

@@ -1,0 +1,70 @@
+"""Bars by source: by how much a bar shrinks once what it is from is known."""
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.identify.bars import interval
+from pipeline.identify.fit import Fit, Mixture
+from pipeline.identify.model import OF_CURVE
+from pipeline.identify.noise import GRID, whiten
+from pipeline.identify.parts import SOURCES
+
+
+def shares(found: Fit) -> FloatArray:
+    """Return shares (u, len(SOURCES)) of the square of each bar by source, without the mesh's; rows add up to 1.
+
+    Thickness, machine and contact are taken for known, in this order. What then remains is noise, but for what bars
+    are wider by deviations from the law.
+    """
+    unknowns = found.model.space.unknowns
+    of_curve = [unknown.name.startswith(OF_CURVE) for unknown in unknowns]
+    of_machine = [unknown.name == "machine_stiffness" for unknown in unknowns]
+    of_geometry = [
+        unknown.prior is not None and not (unknown.is_wanted or of_curve[k] or of_machine[k])
+        for k, unknown in enumerate(unknowns)
+    ]
+    groups = {"thickness": of_geometry, "machine": of_machine, "contact": of_curve}
+    mixture = found.mixture
+    information = np.linalg.inv(mixture.covariance[int(np.argmax(mixture.weight))])
+    result = np.zeros((len(unknowns), len(SOURCES)))
+    without = mixture.of_law()
+    for place in range(len(unknowns)):
+        law = 1 - min(_width(without, place) / _width(mixture, place), 1.0) ** 2 if without else 0.0
+        known: list[int] = []
+        before = whole = _variance(information, place, known)
+        for name, belongs in groups.items():
+            known += [k for k in range(len(unknowns)) if k != place and k not in known and belongs[k]]
+            after = _variance(information, place, known)
+            result[place, SOURCES.index(name)] = (1 - law) * (before - after) / whole
+            before = after
+        result[place, SOURCES.index("law")] = law
+        result[place, SOURCES.index("noise")] = (1 - law) * before / whole
+    return result
+
+
+def mesh(found: Fit) -> FloatArray:
+    """Return half widths (u,), in coordinates, by the errors of the forward models, of one sign over each curve."""
+    top = found.mixture.covariance[int(np.argmax(found.mixture.weight))]
+    model, values = found.model, found.model.space.values(found.x)
+    square = np.zeros(len(found.x))
+    for number, (measured, belief) in enumerate(zip(model.measured, found.beliefs, strict=True)):
+        best = int(np.argmax(belief.weight))
+        contact = found.force[number] - model.offset(number, values)
+        wrong = contact * measured.forward.error(model.depth(number, values, found.force[number]), values)
+        share = contact / np.maximum(np.abs(contact).max(), np.finfo(float).tiny)
+        columns = model.thinned(np.column_stack([found.jacobian[number], wrong]))
+        whitened, _ = whiten(columns, model.thinned(share), GRID[belief.noise[best]])
+        pull = whitened[:, :-1].T @ whitened[:, -1] / belief.scale[best] ** 2
+        square += (top @ pull) ** 2
+    return np.sqrt(square)
+
+
+def _variance(information: FloatArray, place: int, known: list[int]) -> float:
+    """Return the variance of an unknown if others are ``known``."""
+    free = [k for k in range(len(information)) if k not in known]
+    return float(np.linalg.inv(information[np.ix_(free, free)])[free.index(place), free.index(place)])
+
+
+def _width(mixture: Mixture, place: int) -> float:
+    low, high = interval(mixture, place)
+    return high - low
