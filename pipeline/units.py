@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 # The units a study file may use. A small registry loads in a millisecond, and a unit that makes no
 # sense here (light years, barn) is refused rather than converted.
 _DEFINITIONS = """
+pico- = 1e-12 = p-
 nano- = 1e-9 = n-
 micro- = 1e-6 = µ- = u-
 milli- = 1e-3 = m-

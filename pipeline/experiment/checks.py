@@ -93,10 +93,13 @@ def _usual_run(force: FloatArray, largest: float) -> int:
     return int(np.unique(upper, return_counts=True)[1].max()) if upper.size else 0
 
 
-def check_contact(found: Recorded) -> Recorded:
-    """Return an approach without air far longer than the contact; report one without contact, tell one without air."""
+def check_contact(found: Recorded, *, is_rising: bool) -> Recorded:
+    """Return an approach without air far longer than the contact; report one without contact, tell one without air.
+
+    ``is_rising`` tells an approach alone from one with a hold, in which the depth has no usual step.
+    """
     depth, force = found.depth, found.force
-    told = _gaps(found, depth, "depth", "m")
+    told = _gaps(found, depth, "depth", "m") if is_rising else []
     air = np.median(force[: max(3, len(force) // 20)])
     end = np.median(force[-max(3, len(force) // 20) :])
     noise = float(np.median(np.abs(np.diff(force)))) * 1.4826 / np.sqrt(2)

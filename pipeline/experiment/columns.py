@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.experiment.header import header_of, is_unit_of
+from pipeline.experiment.header import factor_of, header_of, is_unit_of
 from pipeline.experiment.reading import UNITS, ExperimentError, Reading
 from pipeline.experiment.table import Table
 from pipeline.experiment.words import is_called
-from pipeline.units import unit_factor
 
 # Two columns of one kind are the same but for a constant within this share of their range.
 _SAME = 1e-3
@@ -156,6 +155,8 @@ def _time(table: Table, taken: set[int], reading: Reading, told: list[str]) -> i
         for n, header in enumerate(table.headers)
         if n not in taken and is_called(header.name, "time") and _has_values(table, n)
     ]
+    for number in [n for n in found if not _unit(table, n, reading, "time")]:
+        told.append(f"column `{_title(table, number)}` has no unit, and is not read as time: give it in units")
     found = [n for n in found if is_unit_of(_unit(table, n, reading, "time"), "s")]
     if len(found) > 1:
         told.append(f"time could be {', '.join(_title(table, n) for n in found)}: not read; name it in columns")
@@ -194,17 +195,17 @@ def _in_si(table: Table, number: int, kind: str, reading: Reading) -> FloatArray
             table.file, f'has no unit: write units = {{{kind} = "{example}"}} in {_SECTION}', column=title
         )
     try:
-        factor = unit_factor(unit, si)
+        factor = factor_of(unit, si)
     except ValueError as error:
         raise ExperimentError(table.file, f"cannot be {kind}: {_message(error)}", column=title) from None
     given = reading.units.get(kind)
-    if given is not None and not np.isclose(unit_factor(given, si), factor, rtol=1e-9):
+    if given is not None and not np.isclose(factor_of(given, si), factor, rtol=1e-9):
         raise ExperimentError(
             table.file, f'has the unit {unit}, but units.{kind} is "{given}": remove the wrong one', column=title
         )
     wanted = reading.columns.get(kind)
     named = header_of(wanted).unit if isinstance(wanted, str) else ""
-    if named and is_unit_of(named, si) and not np.isclose(unit_factor(named, si), factor, rtol=1e-9):
+    if named and is_unit_of(named, si) and not np.isclose(factor_of(named, si), factor, rtol=1e-9):
         raise ExperimentError(table.file, f'has the unit {unit}, but columns.{kind} is "{wanted}"', column=title)
     return table.values[:, number] * factor
 

@@ -9,6 +9,15 @@ from pipeline.units import unit_factor
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[(\[{]\s*(?P<unit>[^()\[\]{}]*?)\s*[)\]}]\s*")
 _DIVIDED = re.compile(r"(?P<name>.*?)(?:\s*/\s*|\s+in\s+|,\s*|\s+|_)(?P<unit>[^\s/,_]+)\s*")
 _SI = ("m", "N", "s")
+# Other words for units.
+_SPELLINGS = {
+    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
+    **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
+    **dict.fromkeys(("micron", "microns", "micrometer", "micrometers"), "µm"),
+    **dict.fromkeys(("millimeter", "millimeters", "millimetres"), "mm"),
+    **dict.fromkeys(("newton", "newtons"), "N"),
+}
+_MARK = re.compile(r"\s*(#|%|//|!)+\s*")
 # Units of other quantities: a column that has one is neither depth, force nor time.
 _OTHERS = frozenset({
     "-", "%", "1", "V", "mV", "µV", "A", "mA", "Pa", "kPa", "MPa", "GPa", "psi", "°C", "K", "Hz", "deg", "rad",
@@ -34,9 +43,28 @@ def is_unit(text: str) -> bool:
 def is_unit_of(text: str, kind: str) -> bool:
     """Tell whether a text is a unit of the same kind as an SI unit."""
     try:
-        return unit_factor(text, kind) > 0
+        return factor_of(text, kind) > 0
     except ValueError:
         return False
+
+
+def factor_of(text: str, kind: str) -> float:
+    """Return what a number in the unit ``text`` is multiplied with to be one in the SI unit ``kind``.
+
+    Raises:
+        ValueError: if ``text`` is no unit of that kind, with those that are.
+    """
+    return unit_factor(_SPELLINGS.get(text.casefold(), text), kind)
+
+
+def is_comment(line: str) -> bool:
+    """Tell a line that is marked as a comment."""
+    return _MARK.match(line) is not None
+
+
+def without_mark(line: str) -> str:
+    """Return a line without the mark of a comment."""
+    return _MARK.sub("", line, count=1)
 
 
 def header_of(text: str) -> Header:

@@ -75,9 +75,9 @@ def read_curve(path: Path, reading: Reading) -> Curve:
     found = check_size(signed(found, reading))
     cycles = cycles_of(found.depth, found.time)
     found = _segment(found, cycles, inside, reading)
-    if reading.segment == "approach":
+    if reading.segment.startswith("approach"):
         found = check_count(without_saturation(found), reading.segment)
-        found = check_contact(found)
+        found = check_contact(found, is_rising=reading.segment == "approach")
     return Curve(path.stem, found.depth, found.force, found.time, found.told)
 
 

@@ -17,7 +17,8 @@ def signs_of(found: Recorded, reading: Reading) -> tuple[int, int]:
     """Return the signs of depth and force with which both are positive where the tool presses.
 
     Force varies where there is contact, and not in air: this end of the depths is the deep one, and the force there
-    is pressure. Where both ends vary alike, the tool is taken to advance from the first row on.
+    is pressure. Where both ends vary alike, it is the one with the larger force; where these are alike, too, the tool
+    is taken to advance from the first row on.
     """
     depth = reading.depth_sign or _deep_end(found.depth, found.force) or _by_time(found.depth, found.force)
     return depth, reading.force_sign or _force_sign(found.depth * depth, found.force)
@@ -45,11 +46,12 @@ def _name(found: Recorded, kind: str) -> str:
 
 
 def _deep_end(depth: FloatArray, force: FloatArray) -> int:
-    """Return 1 if the force varies at the largest depths, -1 if it does at the smallest; 0 if that is not clear."""
-    low, high = (_spread(depth, force, end) for end in (-1, 1))
-    if max(low, high) == 0:
-        return 0
-    return 1 if high > _CLEAR * low else -1 if low > _CLEAR * high else 0
+    """Return 1 if the force varies, or is large, at the largest depths, -1 at the smallest; 0 if that is not clear."""
+    for measure in (_spread, _size):
+        low, high = (measure(depth, force, end) for end in (-1, 1))
+        if max(low, high) > _CLEAR * min(low, high):
+            return 1 if high > low else -1
+    return 0
 
 
 def _spread(depth: FloatArray, force: FloatArray, end: int) -> float:
@@ -60,6 +62,12 @@ def _spread(depth: FloatArray, force: FloatArray, end: int) -> float:
         return 0.0
     slope = np.polyfit(along[near] - along[near].mean(), force[near], 1)[0]
     return float(abs(slope) * np.ptp(along[near]))
+
+
+def _size(depth: FloatArray, force: FloatArray, end: int) -> float:
+    """Return the size of the force at the last depths towards an ``end``: without air, it is small at first touch."""
+    along = end * depth
+    return float(abs(np.median(force[along >= along.max() - 0.05 * np.ptp(along)])))
 
 
 def _by_time(depth: FloatArray, force: FloatArray) -> int:

@@ -1,7 +1,6 @@
 """The table of numbers in a text: its headers with their units, its values, and the lines they are from."""
 
 import csv
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from io import StringIO
@@ -10,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.experiment.header import Header, header_of, is_unit
+from pipeline.experiment.header import Header, is_comment
+from pipeline.experiment.headings import headers_of
 from pipeline.experiment.layout import MISSING, Layout, find_layout
 from pipeline.experiment.reading import ExperimentError
 
@@ -18,8 +18,6 @@ from pipeline.experiment.reading import ExperimentError
 _MOST_ODD = 0.05
 # The separator of fields that ASCII has: no text has it.
 _UNIT = "\x1f"
-_COMMENT = re.compile(r"\s*(#|%|//|!|')\s*")
-_PURE = ("%", "1", "-", "")
 
 
 @dataclass(frozen=True)
@@ -51,11 +49,12 @@ def table_of(lines: Sequence[str], file: str) -> Table:
     if begin is None:
         raise ExperimentError(file, "has no row of numbers")
     kept, odd = _rows(lines, begin, layout)
-    headers = _headers(lines[:begin], layout)
+    headers = headers_of(lines[:begin], layout)
     _check_decimals(headers, lines[:begin], layout, file, begin)
-    if len(odd) > max(1, _MOST_ODD * len(kept)):
-        width = len(layout.fields(lines[odd[0]]))
-        raise ExperimentError(file, f"has {width} columns, others have {layout.width}", line=odd[0] + 1)
+    wrong = [number for number in odd if not is_comment(lines[number])]
+    if len(wrong) > max(1, _MOST_ODD * len(kept)):
+        width = len(layout.fields(lines[wrong[0]]))
+        raise ExperimentError(file, f"has {width} columns, others have {layout.width}", line=wrong[0] + 1)
     told = [f"{_of_lines(odd)} no row of {layout.width} columns: left out"] if odd else []
     numbers = np.array(kept) + 1
     values, strange = _values([lines[n] for n in kept], layout, numbers)
@@ -80,7 +79,7 @@ def _rows(lines: Sequence[str], begin: int, layout: Layout) -> tuple[list[int], 
             continue
         is_plain = '"' not in line and layout.separator != " "
         width = line.count(layout.separator) + 1 if is_plain else len(layout.fields(line))
-        (kept if width == layout.width else odd).append(number)
+        (kept if width == layout.width and not is_comment(line) else odd).append(number)
     return kept, odd
 
 
@@ -116,6 +115,8 @@ def _values(rows: Sequence[str], layout: Layout, lines: IntArray) -> tuple[Float
             plain = text.str.replace(",", ".", regex=False) if layout.decimal == "," else text
             numbers = pd.to_numeric(plain, errors="coerce")
             wrong = numbers.isna() & column.notna() & ~text.str.lower().isin(MISSING)
+            if layout.decimal == ",":  # a point is for thousands, or another decimal sign
+                wrong |= text.str.contains(".", regex=False) & column.notna()
             if wrong.any():
                 first = int(np.argmax(wrong.to_numpy()))
                 strange[number] = (int(lines[first]), str(text.iloc[first]))
@@ -123,48 +124,6 @@ def _values(rows: Sequence[str], layout: Layout, lines: IntArray) -> tuple[Float
         found[:, number] = column.to_numpy(float)
     found[~np.isfinite(found)] = np.nan
     return found, strange
-
-
-def _headers(before: Sequence[str], layout: Layout) -> tuple[Header, ...]:
-    """Return the headers, from the lines before the rows: names, and units there or in a row of their own."""
-    near = [line for line in before if line.strip()][-3:]
-    rows = [row for row in (_header_fields(line, layout) for line in near) if row]
-    if not rows:
-        return tuple(Header("", "") for _ in range(layout.width))
-    units = None
-    if len(rows) > 1 and _are_units(rows[-1]):
-        units = rows.pop()
-    found = []
-    for number, text in enumerate(rows[-1]):
-        header = header_of(text)
-        if units is not None and units[number].strip("()[]{} ") and not header.unit:
-            unit = units[number].strip("()[]{} ")
-            header = Header(f"{text} ({unit})", text, unit)
-        found.append(header)
-    return tuple(found)
-
-
-def _header_fields(line: str, layout: Layout) -> list[str] | None:
-    """Return the fields of a line of headers; None if it has another number of columns."""
-    for text in (line, _COMMENT.sub("", line, count=1)):
-        fields = layout.fields(text)
-        if len(fields) == layout.width and not all(map(layout.is_number, fields)):
-            return fields
-        if layout.separator == " " and text.strip():
-            joined = re.sub(r"\s+([(\[{/])\s*", r"\1", text)  # "depth (mm)" is one header
-            fields = joined.split()
-            for other in ("\t", ";", ",", "  "):
-                if len(fields) != layout.width and other in text.strip():
-                    fields = [field.strip() for field in text.strip().split(other) if field.strip()]
-            if len(fields) == layout.width:
-                return fields
-    return None
-
-
-def _are_units(fields: Sequence[str]) -> bool:
-    """Tell a row of units."""
-    bare = [field.strip("()[]{} ") for field in fields]
-    return any(map(is_unit, bare)) and all(is_unit(unit) or unit in _PURE or len(unit) <= 6 for unit in bare)
 
 
 def _check_decimals(headers: tuple[Header, ...], before: Sequence[str], layout: Layout, file: str, begin: int) -> None:

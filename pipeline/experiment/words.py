@@ -6,7 +6,7 @@ import re
 _WORDS = {
     "depth": frozenset({
         "depth", "indentation", "indent", "displacement", "disp", "position", "pos", "piezo", "extension",
-        "stroke", "travel", "compression", "crosshead", "deformation", "z", "weg", "h", "d",
+        "stroke", "travel", "compression", "crosshead", "deformation", "height", "separation", "z", "weg", "h", "d",
     }),
     "force": frozenset({"force", "load", "kraft", "f", "fn", "fz", "p"}),
     "time": frozenset({"time", "timestamp", "elapsed", "zeit", "t"}),

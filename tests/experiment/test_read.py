@@ -198,3 +198,46 @@ def test_measured_curves_are_read_as_they_are():
     for curve in read_curves("ecoflex/EF*.csv", Reading(), REAL):
         assert np.ptp(curve.depth) == pytest.approx(20e-3, rel=1e-3)
         assert len(curve.depth) == 1202
+
+
+MICROSCOPE = """# xPosition: 0.0
+# springConstant: 0.05
+#
+# columns: height vDeflection seriesTime
+# fancyNames: "Height (measured)" "Vertical deflection" "Series Time"
+# units: m N s
+"""
+AFTER = ["", "# segmentIndex: 1", "# segment: pause"]
+
+
+def test_a_file_of_a_force_microscope(tmp_path):
+    columns = {"a": 9e-3 - DEPTH, "b": FORCE, "c": TIME}
+    change = lambda lines: [*lines[1:150], *AFTER, *lines[150:]]  # noqa: E731
+    curve = read(write(tmp_path / "a.txt", columns, separator=" ", before=MICROSCOPE, change=change))
+    assert is_the_approach(curve)
+    assert "depth is column `Height (measured)" in " ".join(curve.told)
+
+
+def test_a_file_of_a_testing_machine_in_quotation_marks(tmp_path):
+    def quoted(lines):
+        rows = [",".join(f'"{field}"' for field in line.split(";")) for line in lines[1:]]
+        return ['"Elapsed Time","Disp","Load"', '"Sec","mm","mN"', *rows]
+
+    for decimal in ".,":
+        path = write(tmp_path / "a.csv", IN_MM, separator=";", decimal=decimal, change=quoted)
+        assert is_the_approach(read(path))
+
+
+def test_rows_that_end_with_a_separator(tmp_path):
+    assert is_the_approach(read(write(tmp_path / "a.csv", IN_MM, change=lambda x: [x[0], *(f"{r}," for r in x[1:])])))
+
+
+def test_a_column_of_words_is_left_alone(tmp_path):
+    change = lambda x: [f"{x[0]},phase", *(f"{row},loading" for row in x[1:])]  # noqa: E731
+    assert is_the_approach(read(write(tmp_path / "a.csv", IN_MM, change=change)))
+
+
+def test_a_retract_alone_without_air_is_a_retract(tmp_path):
+    way = np.linspace(1, 0, 100)
+    curve = read(write(tmp_path / "a.csv", {"z (mm)": way, "F (N)": 10 * way}), segment="retract")
+    assert curve.force[0] == pytest.approx(10) and curve.depth[0] > curve.depth[-1]

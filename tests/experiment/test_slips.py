@@ -63,6 +63,10 @@ ERRORS = {
         dict(zip("tzF", cycle(), strict=True)), {}, {"columns": {"depth": 1, "time": 2, "force": 3}, "units": UNITS},
         ["`z`", "time falls", "swapped"],
     ),
+    "a point for thousands": (
+        GOOD, {"separator": ";", "decimal": ",", "change": lambda x: [*x[:99], "9,9;1.234;5,1", *x[100:]]}, {},
+        ["line 100", "`depth (mm)`", '"1.234" is no number'],
+    ),
     "no such column": (
         GOOD, {}, {"columns": {"depth": "indentation"}}, ['no column "indentation"', "`depth (mm)`"],
     ),
@@ -132,6 +136,7 @@ TOLD = {
     "empty column": (GOOD | {"spare": np.nan * TIME}, {}, ["columns without values: spare"]),
     "a line between rows": (GOOD, {"change": lambda x: [*x[:99], "paused", *x[99:]]}, ["line 100", "left out"]),
     "a row cut short": (GOOD, {"change": lambda lines: [*lines, "20.1,2.0"]}, ["line 202", "left out"]),
+    "time without a unit": ({"t": TIME, "z (mm)": 1e3 * DEPTH, "F (N)": FORCE}, {}, ["`t` has no unit", "units"]),
     "several cycles": (TWO_CYCLES, {}, ["2 cycles", "number 1"]),
     "no air": ({k: v[100:] for k, v in GOOD.items()}, {}, ["little or no air"]),
     "metres for millimetres": (
