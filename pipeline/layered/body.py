@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf, log
+from math import inf, log, pi
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from pipeline.arrays import FloatArray
 from pipeline.layered.compliance import Layer, Solid, compliance
-from pipeline.layered.contact import WIDEST, Profile, Touch, touch
+from pipeline.layered.contact import WIDEST, Profile, Touch, flat, touch, waves_below
 
 RIGID = Solid(inf, 0.0)
 # Contact radii of a table: so many, from this share of the largest on.
@@ -76,6 +76,22 @@ class LayeredBody:
     def force(self, profile: Profile, depth: FloatArray) -> FloatArray:
         """Return F (N) of a tool at depths (n,), in m; 0 above the surface."""
         return self.top.plane * self.table(profile, float(np.max(depth)))(depth)
+
+    def punch(self, radius: float) -> float:
+        """Return the stiffness (N/m) of a flat disc of a ``radius`` (m)."""
+        return self.top.plane * float(self.touch(flat(radius), np.array([radius])).stiffness[0])
+
+    def added_compliance(self) -> tuple[float, float]:
+        """Return the compliance that is added to a small tool's on a half-space of the top layer: c (1/m), g (1/m³).
+
+        The displacement by a point force is larger by c / E at the force, with E of the top. For points at distances s
+        and s' from a centre it is larger by (c + g (s² + s'²)/2) / E, in the mean over directions: J₀ of the waves to
+        second order.
+        """
+        waves, weights = waves_below(self.layers, 0.0)
+        beyond = weights * (self.compliance(waves) - 1)
+        scale = (1 - self.top.poisson**2) / pi
+        return scale * float(beyond.sum()), -scale / 2 * float(beyond @ waves**2)
 
     def table(self, profile: Profile, deepest: float) -> Table:
         """Return F / E* over depth up to ``deepest`` (m)."""

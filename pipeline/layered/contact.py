@@ -69,6 +69,11 @@ class Profile:
         return x * total
 
 
+def flat(radius: float) -> Profile:
+    """Return the section of a flat disc of a ``radius`` (m)."""
+    return Profile(np.zeros_like, limit=radius, flat=radius)
+
+
 @dataclass(frozen=True)
 class Touch:
     """Depth (m), F / E* (m²) and its slope over depth (m) at contact radii (m), all (n,)."""
@@ -90,7 +95,7 @@ def touch(layers: tuple[Layer, ...], base: Solid, profile: Profile, radius: Floa
         raise ValueError(
             f"contact of radius {widest:.3g} m is too wide for a top layer of {top:.3g} m: at most 100 times"
         )
-    waves, weights = _waves(layers, widest)
+    waves, weights = waves_below(layers, widest)
     weights = weights * (1 - compliance(layers, base, waves))
     parts = [
         _solved(profile, some, waves, weights, _LEAST + ceil(_MORE * float(np.max(some)) / top))
@@ -129,8 +134,11 @@ def _along(profile: Profile, radius: FloatArray, points: int) -> tuple[FloatArra
     return x.reshape(len(radius), -1), np.multiply.outer(half, weights).reshape(len(radius), -1)
 
 
-def _waves(layers: tuple[Layer, ...], widest: float) -> tuple[FloatArray, FloatArray]:
-    """Return points and weights of a quadrature over the wavenumbers (1/m) that a base changes."""
+def waves_below(layers: tuple[Layer, ...], widest: float) -> tuple[FloatArray, FloatArray]:
+    """Return points and weights of a quadrature over the wavenumbers (1/m) that see below the top layer.
+
+    They resolve the waves between points that are ``widest`` (m) apart.
+    """
     if not layers:
         return np.zeros(0), np.zeros(0)
     first = _LONGEST / sum(layer.thickness for layer in layers)
@@ -138,7 +146,7 @@ def _waves(layers: tuple[Layer, ...], widest: float) -> tuple[FloatArray, FloatA
     doubled = first * 2 ** np.arange(ceil(log2(last / first)) + 1)
     ends = [0.0]
     for end in doubled:
-        panels = ceil((end - ends[-1]) * widest / pi)
+        panels = max(1, ceil((end - ends[-1]) * widest / pi))
         ends.extend(np.linspace(ends[-1], end, panels + 1)[1:])
     nodes, weights = _gauss(_PANEL)
     half = np.diff(ends) / 2

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.layered.body import RIGID, LayeredBody
 from pipeline.layered.compliance import Layer
-from pipeline.layered.contact import Profile
+from pipeline.layered.contact import Profile, flat
 from pipeline.shapes.body import Layered
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.probes._round import RoundIndenter
@@ -36,7 +36,7 @@ _SUPPORTS = ("bottom", "bottom+sides")
 def profile_of(probe: Probe) -> Profile | None:
     """Return the section of a round tool; None for any other."""
     if isinstance(probe, Disc):
-        return Profile(lambda distance: 0 * distance, limit=probe.radius, flat=probe.radius)
+        return flat(probe.radius)
     if isinstance(probe, RoundIndenter):
         section = probe.section
         return Profile(section.slope, limit=probe.limit, flat=section.flat, kinks=probe.kinks)

@@ -1,13 +1,13 @@
 """The compliance that a rigid base adds for a tool on a layer: known, and the same for every small tool."""
 
 from collections.abc import Iterator
-from math import inf
 
 from mpi4py import MPI
 
+from pipeline.layered.body import LayeredBody
+from pipeline.layered.compliance import Layer
 from pipeline.verify import known
 from pipeline.verify.compare import solve
-from pipeline.verify.layered import SOURCE, Solid, added_compliance
 from pipeline.verify.row import Row
 from pipeline.verify.sections import cylinder, disc, tissue
 
@@ -37,7 +37,7 @@ def _published() -> Row:
     thickness, a = 1.0, _PUBLISHED
     kappa, whole = known.LAYER[_PUBLISHED], (1 - 0.3**2) / (2 * a)
     reference = whole * (1 / kappa - 1)
-    c, g = added_compliance(Solid(_YOUNG, 0.3), thickness, Solid(inf, 0.3))
+    c, g = LayeredBody((Layer(_YOUNG, 0.3, thickness),)).added_compliance()
     bar = known.LAYER_ERROR / (kappa - 1) + _FOURTH * (a / thickness) ** 4
     name = f"layer on a rigid base, its compliance from κ of a/h = {a:g}, ν = 0.3"
     return Row(name, "integral", reference, known.LAYER_SOURCE, c + g * 2 / 3 * a**2, 0.0, bar)
@@ -46,7 +46,7 @@ def _published() -> Row:
 def _of_disc(comm: MPI.Comm, contact: str, nu: float, ratio: float) -> Row:
     """Compare E d / F of a disc, minus that on a half-space, with c of the layer."""
     thickness = _RADIUS / ratio
-    c, g = added_compliance(Solid(_YOUNG, nu), thickness, Solid(inf, nu))
+    c, g = LayeredBody((Layer(_YOUNG, nu, thickness),)).added_compliance()
     slides = contact == "frictionless"
     reference = c + (g * 2 / 3 * _RADIUS**2 if slides else 0.0)
     body = cylinder(13e3 * thickness, 1e3 * thickness)
@@ -57,4 +57,4 @@ def _of_disc(comm: MPI.Comm, contact: str, nu: float, ratio: float) -> Row:
     left_out = _FOURTH * ratio**4 if slides else _SECOND * ratio**2
     name = f"layer on a rigid base, compliance added to a half-space's, a/h = {ratio:g}, {contact}, ν = {nu:g}"
     value = whole - _YOUNG * _DEPTH / half_space
-    return Row(name, "2D", reference, SOURCE, value, bar * whole / abs(value), left_out, message)
+    return Row(name, "2D", reference, known.LAYERED, value, bar * whole / abs(value), left_out, message)

@@ -4,8 +4,12 @@ from collections.abc import Iterator
 from math import radians
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
+from pipeline.layered.body import LayeredBody
+from pipeline.layered.compliance import Layer
+from pipeline.layered.contact import Profile
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
@@ -13,7 +17,6 @@ from pipeline.shapes.rounded import Rounded
 from pipeline.study.read import parse
 from pipeline.verify import known
 from pipeline.verify.compare import against_meridian, solve
-from pipeline.verify.layer_contact import layer_contact
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section
 
@@ -150,10 +153,11 @@ def _scene(body: Section, tool: Section, poisson: float) -> Section:
 
 def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
     """Layers on a rigid base, from three times as thick as contact is in radius to a third of that."""
-    ball = Rounded(0.0, _BALL * 1e-3)
+    ball = Profile(Rounded(0.0, _BALL * 1e-3).slope, limit=_BALL * 1e-3)
     for nu in (_POISSON,) if quick else (_POISSON, 0.45, 0.5):
         for thick in _LAYERS[-1:] if quick else _LAYERS:
-            depth, force = layer_contact(ball.slope, 1e-3, thick * 1e-3, nu)
+            touched = LayeredBody((Layer(_YOUNG, nu, thick * 1e-3),)).touch(ball, np.array([1e-3]))
+            depth, force = float(touched.depth[0]), float(touched.force[0])
             body = _cylinder(1 + 20 * max(thick, 0.5), thick)
             record = _solved(comm, "2D", body, {"shape": "sphere", "radius": f"{_BALL} mm"}, depth, nu)
             name = f"layer on a rigid base, sphere, a/h = {1 / thick:.2g}, ν = {nu:g}"

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import inf
 
 from mpi4py import MPI
 
+from pipeline.layered.body import LayeredBody
+from pipeline.layered.compliance import Layer
 from pipeline.verify import known
 from pipeline.verify.boundary import rectangle_stiffness
 from pipeline.verify.compare import against, against_meridian
-from pipeline.verify.layered import SOURCE, Solid, layered_disc
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section, blade, cylinder, disc, ellipse, tissue
 
@@ -88,10 +88,10 @@ def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
     for ratio in (0.4,) if quick else known.LAYER:
         thickness = a / ratio
         published = known.layer(ratio, 10e3, a * 1e-3, 1e-5), known.LAYER_SOURCE, known.LAYER_ERROR
-        force = layered_disc(Solid(10e3, 0.3), thickness * 1e-3, Solid(inf, 0.3), a * 1e-3, 1e-5)
+        force = LayeredBody((Layer(10e3, 0.3, thickness * 1e-3),)).punch(a * 1e-3) * 1e-5
         scene = _scene(cylinder(a + 12 * thickness, thickness), 0.3, disc(a, contact="frictionless"))
         name = f"layer on a rigid base, a/h = {ratio:g}, frictionless, ν = 0.3"
-        flat = against(comm, name, "2D", (force, SOURCE, _SIDE), scene)
+        flat = against(comm, name, "2D", (force, known.LAYERED, _SIDE), scene)
         reference, source, bar = published
         yield flat
         yield replace(flat, reference=reference, source=source, reference_bar=bar)

@@ -6,7 +6,7 @@ With the line load's transform P(ξ) = ∫ φ(t) J₀(ξ t) dt for 0 < t < b, th
     φ(x) - ∫ φ(t) x ∫ (1 - L(ξ h)) ξ J₀(ξ x) J₀(ξ t) dξ dt = E* m.
 
 The pressure is zero at b for every φ, and the load is ∫ φ dt. On a half-plane φ = E* m, where the pressure is
-E* m / π arcosh(b / |y|) (K. L. Johnson, Contact Mechanics, 5.2). L is that of :mod:`pipeline.verify.layer_contact`.
+E* m / π arcosh(b / |y|) (K. L. Johnson, Contact Mechanics, 5.2). L is that of :mod:`pipeline.layered.compliance`.
 """
 
 from math import pi
@@ -14,10 +14,11 @@ from math import pi
 import numpy as np
 from scipy.special import j0
 
-from pipeline.verify.layer_contact import LAST, layer_share
+from pipeline.layered.body import LayeredBody
+from pipeline.layered.compliance import Layer
 
-# Gauss points across the contact, and along ξ h.
-_ACROSS, _WAVES = 64, 400
+# Gauss points across the contact, and along ξ h up to where 1 - L is below 1e-16.
+_ACROSS, _WAVES, _LAST = 64, 400, 24.0
 
 
 def layer_wedge(slope: float, half_width: float, thickness: float, poisson: float) -> tuple[float, float]:
@@ -30,8 +31,8 @@ def layer_wedge(slope: float, half_width: float, thickness: float, poisson: floa
     root = (nodes + 1) / 2
     t, w = half_width * root**2, half_width * root * weights
     waves, strength = np.polynomial.legendre.leggauss(_WAVES)
-    s, ds = LAST * (waves + 1) / 2, LAST * strength / 2
-    share = layer_share(s, poisson)
+    s, ds = _LAST * (waves + 1) / 2, _LAST * strength / 2
+    share = LayeredBody((Layer(1.0, poisson, 1.0),)).compliance(s)
     bessel = j0(np.outer(t, s / thickness))
     kernel = t[:, None] * ((bessel * ((1 - share) * s * ds / thickness**2)) @ bessel.T)
     phi = np.linalg.solve(np.eye(_ACROSS) - kernel * w, np.full(_ACROSS, slope))

@@ -5,10 +5,11 @@ from math import pi
 
 from mpi4py import MPI
 
+from pipeline.layered.body import LayeredBody
+from pipeline.layered.compliance import Layer, Solid
 from pipeline.verify import known
 from pipeline.verify.compare import against, against_meridian, solve
 from pipeline.verify.forces import FAR
-from pipeline.verify.layered import SOURCE, Solid, layered_disc
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section, cylinder, disc, layers, tissue
 
@@ -39,16 +40,18 @@ def _half_spaces(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
     """A layer on a half-space, by an integral equation."""
     for name, (layer, below) in [*_HALF_SPACES.items()][: 1 if quick else None]:
         (thickness, young, nu), (young_below, nu_below) = layer, below
-        solids = Solid(1e3 * young, nu), Solid(1e3 * young_below, nu_below)
-        force = layered_disc(solids[0], 1e-3 * thickness, solids[1], 1e-3, _DEPTH)
-        force = known.in_cylinder(force, solids[1].young, nu_below, 1e-3 * FAR, _DEPTH)
+        base = Solid(1e3 * young_below, nu_below)
+        body = LayeredBody((Layer(1e3 * young, nu, 1e-3 * thickness),), base)
+        force = known.in_cylinder(body.punch(1e-3) * _DEPTH, base.young, nu_below, 1e-3 * FAR, _DEPTH)
         scene = {
             "body": cylinder(FAR, FAR) | {"layer": layers([layer])},
             "material": tissue(nu_below, young_below),
             "probe": disc(1, contact="frictionless"),
         }
         for path in ("2D", "3D"):
-            yield against(comm, f"layer on a half-space, {name}, frictionless", path, (force, SOURCE, _SIZE), scene)
+            yield against(
+                comm, f"layer on a half-space, {name}, frictionless", path, (force, known.LAYERED, _SIZE), scene
+            )
 
 
 def _springs(comm: MPI.Comm, quick: bool) -> Iterator[Row]:

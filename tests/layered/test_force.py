@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.layered.body import LayeredBody
 from pipeline.layered.compliance import Layer, Solid
-from pipeline.layered.contact import Profile
+from pipeline.layered.contact import Profile, flat
 from pipeline.shapes.rounded import Rounded
 from pipeline.verify.known import LAYER, LAYER_ERROR
 
@@ -21,11 +21,6 @@ CONE = Profile(lambda r: FLANK + 0 * r)
 DEPTH = np.array([-1e-4, 0.0, 1e-8, 1e-5, 3e-4, 1e-3])
 
 
-def disc(radius):
-    """Return a flat tool."""
-    return Profile(lambda r: 0 * r, limit=radius, flat=radius)
-
-
 def on_rigid(poisson, thickness):
     """Return a layer on a rigid base."""
     return LayeredBody((Layer(E, poisson, thickness),))
@@ -36,7 +31,7 @@ def on_rigid(poisson, thickness):
     [
         (PARABOLA, lambda d: 4 / 3 * PLANE * R**0.5 * d**1.5),
         (CONE, lambda d: 2 / pi * PLANE / FLANK * d**2),
-        (disc(1e-3), lambda d: 2 * PLANE * 1e-3 * d),
+        (flat(1e-3), lambda d: 2 * PLANE * 1e-3 * d),
     ],
 )
 def test_a_half_space_is_that_of_hertz_love_and_boussinesq(tool, closed):
@@ -78,7 +73,7 @@ def test_the_table_has_the_stiffness_of_a_flat_punch_as_its_slope():
 @pytest.mark.parametrize("ratio", LAYER)
 def test_punches_on_layers_are_those_published(ratio):
     """W. C. Hayes' table, for ν = 0.3."""
-    force = on_rigid(0.3, 1e-3 / ratio).force(disc(1e-3), np.array([1e-4]))
+    force = on_rigid(0.3, 1e-3 / ratio).force(flat(1e-3), np.array([1e-4]))
     assert force == pytest.approx(2 * PLANE * 1e-3 * 1e-4 * LAYER[ratio], rel=LAYER_ERROR)
 
 
@@ -86,8 +81,8 @@ def test_thick_layers_are_half_spaces_and_thin_ones_their_base():
     depth = np.array([1e-4])
     base = Solid(5 * E, 0.45)
     for thickness, other in ((1e3, HALF_SPACE), (1e-5, LayeredBody(base=base))):
-        layered = LayeredBody((Layer(E, NU, thickness),), base).force(disc(1e-3 / 4), depth)
-        assert layered == pytest.approx(other.force(disc(1e-3 / 4), depth), rel=0.15 if thickness < 1 else 1e-6)
+        layered = LayeredBody((Layer(E, NU, thickness),), base).force(flat(1e-3 / 4), depth)
+        assert layered == pytest.approx(other.force(flat(1e-3 / 4), depth), rel=0.15 if thickness < 1 else 1e-6)
 
 
 def test_very_thin_layers_flow_or_are_pressed_flat():
@@ -113,7 +108,7 @@ def test_a_tool_that_ends_goes_on_as_a_punch():
     at = touched.depth[0] + np.array([-1e-9, 1e-5, 2e-5])
     force = body.force(ended, at)
     assert force[0] == pytest.approx(body.top.plane * touched.force[0], rel=1e-4)
-    assert (force[2] - force[1]) / 1e-5 == pytest.approx(body.force(disc(limit), np.array([1.0]))[0], rel=1e-4)
+    assert (force[2] - force[1]) / 1e-5 == pytest.approx(body.force(flat(limit), np.array([1.0]))[0], rel=1e-4)
 
 
 def test_too_wide_a_contact_is_refused():

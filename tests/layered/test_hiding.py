@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.layered.body import LayeredBody
 from pipeline.layered.compliance import Layer, Solid
-from pipeline.layered.contact import Profile
+from pipeline.layered.contact import Profile, flat
 from pipeline.layered.hiding import base_factor, flat_tip, layer_factor, strain_factor, tip_of
 from pipeline.shapes.rounded import Rounded
 
@@ -16,7 +16,7 @@ ROUNDED = Rounded(radians(70), 1e-3)
 TOOLS = {
     "ball": Profile(lambda r: r / R),
     "cone": Profile(lambda r: 0.4 + 0 * r),
-    "punch": Profile(lambda r: 0 * r, limit=1e-3, flat=1e-3),
+    "punch": flat(1e-3),
     "rounded cone": Profile(ROUNDED.slope, kinks=(ROUNDED.tangent,)),
 }
 ERROR = {"ball": 3e-3, "cone": 3e-3, "punch": 3e-3, "rounded cone": 0.05}

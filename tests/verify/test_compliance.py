@@ -1,18 +1,19 @@
-"""Compliances of a layer on a rigid base, from three integral equations, and what tools say of themselves by them."""
+"""Compliances of a layer on a rigid base, from integral equations, and what tools say of themselves by them."""
 
-from math import inf, radians, tan
+from math import radians, tan
 
+import numpy as np
 import pytest
 
+from pipeline.layered.body import LayeredBody
+from pipeline.layered.compliance import Layer
+from pipeline.layered.contact import Profile
 from pipeline.study.read import parse
 from pipeline.verify import known
-from pipeline.verify.layer_contact import layer_contact
-from pipeline.verify.layered import Solid, added_compliance, layered_disc
 from tests.cases import raw
 
 YOUNG, NU = 10e3, 0.3
 PLANE = YOUNG / (1 - NU**2)
-LAYER, RIGID = Solid(YOUNG, NU), Solid(inf, NU)
 
 
 def probe(**keys):
@@ -29,8 +30,8 @@ def test_a_small_disc_finds_the_compliance_of_the_layer():
     disc = probe(shape="disc", radius="1 mm", depth="0.01 mm")
     alone, _ = known.half_space_disc(YOUNG, NU, 1e-3, 1e-5, "frictionless")
     for thickness, rest in ((20e-3, 1e-5), (10e-3, 1e-4)):
-        c, g = added_compliance(LAYER, thickness, RIGID)
-        force = layered_disc(LAYER, thickness, RIGID, 1e-3, 1e-5)
+        layer = LayeredBody((Layer(YOUNG, NU, thickness),))
+        (c, g), force = layer.added_compliance(), layer.punch(1e-3) * 1e-5
         found = added(force, alone, 1e-5, disc.force_exponent)
         assert found == pytest.approx(c + g * disc.mean_square, rel=rest)
         assert abs(found / c - 1) > 20 * rest
@@ -44,8 +45,9 @@ def test_tools_of_which_more_touches_with_depth_find_the_same(shape):
     """
     angle, radius, a, thickness = radians(89), 1.0, 1e-3, 20e-3
     slope = (lambda r: r / radius) if shape == "sphere" else (lambda r: 1 / tan(angle) + 0 * r)
-    depth, force = layer_contact(slope, a, thickness, NU)
-    c, g = added_compliance(LAYER, thickness, RIGID)
+    layer = LayeredBody((Layer(YOUNG, NU, thickness),))
+    touched, (c, g) = layer.touch(Profile(slope), np.array([a])), layer.added_compliance()
+    depth, force = float(touched.depth[0]), float(touched.force[0])
     keys = {"radius": "1 m"} if shape == "sphere" else {"angle": "89 deg", "radius": "1 m"}
     tool = probe(shape=shape, depth=f"{depth!r} m", **keys)
     n = tool.force_exponent

@@ -2,15 +2,15 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from mpi4py import MPI
 from typer.testing import CliRunner
 
 from pipeline import cli, verify
+from pipeline.layered.body import LayeredBody
+from pipeline.layered.compliance import Layer, Solid
 from pipeline.verify import known
 from pipeline.verify.boundary import rectangle_stiffness
-from pipeline.verify.layered import Solid, layered_disc, surface_compliance
 from pipeline.verify.row import Row
 
 
@@ -62,7 +62,7 @@ def test_layers_on_half_spaces_meet_their_limits():
     """A thick layer is a half-space, a thin one is not felt, one like its base is none; a rigid base is known."""
 
     def force(layer, thickness, base):
-        return layered_disc(layer, thickness, base, 1e-3, 1e-5)
+        return LayeredBody((Layer(layer.young, layer.poisson, thickness),), base).punch(1e-3) * 1e-5
 
     def alone(solid):
         return known.half_space_disc(solid.young, solid.poisson, 1e-3, 1e-5, "frictionless")[0]
@@ -80,12 +80,3 @@ def test_layers_on_half_spaces_meet_their_limits():
         bone = Solid(float("inf"), 0.3)
         layer = Solid(1e4, 0.3)
         assert force(layer, 1e-3 / ratio, bone) / alone(layer) == pytest.approx(kappa, rel=known.LAYER_ERROR)
-
-
-@pytest.mark.parametrize("softer", [0.1, 1.0, 10.0])
-def test_layers_sink_like_burmister_has_it(softer):
-    """D. M. Burmister's closed form for two incompressible solids."""
-    k = np.array([0.01, 0.1, 1.0, 3.0, 10.0])
-    n, e = (1 - softer) / (1 + softer), np.exp(-2 * k)
-    closed = (1 + 4 * n * k * e - n**2 * e**2) / (1 - 2 * n * (1 + 2 * k**2) * e + n**2 * e**2)
-    assert surface_compliance(Solid(1.0, 0.5), Solid(softer, 0.5), k) == pytest.approx(closed, rel=1e-8)
