@@ -14,10 +14,9 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.shapes.distance import Distance
 from pipeline.solve import SolveError
-from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.contact_steps import check_outside
-from pipeline.solve.contact.deformed import ContactSolution, first_set, solve_contact
+from pipeline.solve.contact.deformed import first_set, solve_contact
 from pipeline.solve.contact.large import placed_tool, touched_area
 from pipeline.solve.contact.levels import Surface
 from pipeline.solve.contact.tissue import DeformedBody
@@ -86,26 +85,14 @@ class PressedTool(Pressed):
         self.rate = -float(self.force[2]) * self._depth
         self.area = 0.0
         if touched.active.any():
-            # Pressures beside the edge tell its place with the modulus of the law, of which less is left.
-            elastic = replace(touched, forces=touched.forces / self._left(touched))
+            # Pressures beside the edge tell its place with the modulus of the law: those without relaxation.
+            elastic = replace(touched, forces=tissue.elastic_forces() * touched.active[:, None])
             places = tissue.candidates
             if not tissue.law.is_linear:
                 places = replace(places, points=tissue.positions())
             area = touched_area(tissue, places, elastic, share * self._depth).value
             self.area = 2.0 ** len(tissue.elements.body.mirrored) * area
         state.array[:] = self._last
-
-    def _left(self, touched: ContactSolution) -> float:
-        """Return the work of the forces in the displacement, over that of the elastic forces; collective."""
-        tissue, body = self._tissue, self.body
-        work = float((touched.forces * (tissue.positions() - tissue.candidates.points)).sum())
-        body.impose(None, (1.0,) * len(tissue.law.parameters))
-        with body.state() as state, body.state() as forces:
-            state.array[:] = self._last
-            body.forces(state, forces)
-            owned = slice(tissue.elements.displacements.owned)
-            own = np.array([forces.array[owned] @ state.array[owned]])
-        return work / float(global_sum(tissue.elements.body.comm, own)[0])
 
     def guess(self, state: PETSc.Vec) -> None:
         """Return nothing: the tangent does not know which nodes the tool will touch."""

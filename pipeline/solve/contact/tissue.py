@@ -90,6 +90,14 @@ class DeformedBody:
         """Return the nodal forces (n, 3), N; zero at prescribed components."""
         return np.where(self.fixed, 0.0, self._numbering.gather_vectors(self._forces()[: self._space.owned]))
 
+    def elastic_forces(self) -> FloatArray:
+        """Return the nodal forces (n, 3), N, of the law without relaxation, which the energy has from then on."""
+        self._body.impose(None, (1.0,) * len(self.law.parameters))
+        with self._body.state() as forces:
+            self._body.forces(self._now, forces)
+            found = self._numbering.gather_vectors(forces.array[: self._space.owned])
+        return np.where(self.fixed, 0.0, found)
+
     def unbalanced(self) -> float:
         """Return the norm (N) of the residual at all other free dofs."""
         left = self._forces().copy()

@@ -169,7 +169,7 @@ class LargeMeridian(LargeSolver):
             state, path = coarse.press(deep, _SHORTEST if before is None else _SHORTEST_OF_FINER)
         except LargeError as stop:
             raise stopped(stop, arrays, law, depth, is_found=False) from stop
-        check_path(path, _ROUNDING * arrays.points.ptp(axis=0).prod())
+        check_path(path, _ROUNDING * float(np.ptp(arrays.points, axis=0).prod()))
         state = fine.equilibrate(fine.forms.interpolate(coarse.forms, state), deep)
         on_probe, on_support, energy = fine.forces(state)
         balance = abs(on_probe + on_support) / abs(on_probe)
