@@ -74,17 +74,16 @@ def _hold(depth: FloatArray, time: FloatArray | None, top: int) -> tuple[int, in
     width = max(2, int(_WINDOW * len(depth)))
     if len(depth) < 3 * width or top < width:
         return top + 1, top + 1
+    base, highest = depth[: top + 1].min(), depth[top]
+    # Time from a fifth to four fifths of the way; the deepest row of a noisy hold may be anywhere in it.
+    first, last = (int(np.argmax(depth >= base + share * (highest - base))) for share in (0.2, 0.8))
+    usual = 0.6 * (highest - base) / max(clock[last] - clock[first], np.finfo(float).tiny)
     rate = np.zeros(len(depth))
     elapsed = np.maximum(clock[width:] - clock[:-width], np.finfo(float).tiny)
     middle = (depth[width:] - depth[:-width]) / elapsed
     rate[width // 2 : width // 2 + len(middle)] = middle
     rate[: width // 2], rate[width // 2 + len(middle) :] = middle[0], middle[-1]
-    moving = rate[: top + 1][rate[: top + 1] > 0]
-    if not moving.size:
-        return top + 1, top + 1
-    usual = float(np.quantile(moving, 0.75))
-    base = depth[: top + 1].min()
-    is_near = depth >= base + _NEAR * (depth[top] - base)
+    is_near = depth >= base + _NEAR * (highest - base)
     slow = np.flatnonzero(is_near & (np.abs(rate) < _SLOW * usual))
     if slow.size < max(_FEWEST, width):
         return top + 1, top + 1

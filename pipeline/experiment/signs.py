@@ -8,9 +8,10 @@ from pipeline.arrays import FloatArray
 from pipeline.experiment.columns import Recorded
 from pipeline.experiment.reading import Reading
 
-# Shares of the depth at both ends of a curve that are compared, and by how much the contact's end must differ more.
-_END, _CLEAR = 0.25, 2.0
-_FEWEST = 4
+# Shares of the depth at both ends of a curve that are compared, and by how much the contact's end must vary more, or
+# have the larger force: an offset of the force makes the latter less sure.
+_END, _CLEAR, _CLEAR_SIZE = 0.25, 2.0, 10.0
+_STEP, _FEWEST, _BETWEEN = 0.02, 4, (0.1, 0.9)
 
 
 def signs_of(found: Recorded, reading: Reading) -> tuple[int, int]:
@@ -47,21 +48,34 @@ def _name(found: Recorded, kind: str) -> str:
 
 def _deep_end(depth: FloatArray, force: FloatArray) -> int:
     """Return 1 if the force varies, or is large, at the largest depths, -1 at the smallest; 0 if that is not clear."""
-    for measure in (_spread, _size):
+    rows = _moving(depth)
+    depth, force = depth[rows], force[rows]
+    for measure, clear in ((_spread, _CLEAR), (_size, _CLEAR_SIZE)):
         low, high = (measure(depth, force, end) for end in (-1, 1))
-        if max(low, high) > _CLEAR * min(low, high):
+        if max(low, high) > clear * min(low, high):
             return 1 if high > low else -1
     return 0
 
 
+def _moving(depth: FloatArray) -> list[int]:
+    """Return rows between which the depth changes by a small share of its range: a hold has one row only."""
+    least, last, rows = _STEP * float(np.ptp(depth)), depth[0], [0]
+    for row, value in enumerate(depth.tolist()):
+        if abs(value - last) > least:
+            last = value
+            rows.append(row)
+    return rows
+
+
 def _spread(depth: FloatArray, force: FloatArray, end: int) -> float:
-    """Return by how much the force varies with the depth in the last quarter of the depths towards an ``end``."""
+    """Return by how much the force varies in the last quarter of the depths towards an ``end``: by slope or range."""
     along = end * depth
     near = along >= along.max() - _END * np.ptp(along)
     if near.sum() < _FEWEST or np.ptp(along[near]) == 0:
         return 0.0
     slope = np.polyfit(along[near] - along[near].mean(), force[near], 1)[0]
-    return float(abs(slope) * np.ptp(along[near]))
+    between = np.ptp(np.quantile(force[near], _BETWEEN))
+    return float(max(abs(slope) * np.ptp(along[near]), between))
 
 
 def _size(depth: FloatArray, force: FloatArray, end: int) -> float:
