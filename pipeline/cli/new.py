@@ -42,8 +42,8 @@ def new(
 ) -> None:
     """Begin a study file: studies/NAME.toml. Existing study files are not changed.
 
-    Default: the short example `pad`, a disc on a soft pad, which runs in seconds. The body's file is copied, too, and
-    study.schema.json, with which editors complete and check keys.
+    Default: the short example `pad`, a disc on a soft pad, which runs in seconds. Files that a study names are copied,
+    too, and study.schema.json, with which editors complete and check keys.
 
     Example: epsmesh new mine
 
@@ -80,7 +80,7 @@ def new(
         data | ({"renamed": changed} if old else {}),
         *(f"{before} is now {after}" for before, after in changed.items()),
         *(["no key has a new name: the copy is as it was"] if old and not changed else []),
-        *(f"{file}: file of the body, copied with the study" for file in carried),
+        *(f"{file}: copied with the study, which names it" for file in carried),
         f"{path}: edit it, then `epsmesh plan {path}` and `epsmesh run {path}`",
     )
 
@@ -146,29 +146,43 @@ def _copy_of(like: str) -> tuple[str, Path]:
 
 
 def _carried(text: str, source: Path, target: Path) -> list[Path]:
-    """Copy the body's file that a study names from the folder ``source`` to where it leads from ``target``.
+    """Copy the files that a study names from the folder ``source`` to where they lead from ``target``.
 
-    An existing file is kept. A missing one is reported when the study is read.
+    An existing file is kept. A missing one is reported when it is read.
 
     Raises:
         OSError: if it cannot be written.
     """
+    copied = []
+    for name in _named(text):
+        here, there = source / name, target / name
+        try:
+            if there.exists() or not here.is_file():
+                continue
+        except ValueError:  # a name with a NUL
+            continue
+        # Others may have written the study: it chooses no place for a file outside the folder that one is in.
+        if not there.resolve().is_relative_to(Path.cwd()):
+            fail(of_file(there, "a file of the study is not copied out of this folder: copy it there first", _HOWTO))
+        there.parent.mkdir(parents=True, exist_ok=True)
+        with atomic(there) as temporary:
+            shutil.copyfile(here, temporary)
+        copied.append(there)
+    return copied
+
+
+def _named(text: str) -> list[str]:
+    """Return the files that a study names: of its body, and of its measurements."""
     import tomllib
 
     try:
-        name = tomllib.loads(text)["body"]["file"]
-        here, there = source / name, target / name
-        if there.exists() or not here.is_file():
-            return []
-    except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError):  # no study, or one of a body without a file
+        study = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
         return []
-    # Others may have written the study: it chooses no place for a file outside the folder that one is in.
-    if not there.resolve().is_relative_to(Path.cwd()):
-        fail(of_file(there, "the body's file is not copied out of this folder: copy it there first", _HOWTO))
-    target.mkdir(parents=True, exist_ok=True)
-    with atomic(there) as temporary:
-        shutil.copyfile(here, temporary)
-    return [there]
+    measurements = study.get("measurement")
+    tables = [study.get("body"), *(measurements if isinstance(measurements, list) else [])]
+    names = [table.get("file") for table in tables if isinstance(table, dict)]
+    return list(dict.fromkeys(name for name in names if isinstance(name, str)))
 
 
 def _known() -> dict[str, Path]:

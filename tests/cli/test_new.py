@@ -195,6 +195,17 @@ def test_the_file_of_a_body_is_taken_along_within_the_project(elsewhere):
     assert not (elsewhere.parent / "meshes").exists()
 
 
+def test_the_curves_of_a_study_are_taken_along(elsewhere):
+    curve = elsewhere / "old" / "curves" / "a.csv"
+    curve.parent.mkdir(parents=True)
+    curve.write_text("depth (mm),force (N)\n")
+    measured = '\n[[measurement]]\nname = "a"\nfile = "curves/a.csv"\n'
+    (elsewhere / "old" / "mine.toml").write_text(examples()["pad"].read_text() + measured)
+    copied = json.loads(new("yours", "--like", "old/mine.toml", "--json").stdout)["carried"]
+    assert copied == ["studies/curves/a.csv"]
+    assert (elsewhere / copied[0]).read_text() == curve.read_text()
+
+
 def test_the_evaluator_in_c_is_copied_and_nothing_overwritten(elsewhere):
     done = epsmesh("export", "--evaluator", "mine/c", "--json")
     names = json.loads(done.stdout)["files"]
