@@ -15,6 +15,7 @@ from pipeline.identify.model import Model
 from pipeline.identify.noise import GRID
 from pipeline.identify.parts import SOURCES, CurveFit, Estimate, Measured, NoiseFound, Profile, Unknown, Window
 from pipeline.identify.profiles import Likelihood, ends, profile
+from pipeline.identify.seen import combinations
 from pipeline.identify.sources import mesh, shares
 from pipeline.identify.start import start
 
@@ -61,7 +62,7 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
         profiles=profiles,
         windows=() if does_fit else _windows(measured, unknowns, found),
         evidence=found.misfit,
-        told=tuple(_told(model, seen)),
+        told=combinations(found, seen),
     )
 
 
@@ -159,9 +160,3 @@ def _cut(measured: Measured, keep: npt.NDArray[np.bool_]) -> Measured:
     curve = measured.curve
     time = None if curve.time is None else curve.time[keep]
     return replace(measured, curve=replace(curve, depth=curve.depth[keep], force=curve.force[keep], time=time))
-
-
-def _told(model: Model, seen: npt.NDArray[np.bool_]) -> list[str]:
-    blind = [unknown.name for unknown, is_seen in zip(model.space.unknowns, seen, strict=True)
-             if unknown.is_wanted and not is_seen]  # fmt: skip
-    return [f"{name} is not in these curves: any value of its range fits them" for name in blind]
