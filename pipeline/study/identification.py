@@ -232,6 +232,10 @@ def _check_radius(given: Mapping[str, Sought], measurements: tuple[Measurement, 
 def _check_relaxation(given: Mapping[str, Sought], measurements: tuple[Measurement, ...], problems: Problems) -> None:
     """Report terms of relaxation that have no hold to be seen in, or a number without those before it."""
     names = [name for name in given if name.startswith("relaxation_")]
+    for number, one in enumerate(measurements if names else (), start=1):
+        if not one.segment.startswith("approach"):
+            allowed = f'must begin with the approach, from which `{names[0]}` is relaxation: "approach+hold"'
+            problems.error(f"measurement[{number}].segment", one.segment, allowed)
     if names and measurements and all("hold" not in one.segment for one in measurements):
         allowed = 'needs a [[measurement]] with segment = "approach+hold"'
         problems.error(f"identify.{names[0]}", None, allowed)

@@ -66,9 +66,9 @@ SECTION_TEXTS = {
     "measurement.sign": "Signs of recorded values. Optional; a sign that is not given is found, and told.",
     "identify": "Unknowns that `epsmesh identify` finds from the measurements. Besides the keys below, the name of a "
     "parameter is a key: `young`, `poisson`, `thickness`, `radius`, `friction`, `skin_young`, `skin_thickness`, a "
-    "parameter of the law, `contact_point`, `baseline`, `drift`, `machine_stiffness`, `relaxation_share_1`, "
-    "`relaxation_time_1`. It has a range, or a value with its error (95 %). What is not named is known. Optional; its "
-    "lists are no sweeps.",
+    "parameter of the law, `contact_point` (larger is deeper), `baseline`, `drift`, `machine_stiffness`, "
+    "`relaxation_share_1`, `relaxation_time_1`. It has a range, or a value with its error (95 %). What is not named is "
+    "known. Optional; its lists are no sweeps.",
 }
 
 

@@ -82,6 +82,11 @@ MISTAKES = {
     "relaxation without a hold": (
         [{}], {"unknown": ["relaxation_share_1", "relaxation_time_1"]}, ["relaxation_share_1", "approach+hold"],
     ),
+    "relaxation from a hold alone": (
+        [{"segment": "hold"}],
+        {"unknown": ["relaxation_share_1", "relaxation_time_1"]},
+        ["measurement[1].segment", "begin with the approach", "approach+hold"],
+    ),
     "share without a time": ([HOLD], {"unknown": ["relaxation_share_1"]}, ["identify", "lacks `relaxation_time_1`"]),
 }  # fmt: skip
 
