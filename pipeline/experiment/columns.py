@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.experiment.header import factor_of, header_of, is_unit_of
+from pipeline.experiment.header import factor_of, header_of, is_unit_of, without_mark
 from pipeline.experiment.reading import UNITS, ExperimentError, Reading
 from pipeline.experiment.table import Table
 from pipeline.experiment.words import is_called
@@ -95,6 +95,7 @@ def _named(table: Table, kind: str, reading: Reading) -> int:
         if wanted > len(table.headers):
             raise ExperimentError(table.file, f"columns.{kind} = {wanted}: there are {len(table.headers)} columns")
         return wanted - 1
+    wanted = without_mark(wanted)
     plain = [_plain(header.text) for header in table.headers]
     found = [number for number, text in enumerate(plain) if text == _plain(wanted)]
     if not found:  # without the unit, which may be in one of both only

@@ -39,7 +39,7 @@ def _with_unit(text: str, unit: str) -> Header:
 def _fields(line: str, layout: Layout) -> list[str] | None:
     """Return the fields of a line of headers; None if it has another number of columns, or numbers."""
     bare = without_mark(line)
-    texts = dict.fromkeys((line, bare, _PREFIX.sub("", bare, count=1)))
+    texts = dict.fromkeys((bare, _PREFIX.sub("", bare, count=1)))
     for text in texts:
         for fields in _ways(text, layout):
             if len(fields) == layout.width - 1:  # rows may end with a separator, and the headers not

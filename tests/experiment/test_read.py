@@ -218,6 +218,12 @@ def test_a_file_of_a_force_microscope(tmp_path):
     assert "depth is column `Height (measured)" in " ".join(curve.told)
 
 
+def test_the_mark_of_a_comment_is_no_part_of_a_header(tmp_path):
+    path = write(tmp_path / "a.csv", IN_MM, before="# ")
+    assert any("column `time (s)`" in told for told in read(path).told)
+    assert is_the_approach(read(path, columns={"time": "# time (s)"}))
+
+
 def test_a_file_of_a_testing_machine_in_quotation_marks(tmp_path):
     def quoted(lines):
         rows = [",".join(f'"{field}"' for field in line.split(";")) for line in lines[1:]]
