@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from pipeline import __version__
-from pipeline.cli import compare, export, guide, new, plan, report, run, status, touch, verify, view
+from pipeline.cli import compare, export, guide, identify, new, plan, report, run, status, touch, verify, view
 from pipeline.cli.console import error, make_patient, say, what_was_not_written
 from pipeline.cli.faults import BAD_INPUT, fail
 from pipeline.cli.group import Commands
@@ -39,6 +39,7 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
     status.status,
     report.report,
     guide.guide,
+    identify.identify,
     compare.compare,
     view.view,
     export.export,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
-from pipeline.cli.console import error, print_json
-from pipeline.cli.faults import DONE, INTERRUPTED, SOME_FAILED, Fault, fail, of_results
+from pipeline.cli.console import error, print_json, warning
+from pipeline.cli.faults import DONE, INTERRUPTED, SOME_FAILED, Fault, fail, of_file, of_results
 from pipeline.cli.words import (
     DEFAULT_MESHES,
     DEFAULT_OUTPUT,
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from pipeline.plan.plan import Plan
     from pipeline.plan.shard import Shard
     from pipeline.run.progress import Terminal
+    from pipeline.study.sweep import Study
     from pipeline.workflow import Opened, Outcome
 
 # So many failed cases are listed; `status` lists all.
@@ -84,6 +85,7 @@ def run(
     check_output(store or output / STORE_NAME, folder=None if meshes == DEFAULT_MESHES else meshes)
     for study in () if part else studies:
         check_output(*result_files(output, study.name))
+    _check_measured(studies, output)
     check_machine()
     from pipeline import workflow
     from pipeline.plan.shard import stores_of
@@ -133,6 +135,22 @@ def run(
     if outcome.interrupted:
         workflow.end_ranks(comm, INTERRUPTED)
     raise typer.Exit(ended)
+
+
+def _check_measured(studies: "list[Study]", output: Path) -> None:
+    """Say that measurements are left out; exit if results would replace those of an identification."""
+    from pipeline.report.identified import is_identification
+
+    for study in (study for study in studies if study.measurements):
+        file = output / f"{study.name}.nc"
+        if file.exists():
+            import xarray as xr
+
+            with xr.open_dataset(file) as dataset:
+                if is_identification(dataset):
+                    what = f"is what `epsmesh identify {quote(study.file)}` found: give another --output for its cases"
+                    fail(of_file(file, what))
+        warning(f"{study.file}: its measurements are for `epsmesh identify`: only its cases are run")
 
 
 def _progress(plan: "Plan", *, verbose: bool) -> "Terminal":

@@ -1,0 +1,110 @@
+"""The experiment of a study: its specimens with their curves, and the forces of the scenes they were measured on."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil, floor, log10
+from typing import cast
+
+import numpy as np
+
+from pipeline.experiment.curve import Curve
+from pipeline.experiment.reading import ExperimentError
+from pipeline.identify.forward import forward_of
+from pipeline.identify.may_hide import hidden_parts
+from pipeline.identify.parts import Forward, Hidden, Measured, Unknown
+from pipeline.identify.tools import tip_of_probe
+from pipeline.shapes.probe import Probe
+from pipeline.study.curves import curves_of
+from pipeline.study.measurement import Measurement
+from pipeline.study.read import scene_of
+from pipeline.study.schema import Material
+from pipeline.study.sweep import Study
+from pipeline.surrogate.cases import Solve
+
+# The force is computed this much deeper than from a twentieth of the largest force on: a ball has that at an eighth of
+# its depth, a cone at a fifth, and the contact point is not known beforehand.
+_SMALL, _DEEPER = 0.05, 1.4
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """What is identified together: one curve of each measurement."""
+
+    name: str
+    curves: tuple[Curve, ...]
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """What all specimens share: for each measurement the force of its scene, and what the body may hide."""
+
+    measurements: tuple[Measurement, ...]
+    forwards: tuple[Forward, ...]
+    hidden: tuple[tuple[Hidden, ...], ...]
+
+    def measured(self, specimen: Specimen) -> tuple[Measured, ...]:
+        """Return the curves of a specimen with their scenes."""
+        rows = zip(specimen.curves, self.measurements, self.forwards, self.hidden, strict=True)
+        return tuple(Measured(curve, forward, one.machine_compliance, own) for curve, one, forward, own in rows)
+
+
+def specimens(study: Study) -> tuple[Specimen, ...]:
+    """Return the specimens of a study, one for each file of a pattern.
+
+    Raises:
+        ExperimentError: if a file is no curve, or the measurements have different numbers of files.
+    """
+    found = [curves_of(study, measurement) for measurement in study.measurements]
+    counts = {len(curves) for curves in found}
+    if len(counts) > 1:
+        text = ", ".join(f"{len(curves)} of {one.file}" for one, curves in zip(study.measurements, found, strict=True))
+        raise ExperimentError(study.file, f"measurements need one curve of each specimen, in the same order: {text}")
+    names = [one.name for one in study.measurements]
+    return tuple(
+        Specimen(curves[0].name, tuple(replace(curve, name=name) for curve, name in zip(curves, names, strict=True)))
+        for curves in zip(*found, strict=True)
+    )
+
+
+def scenes_of(study: Study, unknowns: Sequence[Unknown], found: Sequence[Specimen], solve: Solve) -> Scenes:
+    """Return the forces of all scenes of a study; ``solve`` runs their cases.
+
+    Raises:
+        StudyError: if a scene cannot be run.
+        SurrogateError: if a case that a force needs has none.
+    """
+    scenes = [scene_of(study, measurement) for measurement in study.measurements]
+    deepest = [_deepest([one.curves[number] for one in found]) for number in range(len(scenes))]
+    made: dict[str, Forward] = {}
+    for scene in scenes:
+        most = max(depth for other, depth in zip(scenes, deepest, strict=True) if other.text == scene.text)
+        if scene.text not in made:
+            made[scene.text] = forward_of(scene, unknowns, most, solve)
+    probes = [cast(Probe, scene.sections["probe"][0]) for scene in scenes]
+    tips = [tip_of_probe(probe, depth) for probe, depth in zip(probes, deepest, strict=True)]
+    hidden = hidden_parts(study.identification.may_hide, tips, deepest, _poisson(study, unknowns))
+    return Scenes(study.measurements, tuple(made[scene.text] for scene in scenes), tuple(hidden))
+
+
+def _deepest(curves: Sequence[Curve]) -> float:
+    """Return the depth (m) that no curve goes beyond, with two digits: the same for curves that are nearly the same."""
+    most = max(map(_depth_of, curves))
+    digit = 10.0 ** (floor(log10(most)) - 1)
+    return ceil(most / digit) * digit
+
+
+def _depth_of(curve: Curve) -> float:
+    """Return a depth (m) that a curve does not go beyond, from where its force is small."""
+    force = curve.force - np.median(curve.force[: max(1, len(curve.force) // 20)])
+    top = int(np.argmax(curve.depth))
+    pressed = np.flatnonzero(force[: top + 1] > _SMALL * force.max())
+    start = curve.depth[pressed[0]] if pressed.size else curve.depth[0]
+    return float(min(_DEEPER * (curve.depth[top] - start), _DEEPER * np.ptp(curve.depth)))
+
+
+def _poisson(study: Study, unknowns: Sequence[Unknown]) -> float:
+    """Return Poisson's ratio of the body, about the middle of its range if it is unknown."""
+    for unknown in unknowns:
+        if unknown.name == "poisson":
+            return (unknown.low + unknown.high) / 2
+    return cast(Material, study.sections["material"][0]).poisson

@@ -1,0 +1,42 @@
+"""Results of single files, kept as they come: an interrupted identification of many files goes on where it was."""
+
+from hashlib import sha256
+from pathlib import Path
+
+import xarray as xr
+
+from pipeline import __version__
+from pipeline.identify.dataset import write
+from pipeline.identify.experiment import Specimen
+from pipeline.study.sweep import Study
+
+
+class Kept:
+    """The folder of what is known of a study's files, in the folder of results; names follow from study and curves."""
+
+    def __init__(self, output: Path, study: Study):
+        self._folder = output / "identified"
+        self._study = f"{__version__}\n{study.text}"
+
+    def read(self, specimen: Specimen) -> xr.Dataset | None:
+        """Return what was kept of a specimen, None if nothing was, or if it cannot be read."""
+        path = self._path(specimen)
+        try:
+            return xr.load_dataset(path, engine="netcdf4") if path.is_file() else None
+        except (OSError, ValueError, RuntimeError):
+            return None
+
+    def write(self, specimen: Specimen, found: xr.Dataset) -> None:
+        """Keep what was found of a specimen.
+
+        Raises:
+            OSError: if it cannot be written.
+        """
+        write(found, self._path(specimen))
+
+    def _path(self, specimen: Specimen) -> Path:
+        digest = sha256(self._study.encode())
+        for curve in specimen.curves:
+            for values in (curve.depth, curve.force, curve.time):
+                digest.update(b"none" if values is None else values.tobytes())
+        return self._folder / f"{digest.hexdigest()[:24]}.nc"

@@ -1,0 +1,143 @@
+"""`epsmesh identify`: from force curves to a dataset, a figure and an answer."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline.layered.body import RIGID, LayeredBody
+from pipeline.layered.compliance import Layer
+from scripts.make_curves import TRUTH, Machine, disc, main, pressed, write
+
+YOUNG = 20e3
+STUDY = """title = "Punch"
+[body]
+shape = "cylinder"
+radius = "40 mm"
+height = "10 mm"
+fixed = "bottom"
+[material]
+young = "10 kPa"
+poisson = 0.4
+[probe]
+shape = "disc"
+radius = "2 mm"
+depth = "0.2 mm"
+contact = "frictionless"
+[mesh]
+accuracy = "0.5 %"
+[[measurement]]
+name = "punch"
+file = "{file}"
+[identify]
+young = ["1 kPa", "1 MPa"]
+may_hide = {may_hide}
+"""
+
+
+def curve(path, young=YOUNG, seed=1):
+    """Write the curve of a flat punch on a wide layer."""
+    tissue = LayeredBody((Layer(young, 0.4, 10e-3),), RIGID)
+    machine = Machine(0.5e-3, 1e-3, count=150)
+    write(path, ("depth (mm)", "force (mN)"), pressed(tissue, disc(2e-3), 0.2e-3, machine, seed), (1e3, 1e3))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Return a folder with a study of one curve, one of three, and one of none."""
+    folder = tmp_path_factory.mktemp("identify")
+    (folder / "curves").mkdir()
+    for number, young in enumerate((20e3, 25e3, 30e3), start=8):
+        curve(folder / "curves" / f"gel_{number}.csv", young, seed=number)
+    (folder / "punch.toml").write_text(STUDY.format(file="curves/gel_8.csv", may_hide='["layer", "base"]'))
+    (folder / "three.toml").write_text(STUDY.format(file="curves/*.csv", may_hide="[]"))
+    (folder / "none.toml").write_text(STUDY.format(file="curves/nothing.csv", may_hide="[]"))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(folder, epsmesh):
+    """Return what `identify` said of the one curve."""
+    return epsmesh("identify", folder / "punch.toml", "--output", folder / "results")
+
+
+def test_the_modulus_is_within_both_bars(folder, found):
+    assert found.exit_code == 0, found.output
+    dataset = xr.load_dataset(folder / "results" / "punch.nc")
+    young = dataset.sel(unknown="young")
+    assert young["low"] < YOUNG < young["high"]
+    assert young["low_hidden"] <= young["low"] and young["high"] <= young["high_hidden"]
+    assert young["high"] - young["low"] < 0.1 * YOUNG
+    assert dataset["fit"].shape == dataset["force"].shape == (1, 150)
+
+
+def test_the_answer_has_both_bars_and_a_material_to_paste(found):
+    assert "if the body is as declared; " in found.stdout
+    assert "if it may hide a layer or a stiff base." in found.stdout
+    assert '\n[material]\nyoung = "20' in found.stdout
+
+
+def test_forces_are_computed_once(folder, epsmesh, found):
+    again = epsmesh("identify", folder / "punch.toml", "--output", folder / "results", "--json")
+    data = json.loads(again.stdout)
+    (study,) = data["studies"]
+    assert data["status"] == 0
+    assert study["values"]["young"]["unit"] == "Pa"
+    before = xr.load_dataset(folder / "results" / "punch.nc").sel(unknown="young")
+    assert study["values"]["young"]["estimate"] == pytest.approx(float(before["estimate"]))
+    status = json.loads(epsmesh("status", "--store", folder / "results" / "cases.sqlite", "--json").stdout)
+    assert status["records"] < 20
+
+
+def test_many_files_are_a_dimension_and_each_is_kept(folder, epsmesh, found, monkeypatch):
+    result = epsmesh("identify", folder / "three.toml", "--output", folder / "results")
+    assert result.exit_code == 0, result.output
+    dataset = xr.load_dataset(folder / "results" / "three.nc")
+    assert list(dataset["file"].values) == ["gel_8", "gel_9", "gel_10"]
+    assert dataset["estimate"].sel(unknown="young").values == pytest.approx([20e3, 25e3, 30e3], rel=0.03)
+    monkeypatch.setattr("pipeline.identify.estimate.identify", lambda *_: pytest.fail("is fitted again"))
+    again = epsmesh("identify", folder / "three.toml", "--output", folder / "results")
+    assert again.exit_code == 0, again.output
+    xr.testing.assert_equal(xr.load_dataset(folder / "results" / "three.nc"), dataset)
+
+
+def test_the_report_is_a_page_with_the_answer(folder, epsmesh, found):
+    result = epsmesh("report", folder / "results" / "punch.nc")
+    assert result.exit_code == 0, result.output
+    assert "if the body is as declared" in (folder / "results" / "punch.html").read_text()
+
+
+def test_the_cases_of_the_study_do_not_replace_what_was_found(folder, epsmesh, found):
+    result = epsmesh("run", folder / "punch.toml", "--output", folder / "results")
+    assert result.exit_code == 2
+    assert "is what `epsmesh identify" in result.stderr
+
+
+def test_what_cannot_be_identified_is_refused_before_anything_is_computed(folder, epsmesh, small):
+    result = epsmesh("identify", folder / "none.toml", "--output", folder / "results")
+    assert result.exit_code == 2
+    assert "nothing.csv" in result.stderr
+    result = epsmesh("identify", small)
+    assert result.exit_code == 2
+    assert "has no [[measurement]]" in result.stderr
+
+
+def test_curves_of_the_studies_are_those_that_the_script_makes(tmp_path):
+    main(tmp_path)
+    for path in tmp_path.iterdir():
+        made, kept = (np.loadtxt(one, delimiter=",", skiprows=1) for one in (path, Path("studies/curves") / path.name))
+        np.testing.assert_allclose(made, kept, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", sorted(TRUTH))
+def test_bars_of_the_studies_hold_what_their_curves_were_made_with(name, tmp_path, epsmesh):
+    result = epsmesh("identify", Path("studies") / f"{name}.toml", "--output", tmp_path)
+    assert result.exit_code == 0, result.output
+    dataset = xr.load_dataset(tmp_path / f"{name}.nc")
+    for unknown, value in TRUTH[name].items():
+        one = dataset.sel(unknown=unknown)
+        assert one["low_hidden"] <= value <= one["high_hidden"]
+        assert one["high"] - one["low"] < 0.2 * value
