@@ -24,7 +24,7 @@ from pipeline.cli.words import (
     warn,
 )
 from pipeline.files import STORE_NAME, result_files
-from pipeline.printable import counted
+from pipeline.printable import counted, printable_lines
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from pipeline.surrogate.cases import Solve
 
 _HOWTO = "docs/howto/identify.md"
+_OF_CURVES = "docs/howto/curves.md"
+# Files of curves, which are described; studies are read.
+_CURVES = (".csv", ".tsv", ".txt", ".tab", ".dat", ".asc")
 # Seconds between two lines of progress.
 _SILENCE = 10.0
 
@@ -52,8 +55,15 @@ def identify(
     is to be found ([identify]). Written are <study>.nc and its figure; `epsmesh report` makes a page of them. Forces
     over the ranges of the unknowns are cases in the store, computed once. An interrupted run goes on where it was.
 
+    Of a curve without a study (CSV, TXT), it prints what is in the file, and a [[measurement]] to paste into a study.
+
     Example: epsmesh identify studies/identify-punch.toml
+
+    Example: epsmesh identify studies/curves/ball.csv
     """
+    if curves := [file for file in files if file.suffix.lower() in _CURVES]:
+        _describe(curves, [file for file in files if file not in curves])
+        return
     studies = read_all(files)
     if store:
         check_store(store)
@@ -75,10 +85,28 @@ def identify(
     raise typer.Exit(status)
 
 
+def _describe(curves: list[Path], others: list[Path]) -> None:
+    """Print what is in files of curves."""
+    from pipeline.experiment.describe import describe
+    from pipeline.experiment.reading import ExperimentError
+
+    if others:
+        fail(Fault(f"{others[0]}: is a study, and {curves[0]} is a curve: give files of one kind", str(others[0])))
+    texts = []
+    for path in curves:
+        with refusing(ExperimentError, file=path, howto=_OF_CURVES):
+            texts.append(describe(path))
+    if is_json_wanted():
+        print_json({"status": DONE, "curves": dict(zip(map(str, curves), texts, strict=True))})
+    else:
+        print("\n\n".join(map(printable_lines, texts)))
+
+
 def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict[str, Any]:
     """Identify the specimens of one study, write the results, print the answer, and return it as data."""
     from pipeline.experiment.reading import ExperimentError
     from pipeline.identify.dataset import write
+    from pipeline.identify.doubts import doubts_of_moduli, doubts_of_scale
     from pipeline.identify.experiment import scenes_of, specimens
     from pipeline.identify.forward import stored_in
     from pipeline.identify.unknowns import unknowns
@@ -88,11 +116,13 @@ def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict
     from pipeline.surrogate.cases import SurrogateError
 
     start, say = time.monotonic(), (lambda *_: None) if quiet else _tell
-    with refusing(ExperimentError, file=study.file, howto=_HOWTO):
+    with refusing(ExperimentError, file=study.file, howto=_OF_CURVES):
         curves = specimens(study)
     for curve in curves[0].curves:
         for line in curve.told:
             say(f"  {curve.name}: {line}")
+    for line in doubts_of_scale(study, curves):
+        say(f"  {line}")
     sought = unknowns(study)
     try:
         scenes = scenes_of(study, sought, curves, _told(stored_in(store), say))
@@ -105,7 +135,7 @@ def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict
     file = output / f"{study.name}.nc"
     write(dataset, file)
     written = [file, *draw(dataset, file.with_suffix(""))]
-    lines = answer(dataset)
+    lines = [*answer(dataset), *doubts_of_moduli(dataset)]
     ended = time.monotonic()
     if not is_json_wanted():
         print(f"{study.title}: {counted(len(curves), 'specimen')}, {counted(len(study.measurements), 'measurement')}")

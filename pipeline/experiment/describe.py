@@ -129,7 +129,11 @@ _TO_ADD = [
 
 
 def _heading(name: str) -> list[str]:
-    return ["[[measurement]]", f"name = {_text(Path(name).stem)}", f"file = {_text(name)}"]
+    return [
+        "[[measurement]]",
+        f"name = {_text(Path(name).stem)}",
+        f"file = {_text(name)} # path from the study's folder",
+    ]
 
 
 def _text(text: str) -> str:

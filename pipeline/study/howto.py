@@ -32,6 +32,7 @@ _PAGES = {
     "plan": "skipping",
     "figure": "report",
     "mesh.accuracy": "accuracy",
+    "measurement": "howto/curves",
 }
 # The page about all keys.
 _ALL = "howto/own-study"

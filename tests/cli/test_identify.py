@@ -124,6 +124,28 @@ def test_what_cannot_be_identified_is_refused_before_anything_is_computed(folder
     assert "has no [[measurement]]" in result.stderr
 
 
+def test_a_curve_without_a_study_is_described(folder, epsmesh):
+    path = folder / "curves" / "gel_8.csv"
+    result = epsmesh("identify", path)
+    assert result.exit_code == 0, result.output
+    assert "150 rows of 2 columns" in result.stdout
+    assert '[[measurement]]\nname = "gel_8"' in result.stdout
+    assert "[[measurement]]" in json.loads(epsmesh("identify", path, "--json").stdout)["curves"][str(path)]
+    assert epsmesh("identify", path, folder / "punch.toml").exit_code == 2
+    (folder / "letter.txt").write_text("Dear all,\n")
+    result = epsmesh("identify", folder / "letter.txt")
+    assert (result.exit_code, "no table of numbers" in result.stderr) == (2, True)
+
+
+def test_a_wrong_unit_is_told_by_depth_and_modulus(folder, epsmesh, found):
+    text = (folder / "curves" / "gel_8.csv").read_text()
+    (folder / "tiny.csv").write_text(text.replace("(mN)", "(µN)"))
+    (folder / "tiny.toml").write_text(STUDY.format(file="tiny.csv", may_hide="[]").replace('"1 kPa"', '"1 Pa"'))
+    result = epsmesh("identify", folder / "tiny.toml", "--output", folder / "results")
+    assert result.exit_code == 0, result.output
+    assert "a unit is probably wrong" in result.stdout
+
+
 def test_curves_of_the_studies_are_those_that_the_script_makes(tmp_path):
     main(tmp_path)
     for path in tmp_path.iterdir():
