@@ -5,6 +5,7 @@ leaves the shape of the curve. So their ranges are covered by a grid of points. 
 anew, and points are weighted by their evidence.
 """
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -12,8 +13,9 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.identify.bars import interval
 from pipeline.identify.fit import Fit, Mixture, fit, prior
-from pipeline.identify.parts import Hidden
+from pipeline.identify.model import Model, Space
 from pipeline.identify.profiles import Likelihood
+from pipeline.identify.tabulated import Tabulated, tabulated
 
 # Points along each hidden unknown by their number; with fewer effective points than this, a fit follows the best.
 _POINTS = {1: 9, 2: 6, 3: 4}
@@ -38,38 +40,47 @@ def hidden_bars(found: Fit, wanted: tuple[int, ...]) -> tuple[FloatArray, FloatA
 def _of_kind(found: Fit, kind: str) -> list[Mixture]:
     """Return the distributions of the unknowns if the body hides one ``kind``."""
     base = found.model
-    parts: dict[str, Hidden] = {
-        unknown.name: hidden
-        for measured in base.measured
-        for hidden in measured.hidden
-        if hidden.kind == kind
-        for unknown in hidden.unknowns
-    }
-    extra = [unknown for name, hidden in parts.items() for unknown in hidden.unknowns if unknown.name == name]
-    model = base.with_unknowns(extra)
-    likelihood, count = Likelihood(found, model), len(found.x)
-    held = tuple(range(count, count + len(extra)))
-    axis = (np.arange(_POINTS[len(extra)]) + 0.5) / _POINTS[len(extra)]
-    _, precision = prior(base)
-    uniform = np.diag(np.where(base.space.prior[1] > 0, 0.0, np.diag(precision)))
-    places, falls, covariances = [], [], []
-    x = found.x
-    for point in product(axis, repeat=len(extra)):
-        x, square, matrix = likelihood.best(np.concatenate([x[:count], point]), held)
-        own = matrix[:count, :count] + uniform
+    hidden = [[one for one in measured.hidden if one.kind == kind] for measured in base.measured]
+    named = {unknown.name: unknown for parts in hidden for part in parts for unknown in part.unknowns}
+    space = Space(tuple(named.values()))
+    mean, precision = space.prior
+    count = _POINTS[len(named)]
+    points = np.array(list(product((np.arange(count) + 0.5) / count, repeat=len(named))))
+    tables = _tables(found)
+    uniform = np.diag(np.where(base.space.prior[1] > 0, 0.0, np.diag(prior(base)[1])))
+    x, places, logs, covariances = found.x, [], [], []
+    for point in points:
+        values = space.values(point)
+        factors = [[part.factor(table.roots**2, values) for part in parts]
+                   for parts, table in zip(hidden, tables, strict=True)]  # fmt: skip
+        scaled = [
+            replace(measured, forward=table.times(np.prod([np.ones(len(table.roots)), *own], axis=0)), hidden=())
+            for measured, table, own in zip(base.measured, tables, factors, strict=True)
+        ]
+        x, square, matrix = Likelihood(found, Model(scaled, base.space)).best(x, ())
         places.append(x)
-        falls.append(-square / 2 - np.linalg.slogdet(own)[1] / 2)
-        covariances.append(np.linalg.inv(own))
-    weight = np.exp(np.array(falls) - max(falls))
+        logs.append(-(square + np.linalg.slogdet(matrix + uniform)[1] + precision @ (point - mean) ** 2) / 2)
+        covariances.append(np.linalg.inv(matrix + uniform))
+    weight = np.exp(np.array(logs) - max(logs))
     weight /= weight.sum()
     # The most probable noise is not the only one: its bars are widened to those of the mixture.
     top = found.mixture.covariance[int(np.argmax(found.mixture.weight))]
     wider = np.sqrt(np.diag(found.mixture.spread) / np.diag(top))
     covariance = np.array([one * np.outer(wider, wider) for one in covariances])
-    mixture = Mixture(
-        weight, np.array(places)[:, :count], covariance, found.mixture.freedom, np.ones(len(weight), dtype=bool)
-    )
+    mixture = Mixture(weight, np.array(places), covariance, found.mixture.freedom, np.full(len(weight), True))
     if 1 / np.sum(weight**2) >= _FEW:
         return [mixture]
     # The curves see the hidden part: between the points of the grid, too.
-    return [mixture, fit(model, places[int(np.argmax(weight))]).mixture]
+    best = int(np.argmax(weight))
+    model = base.with_unknowns(space.unknowns)
+    return [mixture, fit(model, np.concatenate([places[best], points[best]])).mixture]
+
+
+def _tables(found: Fit) -> list[Tabulated]:
+    """Return tables of the force of each curve's scene about the fit."""
+    model, values = found.model, found.model.space.values(found.x)
+    depths = [float(model.depth(number, values, force).max()) for number, force in enumerate(found.force)]
+    return [
+        tabulated(measured.forward, model.space.unknowns, values, depth)
+        for measured, depth in zip(model.measured, depths, strict=True)
+    ]

@@ -132,15 +132,20 @@ class Model:
         """Return the force (N) of curve ``number`` for ``values`` of all unknowns."""
         offset, compliance = self.offset(number, values), self._compliance(number, values)
         if not compliance:
-            return np.asarray(offset + self._contact(number, values, self.depth(number, values, offset)))
+            return np.asarray(offset + self.contact_force(number, values, self.depth(number, values, offset)))
         force = self.measured[number].curve.force
         for _ in range(_NEWTON):
             depth = self.depth(number, values, force)
             step = _STEP * float(np.ptp(depth))
-            contact = self._contact(number, values, depth)
-            stiffness = self._elastic(number, values, depth + step) - self._elastic(number, values, depth)
+            elastic = self._elastic(number, values, depth)
+            stiffness = self._elastic(number, values, depth + step) - elastic
+            contact = self._relaxed(number, values, elastic)
             force = force + (offset + contact - force) / (1 + compliance * np.maximum(stiffness, 0.0) / step)
         return np.asarray(force)
+
+    def contact_force(self, number: int, values: Values, depth: FloatArray) -> FloatArray:
+        """Return the force (N) of the tissue in curve ``number`` for a tool at ``depth`` (n,), in m."""
+        return self._relaxed(number, values, self._elastic(number, values, depth))
 
     def jacobian(self, number: int, x: FloatArray, force: FloatArray) -> FloatArray:
         """Return the derivatives (n, u) of the force of curve ``number`` by coordinates; ``force`` is that at x."""
@@ -184,8 +189,7 @@ class Model:
                 force = force * hidden.factor(depth, values)
         return force
 
-    def _contact(self, number: int, values: Values, depth: FloatArray) -> FloatArray:
-        force = self._elastic(number, values, depth)
+    def _relaxed(self, number: int, values: Values, force: FloatArray) -> FloatArray:
         if not self._terms:
             return force
         terms = tuple(

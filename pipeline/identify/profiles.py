@@ -41,7 +41,7 @@ class Likelihood:
     """The likelihood of a model's coordinates for the most probable noise, without linearising the model."""
 
     def __init__(self, found: Fit, model: Model | None = None):
-        """``model`` may have further unknowns, after those of ``found``."""
+        """``model`` may have other forces with the same unknowns."""
         self.model = model or found.model
         self._curves = tuple(_most_probable(found, number) for number in range(len(found.force)))
         self._mean, precision = prior(self.model)

@@ -7,18 +7,26 @@ from pipeline.arrays import FloatArray
 from pipeline.identify.fit import prior
 from pipeline.identify.model import Model
 
-# Contact points that are tried, as shares of the recorded depths, and coordinates of the other unknowns.
+# Contact points that are tried, as shares of the recorded depths, then between those next to the best; coordinates of
+# the other unknowns without prior.
 _CONTACTS = np.linspace(-0.2, 0.95, 24)
+_FINER = np.linspace(-0.9, 0.9, 7)
 _OTHERS = (0.5, 0.15, 0.85)
 # Least squares follows the best starts, for so many evaluations of derivatives.
 _FOLLOWED, _MOST = 2, 30
 # Weight of the prior: noise is taken for a thousandth of the largest force.
 _WEAK = 1e-3
+# Starts that are nearer, in coordinates, are one.
+_SAME = 1e-6
 
 
 def start(model: Model) -> FloatArray:
     """Return the coordinates (u,) of the best of several least-squares fits."""
-    places = [_place(model, other) for other in _OTHERS]
+    places: list[FloatArray] = []
+    for other in _OTHERS:
+        place = _place(model, other)
+        if all(np.abs(place - before).max() > _SAME for before in places):
+            places.append(place)
     ranked = sorted(places, key=lambda x: _square(model, x))[:_FOLLOWED]
     fits = [_least_squares(model, x) for x in ranked]
     return min(fits, key=lambda x: _square(model, x))
@@ -30,15 +38,13 @@ def _place(model: Model, other: float) -> FloatArray:
     x = np.where(model.space.prior[1] > 0, mean, other)
     scales = []
     for number, measured in enumerate(model.measured):
-        depth, force = measured.curve.depth, measured.curve.force
-        place = model.names.index(model.own("contact_point", number))
-        best = (np.inf, x, 1.0)
-        for share in _CONTACTS:
-            contact = float(depth.min() + share * np.ptp(depth))
-            trial = x.copy()
-            trial[place] = np.clip(model.space.coordinate(place, contact), 0.0, 1.0)
-            best = min(best, _proportion(model, number, trial, force), key=lambda one: one[0])
-        _, x, scale = best
+        depth = measured.curve.depth
+        own, span = float(depth.min()), float(np.ptp(depth))
+        step = float(_CONTACTS[1] - _CONTACTS[0])
+        tried = [_proportion(model, number, x, own + share * span) for share in _CONTACTS]
+        best = min(range(len(tried)), key=lambda k: tried[k][0])
+        finer = [_proportion(model, number, x, own + (_CONTACTS[best] + step * by) * span) for by in _FINER]
+        _, x, scale = min([tried[best], *finer], key=lambda one: one[0])
         scales.append(scale)
     for place, name in enumerate(model.names):
         if name.endswith("young"):
@@ -48,19 +54,27 @@ def _place(model: Model, other: float) -> FloatArray:
     return x
 
 
-def _proportion(model: Model, number: int, x: FloatArray, force: FloatArray) -> tuple[float, FloatArray, float]:
-    """Return the square of the residual, coordinates with baseline and drift, and the factor of the moduli."""
-    values = model.space.values(x)
-    contact = model.predict(number, values) - model.offset(number, values)
+def _proportion(model: Model, number: int, x: FloatArray, contact: float) -> tuple[float, FloatArray, float]:
+    """Return the square of the residual, coordinates with contact point (m) and offset, and the factor of the moduli.
+
+    The measured force, less that before contact, bends the machine, so that the force is proportional to the moduli.
+    """
+    curve, values = model.measured[number].curve, model.space.values(x)
+    force, is_air = curve.force, curve.depth < contact
     own = [name for name in ("baseline", "drift") if model.own(name, number) in model.names]
-    columns = np.column_stack([contact, np.ones(len(force)), model.times[number]][: 1 + len(own)])
+    air = float(np.median(force[is_air])) if is_air.any() else float(force[0])
+    still = {model.own(name, number): value for name, value in zip(own, (air, 0.0), strict=False)}
+    values |= still | {model.own("contact_point", number): contact}
+    elastic = model.contact_force(number, values, model.depth(number, values, force))
+    columns = np.column_stack([elastic, np.ones(len(force)), model.times[number]][: 1 + len(own)])
     found, *_ = np.linalg.lstsq(columns, force, rcond=None)
-    scale = float(found[0]) if found[0] > 0 and contact.any() else 0.0
-    square = float(np.sum((force - columns @ found) ** 2)) if scale else np.inf
-    for name, value in zip(own, found[1:], strict=True):
+    if not (elastic.any() and found[0] > 0):
+        return np.inf, x, float(np.finfo(float).tiny)
+    x = x.copy()
+    for name, value in zip(("contact_point", *own), (contact, *found[1:]), strict=True):
         place = model.names.index(model.own(name, number))
         x[place] = np.clip(model.space.coordinate(place, float(value)), 0.0, 1.0)
-    return square, x, scale or float(np.finfo(float).tiny)
+    return float(np.sum((force - columns @ found) ** 2)), x, float(found[0])
 
 
 def _residual(model: Model, x: FloatArray) -> FloatArray:

@@ -15,14 +15,14 @@ from tests.identify.synthetic import DRIFT, POISSON, YOUNG, Ball, Punch, measure
 @pytest.mark.parametrize("correlation", [0.0, 0.9, 0.99])
 def test_bars_hold_whatever_the_correlation_of_the_noise(correlation):
     held, ratio = [], []
-    for seed in range(30):
+    for seed in range(20):
         rng = np.random.default_rng((seed, int(100 * correlation)))
         young = 10 ** rng.uniform(3.5, 5.5)
         error = 0.01 * noise(rng, int(rng.integers(120, 300)), correlation, rng.uniform(0, 0.4))
         found = identify([measured(Ball(), {"young": young}, error, 2e-4, rng.uniform(0.3, 1.0))], [YOUNG, DRIFT])
         held.append(found.low[0] <= young <= found.high[0] or not found.fits)
         ratio.append((found.high[0] - found.low[0]) / 2 / abs(found.estimate[0] - young))
-    assert sum(held) >= 26  # of 30: fewer happen by chance once in 30 times if 95 % hold
+    assert sum(held) >= 17  # of 20: fewer happen by chance once in 60 times if 95 % hold
     assert np.nanmedian(ratio) < 8
 
 
