@@ -93,10 +93,11 @@ def _usual_run(force: FloatArray, largest: float) -> int:
     return int(np.unique(upper, return_counts=True)[1].max()) if upper.size else 0
 
 
-def check_contact(found: Recorded, *, is_rising: bool) -> Recorded:
+def check_contact(found: Recorded, *, is_rising: bool, is_cut: bool) -> Recorded:
     """Return an approach without air far longer than the contact; report one without contact, tell one without air.
 
-    ``is_rising`` tells an approach alone from one with a hold, in which the depth has no usual step.
+    ``is_rising`` tells an approach alone from one with a hold, in which the depth has no usual step. Air is left where
+    the study gives the window: ``is_cut`` is false.
     """
     depth, force = found.depth, found.force
     told = _gaps(found, depth, "depth", "m") if is_rising else []
@@ -113,7 +114,7 @@ def check_contact(found: Recorded, *, is_rising: bool) -> Recorded:
     way, contact = float(depth[min(touch, len(depth) - 1)] - depth[0]), float(depth[-1] - depth[touch - 1])
     if way < _NONE * np.ptp(depth):
         told.append("little or no air before the contact: contact point and baseline are hardly known")
-    elif way > _LONG * contact > 0:
+    elif is_cut and way > _LONG * contact > 0:
         kept = depth >= depth[touch] - _LEFT * contact
         told.append(f"{int((~kept).sum())} rows of air, far longer than the contact, are left out")
         return found.part(kept).tell(*told)

@@ -74,8 +74,8 @@ def recorded(table: Table, reading: Reading) -> Recorded:
 
 def _empty(table: Table) -> list[str]:
     """Say which columns have no value."""
-    empty = [_title(table, number) for number in np.flatnonzero(np.isnan(table.values).all(axis=0))]
-    empty = [name for number, name in enumerate(empty) if number not in table.strange]
+    numbers = np.flatnonzero(np.isnan(table.values).all(axis=0))
+    empty = [table.headers[n].text for n in numbers if table.headers[n].text and n not in table.strange]
     return [f"columns without values: {', '.join(empty)}"] if empty else []
 
 
@@ -150,12 +150,10 @@ def _found(table: Table, kind: str, reading: Reading, told: list[str]) -> int:
 
 
 def _time(table: Table, taken: set[int], reading: Reading, told: list[str]) -> int | None:
-    """Return the only column that is called time; None if there is none, or several."""
-    found = [
-        n
-        for n, header in enumerate(table.headers)
-        if n not in taken and is_called(header.name, "time") and _has_values(table, n)
-    ]
+    """Return the only column that is called time, or has a unit of time; None if there is none, or several."""
+    free = [n for n in range(len(table.headers)) if n not in taken and _has_values(table, n)]
+    found = [n for n in free if is_called(table.headers[n].name, "time")]
+    found = found or [n for n in free if is_unit_of(table.headers[n].unit, "s")]
     for number in [n for n in found if not _unit(table, n, reading, "time")]:
         told.append(f"column `{_title(table, number)}` has no unit, and is not read as time: give it in units")
     found = [n for n in found if is_unit_of(_unit(table, n, reading, "time"), "s")]

@@ -91,7 +91,7 @@ def _score(rows: Sequence[Sequence[str]], decimal: str) -> tuple[tuple[int, floa
         if numbers + missing == width and numbers:
             whole[width] += 1
         if numbers > 1:
-            shares[width] += numbers / width  # type: ignore[assignment]
+            shares[width] += (numbers + missing) / width  # type: ignore[assignment]
     if not whole and not shares:
         return (0, 0.0), 0
     width = max({*whole, *shares}, key=lambda w: (whole[w], shares[w]))

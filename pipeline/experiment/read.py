@@ -19,6 +19,8 @@ from pipeline.experiment.text import read_lines
 
 # Files of a folder whose errors are told; the others are counted.
 _MOST_TOLD = 5
+# A row at the end of a window is in it.
+_ROUNDING = 1e-9
 
 
 def files_of(pattern: str, folder: Path) -> tuple[Path, ...]:
@@ -77,7 +79,7 @@ def read_curve(path: Path, reading: Reading) -> Curve:
     found = _segment(found, cycles, inside, reading)
     if reading.segment.startswith("approach"):
         found = check_count(without_saturation(found), reading.segment)
-        found = check_contact(found, is_rising=reading.segment == "approach")
+        found = check_contact(found, is_rising=reading.segment == "approach", is_cut=reading.window is None)
     return Curve(path.stem, found.depth, found.force, found.time, found.told)
 
 
@@ -94,7 +96,8 @@ def _inside(found: Recorded, window: Window | None) -> BoolArray:
     if window.unit == "s" and found.time is None:
         raise ExperimentError(found.file, "window is a range of time, and no column of time is known")
     values = found.depth if found.time is None or window.unit == "m" else found.time
-    inside: BoolArray = (values >= window.low) & (values <= window.high)
+    rounding = _ROUNDING * (window.high - window.low)
+    inside: BoolArray = (values >= window.low - rounding) & (values <= window.high + rounding)
     if not inside.any():
         factor, unit = (1e3, "mm") if window.unit == "m" else (1.0, "s")
         ends = " to ".join(f"{factor * end:g} {unit}" for end in (window.low, window.high))

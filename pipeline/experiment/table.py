@@ -16,6 +16,8 @@ from pipeline.experiment.reading import ExperimentError
 
 # Lines of other widths among the rows, beyond which a file is more than one table.
 _MOST_ODD = 0.05
+# Rows one after the other that are a table.
+_ROWS = 4
 # The separator of fields that ASCII has: no text has it.
 _UNIT = "\x1f"
 
@@ -45,7 +47,7 @@ def table_of(lines: Sequence[str], file: str) -> Table:
     layout = find_layout(lines)
     if layout is None:
         raise ExperimentError(file, "has no table of numbers: no two lines have the same number of numeric columns")
-    begin = next((n for n, line in enumerate(lines) if _is_data(layout, line)), None)
+    begin = _begin(lines, layout)
     if begin is None:
         raise ExperimentError(file, "has no row of numbers")
     kept, odd = _rows(lines, begin, layout)
@@ -59,6 +61,21 @@ def table_of(lines: Sequence[str], file: str) -> Table:
     numbers = np.array(kept) + 1
     values, strange = _values([lines[n] for n in kept], layout, numbers)
     return Table(file, headers, values, numbers, strange, tuple(told), layout)
+
+
+def _begin(lines: Sequence[str], layout: Layout) -> int | None:
+    """Return the first line of the rows: a summary above them has fewer in a row. None if there is no row."""
+    first, run = None, 0
+    for number, line in enumerate(lines):
+        if not line.strip():
+            continue
+        run = run + 1 if _is_data(layout, line) else 0
+        if run == 1:
+            start = number
+            first = number if first is None else first
+        if run == _ROWS:
+            return start
+    return first
 
 
 def _is_data(layout: Layout, line: str) -> bool:

@@ -171,6 +171,8 @@ def test_air_far_longer_than_contact_is_cut(tmp_path):
     air = AIR - (curve.depth[0])
     assert DEEP < air < 3 * DEEP
     assert any("air" in told for told in curve.told)
+    whole = read(tmp_path / "a.csv", window=Window(-9e-3, 2e-3, "m"))
+    assert len(whole.depth) == len(depth)  # a window is the user's
 
 
 def test_a_folder_of_curves_in_the_order_of_their_numbers(tmp_path):
@@ -247,3 +249,24 @@ def test_a_retract_alone_without_air_is_a_retract(tmp_path):
     way = np.linspace(1, 0, 100)
     curve = read(write(tmp_path / "a.csv", {"z (mm)": way, "F (N)": 10 * way}), segment="retract")
     assert curve.force[0] == pytest.approx(10) and curve.depth[0] > curve.depth[-1]
+
+
+# Header lines of exports of testing machines, and how rows are written under them.
+MACHINES = {
+    "a summary above the table": (
+        '"Results 1"\n,"Specimen","Maximum load (N)"\n1,"A","0.06"\n\n"Time","Extension","Load"\n"(s)","(mm)","(mN)"\n',
+        {"separator": ","},
+    ),
+    "German, with units below": (
+        '"Prüfzeit";"Traversenweg absolut";"Standardkraft"\ns;mm;mN\n', {"separator": ";", "decimal": ","},
+    ),
+    "tabs at the ends, and seconds": ("Test: x\nElapsed Time \tDisp\tLoad\t\nSec\tmm\tmN\t\n", {"separator": "\t"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_exports_of_testing_machines(tmp_path, machine):
+    before, how = MACHINES[machine]
+    end = "\t" if "tabs" in machine else ""
+    path = write(tmp_path / "a.txt", IN_MM, before=before, change=lambda x: [f"{row}{end}" for row in x[1:]], **how)
+    assert is_the_approach(read(path))
