@@ -4,11 +4,12 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pipeline.cli.console import is_json_wanted, print_json
+from pipeline.cli.design import design as rank
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_study, refusing
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
@@ -46,6 +47,9 @@ def identify(
     files: Files,
     output: Output = DEFAULT_OUTPUT,
     store: StoreFile = None,
+    design: Annotated[
+        bool, typer.Option("--design", help="Rank which test to make next, by what it would do to each error bar.")
+    ] = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -57,7 +61,11 @@ def identify(
 
     Of a curve without a study (CSV, TXT), it prints what is in the file, and a [[measurement]] to paste into a study.
 
+    With --design it reads no curves. It ranks further tests, such as a second radius, from the study's declared values.
+
     Example: epsmesh identify studies/identify-punch.toml
+
+    Example: epsmesh identify studies/identify-punch.toml --design
 
     Example: epsmesh identify studies/curves/ball.csv
     """
@@ -68,6 +76,10 @@ def identify(
     if store:
         check_store(store)
     path = store or output / STORE_NAME
+    if design:
+        check_output(path)
+        check_machine()
+        rank(studies, path, _HOWTO, quiet=quiet or is_json_wanted())
     without = [Fault(f"{s.file}: has no [[measurement]]", s.file, howto=_HOWTO) for s in studies if not s.measurements]
     if without:
         fail(*without)

@@ -2,7 +2,7 @@
 
 All tests are computed with the values that the study declares, and are taken to have noise as usual. The unknowns'
 distribution is then normal, its information the sum of that of the tests' whitened derivatives. The second bar is the
-widest of those of bodies that hide a layer, a base or a law that stiffens, each of a few sizes.
+widest of those of bodies that hide a layer, a base or a law that stiffens: of each, the mean over a few sizes.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -70,6 +70,7 @@ class Design:
     values: Values
     planned: Widths
     ranked: tuple[Ranked, ...]
+    may_hide: tuple[str, ...] = ()
 
     @staticmethod
     def is_seen(width: float) -> bool:
@@ -98,7 +99,8 @@ class Designer:
         declared = _half_widths(model, self._at(model, self.values))
         hidden = [declared]
         for kind in self._kinds:
-            hidden += [_half_widths(*made)[: len(declared)] for made in self._hidden(kind, trials, measured)]
+            sizes = [_half_widths(*made)[: len(declared)] for made in self._hidden(kind, trials, measured)]
+            hidden.append(np.exp(np.mean(np.log(sizes), axis=0)))
         widest = np.max(hidden, axis=0)
         wanted = [k for k, unknown in enumerate(model.space.unknowns) if unknown.is_wanted]
         return {model.names[k]: (float(declared[k]), float(widest[k])) for k in wanted}
@@ -133,17 +135,22 @@ class Designer:
     def _hidden(
         self, kind: str, trials: Sequence[Trial], measured: Sequence[Measured]
     ) -> Iterator[tuple[Model, FloatArray]]:
-        """Yield models of a body that hides something of a kind, each with its coordinates."""
-        tips = [tip_of_probe(trial.probe, trial.depth) for trial in trials]
+        """Yield models of a body that hides something of a kind, each with its coordinates.
+
+        Ranges are those of the tests as planned: what may be hidden does not depend on which test follows.
+        """
         first = self.planned[0]
+        tips = [tip_of_probe(trial.probe, trial.depth) for trial in self.planned]
         poisson = self.values.get("poisson", case_of(first.scene).material.poisson)
-        parts = hidden_parts([kind], tips, [trial.depth for trial in trials], poisson)
-        radius = float(tip_of_probe(first.probe, first.depth)(np.array([first.depth])).radius[0])
+        (part,), *_ = hidden_parts([kind], tips, [trial.depth for trial in self.planned], poisson)
+        radius = float(tips[0](np.array([first.depth])).radius[0])
+        with_parts = [
+            replace(one, hidden=(replace(part, tip=tip_of_probe(trial.probe, trial.depth)),))
+            for one, trial in zip(measured, trials, strict=True)
+        ]
+        model = Model.of(with_parts, self.unknowns).with_unknowns(part.unknowns)
         for found in _sizes(kind, radius):
-            values = {**self.values, **found}
-            with_parts = [replace(one, hidden=own) for one, own in zip(measured, parts, strict=True)]
-            model = Model.of(with_parts, self.unknowns).with_unknowns(parts[0][0].unknowns)
-            yield model, self._at(model, values)
+            yield model, self._at(model, {**self.values, **found})
 
 
 def rank(study: Study, solve: Solve, say: Callable[[str], None] = lambda _: None) -> Design:
@@ -165,7 +172,7 @@ def rank(study: Study, solve: Solve, say: Callable[[str], None] = lambda _: None
             continue
         ranked.append(Ranked(candidate.words, widths, _gain(planned, widths)))
     ranked.sort(key=lambda one: -one.gain)
-    return Design(designer.unknowns, designer.values, planned, tuple(ranked))
+    return Design(designer.unknowns, designer.values, planned, tuple(ranked), study.identification.may_hide)
 
 
 def _gain(before: Widths, after: Widths) -> float:

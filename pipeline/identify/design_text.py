@@ -16,7 +16,8 @@ _UNSEEN = "not seen"
 def lines(design: Design) -> Iterator[str]:
     """Yield the ranking as a table, and then what it says of unknowns that the planned tests do not see."""
     names = list(design.planned)
-    head = ["test", "narrower", *(text for name in names for text in (title(name), f"{title(name)} hidden"))]
+    kinds = ("", " hidden") if design.may_hide else ("",)
+    head = ["test", "narrower", *(f"{title(name)}{kind}" for name in names for kind in kinds)]
     rows = [("as planned", "", design.planned)]
     rows += [(one.words, f"{one.gain:.1f} times", one.widths) for one in design.ranked]
     table = [head, *([words, gain, *_cells(design, names, widths)] for words, gain, widths in rows)]
@@ -26,13 +27,16 @@ def lines(design: Design) -> Iterator[str]:
     yield from _of_unseen(design)
     yield (
         f"Bars are half widths of 95 %, for noise of {percent(NOISE)} of the largest force, {CORRELATION:g} correlated "
-        f"between the {POINTS} points of a test; hidden: if the body may hide a layer, a base or stiffening."
+        f"from one of the {POINTS} points of a test to the next."
     )
+    if design.may_hide:
+        yield f"hidden: if the body may hide {' or '.join(design.may_hide)}."
 
 
 def _cells(design: Design, names: list[str], widths: Widths) -> list[str]:
     known = {unknown.name: unknown for unknown in design.unknowns}
-    return [bar(known[name], width) for name in names for width in widths[name]]
+    both = 1 + bool(design.may_hide)
+    return [bar(known[name], width) for name in names for width in widths[name][:both]]
 
 
 def _of_unseen(design: Design) -> Iterator[str]:

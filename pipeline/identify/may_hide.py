@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.identify.parts import Hidden, Unknown, Values
+from pipeline.identify.parts import Unknown, Values
 from pipeline.layered.hiding import MOST_RATIO, Tip, base_factor, layer_factor, strain_factor
 
 KINDS = ("layer", "base", "strain")
@@ -53,7 +53,7 @@ class HiddenPart:
 
 def hidden_parts(
     kinds: Iterable[str], tips: Sequence[Callable[[FloatArray], Tip]], deepest: Sequence[float], poisson: float
-) -> list[tuple[Hidden, ...]]:
+) -> list[tuple[HiddenPart, ...]]:
     """Return for each curve, with its tip and its largest depth (m), what the body may hide of these ``kinds``.
 
     ``poisson`` is the ratio of the body, or about its middle if it is unknown.

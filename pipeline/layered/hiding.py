@@ -22,7 +22,7 @@ from pipeline.layered.contact import Profile
 MOST_RATIO = 30.0
 """Largest stiffness of a hidden layer, relative to what is below it; the smallest is its inverse."""
 
-WIDEST_ON_BASE = 2.0
+WIDEST_ON_BASE = 4.0
 """Largest contact radius, in depths of a hidden base."""
 
 # A depth, of the first in a table, above which contact counts as closed.

@@ -163,3 +163,23 @@ def test_bars_of_the_studies_hold_what_their_curves_were_made_with(name, tmp_pat
         one = dataset.sel(unknown=unknown)
         assert one["low_hidden"] <= value <= one["high_hidden"]
         assert one["high"] - one["low"] < 0.2 * value
+
+
+def test_design_ranks_tests_without_any_curve(folder, epsmesh, tmp_path):
+    """A study whose file does not exist yet: what one more test would do to the error bars of E."""
+    done = epsmesh("identify", folder / "none.toml", "--design", "--output", tmp_path)
+    assert done.exit_code == 0, done.output
+    assert "as planned" in done.output
+    assert "a further punch of radius 6.00 mm" in done.output
+    data = json.loads(epsmesh("identify", folder / "none.toml", "--design", "--json", "--output", tmp_path).stdout)
+    (study,) = data["studies"]
+    assert {one["test"] for one in study["ranked"]} >= {"a further punch of radius 600 µm", "the same test, bonded"}
+    assert all(one["half_widths"]["young"][0] > 0 for one in study["ranked"])
+
+
+def test_design_needs_unknowns(folder, epsmesh, tmp_path):
+    text = STUDY.format(file="x.csv", may_hide="[]").partition("[[measurement]]")[0]
+    (tmp_path / "known.toml").write_text(text)
+    done = epsmesh("identify", tmp_path / "known.toml", "--design", "--output", tmp_path)
+    assert done.exit_code == 2
+    assert "has no [identify]" in done.output

@@ -1,0 +1,48 @@
+"""The ranking of tests that `epsmesh identify --design` prints."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from pipeline.cli.console import is_json_wanted, print_json
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_study
+
+if TYPE_CHECKING:
+    from pipeline.study.sweep import Study
+
+
+def design(studies: "Sequence[Study]", store: Path, howto: str, *, quiet: bool) -> None:
+    """Print for each study which test to make next; its forces are cases in the ``store``."""
+    if without := [study for study in studies if not study.identification.sought]:
+        fail(*(Fault(f"{study.file}: has no [identify]: name what is not known", study.file, howto=howto)
+               for study in without))  # fmt: skip
+    found = [_ranked(study, store, quiet=quiet) for study in studies]
+    if is_json_wanted():
+        print_json({"status": DONE, "studies": found})
+    raise typer.Exit(DONE)
+
+
+def _ranked(study: "Study", store: Path, *, quiet: bool) -> dict[str, Any]:
+    from pipeline.identify.design import rank
+    from pipeline.identify.design_text import as_data, lines
+    from pipeline.identify.forward import stored_in
+    from pipeline.study.problems import StudyError
+    from pipeline.surrogate.cases import SurrogateError
+
+    def say(line: str) -> None:
+        if not quiet:
+            print(f"  {line}", file=sys.stderr, flush=True)
+
+    try:
+        found = rank(study, stored_in(store), say)
+    except StudyError as wrong:
+        fail(*of_study(wrong))
+    except SurrogateError as wrong:
+        fail(Fault(str(wrong), file=study.file), status=SOME_FAILED)
+    if not is_json_wanted():
+        print(study.title)
+        print("\n".join(f"  {line}" for line in lines(found)))
+    return {"study": study.file, **as_data(found)}
