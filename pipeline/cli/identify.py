@@ -2,7 +2,6 @@
 
 import sys
 import time
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,22 +24,18 @@ from pipeline.cli.words import (
     warn,
 )
 from pipeline.files import STORE_NAME, result_files
-from pipeline.printable import counted, printable_lines
+from pipeline.printable import printable_lines
+from pipeline.run.remaining import format_seconds
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.identify.experiment import Scenes, Specimen
-    from pipeline.identify.parts import Unknown
     from pipeline.study.sweep import Study
-    from pipeline.surrogate.cases import Solve
 
 _HOWTO = "docs/howto/identify.md"
 _OF_CURVES = "docs/howto/curves.md"
 # Files of curves, which are described; studies are read.
 _CURVES = (".csv", ".tsv", ".txt", ".tab", ".dat", ".asc")
-# Seconds between two lines of progress.
-_SILENCE = 10.0
 
 
 def identify(
@@ -85,16 +80,13 @@ def identify(
         fail(*without)
     check_output(path, *(file for study in studies for file in result_files(output, study.name)))
     check_machine()
-    found, status = list[dict[str, Any]](), DONE
+    found = []
     for study in studies:
         if not is_json_wanted():
             warn(study)
-        data = _identify(study, output, path, quiet=quiet or is_json_wanted())
-        status = max(status, DONE if data else SOME_FAILED)
-        found.append(data)
+        found.append(_identify(study, output, path, quiet=quiet or is_json_wanted()))
     if is_json_wanted():
-        print_json({"status": status, "studies": found})
-    raise typer.Exit(status)
+        print_json({"status": DONE, "studies": found})
 
 
 def _describe(curves: list[Path], others: list[Path]) -> None:
@@ -118,115 +110,47 @@ def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict
     """Identify the specimens of one study, write the results, print the answer, and return it as data."""
     from pipeline.experiment.reading import ExperimentError
     from pipeline.identify.dataset import write
-    from pipeline.identify.doubts import doubts_of_moduli, doubts_of_scale
-    from pipeline.identify.experiment import scenes_of, specimens
-    from pipeline.identify.forward import stored_in
-    from pipeline.identify.unknowns import unknowns
+    from pipeline.identify.run import identification
     from pipeline.report.figures.identification import draw
-    from pipeline.report.identified import answer, material
+    from pipeline.report.identified import answer
     from pipeline.study.problems import StudyError
     from pipeline.surrogate.cases import SurrogateError
 
-    start, say = time.monotonic(), (lambda *_: None) if quiet else _tell
-    with refusing(ExperimentError, file=study.file, howto=_OF_CURVES):
-        curves = specimens(study)
-    for curve in curves[0].curves:
-        for line in curve.told:
-            say(f"  {curve.name}: {line}")
-    for line in doubts_of_scale(study, curves):
-        say(f"  {line}")
-    sought = unknowns(study)
+    start = time.monotonic()
     try:
-        scenes = scenes_of(study, sought, curves, _told(stored_in(store), say))
+        with refusing(ExperimentError, file=study.file, howto=_OF_CURVES):
+            dataset = identification(study, output, store, (lambda _: None) if quiet else _tell)
     except StudyError as wrong:
         fail(*of_study(wrong))
     except SurrogateError as wrong:
         fail(Fault(str(wrong), file=study.file), status=SOME_FAILED)
-    solved = time.monotonic()
-    dataset = _found(study, sought, scenes, curves, output, say)
     file = output / f"{study.name}.nc"
     write(dataset, file)
     written = [file, *draw(dataset, file.with_suffix(""))]
-    lines = [*answer(dataset), *doubts_of_moduli(dataset)]
-    ended = time.monotonic()
     if not is_json_wanted():
-        print(f"{study.title}: {counted(len(curves), 'specimen')}, {counted(len(study.measurements), 'measurement')}")
-        print("\n".join(f"  {line}" for line in lines))
-        if block := material(dataset):
-            print(f'\n{block}\n\n# or, with the error bars: material = {{from = "{file}"}}\n')
-        print(
-            f"{study.file}: wrote {', '.join(map(str, written))}; {solved - start:.1f} s for forces, "
-            f"{ended - solved:.1f} s for {counted(len(curves), 'fit')}"
-        )
+        _print(study, dataset, file)
+        print(f"{study.file}: wrote {', '.join(map(str, written))}; {format_seconds(time.monotonic() - start)}")
     return {
         "study": study.file,
-        "answer": lines,
+        "answer": answer(dataset),
         "values": _as_data(dataset),
         "files": list(map(str, written)),
-        "seconds": round(ended - start, 3),
+        "seconds": round(time.monotonic() - start, 3),
     }
 
 
 def _tell(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
+    print(f"  {line}", file=sys.stderr, flush=True)
 
 
-def _told(solve: "Solve", say: Callable[[str], None]) -> "Solve":
-    """Return what solves studies, and says how many cases there were every few seconds."""
-    start, count, printed = time.monotonic(), 0, time.monotonic()
+def _print(study: "Study", dataset: "xr.Dataset", file: Path) -> None:
+    """Print the answer, and the material to paste."""
+    from pipeline.report.identified import answer, material
 
-    def told(study: "Study") -> "xr.Dataset":
-        nonlocal count, printed
-        dataset = solve(study)
-        count += len(study)
-        if time.monotonic() - printed > _SILENCE:
-            printed = time.monotonic()
-            say(f"  forces over the ranges of the unknowns: {count} cases so far, {printed - start:.0f} s")
-        return dataset
-
-    return told
-
-
-def _found(
-    study: "Study",
-    sought: "Sequence[Unknown]",
-    scenes: "Scenes",
-    curves: "Sequence[Specimen]",
-    output: Path,
-    say: Callable[[str], None],
-) -> "xr.Dataset":
-    """Return the dataset of all specimens; those of many files are kept as they come, and read back."""
-    from pipeline.identify.dataset import dataset_of, joined
-    from pipeline.identify.estimate import identify as fit
-    from pipeline.identify.kept import Kept
-
-    attributes = _attributes(study)
-    if len(curves) == 1:
-        return dataset_of(fit(scenes.measured(curves[0]), sought), attributes)
-    kept, found, printed = Kept(output, study), [], time.monotonic()
-    for number, specimen in enumerate(curves, start=1):
-        one = kept.read(specimen)
-        if one is None:
-            one = dataset_of(fit(scenes.measured(specimen), sought), attributes)
-            kept.write(specimen, one)
-        found.append(one)
-        if time.monotonic() - printed > _SILENCE:
-            printed = time.monotonic()
-            say(f"  {number} of {len(curves)} files")
-    return joined(found, [specimen.name for specimen in curves])
-
-
-def _attributes(study: "Study") -> dict[str, Any]:
-    from pipeline.run.provenance import provenance
-
-    return {
-        "title": study.title,
-        "study": study.text,
-        "study_file": Path(study.file).name,
-        "study_folder": str(Path(study.file).absolute().parent),
-        "may_hide": " ".join(study.identification.may_hide),
-        **provenance(ranks=1),
-    }
+    print(study.title)
+    print("\n".join(f"  {line}" for line in answer(dataset)))
+    if block := material(dataset):
+        print(f'\n{block}\n\n# or, with the error bars:\n[material]\nfrom = "{file}"\n')
 
 
 def _as_data(dataset: "xr.Dataset") -> dict[str, Any]:

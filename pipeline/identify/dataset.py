@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pipeline.arrays import FloatArray
 from pipeline.identify.parts import SOURCES, CurveFit, Estimate
 from pipeline.netcdf import write_netcdf
 
@@ -31,6 +32,7 @@ _WORDS: dict[str, tuple[str, str]] = {
     "profile": ("1", "twice the fall of the logarithm of the likelihood; 3.84 at the ends of a 95 % bar"),
     "depth": ("m", "depth of the tool below the surface"),
     "force": ("N", "measured force"),
+    "time": ("s", "time as recorded"),
     "fit": ("N", "force of the model, with baseline and drift"),
     "band": ("N", "95 % error bar of the fit"),
     "residual": ("N", "measured force less that of the model"),
@@ -43,8 +45,10 @@ _WORDS: dict[str, tuple[str, str]] = {
 _OF_CURVES = ("depth", "force", "fit", "band", "residual")
 
 
-def dataset_of(found: Estimate, attributes: Mapping[str, Any]) -> xr.Dataset:
-    """Return an estimate as a dataset; ``attributes`` tell of the study.
+def dataset_of(
+    found: Estimate, attributes: Mapping[str, Any], times: Sequence[FloatArray | None] | None = None
+) -> xr.Dataset:
+    """Return an estimate as a dataset; ``attributes`` tell of the study, ``times`` (s) when curves were recorded.
 
     Curves have different lengths: the dimension ``sample`` is that of the longest, and the others end in NaN.
     """
@@ -66,6 +70,10 @@ def dataset_of(found: Estimate, attributes: Mapping[str, Any]) -> xr.Dataset:
     if found.windows:
         values["window_depth"] = ("window", [window.depth for window in found.windows])
         values["window_young"] = ("window", [window.young for window in found.windows])
+    if times and any(time is not None for time in times):
+        longest = max(curve.depth.size for curve in found.curves)
+        rows = [_padded([] if time is None else time, longest) for time in times]
+        values["time"] = (("measurement", "sample"), np.array(rows))
     coordinates = {
         "unknown": names,
         "unknown_2": names,

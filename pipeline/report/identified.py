@@ -31,6 +31,7 @@ _NAMES = {
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Unknowns whose error is told as a number, not as a share of their value: it may be 0, or is a share itself.
 _ABSOLUTE = ("poisson", "friction", "baseline", "drift", "contact_point", "share")
+_SHARES = "relaxation_share_"
 # Error bars whose sides differ by more than this share have no ±.
 _UNEVEN = 0.25
 # Names of files that are listed.
@@ -54,7 +55,8 @@ def answer(dataset: xr.Dataset) -> list[str]:
         return [*_of_files(dataset), *told(dataset)]
     if dataset.attrs["verdict"] != FITS:
         return [*_without_bars(dataset), *told(dataset)]
-    return [*(of_unknown(dataset, name) for name in wanted(dataset)), *told(dataset)]
+    lines = [of_unknown(dataset, name, is_short=number > 0) for number, name in enumerate(wanted(dataset))]
+    return [*lines, *told(dataset)]
 
 
 def told(dataset: xr.Dataset) -> list[str]:
@@ -62,17 +64,20 @@ def told(dataset: xr.Dataset) -> list[str]:
     return [line for line in str(dataset.attrs.get("told", "")).splitlines() if line]
 
 
-def of_unknown(dataset: xr.Dataset, name: str) -> str:
-    """Say what one unknown is, with both error bars."""
+def of_unknown(dataset: xr.Dataset, name: str, *, is_short: bool = False) -> str:
+    """Say what one unknown is, with both error bars; ``is_short`` leaves out what was said of another."""
     one = dataset.sel(unknown=name)
     what = title(name)
     if not bool(one["seen"]):
-        ends = f"{written(dataset, name, float(one['low']))} to {written(dataset, name, float(one['high']))}"
+        ends = span(dataset, name, float(one["low"]), float(one["high"]))
         return f"{what} is not in {_curves(dataset)}: all values from {ends} fit."
     value = f"{what} = {written(dataset, name, float(one['estimate']))}"
     first, second = bar(dataset, name), bar(dataset, name, hidden=True)
+    first = first if first.startswith("±") else f"({first})"
     if not second or second == first:
         return f"{value} {first}."
+    if is_short:
+        return f"{value} {first} as declared; {second} with what it may hide."
     return f"{value} {first} if the body is as declared; {second} if it may hide {hidden_words(dataset)}."
 
 
@@ -89,10 +94,17 @@ def bar(dataset: xr.Dataset, name: str, *, hidden: bool = False) -> str:
         return ""
     half = (high - low) / 2
     if abs(high + low - 2 * value) > 2 * _UNEVEN * half:
-        return f"({written(dataset, name, low)} to {written(dataset, name, high)})"
-    if name.endswith(_ABSOLUTE) or value == 0:
+        return span(dataset, name, low, high)
+    if _is_absolute(name) or value == 0:
         return f"± {written(dataset, name, half, 2)}"
     return f"± {percent(half / abs(value))}"
+
+
+def span(dataset: xr.Dataset, name: str, low: float, high: float) -> str:
+    """Write a range of an unknown, with one unit if both ends have it: ``43.6 to 45.6 kPa``."""
+    first, last = (written(dataset, name, end) for end in (low, high))
+    number, _, unit = first.partition(" ")
+    return f"{number if last.endswith(f' {unit}') else first} to {last}"
 
 
 def parts(dataset: xr.Dataset, name: str) -> str:
@@ -101,7 +113,7 @@ def parts(dataset: xr.Dataset, name: str) -> str:
     shares = [(float(one["part"].sel(source=source)), words) for source, words in _SOURCES.items()]
     whole = float((one["high"] - one["low"]) / 2)
     known = sorted((share, words) for share, words in shares if isfinite(share) and share > 0.005 * whole)[::-1]
-    absolute = name.endswith(_ABSOLUTE)
+    absolute = _is_absolute(name)
     size = abs(float(one["estimate"]))
     of = (f"{words} {written(dataset, name, s, 2) if absolute else percent(s / size)}" for s, words in known)
     return f"{title(name)}: {', '.join(of)}"
@@ -111,6 +123,10 @@ def mesh_share(dataset: xr.Dataset, name: str) -> float:
     """Return the mesh's part of the first error bar, as a share of it."""
     one = dataset.sel(unknown=name)
     return float(one["part"].sel(source="mesh") / ((one["high"] - one["low"]) / 2))
+
+
+def _is_absolute(name: str) -> bool:
+    return name.endswith(_ABSOLUTE) or name.startswith(_SHARES)
 
 
 def title(name: str) -> str:
@@ -149,7 +165,7 @@ def material(dataset: xr.Dataset) -> str:
         if not bool(dataset["seen"].sel(unknown=name)) or owner.startswith("relaxation"):
             continue
         value = written(dataset, name, float(dataset["estimate"].sel(unknown=name)), 4)
-        text = value if name.endswith(_ABSOLUTE) else json.dumps(value, ensure_ascii=False)
+        text = value if _is_absolute(name) else json.dumps(value, ensure_ascii=False)
         second = bar(dataset, name, hidden=True)
         comment = f"{bar(dataset, name)}{f'; {second} with what it may hide' if second else ''}"
         heading = f"[[body.layer]]  # {owner}" if owner else "[material]"
@@ -197,7 +213,7 @@ def _of_files(dataset: xr.Dataset) -> Iterator[str]:
 def _median_bars(dataset: xr.Dataset, name: str) -> str:
     one = dataset.sel(unknown=name)
     halves = [(one[f"high{end}"] - one[f"low{end}"]) / 2 for end in ("", "_hidden")]
-    if name.endswith(_ABSOLUTE):
+    if _is_absolute(name):
         words = [written(dataset, name, float(half.median()), 2) for half in halves]
     else:
         words = [percent(float((half / abs(one["estimate"])).median())) for half in halves]

@@ -97,7 +97,7 @@ def test_many_files_are_a_dimension_and_each_is_kept(folder, epsmesh, found, mon
     dataset = xr.load_dataset(folder / "results" / "three.nc")
     assert list(dataset["file"].values) == ["gel_8", "gel_9", "gel_10"]
     assert dataset["estimate"].sel(unknown="young").values == pytest.approx([20e3, 25e3, 30e3], rel=0.03)
-    monkeypatch.setattr("pipeline.identify.estimate.identify", lambda *_: pytest.fail("is fitted again"))
+    monkeypatch.setattr("pipeline.identify.run.identify", lambda *_: pytest.fail("is fitted again"))
     again = epsmesh("identify", folder / "three.toml", "--output", folder / "results")
     assert again.exit_code == 0, again.output
     xr.testing.assert_equal(xr.load_dataset(folder / "results" / "three.nc"), dataset)

@@ -19,8 +19,10 @@ _WIDTH, _CURVES, _RESIDUALS, _PROFILES, _BESIDE = 7.6, 2.4, 1.2, 1.9, 1.4  # inc
 _MOST_CURVES, _MOST_PROFILES = 3, 4
 _MEASURED, _FIT, _HIDDEN = COLOURS[1], COLOURS[4], COLOURS[3]
 _MOST_POINTS = 400
+_HELD = 0.02  # share of the depth within which a tool is held
 _NORMAL = 3.84  # fall of the likelihood at the ends of a 95 % interval
-_HIGHEST = 12.0
+_HIGHEST = 6.0
+_NEAR = 1.3  # error bars, on both sides of the estimate, that a profile shows
 
 
 def identification(dataset: xr.Dataset, name: str) -> Figure:
@@ -37,21 +39,21 @@ def draw(dataset: xr.Dataset, stem: Path, formats: Sequence[str] = FIGURE_FORMAT
 
 def _of_curves(dataset: xr.Dataset, name: str) -> Figure:
     shown = wanted(dataset)[:_MOST_PROFILES]
-    shown = [one for one in shown if "profile" in dataset and dataset["profile"].sel(unknown=one).notnull().any()]
+    shown = [one for one in shown if bool(np.isfinite(dataset["low"].sel(unknown=one)))]
     count = min(dataset.sizes["measurement"], _MOST_CURVES)
-    heights = [_CURVES, _RESIDUALS, *([_PROFILES] if shown else [])]
+    heights = [_CURVES + _RESIDUALS, *([_PROFILES] if shown else [])]
     figure = new_figure(_WIDTH, sum(heights) + _BESIDE)
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-    curves, residuals = grid[0].subgridspec(1, count), grid[1].subgridspec(1, count)
+    curves = grid[0].subgridspec(2, count, height_ratios=(_CURVES, _RESIDUALS))
     for number in range(count):
         one = dataset.isel(measurement=number)
-        upper = figure.add_subplot(curves[number])
-        lower = figure.add_subplot(residuals[number], sharex=upper)
-        _draw_curve(upper, lower, one, is_first=number == 0)
+        upper = figure.add_subplot(curves[0, number])
+        lower = figure.add_subplot(curves[1, number], sharex=upper)
+        _draw_curve(upper, lower, one, is_first=number == 0, fits=dataset.attrs["verdict"] == FITS)
         if count > 1:
             upper.set_title(str(one["measurement"].values))
     if shown:
-        row = grid[2].subgridspec(1, len(shown))
+        row = grid[1].subgridspec(1, len(shown))
         for number, unknown in enumerate(shown):
             _draw_profile(figure.add_subplot(row[number]), dataset, unknown, is_first=number == 0)
     finish(figure, name, _caption(dataset, count, bool(shown)), legend=False)
@@ -59,51 +61,81 @@ def _of_curves(dataset: xr.Dataset, name: str) -> Figure:
     return figure
 
 
-def _draw_curve(upper: Axes, lower: Axes, one: xr.Dataset, *, is_first: bool) -> None:
-    """Draw a curve and its fit in the ``upper`` axes, and what is left in the ``lower``."""
+def _draw_curve(upper: Axes, lower: Axes, one: xr.Dataset, *, is_first: bool, fits: bool) -> None:
+    """Draw a curve and its fit in the ``upper`` axes, what is left in the ``lower``; over time if the tool holds."""
     known = np.flatnonzero(np.isfinite(one["force"].values))
     known = known[:: max(1, len(known) // _MOST_POINTS)]
     one = one.isel(sample=known)
-    depth, of_depth = _scaled(one["depth"].values, "m")
+    over_time = _holds(one)
+    along, of_along = _scaled(one["time" if over_time else "depth"].values, "s" if over_time else "m")
     largest, of_force = _scaled(one["force"].values, "N")
     factor = float(largest[-1] / one["force"].values[-1]) if one["force"].values[-1] else 1.0
     fit, band, residual = (factor * one[key].values for key in ("fit", "band", "residual"))
-    order = np.argsort(depth)
-    upper.plot(depth, largest, ".", color=_MEASURED, markersize=3, label="measured")
-    upper.plot(depth[order], fit[order], color=_FIT, label="fit")
-    upper.fill_between(
-        depth[order], (fit - band)[order], (fit + band)[order], color=_FIT, alpha=0.25, linewidth=0, label="its 95 %"
-    )
+    order = np.argsort(along)
+    upper.plot(along, largest, ".", color=_MEASURED, markersize=3, label="measured")
+    upper.plot(along[order], fit[order], color=_FIT, label="fit")
+    if fits:
+        ends = (along[order], (fit - band)[order], (fit + band)[order])
+        upper.fill_between(*ends, color=_FIT, alpha=0.25, linewidth=0, label="its 95 %")
     upper.tick_params(labelbottom=False)
-    lower.plot(depth, residual, ".", color=_MEASURED, markersize=2)
+    lower.plot(along, residual, ".", color=_MEASURED, markersize=2)
     lower.axhline(0, color=_FIT)
-    lower.set_xlabel(f"depth of the tool, {of_depth}")
+    lower.set_xlabel(f"time, {of_along}" if over_time else f"depth of the tool, {of_along}")
     if is_first:
         upper.set_ylabel(f"force, {of_force}")
         lower.set_ylabel(f"residual, {of_force}")
 
 
+def _holds(one: xr.Dataset) -> bool:
+    """Tell whether the tool is at its largest depth for a quarter of the time."""
+    if "time" not in one or not bool(one["time"].notnull().all()):
+        return False
+    time, depth = one["time"].values, one["depth"].values
+    at_end = time[depth > depth.max() - _HELD * np.ptp(depth)]
+    return bool(np.ptp(at_end) > np.ptp(time) / 4)
+
+
 def _draw_profile(ax: Axes, dataset: xr.Dataset, unknown: str, *, is_first: bool) -> None:
-    """Draw how much worse the fit is at other values of an unknown, with both error bars."""
-    one = dataset.sel(unknown=unknown)
-    known = np.isfinite(one["profile"].values)
-    values, unit = _scaled(one["profile_value"].values[known], str(one["unit"].values))
-    factor = _factor(one["profile_value"].values[known], str(one["unit"].values))
+    """Draw how much worse the fit is at other values of an unknown, with both error bars as far as they are near."""
+    one, unit = dataset.sel(unknown=unknown), str(dataset["unit"].sel(unknown=unknown).values)
+    estimate, low, high = (float(one[name]) for name in ("estimate", "low", "high"))
+    values, fall = _profile(one)
+    factor = _factor(np.array([low, high]), unit)
     for end, colour in (("_hidden", _HIDDEN), ("", _MEASURED)):
-        low, high = (factor * float(one[f"{side}{end}"]) for side in ("low", "high"))
-        if np.isfinite(low) and np.isfinite(high):
-            ax.axvspan(low, high, color=colour, alpha=0.25, linewidth=0)
-    ax.plot(values, one["profile"].values[known], color=LINE)
+        ends = [factor * float(one[f"{side}{end}"]) for side in ("low", "high")]
+        if np.isfinite(ends).all():
+            ax.axvspan(ends[0], ends[1], color=colour, alpha=0.25, linewidth=0)
+    ax.plot(factor * values, fall, color=LINE)
     ax.axhline(_NORMAL, color=QUIET, linestyle=":")
-    ax.axvline(factor * float(one["estimate"]), color=_FIT)
+    ax.axvline(factor * estimate, color=_FIT)
+    ax.set_xlim(factor * (estimate - _NEAR * (estimate - low)), factor * (estimate + _NEAR * (high - estimate)))
     ax.set_ylim(0, _HIGHEST)
-    ax.set_xlabel(f"{title(unknown)}{f', {unit}' if unit else ''}")
-    ax.set_title(bar(dataset, unknown) if bool(one["seen"]) else "not in the curves")
+    word = _scaled(np.array([low, high]), unit)[1]
+    ax.set_xlabel(f"{title(unknown)}{f', {word}' if word else ''}")
+    ax.set_title(_bars(dataset, unknown))
     ax.locator_params(axis="x", nbins=4)
     if is_first:
         ax.set_ylabel("misfit, −2 ln L/L_max")
     else:
         ax.tick_params(labelleft=False)
+
+
+def _profile(one: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Return values of an unknown and the fall of the likelihood there: without a profile, that of its error bar."""
+    if "profile" in one and bool(one["profile"].notnull().any()):
+        known = np.isfinite(one["profile"].values)
+        return one["profile_value"].values[known], one["profile"].values[known]
+    estimate, low, high = (float(one[name]) for name in ("estimate", "low", "high"))
+    shares = np.linspace(-_NEAR, _NEAR, 101)
+    return estimate + np.where(shares < 0, estimate - low, high - estimate) * shares, _NORMAL * shares**2
+
+
+def _bars(dataset: xr.Dataset, unknown: str) -> str:
+    """Write both error bars, one below the other."""
+    if not bool(dataset["seen"].sel(unknown=unknown)):
+        return "not in the curves"
+    first, second = bar(dataset, unknown), bar(dataset, unknown, hidden=True)
+    return f"{first}\nmay hide: {second}" if second and second != first else first
 
 
 def _caption(dataset: xr.Dataset, count: int, has_profiles: bool) -> str:

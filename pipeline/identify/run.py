@@ -1,0 +1,92 @@
+"""An identification from the study to its dataset: curves, forces over ranges, fits, and what is kept of them."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from pipeline.identify.dataset import dataset_of, joined
+from pipeline.identify.doubts import doubts_of_moduli, doubts_of_scale
+from pipeline.identify.estimate import identify
+from pipeline.identify.experiment import Scenes, Specimen, scenes_of, specimens
+from pipeline.identify.forward import stored_in
+from pipeline.identify.kept import Kept
+from pipeline.identify.unknowns import unknowns
+from pipeline.run.provenance import provenance
+from pipeline.study.sweep import Study
+from pipeline.surrogate.cases import Solve
+
+# Seconds between two lines of progress.
+_SILENCE = 10.0
+
+
+def identification(study: Study, output: Path, store: Path, say: Callable[[str], None]) -> xr.Dataset:
+    """Return the dataset of an identification; ``say`` is told what is found in files, and how far the work is.
+
+    Cases of forces are in the ``store``; results of single files are kept in the folder ``output``.
+
+    Raises:
+        ExperimentError: if a file is no force curve.
+        StudyError: if a scene cannot be run.
+        SurrogateError: if a case that a force needs has none.
+    """
+    found = specimens(study)
+    for curve in found[0].curves:
+        for line in curve.told:
+            say(f"{curve.name}: {line}")
+    for line in doubts_of_scale(study, found):
+        say(line)
+    scenes = scenes_of(study, unknowns(study), found, _told(stored_in(store), say))
+    if len(found) == 1:
+        return _doubted(_of_one(study, scenes, found[0]))
+    kept, datasets, printed = Kept(output, study), [], time.monotonic()
+    for number, specimen in enumerate(found, start=1):
+        one = kept.read(specimen)
+        if one is None:
+            one = _of_one(study, scenes, specimen)
+            kept.write(specimen, one)
+        datasets.append(one)
+        if time.monotonic() - printed > _SILENCE:
+            printed = time.monotonic()
+            say(f"{number} of {len(found)} files are fitted")
+    return _doubted(joined(datasets, [specimen.name for specimen in found]))
+
+
+def _doubted(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset that also tells why its values are doubtful."""
+    lines = [*str(dataset.attrs.get("told", "")).splitlines(), *doubts_of_moduli(dataset)]
+    return dataset.assign_attrs({"told": "\n".join(lines)} if lines else {})
+
+
+def _of_one(study: Study, scenes: Scenes, specimen: Specimen) -> xr.Dataset:
+    found = identify(scenes.measured(specimen), unknowns(study))
+    return dataset_of(found, _attributes(study), [curve.time for curve in specimen.curves])
+
+
+def _told(solve: Solve, say: Callable[[str], None]) -> Solve:
+    """Return what solves studies, and says how many cases there were every few seconds."""
+    start, count, printed = time.monotonic(), 0, time.monotonic()
+
+    def told(study: Study) -> xr.Dataset:
+        nonlocal count, printed
+        dataset = solve(study)
+        count += len(study)
+        if time.monotonic() - printed > _SILENCE:
+            printed = time.monotonic()
+            say(f"forces over the ranges of the unknowns: {count} cases so far, {printed - start:.0f} s")
+        return dataset
+
+    return told
+
+
+def _attributes(study: Study) -> dict[str, Any]:
+    return {
+        "title": study.title,
+        "study": study.text,
+        "study_file": Path(study.file).name,
+        "study_folder": str(Path(study.file).absolute().parent),
+        "may_hide": " ".join(study.identification.may_hide),
+        **provenance(ranks=1),
+    }
