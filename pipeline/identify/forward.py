@@ -5,11 +5,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.identify.parts import Forward, Unknown
+from pipeline.identify.parts import Unknown
 from pipeline.study.sweep import Study
 from pipeline.surrogate.build import build
 from pipeline.surrogate.cases import Solve, domain_of
 from pipeline.surrogate.derived import parameters
+from pipeline.surrogate.table import Table
 from pipeline.surrogate.wide import wide_solve
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 _MANY = 800
 
 
-def forward_of(scene: Study, unknowns: Sequence[Unknown], deepest: float, solve: Solve) -> Forward:
+def forward_of(scene: Study, unknowns: Sequence[Unknown], deepest: float, solve: Solve) -> Table:
     """Return the force of a scene down to a depth (m), over the ranges of those unknowns that are keys of its study.
 
     If its body is wide, the integral equation of layered bodies replaces all but three solves.

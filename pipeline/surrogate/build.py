@@ -30,8 +30,7 @@ def build(domain: Domain, solve: Solve, tolerance: float | None = None, most: in
     """
     tolerance = tolerance or (ON_MERIDIAN if domain.is_on_meridian else IN_SPACE)
     cases = Cases(domain, solve)
-    shallowest = SHALLOWEST if domain.is_on_meridian else _IN_SPACE
-    depths = Depths(domain.deepest, domain.exponent, 1 if domain.is_proportional else 3, shallowest)
+    depths = _first(domain)
     place = domain.middle
     while True:
         depths, _ = _finer(cases, depths, place, _OF_DEPTH * tolerance)
@@ -41,8 +40,17 @@ def build(domain: Domain, solve: Solve, tolerance: float | None = None, most: in
         if enough == depths:
             break
         depths = enough
-    error, mesh = found.error + of_depth, max(cases.bars)
-    return Table(domain.ranges, domain.reference, depths, found.grid, error, mesh, len(cases.bars))
+    error, mesh = found.error + of_depth, max(cases.bars, default=0.0)
+    return Table(domain.output, domain.ranges, domain.reference, depths, found.grid, error, mesh, len(cases.bars))
+
+
+def _first(domain: Domain) -> Depths:
+    """Return the nodes of the depth to begin with."""
+    if domain.is_proportional or domain.shallowest == domain.deepest:
+        return Depths(domain.deepest, domain.exponent, 1)
+    least = SHALLOWEST if domain.is_on_meridian else _IN_SPACE
+    share = least if domain.shallowest is None else domain.shallowest / domain.deepest
+    return Depths(domain.deepest, domain.exponent, 3, share)
 
 
 def _over_parameters(cases: Cases, depths: Depths, tolerance: float, most: int) -> Interpolation:

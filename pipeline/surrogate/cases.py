@@ -14,7 +14,7 @@ from pipeline.study.parameters import Parameter
 from pipeline.study.problems import Problem, StudyError
 from pipeline.study.sweep import Study
 from pipeline.surrogate.depths import Depths
-from pipeline.surrogate.derived import DEPTH, IN_SPACE, ON_MERIDIAN, derive, has_mesh, in_order
+from pipeline.surrogate.derived import DEPTH, FORCE, IN_SPACE, ON_MERIDIAN, Output, derive, has_mesh, in_order
 from pipeline.surrogate.moduli import Bounds, Reference, ranges_of, reference_of
 from pipeline.surrogate.ranges import Range, trend_of
 from pipeline.surrogate.sparse import Block, points_of
@@ -32,9 +32,9 @@ class SurrogateError(Exception):
 
 @dataclass(frozen=True)
 class Domain:
-    """What a surrogate spans: a scene, ranges of its parameters, and depths down to the ``deepest`` (m).
+    """What a surrogate spans: a scene, ranges of its parameters, and depths from the ``shallowest`` to the ``deepest``.
 
-    Meshes have an ``accuracy``; None for that of the scene's own mesh. Forces are divided by the depth to the power of
+    Depths (m) begin near 0 if there is no shallowest. Meshes have an ``accuracy``; None for that of the scene's own mesh. Forces are divided by the depth to the power of
     ``exponent``; ``is_proportional`` tells that nothing else is left of the depth.
     """
 
@@ -43,6 +43,8 @@ class Domain:
     reference: Reference
     deepest: float
     accuracy: float | None = None
+    shallowest: float | None = None
+    output: Output = FORCE
     exponent: float = 1.0
     is_proportional: bool = False
     is_on_meridian: bool = False
@@ -69,14 +71,18 @@ class Domain:
         return [self.reference.parameter, *(one.parameter for one in self.ranges), DEPTH]
 
 
-def domain_of(scene: Study, bounds: Bounds, deepest: float) -> Domain:
+def domain_of(
+    scene: Study, bounds: Bounds, deepest: float, shallowest: float | None = None, output: Output = FORCE
+) -> Domain:
     """Return the domain of a surrogate between bounds of parameters, and down to a depth (m).
+
+    With a ``shallowest`` depth (m), which may be the same, it begins there.
 
     Raises:
         StudyError: if the study cannot be run, or its forces are not proportional to its moduli.
     """
     reference = reference_of(scene, bounds)
-    found = Domain(scene, ranges_of(scene, bounds, reference), reference, deepest)
+    found = Domain(scene, ranges_of(scene, bounds, reference), reference, deepest, shallowest, output=output)
     found = found if has_mesh(scene) else replace(found, accuracy=ON_MERIDIAN)
     study = found.study([one.value(np.zeros(1)) for one in found.ranges], np.array([deepest]))
     case = study.case((0,) * len(study.axes))
@@ -86,8 +92,10 @@ def domain_of(scene: Study, bounds: Bounds, deepest: float) -> Domain:
         found = replace(found, is_on_meridian=True)
     elif found.accuracy is not None:
         found = replace(found, accuracy=IN_SPACE)
+    if output != FORCE:
+        return replace(found, exponent=0.0)
     exponent = (case.probe.force_exponent if case.probe.is_unilateral else None) or 1.0
-    return replace(found, exponent=exponent, is_proportional="depth" in case.moves_in_proportion)
+    return replace(found, exponent=exponent, is_proportional=case.moves_in_proportion == ("depth",))
 
 
 @dataclass
@@ -107,18 +115,22 @@ class Cases:
         domain, depth = self.domain, depths.values
         study = domain.study([one.value(x) for one, x in zip(domain.ranges, block, strict=True)], depth)
         dataset = self.solve(study)
-        _check(dataset, study)
-        names = ("force", "force_error")
-        force, bar = (in_order(study, domain.order, dataset[name]).reshape(-1, len(depth)) for name in names)
-        self.bars += (bar / force).ravel().tolist()
-        logs = np.log(force / (domain.reference.young * depths.power(depth)))
-        return np.asarray(logs - trend_of(domain.ranges, points_of(block)))
+        _check(dataset, study, domain.output)
+        name = domain.output.name
+        value = in_order(study, domain.order, dataset[name]).reshape(-1, len(depth))
+        if (error := f"{name}_error") in dataset:
+            bar = in_order(study, domain.order, dataset[error]).reshape(-1, len(depth))
+            self.bars += (bar / value).ravel().tolist()
+        unit = domain.reference.young if domain.output.is_proportional else 1.0
+        return np.asarray(np.log(value / (unit * depths.power(depth))) - trend_of(domain.ranges, points_of(block)))
 
 
-def _check(dataset: "xr.Dataset", study: Study) -> None:
-    """Raise an exception if a case has no force."""
-    status, force = np.ravel(dataset["status"]), np.ravel(dataset["force"])
-    if (wrong := np.flatnonzero((status != OK) | ~(force > 0))).size:
+def _check(dataset: "xr.Dataset", study: Study, output: Output) -> None:
+    """Raise an exception if a case has no output, or one that is not positive."""
+    if output.name not in dataset:
+        raise SurrogateError(f"{study.file}: these cases have no {output.name}")
+    status, value = np.ravel(dataset["status"]), np.ravel(dataset[output.name])
+    if (wrong := np.flatnonzero((status != OK) | ~(value > 0))).size:
         case = list(study.cases())[int(wrong[0])]
         why = str(np.ravel(dataset["message"])[wrong[0]]) or str(status[wrong[0]])
-        raise SurrogateError(f"{study.file}: {case}: no force: {why}; a smaller range may avoid this case")
+        raise SurrogateError(f"{study.file}: {case}: no {output.name}: {why}; a smaller range may avoid this case")

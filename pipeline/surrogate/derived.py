@@ -1,11 +1,13 @@
 """Studies whose cases a surrogate is made of: a scene with lists of values, run and stored as any other study."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.quantities import quantity_of
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.study.parameters import Parameter, parameters_of
@@ -19,6 +21,22 @@ from pipeline.study.toml import to_toml
 # Error bars asked of cases whose study has none: those of the meridian cost little.
 ON_MERIDIAN, IN_SPACE = 1e-3, 1e-2
 DEPTH = Parameter("depth", "m", 0.0, np.inf, 0.0, np.inf, place=("probe", "depth"))
+
+
+@dataclass(frozen=True)
+class Output:
+    """A variable of a dataset, one positive number for each case."""
+
+    name: str
+
+    @property
+    def is_proportional(self) -> bool:
+        """Whether it is proportional to all moduli together: forces, stresses and energies are, lengths are not."""
+        quantity = quantity_of(self.name)
+        return quantity is not None and any(unit in quantity.unit for unit in ("N", "Pa", "J"))
+
+
+FORCE = Output("force")
 
 
 def parameters(scene: Study) -> dict[str, Parameter]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays import FloatArray
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.study.parameters import Parameter
 from pipeline.study.swept import Place
 
@@ -45,16 +45,16 @@ class Range:
             return np.asarray(np.sqrt(self.low * self.high) * (self.high / self.low) ** (x / 2))
         return np.asarray(self.low + (self.high - self.low) * (x + 1) / 2)
 
-    def position(self, value: float) -> float:
-        """Return the position in [-1, 1] of a value of the range."""
+    def position(self, value: FloatArray) -> FloatArray:
+        """Return the positions (n,) in [-1, 1] of values of the range."""
         if self._is_logarithmic:
-            return float(2 * np.log(value / np.sqrt(self.low * self.high)) / np.log(self.high / self.low))
-        return 2 * (value - self.low) / (self.high - self.low) - 1
+            return np.asarray(2 * np.log(value / np.sqrt(self.low * self.high)) / np.log(self.high / self.low))
+        return np.asarray(2 * (value - self.low) / (self.high - self.low) - 1)
 
-    def spans(self, value: float) -> bool:
-        """Return whether a value is in the range, but for rounding."""
+    def spans(self, value: FloatArray) -> BoolArray:
+        """Return whether values (n,) are in the range, but for rounding."""
         slack = 1e-9 * (self.high - self.low)
-        return self.low - slack <= value <= self.high + slack
+        return np.asarray((self.low - slack <= value) & (value <= self.high + slack))
 
     def trend(self, x: FloatArray) -> FloatArray:
         """Return the logarithm of what forces are divided by at positions in [-1, 1]: 1/(1 - ν²) of a half-space."""

@@ -7,20 +7,26 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.surrogate.depths import Depths
+from pipeline.surrogate.derived import Output
 from pipeline.surrogate.moduli import Reference
 from pipeline.surrogate.ranges import Range, trend_of
 from pipeline.surrogate.sparse import SparseGrid
 
+Values = Mapping[str, float] | Mapping[str, FloatArray]
+# Samples that are evaluated together: their basis takes tens of megabytes.
+_AT_ONCE = 4096
+
 
 @dataclass(frozen=True)
 class Table:
-    """The force of a scene over ranges of its parameters.
+    """The force of a scene, or another output, over ranges of its parameters.
 
     ``grid`` interpolates ln F (1 - ν²)/(E d^p), with d in units of the largest depth, at the nodes of the depth. Its
     error is ``interpolation``, relative to F; ``mesh`` is the largest of the error bars of its cases, and ``cases``
     their number.
     """
 
+    output: Output
     ranges: tuple[Range, ...]
     reference: Reference
     depths: Depths
@@ -45,7 +51,20 @@ class Table:
         """
         below = np.maximum(depth, 0.0)
         logs = self.logs(self.positions(values), np.minimum(below, self.depths.deepest))[0]
-        return np.asarray(self.young(values) * np.exp(logs) * self.depths.power(below))
+        return np.asarray(self._factor(values) * np.exp(logs) * self.depths.power(below))
+
+    def sampled(self, values: Mapping[str, FloatArray], depth: FloatArray) -> FloatArray:
+        """Return the output (n,) at values (n,) of all parameters and depths (n,), in m: one of each for a sample.
+
+        Raises:
+            ValueError: if a value is outside the range of its parameter.
+        """
+        positions, found = self.positions(values), np.empty(len(depth))
+        for start in range(0, len(depth), _AT_ONCE):
+            part = slice(start, start + _AT_ONCE)
+            nodes = self.grid(positions[part]) + trend_of(self.ranges, positions[part])
+            found[part] = np.einsum("ij,ij->i", nodes, self.depths.basis(depth[part]))
+        return np.asarray(self._factor(values) * np.exp(found) * self.depths.power(depth))
 
     def error(self, depth: FloatArray, values: Mapping[str, float]) -> FloatArray:
         """Return the relative error of the force, of meshes and interpolation; infinite beyond the largest depth.
@@ -65,21 +84,26 @@ class Table:
         found = self.grid(positions) + trend_of(self.ranges, positions)
         return np.asarray(found @ self.depths.basis(depth).T)
 
-    def young(self, values: Mapping[str, float]) -> float:
-        """Return the modulus (Pa) that the force is proportional to."""
-        return self.reference.young if self.reference.is_known else values[self.reference.name]
-
-    def positions(self, values: Mapping[str, float]) -> FloatArray:
-        """Return the position (1, ranges) in [-1, 1] of values of the parameters.
+    def positions(self, values: Values) -> FloatArray:
+        """Return the positions (n, ranges) in [-1, 1] of values of the parameters, one or n of each.
 
         Raises:
             ValueError: if one is outside its range.
         """
-        young, found = self.young(values), np.zeros((1, len(self.ranges)))
-        for number, one in enumerate(self.ranges):
-            value = values[one.name] / (young if one.is_ratio else 1.0)
-            if not one.spans(value):
+        young, found = self._young(values), []
+        for one in self.ranges:
+            value = np.atleast_1d(values[one.name] / (young if one.is_ratio else 1.0))
+            if not np.all(one.spans(value)):
                 what = f"{one.name} over {self.reference.name}" if one.is_ratio else one.name
-                raise ValueError(f"{what} = {value:.6g} is not in its range, {one.low:.6g} to {one.high:.6g}")
-            found[0, number] = np.clip(one.position(value), -1, 1)
-        return found
+                wrong = value[~one.spans(value)][0]
+                raise ValueError(f"{what} = {wrong:.6g} is not in its range, {one.low:.6g} to {one.high:.6g}")
+            found.append(np.clip(one.position(value), -1, 1))
+        return np.stack(found, axis=1) if found else np.zeros((np.size(young), 0))
+
+    def _young(self, values: Values) -> float | FloatArray:
+        """Return the modulus (Pa) that all others are divided by."""
+        return self.reference.young if self.reference.is_known else values[self.reference.name]
+
+    def _factor(self, values: Values) -> float | FloatArray:
+        """Return what the interpolated output is multiplied by."""
+        return self._young(values) if self.output.is_proportional else 1.0
