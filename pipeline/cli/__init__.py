@@ -8,7 +8,21 @@ from typing import Annotated
 import typer
 
 from pipeline import __version__
-from pipeline.cli import compare, export, guide, identify, new, plan, report, run, status, touch, verify, view
+from pipeline.cli import (
+    compare,
+    export,
+    guide,
+    identify,
+    new,
+    plan,
+    report,
+    run,
+    sensitivity,
+    status,
+    touch,
+    verify,
+    view,
+)
 from pipeline.cli.console import error, make_patient, say, what_was_not_written
 from pipeline.cli.faults import BAD_INPUT, fail
 from pipeline.cli.group import Commands
@@ -41,6 +55,7 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
     guide.guide,
     identify.identify,
     compare.compare,
+    sensitivity.sensitivity,
     view.view,
     export.export,
     touch.touch,

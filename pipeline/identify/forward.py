@@ -1,20 +1,16 @@
 """The force of a measurement's scene as a function of depth and unknowns: which model it is computed with."""
 
 from collections.abc import Sequence
-from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pipeline.identify.parts import Unknown
 from pipeline.study.sweep import Study
 from pipeline.surrogate.build import build
-from pipeline.surrogate.cases import Solve, domain_of
+from pipeline.surrogate.cases import Solve, domain_of, stored_in
 from pipeline.surrogate.derived import parameters
 from pipeline.surrogate.table import Table
 from pipeline.surrogate.wide import wide_solve
 
-if TYPE_CHECKING:
-    from mpi4py import MPI
+__all__ = ["forward_of", "stored_in"]
 
 # Most points of a surrogate by the integral equation, which takes 20 ms for one.
 _MANY = 800
@@ -35,10 +31,3 @@ def forward_of(scene: Study, unknowns: Sequence[Unknown], deepest: float, solve:
     if wide := wide_solve(domain, solve):
         return build(domain, wide, most=_MANY)
     return build(domain, solve)
-
-
-def stored_in(store: Path, comm: "MPI.Comm | None" = None) -> Solve:
-    """Return what solves studies on the ranks of ``comm`` (all there are), with their cases in a store."""
-    from pipeline import workflow  # noqa: PLC0415 (MPI starts as it is imported)
-
-    return partial(workflow.solve, comm=workflow.world() if comm is None else comm, store=store)

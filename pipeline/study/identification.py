@@ -99,11 +99,12 @@ def read_identify(
         return Identification()
     given: dict[str, Sought] = {}
     for key in (key for key in raw if key not in own):
-        parameter = _known(f"identify.{key}", raw[key], key, known, problems)
-        if parameter and (one := _given(parameter, raw[key], key in identify.unknown, problems)):
+        parameter = known_one(f"identify.{key}", raw[key], key, known, problems)
+        is_asked = key in identify.unknown
+        if parameter and (one := given_one("identify", parameter, raw[key], problems, is_asked=is_asked)):
             given[key] = one
     for name in identify.unknown:
-        parameter = _known("identify.unknown", name, name, known, problems)
+        parameter = known_one("identify.unknown", name, name, known, problems)
         if parameter and name not in raw:
             given[name] = Sought(parameter, parameter.low, parameter.high)
     _add_implied(given, known, measurements, problems)
@@ -112,32 +113,34 @@ def read_identify(
     return Identification(tuple(given.values()), identify.may_hide)
 
 
-def _known(key: str, found: Any, name: str, known: Mapping[str, Parameter], problems: Problems) -> Parameter | None:
+def known_one(key: str, found: Any, name: str, known: Mapping[str, Parameter], problems: Problems) -> Parameter | None:
+    """Return the parameter of a name; None if there is none, which is reported at the ``key``."""
     if name not in known:
         problems.error(key, found, f"`{name}` is no parameter of this study; {nearest(name, known)}")
     return known.get(name)
 
 
-def _given(parameter: Parameter, raw: Any, is_asked: bool, problems: Problems) -> Sought | None:
-    """Return a parameter with the range, or with the value and error, that the study gives."""
-    key, unit = f"identify.{parameter.name}", parameter.unit
+def given_one(
+    section: str, parameter: Parameter, raw: Any, problems: Problems, *, is_asked: bool = False
+) -> Sought | None:
+    """Return a parameter with the range, or with the value and error, that a section of the study gives."""
+    key, unit = f"{section}.{parameter.name}", parameter.unit
     ends, example = _EXAMPLES[unit]
     allowed = f'must be a range, such as {ends}, or a value with an error, such as {{value = {example}, error = "5 %"}}'
     try:
         if isinstance(raw, list) and len(raw) == 2:
             low, high = (_number(end, unit) for end in raw)
-            return _ranged(parameter, raw, low, high, problems)
+            return _ranged(key, parameter, raw, low, high, problems)
         if isinstance(raw, dict) and raw.keys() == {"value", "error"}:
             value, error = _number(raw["value"], unit), _error(raw["error"], raw["value"], unit)
-            return _with_error(parameter, raw, value, error, is_asked, problems)
+            return _with_error(key, parameter, raw, value, error, is_asked, problems)
         problems.error(key, raw, allowed)
     except PydanticCustomError as wrong:
         problems.error(key, raw, f"{allowed}: {wrong.message()}")
     return None
 
 
-def _ranged(parameter: Parameter, raw: Any, low: float, high: float, problems: Problems) -> Sought | None:
-    key = f"identify.{parameter.name}"
+def _ranged(key: str, parameter: Parameter, raw: Any, low: float, high: float, problems: Problems) -> Sought | None:
     if low >= high:
         problems.error(key, raw, "must rise: its first value is not below its second")
     elif low < parameter.least or high > parameter.most or (parameter.is_logarithmic and low <= 0):
@@ -148,9 +151,8 @@ def _ranged(parameter: Parameter, raw: Any, low: float, high: float, problems: P
 
 
 def _with_error(
-    parameter: Parameter, raw: Any, value: float, error: float, is_asked: bool, problems: Problems
+    key: str, parameter: Parameter, raw: Any, value: float, error: float, is_asked: bool, problems: Problems
 ) -> Sought | None:
-    key = f"identify.{parameter.name}"
     if error <= 0:
         problems.error(key, raw, "must have an error above 0; a parameter without an error is known: omit it here")
     elif not parameter.least <= value <= parameter.most:

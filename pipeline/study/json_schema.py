@@ -16,7 +16,7 @@ from pydantic.json_schema import models_json_schema
 from pipeline.shapes.history import History, Sine
 from pipeline.shapes.section import Section, words_of
 from pipeline.study.identified import WORDS as IDENTIFIED
-from pipeline.study.measurement import Identify
+from pipeline.study.measurement import Identify, Sensitivity
 from pipeline.study.named import SCHEMA
 from pipeline.study.ranges import KEYS
 from pipeline.study.schema import EXPERIMENT, NESTED, SECTIONS, SINGLE, TABLES
@@ -88,7 +88,8 @@ def study_schema() -> Schema:
         properties = definition.get("properties", {})
         for key, value in properties.items():
             properties[key] = _described(_in_file(value, name in swept, key), words.get(name), key)
-    definitions[Identify.__name__]["additionalProperties"] = _SOUGHT
+    for model in (Identify, Sensitivity):
+        definitions[model.__name__]["additionalProperties"] = _SOUGHT
     material = definitions["Material"]
     material["properties"]["from"] = {"description": IDENTIFIED.text, "type": "string"}
     del material["required"]  # `from` has them, too

@@ -69,6 +69,9 @@ SECTION_TEXTS = {
     "parameter of the law, `contact_point` (larger is deeper), `baseline`, `drift`, `machine_stiffness`, "
     "`relaxation_share_1`, `relaxation_time_1`. It has a range, or a value with its error (95 %). What is not named is "
     "known. Optional; its lists are no sweeps.",
+    "sensitivity": "Parameters whose effect on the force `epsmesh sensitivity` compares. Besides the key below, the "
+    "name of a parameter is a key, as in [identify], and `depth`: it has a range, or a value with its error "
+    "(95 %). Forces do not depend on this section. Optional; its lists are no sweeps.",
 }
 
 

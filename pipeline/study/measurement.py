@@ -296,3 +296,17 @@ class Identify(Section):
             '["layer", "strain"]',
         ),
     ] = ("layer", "base", "strain")
+
+
+class Sensitivity(Section):
+    """Keys of ``[sensitivity]`` besides the parameters."""
+
+    outputs: Annotated[
+        tuple[Annotated[str, Field(min_length=1)], ...],
+        Words(
+            "Variables of the dataset whose spread is explained. All other keys of this section are parameters, as in "
+            '[identify]: a range, such as young = ["5 kPa", "20 kPa"], or a value with an error, such as '
+            'skin_thickness = {value = "2 mm", error = "5 %"}.',
+            '["force", "contact_area"]',
+        ),
+    ] = ("force",)

@@ -56,6 +56,10 @@ class Parameter:
     is_logarithmic: bool = False
 
 
+# The depth of the tool: no unknown of a force curve, which has all depths.
+DEPTH = Parameter("depth", "m", 0.0, inf, 0.0, inf, place=("probe", "depth"), is_logarithmic=True)
+
+
 def parameters_of(body: Body, material: Material, probe: Probe) -> dict[str, Parameter]:
     """Return every parameter by name that can be identified with a body, its material and a probe."""
     found = [*_of_tissues(body, material), *_of_body(body), *_of_probe(probe), *_of_measurements()]

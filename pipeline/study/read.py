@@ -16,11 +16,12 @@ from pipeline.study.identification import Identification, read_identify, read_me
 from pipeline.study.identified import with_identified
 from pipeline.study.loads import Load
 from pipeline.study.measurement import Measurement
-from pipeline.study.parameters import parameters_of
+from pipeline.study.parameters import DEPTH, Parameter, parameters_of
 from pipeline.study.problems import Problem, Problems, StudyError, nearest
 from pipeline.study.regions import check_regions, material_without_section
 from pipeline.study.scenes import scene_mapping
 from pipeline.study.schema import EXPERIMENT, NESTED, SECTIONS, Material, Mesh
+from pipeline.study.sensitivity import Spread, read_sensitivity
 from pipeline.study.stages import with_stages
 from pipeline.study.sweep import Study
 from pipeline.study.tables import MOST_CASES, read_section
@@ -87,12 +88,13 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
     if all(problem.key != "study" for problem in problems.errors):
         _check_together(sections, tuple(axes), problems)
     measurements, identification = _read_experiment(given, sections, file, problems)
+    spread = _read_spread(given, sections, problems)
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))
     sections, every_axis = with_stages(sections, tuple(axes))
     warnings = tuple(f"{file}: {warning}" for warning in problems.told_once())
     title = str(raw.get("title", Path(file).stem))
-    experiment = (given, measurements, identification, identified)
+    experiment = (given, measurements, identification, identified, spread)
     return Study(file, Path(file).stem, title, text, every_axis, sections, warnings, *experiment)
 
 
@@ -137,10 +139,22 @@ def _read_experiment(
     for number, measurement in enumerate(measurements, start=1):
         if measurement.probe or measurement.body:
             _scene(raw, measurement, f"measurement[{number}]", file, problems)
+    return measurements, read_identify(raw.get("identify", {}), measurements, _parameters(sections), problems)
+
+
+def _read_spread(raw: dict[str, Any], sections: dict[str, tuple[Section, ...]], problems: Problems) -> Spread:
+    """Return the parameters that are varied, and the outputs to explain."""
+    if problems.errors or "sensitivity" not in raw:
+        return Spread()
+    known = {name: one for name, one in _parameters(sections).items() if one.place}
+    return read_sensitivity(raw["sensitivity"], known | {DEPTH.name: DEPTH}, problems)
+
+
+def _parameters(sections: dict[str, tuple[Section, ...]]) -> dict[str, Parameter]:
+    """Return the parameters of the first scene, by name."""
     body, material, probe = (sections[name][0] for name in ("body", "material", "probe"))
     assert isinstance(body, Body) and isinstance(material, Material) and isinstance(probe, Probe)
-    known = parameters_of(body, material, probe)
-    return measurements, read_identify(raw.get("identify", {}), measurements, known, problems)
+    return parameters_of(body, material, probe)
 
 
 def _check_together(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:

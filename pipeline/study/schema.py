@@ -16,7 +16,7 @@ from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.tissue import LAWS, Fibres, Relaxation, Term, Tissue
 from pipeline.study.loads import Load, Traction
-from pipeline.study.measurement import Columns, ColumnUnits, Identify, Measurement, Sign
+from pipeline.study.measurement import Columns, ColumnUnits, Identify, Measurement, Sensitivity, Sign
 from pipeline.study.path import Path
 from pipeline.study.vocabulary import FIGURES, REDUCTIONS
 from pipeline.units import Length, Pressure, Share, parse_quantity
@@ -282,8 +282,12 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "load": Load,
     "figure": Drawing,
 }
-# Sections about experiments, on which no case depends: see pipeline/study/identification.py.
-EXPERIMENT: dict[str, type[Section]] = {"measurement": Measurement, "identify": Identify}
+# Sections about experiments and their parameters, on which no case depends: see pipeline/study/identification.py.
+EXPERIMENT: dict[str, type[Section]] = {
+    "measurement": Measurement,
+    "identify": Identify,
+    "sensitivity": Sensitivity,
+}
 # Arrays of tables within a section: pieces of it, each with keys that can be swept.
 NESTED: dict[str, dict[str, type[Section]]] = {
     "body": {"layer": Layer, "inclusion": Inclusion},

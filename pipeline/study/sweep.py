@@ -16,6 +16,7 @@ from pipeline.study.identification import Identification
 from pipeline.study.identified import NOTHING, Identified
 from pipeline.study.measurement import Measurement
 from pipeline.study.schema import Drawing, Material, Planning, Solving, material_of
+from pipeline.study.sensitivity import Spread
 
 _PARTS = ("body", "material", "probe", "mesh", "solve", "load")
 Value = TypeVar("Value")
@@ -36,6 +37,7 @@ class Study:
     measurements: tuple[Measurement, ...] = ()
     identification: Identification = field(default_factory=Identification)
     identified: Identified = NOTHING
+    spread: Spread = field(default_factory=Spread)
 
     @property
     def shape(self) -> tuple[int, ...]:

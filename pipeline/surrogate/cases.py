@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,17 +12,18 @@ from pipeline.arrays import FloatArray
 from pipeline.plan.plan import make_plan
 from pipeline.states import OK
 from pipeline.study.capabilities.obstacles import obstacle
-from pipeline.study.parameters import Parameter
+from pipeline.study.parameters import DEPTH, Parameter
 from pipeline.study.problems import Problem, StudyError
 from pipeline.study.sweep import Study
 from pipeline.surrogate.depths import Depths
-from pipeline.surrogate.derived import DEPTH, FORCE, IN_SPACE, ON_MERIDIAN, Output, derive, has_mesh, in_order
+from pipeline.surrogate.derived import FORCE, IN_SPACE, ON_MERIDIAN, Output, derive, has_mesh, in_order
 from pipeline.surrogate.moduli import Bounds, Reference, ranges_of, reference_of
 from pipeline.surrogate.ranges import Range, trend_of
 from pipeline.surrogate.sparse import Block, points_of
 
 if TYPE_CHECKING:
     import xarray as xr
+    from mpi4py import MPI
 
 Solve = Callable[[Study], "xr.Dataset"]
 """What returns the dataset of a study: it runs it, or reads it from a store."""
@@ -34,8 +37,9 @@ class SurrogateError(Exception):
 class Domain:
     """What a surrogate spans: a scene, ranges of its parameters, and depths from the ``shallowest`` to the ``deepest``.
 
-    Depths (m) begin near 0 if there is no shallowest. Meshes have an ``accuracy``; None for that of the scene's own mesh. Forces are divided by the depth to the power of
-    ``exponent``; ``is_proportional`` tells that nothing else is left of the depth.
+    Depths (m) begin near 0 without a shallowest. Meshes have an ``accuracy``; None for that of the scene's own mesh.
+    Forces are divided by the depth to the power of ``exponent``; ``is_proportional`` tells that nothing else is left of
+    the depth.
     """
 
     scene: Study
@@ -82,7 +86,7 @@ def domain_of(
         StudyError: if the study cannot be run, or its forces are not proportional to its moduli.
     """
     reference = reference_of(scene, bounds)
-    found = Domain(scene, ranges_of(scene, bounds, reference), reference, deepest, shallowest, output=output)
+    found = Domain(scene, ranges_of(scene, bounds, reference), reference, deepest, shallowest=shallowest, output=output)
     found = found if has_mesh(scene) else replace(found, accuracy=ON_MERIDIAN)
     study = found.study([one.value(np.zeros(1)) for one in found.ranges], np.array([deepest]))
     case = study.case((0,) * len(study.axes))
@@ -96,6 +100,13 @@ def domain_of(
         return replace(found, exponent=0.0)
     exponent = (case.probe.force_exponent if case.probe.is_unilateral else None) or 1.0
     return replace(found, exponent=exponent, is_proportional=case.moves_in_proportion == ("depth",))
+
+
+def stored_in(store: Path, comm: "MPI.Comm | None" = None) -> Solve:
+    """Return what solves studies on the ranks of ``comm`` (all there are), with their cases in a store."""
+    from pipeline import workflow  # noqa: PLC0415 (MPI starts as it is imported)
+
+    return partial(workflow.solve, comm=workflow.world() if comm is None else comm, store=store)
 
 
 @dataclass

@@ -20,7 +20,6 @@ from pipeline.study.toml import to_toml
 
 # Error bars asked of cases whose study has none: those of the meridian cost little.
 ON_MERIDIAN, IN_SPACE = 1e-3, 1e-2
-DEPTH = Parameter("depth", "m", 0.0, np.inf, 0.0, np.inf, place=("probe", "depth"))
 
 
 @dataclass(frozen=True)

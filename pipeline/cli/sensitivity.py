@@ -1,0 +1,98 @@
+"""The command that tells which parameter of a study matters most."""
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.cli.console import say
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_study
+from pipeline.cli.words import (
+    DEFAULT_OUTPUT,
+    File,
+    Json,
+    Output,
+    Quiet,
+    StoreFile,
+    check_machine,
+    check_output,
+    check_store,
+    read_all,
+    warn,
+)
+from pipeline.files import STORE_NAME, result_files
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.study.sweep import Study
+
+_HOWTO = "docs/howto/sensitivity.md"
+# What the names of the files add to the study's: its own dataset stays.
+_ENDING = "_sensitivity"
+
+
+def sensitivity(
+    file: File,
+    output: Output = DEFAULT_OUTPUT,
+    store: StoreFile = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Tell how much of the spread of the force each parameter of a study makes.
+
+    The study's section [sensitivity] has the parameters with their ranges. A surrogate of the force over these ranges
+    is made of cases, which are kept in the case store. Results are Sobol's indices, with error bars.
+
+    Example: epsmesh sensitivity studies/sensitivity.toml
+    """
+    (study,) = read_all([file])
+    if store:
+        check_store(store)
+    path, name = store or output / STORE_NAME, study.name + _ENDING
+    files = result_files(output, name)
+    check_output(path, *files)
+    check_machine()
+    warn(study)
+    start = time.perf_counter()
+    dataset = _dataset(study, path)
+    from pipeline.netcdf import write_netcdf
+    from pipeline.report.figures.sensitivity import draw
+    from pipeline.report.sensitivity import answer
+
+    write_netcdf(dataset, files[0], "NETCDF4")
+    written = [files[0], *draw(dataset, output / name)]
+    seconds = time.perf_counter() - start
+    lines = [] if quiet else answer(dataset)
+    wrote = f"{study.file}: wrote {', '.join(map(str, written))}; {seconds:.3g} s"
+    say({"status": DONE, "files": list(map(str, written)), "outputs": _as_data(dataset)}, *lines, wrote)
+
+
+def _dataset(study: "Study", store: Path) -> "xr.Dataset":
+    """Return the indices of the study's outputs; exit if they cannot be had."""
+    from pipeline.study.problems import StudyError
+    from pipeline.surrogate.cases import SurrogateError, stored_in
+    from pipeline.surrogate.sensitivity import dataset_of, explain
+
+    try:
+        return dataset_of(study, explain(study, stored_in(store)))
+    except StudyError as wrong:
+        fail(*of_study(wrong))
+    except SurrogateError as wrong:
+        fail(Fault(str(wrong), file=study.file, howto=_HOWTO), status=SOME_FAILED)
+
+
+def _as_data(dataset: "xr.Dataset") -> dict[str, object]:
+    """Return the indices by output and parameter, and mean and deviation of each output."""
+    names = ("first", "first_error", "total", "total_error")
+    return {
+        str(output): {
+            "mean": float(dataset["mean"].sel(output=output)),
+            "deviation": float(dataset["deviation"].sel(output=output)),
+            "surrogate_error": float(dataset["surrogate_error"].sel(output=output)),
+            "parameters": {
+                str(parameter): {name: float(dataset[name].sel(output=output, parameter=parameter)) for name in names}
+                for parameter in dataset["parameter"].values
+            },
+        }
+        for output in dataset["output"].values
+    }

@@ -1,0 +1,55 @@
+"""Reading of ``[sensitivity]``: ranges of parameters, and the outputs whose spread over them is to be explained.
+
+Forces do not depend on this section: it neither sweeps nor changes cases.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import ValidationError
+
+from pipeline.quantities import QUANTITIES, RUN
+from pipeline.study.identification import Sought, given_one, known_one
+from pipeline.study.measurement import Sensitivity
+from pipeline.study.parameters import Parameter
+from pipeline.study.problems import Problems, nearest, tuples
+
+# Variables of a dataset that are one number for each case, and may be positive.
+OUTPUTS = tuple(
+    name for name, one in QUANTITIES.items() if name not in RUN and one.unit and not name.endswith(("_error", "_exact"))
+)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Parameters with their ranges, and names of outputs."""
+
+    varied: tuple[Sought, ...] = ()
+    outputs: tuple[str, ...] = ()
+
+
+def read_sensitivity(raw: Any, known: Mapping[str, Parameter], problems: Problems) -> Spread:
+    """Return the parameters of ``[sensitivity]``, of those that are ``known`` by name, and its outputs."""
+    if not isinstance(raw, dict):
+        problems.error("sensitivity", raw, "must be a table: write [sensitivity]")
+        return Spread()
+    own = {key: value for key, value in raw.items() if key in Sensitivity.model_fields and key != "name"}
+    try:
+        section = Sensitivity.model_validate({key: tuples(value) for key, value in own.items()})
+    except ValidationError as error:
+        problems.from_pydantic("sensitivity", error, Sensitivity, own)
+        return Spread()
+    for name in section.outputs:
+        if name not in OUTPUTS:
+            allowed = f"is no variable of a dataset with one number for each case; {nearest(name, OUTPUTS)}"
+            problems.error("sensitivity.outputs", name, allowed)
+    varied = []
+    for key in (key for key in raw if key not in own):
+        parameter = known_one(f"sensitivity.{key}", raw[key], key, known, problems)
+        if parameter and (one := given_one("sensitivity", parameter, raw[key], problems)):
+            varied.append(one)
+    if not varied and not problems.errors:
+        allowed = 'must have a parameter with its range, such as young = ["5 kPa", "20 kPa"]'
+        problems.error("sensitivity", None, allowed)
+    return Spread(tuple(varied), section.outputs)

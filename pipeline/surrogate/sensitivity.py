@@ -1,0 +1,131 @@
+"""Sensitivity of a study's outputs to its parameters: surrogates, Sobol's indices of them, and their dataset."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.special import ndtri
+
+from pipeline.arrays import FloatArray
+from pipeline.quantities import QUANTITIES
+from pipeline.study.identification import Sought
+from pipeline.study.parameters import DEPTH
+from pipeline.study.problems import Problem, StudyError
+from pipeline.study.sweep import Study
+from pipeline.surrogate.build import build
+from pipeline.surrogate.cases import Solve, domain_of
+from pipeline.surrogate.derived import FORCE, Output
+from pipeline.surrogate.sobol import Indices, sobol
+from pipeline.surrogate.table import Table
+from pipeline.surrogate.wide import wide_solve
+
+_WORDS = {
+    "output": "variable of the study's dataset",
+    "parameter": "parameter of the study",
+    "first": "share of the output's variance that the parameter makes alone (Sobol's index of first order)",
+    "first_error": "error bar (95 %) on first: of the sample, and of the surrogate",
+    "total": "share of the output's variance that vanishes if the parameter is known (Sobol's total index)",
+    "total_error": "error bar (95 %) on total: of the sample, and of the surrogate",
+    "mean": "mean of the output over all parameters, in its unit",
+    "deviation": "standard deviation of the output, relative to its mean",
+    "surrogate_error": "error bar (95 %) on the surrogate, relative to the output: meshes and interpolation",
+    "cases": "number of the surrogate's cases",
+    "low": "least value of the parameter, in its unit",
+    "high": "largest value of the parameter, in its unit",
+    "expected": "mean of a parameter with a normal distribution, in its unit; missing where all values are alike",
+    "expected_error": "95 % of the values of such a parameter are within this distance of its mean",
+    "unit": "unit of the parameter",
+    "output_unit": "unit of the output",
+}
+_SHARES = ("first", "first_error", "total", "total_error", "deviation", "surrogate_error", "cases")
+
+
+@dataclass(frozen=True)
+class Explained:
+    """Indices of one output, and the surrogate that they are of."""
+
+    output: str
+    indices: Indices
+    table: Table
+
+    @property
+    def error(self) -> float:
+        """Relative error of the surrogate."""
+        return self.table.interpolation + self.table.mesh
+
+
+def explain(study: Study, solve: Solve) -> list[Explained]:
+    """Return the indices of every output of a study's section [sensitivity].
+
+    Raises:
+        StudyError: if the study has no such section, or is not one scene.
+        SurrogateError: if a case that a surrogate needs has no output.
+    """
+    if not study.spread.varied:
+        why = 'is required for `epsmesh sensitivity`: parameters with ranges, such as young = ["5 kPa", "20 kPa"]'
+        raise StudyError(study.file, [Problem("[sensitivity]", None, why)])
+    return [_explained(study, Output(name), solve) for name in study.spread.outputs]
+
+
+def _explained(study: Study, output: Output, solve: Solve) -> Explained:
+    varied = study.spread.varied
+    bounds = {one.parameter.name: (one.low, one.high) for one in varied if one.parameter != DEPTH}
+    shallowest, deepest = _depths(study)
+    domain = domain_of(study, bounds, deepest, shallowest, output)
+    wide = wide_solve(domain, solve) if output == FORCE else None
+    table = build(domain, wide or solve)
+
+    def function(points: FloatArray) -> FloatArray:
+        values = {one.parameter.name: _quantiles(one, x) for one, x in zip(varied, points.T, strict=True)}
+        return table.sampled(values, values.pop(DEPTH.name, np.full(len(points), deepest)))
+
+    return Explained(output.name, sobol(function, len(varied), table.interpolation + table.mesh), table)
+
+
+def _depths(study: Study) -> tuple[float, float]:
+    """Return the least and the largest depth (m)."""
+    for one in study.spread.varied:
+        if one.parameter == DEPTH:
+            return one.low, one.high
+    depths = sorted({probe.depth for probe in study.probes})
+    if len(depths) > 1:
+        allowed = f"is a list of {len(depths)}: one value is needed, or a range in [sensitivity]"
+        raise StudyError(study.file, [Problem("probe.depth", None, allowed)])
+    return depths[0], depths[0]
+
+
+def _quantiles(one: Sought, share: FloatArray) -> FloatArray:
+    """Return the values (n,) below which a share (n,) of all values is."""
+    if one.prior is not None:
+        mean, deviation = one.prior
+        return np.clip(mean + deviation * ndtri(share), one.low, one.high)
+    if one.parameter.is_logarithmic and one.low > 0:
+        return np.asarray(one.low * (one.high / one.low) ** share)
+    return np.asarray(one.low + (one.high - one.low) * share)
+
+
+def dataset_of(study: Study, found: Sequence[Explained]) -> xr.Dataset:
+    """Return the indices of all outputs as a dataset."""
+    varied = study.spread.varied
+    both, of_output = ("output", "parameter"), ("output",)
+    values: dict[str, Any] = {
+        name: (both, [getattr(one.indices, name) for one in found])
+        for name in ("first", "first_error", "total", "total_error")
+    }
+    values |= {name: (of_output, [getattr(one.indices, name) for one in found]) for name in ("mean", "deviation")}
+    values["surrogate_error"] = of_output, [one.error for one in found]
+    values["cases"] = of_output, [one.table.cases for one in found]
+    values |= {name: (("parameter",), [getattr(one, name) for one in varied]) for name in ("low", "high")}
+    values["expected"] = ("parameter",), [one.prior[0] if one.prior else nan for one in varied]
+    values["expected_error"] = ("parameter",), [2 * one.prior[1] if one.prior else nan for one in varied]
+    values["unit"] = ("parameter",), np.array([one.parameter.unit for one in varied], dtype=object)
+    values["output_unit"] = of_output, np.array([QUANTITIES[one.output].unit for one in found], dtype=object)
+    names = {"output": [one.output for one in found], "parameter": [one.parameter.name for one in varied]}
+    dataset = xr.Dataset(values, names)
+    for name in dataset.variables:
+        units = {"units": "1"} if name in _SHARES else {}
+        dataset[name].attrs = {"long_name": _WORDS[str(name)]} | units
+    return dataset.assign_attrs(Conventions="CF-1.8", title=study.title, study=study.text)

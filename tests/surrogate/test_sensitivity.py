@@ -1,0 +1,136 @@
+"""Sobol's indices: those of the closed form of a punch, with bars that hold."""
+
+import json
+
+import numpy as np
+import pytest
+
+from pipeline.study.problems import StudyError
+from pipeline.study.read import read_mapping
+from pipeline.surrogate.sensitivity import dataset_of, explain
+from pipeline.surrogate.sobol import sobol
+from tests.surrogate.scenes import BALL, PUNCH, hertz, solved_by
+
+VARIED = {
+    "young": ["5 kPa", "20 kPa"],
+    "poisson": [0.2, 0.5],
+    "radius": {"value": "2 mm", "error": "20 %"},
+    "depth": ["0.1 mm", "0.2 mm"],
+}
+
+
+def _punch(case):
+    return 2 * case.material.young / (1 - case.material.poisson**2) * case.probe.radius * case.probe.depth
+
+
+def _product(spreads):
+    """Return indices of first order and total ones of a product with the coefficients of variation squared."""
+    spreads = np.array(spreads)
+    whole = np.prod(1 + spreads) - 1
+    return spreads / whole, spreads / (1 + spreads) * (1 + whole) / whole
+
+
+def _spread(values):
+    return np.var(values) / np.mean(values) ** 2
+
+
+def _exact():
+    share = (np.arange(20000) + 0.5) / 20000
+    nu = 0.2 + 0.3 * share
+    return _product([_spread(4**share), _spread(1 / (1 - nu**2)), 0.1**2, _spread(2**share)])
+
+
+def test_indices_of_a_punch_are_those_of_the_closed_form():
+    study = read_mapping(PUNCH | {"sensitivity": VARIED}, "punch")
+    (found,) = explain(study, solved_by(_punch))
+    for name, exact in zip(("first", "total"), _exact(), strict=True):
+        wrong, bar = abs(getattr(found.indices, name) - exact), getattr(found.indices, f"{name}_error")
+        assert np.all(wrong <= bar) and np.all(bar < 0.04)
+
+
+def test_the_error_of_the_surrogate_is_in_the_bars():
+    def linear(x):
+        return 1 + 0.2 * x[:, 0] + 0.1 * x[:, 1]
+
+    def wrong(x):
+        """The same with an error of at most 2 % that only one parameter has."""
+        return linear(x) * (1 + 0.02 * np.cos(np.pi * x[:, 1]))
+
+    exact, found = sobol(linear, 2, 0.0), sobol(wrong, 2, 0.02)
+    np.testing.assert_allclose(exact.first, [0.8, 0.2], atol=0.01)
+    assert np.all(abs(found.first - [0.8, 0.2]) <= found.first_error)
+    assert np.all(abs(found.total - [0.8, 0.2]) <= found.total_error)
+    assert abs(found.first - [0.8, 0.2]).max() > exact.first_error.max()
+
+
+def test_the_dataset_names_what_was_varied():
+    study = read_mapping(PUNCH | {"sensitivity": VARIED}, "punch")
+    dataset = dataset_of(study, explain(study, solved_by(_punch)))
+    assert list(dataset["parameter"].values) == list(VARIED)
+    assert float(dataset["high"].sel(parameter="radius")) == pytest.approx(3e-3)
+    assert str(dataset["output_unit"].sel(output="force").values) == "N"
+
+
+def test_outputs_that_are_no_force_do_not_depend_on_the_modulus():
+    def solve(study):
+        dataset = solved_by(hertz)(study)
+        area = np.reshape([np.pi * case.probe.radius * case.probe.depth for case in study.cases()], study.shape)
+        return dataset.assign(contact_area=(dataset["force"].dims, area))
+
+    varied = {"young": ["5 kPa", "20 kPa"], "depth": ["0.01 mm", "0.02 mm"], "outputs": ["contact_area"]}
+    (found,) = explain(read_mapping(BALL | {"sensitivity": varied}, "ball"), solve)
+    np.testing.assert_allclose(found.indices.first, [0, 1], atol=0.02)
+    assert found.indices.mean == pytest.approx(np.pi * 2e-3 * 1e-5 / np.log(2), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        ({}, r"\[sensitivity\]: is required"),
+        ({"sensitivity": {"yuong": ["5 kPa", "20 kPa"]}}, r"sensitivity\.yuong.*`yuong` is no parameter.*`young`"),
+        ({"sensitivity": {"young": ["20 kPa", "5 kPa"]}}, r"sensitivity\.young.*must rise"),
+        ({"sensitivity": {"baseline": ["0 N", "1 N"]}}, r"sensitivity\.baseline.*is no parameter"),
+        ({"sensitivity": {"poisson": [0, 0.5], "outputs": ["forse"]}}, r"sensitivity\.outputs = \"forse\".*`force`"),
+        ({"sensitivity": {"outputs": ["force"]}}, r"sensitivity: must have a parameter"),
+        (
+            {"sensitivity": {"poisson": [0, 0.5]}, "probe": PUNCH["probe"] | {"depth": ["1 mm", "2 mm"]}},
+            r"probe\.depth: is a list of 2",
+        ),
+    ],
+    ids=["none", "name", "order", "experiment", "output", "empty", "depths"],
+)
+def test_mistakes_are_told_by_their_key(section, message):
+    with pytest.raises(StudyError, match=message):
+        explain(read_mapping(PUNCH | section, "punch"), solved_by(_punch))
+
+
+def test_the_command_writes_a_dataset_and_a_figure_and_tells_what_matters_most(epsmesh, tmp_path):
+    text = """
+        [body]
+        shape = "cylinder"
+        radius = "60 mm"
+        height = "60 mm"
+        fixed = "bottom"
+        [material]
+        young = "10 kPa"
+        poisson = 0.45
+        [probe]
+        shape = "disc"
+        radius = "2 mm"
+        depth = "0.1 mm"
+        contact = "frictionless"
+        [mesh]
+        accuracy = "1 %"
+        [sensitivity]
+        young = ["5 kPa", "20 kPa"]
+        poisson = [0.2, 0.5]
+        """
+    study = tmp_path / "punch.toml"
+    study.write_text(text, encoding="utf-8")
+    ran = epsmesh("sensitivity", study, "--output", tmp_path, "--json")
+    found = json.loads(ran.stdout)["outputs"]["force"]["parameters"]
+    assert found["young"]["total"] > 0.9
+    assert found["poisson"]["total"] < 0.1
+    assert all((tmp_path / f"punch_sensitivity.{ending}").is_file() for ending in ("nc", "png", "svg"))
+    again = epsmesh("sensitivity", study, "--output", tmp_path)
+    assert "young matters most" in again.stdout
