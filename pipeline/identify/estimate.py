@@ -33,6 +33,9 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
     """Return the unknowns of one or several curves with their 95 % bars.
 
     Contact point and baseline of each curve are always unknown. Ranges with an infinite end are those of the curve.
+
+    Raises:
+        ValueError: if a curve is fitted at depths for which its force is not known.
     """
     model = Model.of(measured, unknowns)
     found = fit(model, start(model))
@@ -116,6 +119,8 @@ def _curve(found: Fit, number: int) -> CurveFit:
     values = model.space.values(found.x)
     best = int(np.argmax(belief.weight))
     noise, force = GRID[belief.noise[best]], found.force[number]
+    # The fit has means over blocks of points.
+    block = len(force) / len(model.thinned(force))
     jacobian = found.jacobian[number]
     variance = np.einsum("ni,ij,nj->n", jacobian, found.mixture.spread, jacobian)
     return CurveFit(
@@ -124,7 +129,7 @@ def _curve(found: Fit, number: int) -> CurveFit:
         force=model.measured[number].curve.force,
         fit=force,
         band=1.96 * np.sqrt(np.maximum(variance, 0.0)),
-        noise=NoiseFound(noise.correlation, noise.white, noise.growth, float(belief.scale[best])),
+        noise=NoiseFound(noise.correlation ** (1 / block), noise.white, noise.growth, float(belief.scale[best])),
     )
 
 

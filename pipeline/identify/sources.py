@@ -43,14 +43,23 @@ def shares(found: Fit) -> FloatArray:
 
 
 def mesh(found: Fit) -> FloatArray:
-    """Return half widths (u,), in coordinates, by the errors of the forward models, of one sign over each curve."""
+    """Return half widths (u,), in coordinates, by the errors of the forward models, of one sign over each curve.
+
+    Raises:
+        ValueError: if a curve is fitted at depths for which its force is not known.
+    """
     top = found.mixture.covariance[int(np.argmax(found.mixture.weight))]
     model, values = found.model, found.model.space.values(found.x)
     square = np.zeros(len(found.x))
     for number, (measured, belief) in enumerate(zip(model.measured, found.beliefs, strict=True)):
         best = int(np.argmax(belief.weight))
         contact = found.force[number] - model.offset(number, values)
-        wrong = contact * measured.forward.error(model.depth(number, values, found.force[number]), values)
+        depth = model.depth(number, values, found.force[number])
+        error = measured.forward.error(depth, values)
+        if not np.isfinite(error).all():
+            name, deepest = measured.curve.name, 1e3 * float(depth.max())
+            raise ValueError(f"curve {name}: the fit is {deepest:.4g} mm deep, for which the force is not computed")
+        wrong = contact * error
         share = contact / np.maximum(np.abs(contact).max(), np.finfo(float).tiny)
         columns = model.thinned(np.column_stack([found.jacobian[number], wrong]))
         whitened, _ = whiten(columns, model.thinned(share), GRID[belief.noise[best]])
