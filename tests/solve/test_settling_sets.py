@@ -1,6 +1,6 @@
 """The active set of contact settles where sets would repeat, and is then the solution of the contact problem."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -79,3 +79,27 @@ def test_sets_settle_on_springs_of_any_coupling(with_followers):
         assert (pressed[judged] > -1e-5 * np.abs(pressed).max()).all()
         assert gap[found.active] == pytest.approx(0.0, abs=1e-7)
         assert (pressed[~found.active] == 0.0).all()
+
+
+def test_sets_settle_where_they_would_repeat_for_ever():
+    """I. Ben Gharbia and J. C. Gilbert, Math. Program. 134, 349, 2012: of three nodes, one after the other is active.
+
+    Each node that leaves lets the next one enter. A fourth node is in contact.
+    """
+    compliance, gap = np.eye(COUNT), np.ones(COUNT)
+    compliance[[0, 1, 2], [2, 0, 1]] = 2.0
+    gap[3] = -1.0
+    stiffness, heights = np.linalg.inv(compliance), np.full(COUNT, 0.5)
+    springs, active = Springs(stiffness, stiffness @ (heights - gap)), np.isin(np.arange(COUNT), (0, 3))
+    sets = []
+
+    def complete(active: BoolArray) -> BoolArray:
+        sets.append(np.flatnonzero(active).tolist())
+        return active
+
+    tool = ceiling(heights, np.zeros(COUNT, dtype=bool))
+    found = solve_contact(springs, replace(tool, complete=complete), active)
+    assert [0, 3] in sets[3:]  # a cycle
+    assert np.flatnonzero(found.active).tolist() == [3]
+    assert -found.forces[:, 1] == pytest.approx(np.maximum(-gap, 0.0))
+    assert heights - springs.state == pytest.approx(np.maximum(gap, 0.0))
