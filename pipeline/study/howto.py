@@ -33,6 +33,8 @@ _PAGES = {
     "figure": "report",
     "mesh.accuracy": "accuracy",
     "measurement": "howto/curves",
+    "identify": "howto/identify",
+    "material.from": "howto/identify",
 }
 # The page about all keys.
 _ALL = "howto/own-study"
