@@ -1,12 +1,14 @@
 """Doubts about units: what is measured does not go with the scene, or with any tissue."""
 
 from collections.abc import Iterator, Sequence
+from math import inf, sqrt
 
 import numpy as np
 import xarray as xr
 
 from pipeline.experiment.curve import Curve
 from pipeline.identify.experiment import Specimen
+from pipeline.identify.parts import Measured, Unknown
 from pipeline.study.case import Case
 from pipeline.study.read import scene_of
 from pipeline.study.sweep import Study
@@ -14,6 +16,10 @@ from pipeline.study.sweep import Study
 # Depths in half widths of a tool, and moduli (Pa) from gels to hard plastics, beyond which a unit is probably wrong.
 _DEPTHS = (1e-4, 30.0)
 _MODULI = (100.0, 1e10)
+# Contact begins, roughly, at this share of the force; a depth less the machine's way is at least this share of it.
+_BEGUN, _LEAST_WAY = 0.05, 1e-3
+# Forces that are this many times off the ends of the moduli's ranges are none of them.
+_ROUGH = 3.0
 
 
 def doubts_of_scale(study: Study, found: Sequence[Specimen]) -> tuple[str, ...]:
@@ -38,6 +44,53 @@ def _of_curve(curve: Curve, case: Case) -> Iterator[str]:
         yield f"{curve.name}: the depth changes by {way:.3g} m, {way / width:.3g} half widths of the tool: {question}"
     elif way > thickness:
         yield f"{curve.name}: the depth changes by {way:.3g} m, and the tissue is {thickness:.3g} m thick: {question}"
+
+
+def doubts_of_force(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> tuple[str, ...]:
+    """Return a doubt for each curve whose force no modulus within its range gives, not even roughly.
+
+    Other unknowns are in the middle of their ranges, and the contact point is where the force is small.
+    """
+    doubts = []
+    for one in measured:
+        depth, force = _largest(one.curve)
+        stiffness = next(((u.low, u.high) for u in unknowns if u.name == "machine_stiffness"), (inf, inf))
+        ends = []
+        for high, machine in enumerate(stiffness):
+            compliance = 1 / machine if one.machine_compliance is None else one.machine_compliance
+            way = np.array([max(depth - compliance * force, _LEAST_WAY * depth)])
+            ends.append(float(one.forward.force(way, _values(unknowns, high))[0]))
+        if not ends[0] / _ROUGH <= force <= ends[1] * _ROUGH:
+            side, limit = ("below", ends[0]) if force < ends[0] else ("above", ends[1])
+            doubts.append(
+                f"{one.curve.name}: {force:.2g} N at a depth of about {depth:.2g} m is {side} the {limit:.2g} N of the "
+                "moduli in [identify]: a unit is wrong, such as mN for µN or mm for µm, or their ranges are"
+            )
+    return tuple(doubts)
+
+
+def _largest(curve: Curve) -> tuple[float, float]:
+    """Return the largest depth (m) below about the contact point, and the rise of the force (N) to there."""
+    force = curve.force - np.median(curve.force[: max(1, len(curve.force) // 20)])
+    top = int(np.argmax(curve.depth))
+    rise = float(np.max(force[: top + 1]))
+    begun = curve.depth[np.flatnonzero(force[: top + 1] > _BEGUN * rise)]
+    return float(curve.depth[top] - (begun[0] if begun.size else curve.depth[0])), rise
+
+
+def _values(unknowns: Sequence[Unknown], high: int) -> dict[str, float]:
+    """Return values of unknowns: moduli at the lower or upper end of their range, others in the middle."""
+    values = {}
+    for one in unknowns:
+        if one.unit == "Pa":
+            values[one.name] = one.high if high else one.low
+        elif one.prior is not None:
+            values[one.name] = one.prior[0]
+        elif one.is_logarithmic:
+            values[one.name] = sqrt(one.low * one.high)
+        else:
+            values[one.name] = (one.low + one.high) / 2
+    return values
 
 
 def doubts_of_moduli(dataset: xr.Dataset) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 import xarray as xr
 
 from pipeline.identify.dataset import dataset_of, joined
-from pipeline.identify.doubts import doubts_of_moduli, doubts_of_scale
+from pipeline.identify.doubts import doubts_of_force, doubts_of_moduli, doubts_of_scale
 from pipeline.identify.estimate import identify
 from pipeline.identify.experiment import Scenes, Specimen, scenes_of, specimens
 from pipeline.identify.forward import stored_in
@@ -20,6 +20,8 @@ from pipeline.surrogate.cases import Solve
 
 # Seconds between two lines of progress.
 _SILENCE = 10.0
+# Doubts about files of a folder beyond these are like those.
+_MOST_TOLD = 5
 
 
 def identification(study: Study, output: Path, store: Path, say: Callable[[str], None]) -> xr.Dataset:
@@ -39,8 +41,9 @@ def identification(study: Study, output: Path, store: Path, say: Callable[[str],
     for line in doubts_of_scale(study, found):
         say(line)
     scenes = scenes_of(study, unknowns(study), found, _told(stored_in(store), say))
+    doubts = [line for one in found for line in doubts_of_force(scenes.measured(one), unknowns(study))][:_MOST_TOLD]
     if len(found) == 1:
-        return _doubted(_of_one(study, scenes, found[0]))
+        return _doubted(_of_one(study, scenes, found[0]), doubts)
     kept, datasets, printed = Kept(output, study), [], time.monotonic()
     for number, specimen in enumerate(found, start=1):
         one = kept.read(specimen)
@@ -51,12 +54,12 @@ def identification(study: Study, output: Path, store: Path, say: Callable[[str],
         if time.monotonic() - printed > _SILENCE:
             printed = time.monotonic()
             say(f"{number} of {len(found)} files are fitted")
-    return _doubted(joined(datasets, [specimen.name for specimen in found]))
+    return _doubted(joined(datasets, [specimen.name for specimen in found]), doubts)
 
 
-def _doubted(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset that also tells why its values are doubtful."""
-    lines = [*str(dataset.attrs.get("told", "")).splitlines(), *doubts_of_moduli(dataset)]
+def _doubted(dataset: xr.Dataset, doubts: list[str]) -> xr.Dataset:
+    """Return a dataset that also tells why its values are doubtful: ``doubts``, and those about its moduli."""
+    lines = [*doubts, *str(dataset.attrs.get("told", "")).splitlines(), *doubts_of_moduli(dataset)]
     return dataset.assign_attrs({"told": "\n".join(lines)} if lines else {})
 
 

@@ -144,6 +144,9 @@ def test_a_wrong_unit_is_told_by_depth_and_modulus(folder, epsmesh, found):
     result = epsmesh("identify", folder / "tiny.toml", "--output", folder / "results")
     assert result.exit_code == 0, result.output
     assert "a unit is probably wrong" in result.stdout
+    (folder / "tiny.toml").write_text(STUDY.format(file="tiny.csv", may_hide="[]"))
+    result = epsmesh("identify", folder / "tiny.toml", "--output", folder / "results")
+    assert "is below the" in result.stdout and "mN for µN" in result.stdout
 
 
 def test_curves_of_the_studies_are_those_that_the_script_makes(tmp_path):

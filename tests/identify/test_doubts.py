@@ -1,12 +1,15 @@
 """A wrong unit shows as a depth that no tool goes to, or as a modulus that no tissue has."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 import xarray as xr
 
 from pipeline.experiment.curve import Curve
-from pipeline.identify.doubts import doubts_of_moduli, doubts_of_scale
+from pipeline.identify.doubts import doubts_of_force, doubts_of_moduli, doubts_of_scale
 from pipeline.identify.experiment import Specimen
+from pipeline.identify.parts import Measured, Unknown
 from pipeline.study.read import parse
 from tests.cases import raw
 
@@ -32,3 +35,40 @@ def test_moduli(values):
     said = doubts_of_moduli(dataset)
     assert len(said) == bool((values[..., 0] < 100).any() or (values[..., 0] > 1e10).any())
     assert all("young" in line and "unit" in line for line in said)
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball on tissue: F = E d^1.5 in SI units."""
+
+    names = ("young",)
+
+    def force(self, depth, values):
+        return values["young"] * np.maximum(depth, 0) ** 1.5
+
+    def error(self, depth, values):
+        return 0 * depth
+
+
+RANGE = Unknown("young", 1e3, 1e6, "Pa", is_logarithmic=True)
+MACHINE = Unknown("machine_stiffness", 3.0, 100.0, "N/m", is_logarithmic=True)
+
+
+@pytest.mark.parametrize(
+    ("factor", "part"), [(1.0, ""), (30.0, ""), (1e-3, "is below the"), (1e3, "is above the"), (1e6, "mN for µN")]
+)
+def test_forces_that_no_modulus_of_the_range_gives(factor, part):
+    depth = np.linspace(0, 2e-3, 200)
+    curve = Curve("punch", depth + 0.03, factor * Ball().force(depth - 1e-3, {"young": 20e3}))
+    said = doubts_of_force([Measured(curve, Ball())], [RANGE])
+    assert len(said) == bool(part) and part in "".join(said)
+
+
+def test_a_soft_machine_is_no_doubt():
+    """The machine has most of the way: on a rigid one the modulus would be far below its range."""
+    depth = np.linspace(0, 1e-3, 200)
+    force = Ball().force(depth, {"young": 2e3})
+    curve = Curve("punch", depth + 0.2 * force, force)
+    assert "is below" in doubts_of_force([Measured(curve, Ball())], [RANGE])[0]
+    assert not doubts_of_force([Measured(curve, Ball(), machine_compliance=0.2)], [RANGE])
+    assert not doubts_of_force([Measured(curve, Ball(), machine_compliance=None)], [RANGE, MACHINE])
