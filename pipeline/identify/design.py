@@ -27,12 +27,6 @@ from pipeline.surrogate.cases import Solve, SurrogateError, domain_of
 from pipeline.surrogate.derived import parameters
 from pipeline.surrogate.wide import layered_body, solve_wide
 
-NOISE = 0.01
-"""Standard deviation of the noise that tests are taken to have, as a share of the largest force."""
-
-CORRELATION = 0.95
-"""Correlation of this noise from one of the points of a test to the next."""
-
 POINTS = 150
 """Number of points while the tool presses, and in each such time of air."""
 
@@ -51,6 +45,18 @@ _RAMP = 0.3
 
 Widths = Mapping[str, tuple[float, float]]
 """Half widths of both bars of each wanted unknown, as shares of its range, which may be that of its logarithm."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Noise of a test: its standard deviation as a share of the largest force, and its kind from point to point."""
+
+    level: float
+    noise: Noise
+
+
+USUAL = Recorded(0.01, Noise(0.95, 0.1, 0.0))
+"""Noise that tests are taken to have."""
 
 
 @dataclass(frozen=True)
@@ -79,13 +85,17 @@ class Design:
 
 
 class Designer:
-    """Bars of tests of a study's unknowns; forces are by ``solve``, or by the equation of wide layered bodies."""
+    """Bars of tests of a study's unknowns; forces are by ``solve``, or by the equation of wide layered bodies.
 
-    def __init__(self, study: Study, solve: Solve):
-        self._solve, self._forces = solve, dict[str, Forward]()
+    Unknowns have the values that the study declares, or ``values`` that are known by name.
+    """
+
+    def __init__(self, study: Study, solve: Solve, values: Values | None = None, noise: Recorded = USUAL):
+        self._solve, self._noise, self._forces = solve, noise, dict[str, Forward]()
         self.planned = planned_trials(study)
         self.unknowns = unknowns(study)
-        self.values = _declared(self.planned[0], self.unknowns)
+        declared = _declared(self.planned[0], self.unknowns)
+        self.values = declared | {name: value for name, value in (values or {}).items() if declared.get(name)}
         self._kinds = study.identification.may_hide
 
     def widths(self, trials: Sequence[Trial]) -> Widths:
@@ -96,10 +106,10 @@ class Designer:
         """
         measured = [self._measured(number, trial) for number, trial in enumerate(trials)]
         model = Model.of(measured, self.unknowns)
-        declared = _half_widths(model, self._at(model, self.values))
+        declared = _half_widths(model, self._at(model, self.values), self._noise)
         hidden = [declared]
         for kind in self._kinds:
-            sizes = [_half_widths(*made)[: len(declared)] for made in self._hidden(kind, trials, measured)]
+            sizes = [_half_widths(*made, self._noise)[: len(declared)] for made in self._hidden(kind, trials, measured)]
             hidden.append(np.exp(np.mean(np.log(sizes), axis=0)))
         widest = np.max(hidden, axis=0)
         wanted = [k for k, unknown in enumerate(model.space.unknowns) if unknown.is_wanted]
@@ -181,15 +191,15 @@ def _gain(before: Widths, after: Widths) -> float:
     return float(np.exp(np.mean(np.log(ratios))))
 
 
-def _half_widths(model: Model, x: FloatArray) -> FloatArray:
+def _half_widths(model: Model, x: FloatArray, recorded: Recorded) -> FloatArray:
     """Return half widths (u,) of 95 % in coordinates, by the tests and what is known beforehand."""
     _, information = prior(model)
     values = model.space.values(x)
     for number in range(len(model.measured)):
         force = model.predict(number, values)
         scale = float(np.ptp(force))
-        jacobian = model.jacobian(number, x, force) / (NOISE * scale)
-        white, _ = whiten(jacobian, np.abs(force) / scale, Noise(CORRELATION, 0.1, 0.0))
+        jacobian = model.jacobian(number, x, force) / (recorded.level * scale)
+        white, _ = whiten(jacobian, np.abs(force) / scale, recorded.noise)
         information = information + white.T @ white
     return np.asarray(_HALF_WIDTH * np.sqrt(np.diag(np.linalg.inv(information))))
 

@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.identify.design import CORRELATION, NOISE, POINTS, Design, Widths
+from pipeline.identify.design import POINTS, USUAL, Design, Widths
 from pipeline.identify.parts import Unknown
 from pipeline.report.identified import engineering, title
 from pipeline.report.words import percent
 
-_UNSEEN = "not seen"
+UNSEEN = "not seen"
+"""The bar of an unknown that may be anywhere in its range."""
 
 
 def lines(design: Design) -> Iterator[str]:
@@ -25,9 +26,10 @@ def lines(design: Design) -> Iterator[str]:
     for row in table:
         yield "  ".join(cell.ljust(size) for cell, size in zip(row, sizes, strict=True)).rstrip()
     yield from _of_unseen(design)
+    size, rho = percent(USUAL.level), USUAL.noise.correlation
     yield (
-        f"Bars are half widths of 95 %, for noise of {percent(NOISE)} of the largest force, {CORRELATION:g} correlated "
-        f"from one of the {POINTS} points of a test to the next."
+        f"Bars are half widths of 95 %, for noise of {size} of the largest force, {rho:g} correlated from one of the "
+        f"{POINTS} points of a test to the next."
     )
     if design.may_hide:
         yield f"hidden: if the body may hide {' or '.join(design.may_hide)}."
@@ -43,17 +45,17 @@ def _of_unseen(design: Design) -> Iterator[str]:
     """Yield which test would give an unknown that the planned ones do not see."""
     known = {unknown.name: unknown for unknown in design.unknowns}
     for name, (width, _) in design.planned.items():
-        if bar(known[name], width) == _UNSEEN and design.ranked:
+        if bar(known[name], width) == UNSEEN and design.ranked:
             best = min(design.ranked, key=lambda one: one.widths[name][0])
             found = bar(known[name], best.widths[name][0])
-            if found != _UNSEEN:
+            if found != UNSEEN:
                 yield f"{title(name)} is not in the planned tests: {best.words} would give it {found}."
 
 
 def bar(unknown: Unknown, width: float) -> str:
     """Write a half width, a share of an unknown's range, as a bar."""
     if not Design.is_seen(width):
-        return _UNSEEN
+        return UNSEEN
     if unknown.is_logarithmic:
         return f"± {percent(float(np.expm1(width * np.log(unknown.high / unknown.low))))}"
     return f"± {engineering(width * (unknown.high - unknown.low), unknown.unit, 2)}"

@@ -2,17 +2,20 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from pipeline.identify.advice import advice
 from pipeline.identify.dataset import dataset_of, joined
 from pipeline.identify.doubts import doubts_of_force, doubts_of_moduli, doubts_of_scale
 from pipeline.identify.estimate import identify
 from pipeline.identify.experiment import Scenes, Specimen, scenes_of, specimens
 from pipeline.identify.forward import stored_in
 from pipeline.identify.kept import Kept
+from pipeline.identify.parts import Estimate
 from pipeline.identify.unknowns import unknowns
 from pipeline.run.provenance import provenance
 from pipeline.study.sweep import Study
@@ -43,14 +46,16 @@ def identification(study: Study, output: Path, store: Path, say: Callable[[str],
     scenes = scenes_of(study, unknowns(study), found, _told(stored_in(store), say))
     doubts = [line for one in found for line in doubts_of_force(scenes.measured(one), unknowns(study))][:_MOST_TOLD]
     if len(found) == 1:
-        return _doubted(_of_one(study, scenes, found[0]), doubts)
+        one = _estimate(study, scenes, found[0])
+        advised = replace(one, told=(*one.told, *advice(study, one)))
+        return _doubted(_as_dataset(study, found[0], advised), doubts)
     kept, datasets, printed = Kept(output, study), [], time.monotonic()
     for number, specimen in enumerate(found, start=1):
-        one = kept.read(specimen)
-        if one is None:
-            one = _of_one(study, scenes, specimen)
-            kept.write(specimen, one)
-        datasets.append(one)
+        dataset = kept.read(specimen)
+        if dataset is None:
+            dataset = _as_dataset(study, specimen, _estimate(study, scenes, specimen))
+            kept.write(specimen, dataset)
+        datasets.append(dataset)
         if time.monotonic() - printed > _SILENCE:
             printed = time.monotonic()
             say(f"{number} of {len(found)} files are fitted")
@@ -63,8 +68,11 @@ def _doubted(dataset: xr.Dataset, doubts: list[str]) -> xr.Dataset:
     return dataset.assign_attrs({"told": "\n".join(lines)} if lines else {})
 
 
-def _of_one(study: Study, scenes: Scenes, specimen: Specimen) -> xr.Dataset:
-    found = identify(scenes.measured(specimen), unknowns(study))
+def _estimate(study: Study, scenes: Scenes, specimen: Specimen) -> Estimate:
+    return identify(scenes.measured(specimen), unknowns(study))
+
+
+def _as_dataset(study: Study, specimen: Specimen, found: Estimate) -> xr.Dataset:
     return dataset_of(found, _attributes(study), [curve.time for curve in specimen.curves])
 
 
