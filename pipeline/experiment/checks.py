@@ -4,14 +4,10 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.experiment.columns import Recorded
+from pipeline.experiment.order import gaps
 from pipeline.experiment.reading import ExperimentError
-from pipeline.experiment.segments import turning_points
 
 FEWEST = 10
-# Turns of the depth, by more than a twentieth of its range, of rows that are in no order: this share of the rows.
-_JUMP, _MOST_TURNS = 0.05, 0.2
-# A step this many times the usual one, and at least this share of all, is a gap.
-_GAP, _SHARE = 10.0, 0.02
 # Rows at one largest force, while the depth rises by this share of its range, that are a saturated load cell.
 _PLATEAU, _RISE = 5, 0.01
 # Sizes (m, N) of what is measured: from atomic force microscopes to crash tests.
@@ -23,43 +19,6 @@ _BEGUN = 0.02
 # Air, in lengths of the contact, that is too long, and what is left of it. Less than this share of a curve is no air:
 # a ball without any exceeds the share above at this depth.
 _LONG, _LEFT, _NONE = 3.0, 2.0, 0.1
-
-
-def check_order(found: Recorded) -> Recorded:
-    """Return the curve; report rows that are in no order, and tell gaps in time."""
-    if np.ptp(found.depth) == 0:
-        raise ExperimentError(found.file, "the depth never changes", column=_depth_name(found))
-    if np.ptp(found.force) == 0:
-        raise ExperimentError(found.file, "the force never changes", column=_force_name(found))
-    if found.time is not None:
-        _check_time(found, found.time)
-    turns = turning_points(found.depth, _JUMP * float(np.ptp(found.depth)))
-    if len(turns) > max(_MOST_TURNS * len(found.depth), 5):
-        line = int(found.lines[turns[1]])
-        why = "the depth jumps to and fro: rows are not in the order of time, or this column is not the depth"
-        raise ExperimentError(found.file, why, column=_depth_name(found), line=line)
-    return found if found.time is None else found.tell(*_gaps(found, found.time, "time", "s"))
-
-
-def _check_time(found: Recorded, time: FloatArray) -> None:
-    """Report times that fall."""
-    steps = np.diff(time)
-    if (steps < 0).any():
-        row = int(np.flatnonzero(steps < 0)[0]) + 1
-        falls = int((steps < 0).sum())
-        why = f"time falls from {time[row - 1]:g} s to {time[row]:g} s: "
-        why += "a second test begins here: write each to its own file" if falls == 1 else (
-            f"it falls in {falls} rows, so these are in no order, or depth and time are swapped")  # fmt: skip
-        raise ExperimentError(found.file, why, column=found.names["time"], line=int(found.lines[row]))
-
-
-def _gaps(found: Recorded, values: FloatArray, what: str, unit: str) -> list[str]:
-    """Say where the largest step of a column is much larger than the usual one."""
-    steps = np.abs(np.diff(values))
-    row = int(np.argmax(steps))
-    if steps[row] <= max(_GAP * float(np.median(steps)), _SHARE * float(np.ptp(values))):
-        return []
-    return [f"gap of {steps[row]:.3g} {unit} in {what} before line {found.lines[row + 1]}"]
 
 
 def check_size(found: Recorded) -> Recorded:
@@ -100,14 +59,14 @@ def check_contact(found: Recorded, *, is_rising: bool, is_cut: bool) -> Recorded
     the study gives the window: ``is_cut`` is false.
     """
     depth, force = found.depth, found.force
-    told = _gaps(found, depth, "depth", "m") if is_rising else []
+    told = gaps(found, depth, "depth", "m") if is_rising else []
     air = np.median(force[: max(3, len(force) // 20)])
     end = np.median(force[-max(3, len(force) // 20) :])
     noise = float(np.median(np.abs(np.diff(force)))) * 1.4826 / np.sqrt(2)
     if end - air <= _NOISE * noise:
         why = f"the force never rises: from {air:.3g} N to {end:.3g} N at a noise of {noise:.2g} N, so there is no "
         why += "contact in this part; check the signs and the columns"
-        raise ExperimentError(found.file, why, column=_force_name(found))
+        raise ExperimentError(found.file, why, column=found.force_name)
     begun = air + _BEGUN * (end - air)
     below = np.flatnonzero(force < begun)
     touch = int(below[-1]) + 1 if below.size else 0
@@ -126,11 +85,3 @@ def check_count(found: Recorded, what: str) -> Recorded:
     if len(found.depth) < FEWEST:
         raise ExperimentError(found.file, f"{what} has {len(found.depth)} rows: at least {FEWEST} are needed")
     return found
-
-
-def _depth_name(found: Recorded) -> str:
-    return found.names.get("depth") or found.names.get("piezo", "")
-
-
-def _force_name(found: Recorded) -> str:
-    return found.names.get("force") or found.names.get("deflection", "")

@@ -31,6 +31,16 @@ class Recorded:
     told: tuple[str, ...] = ()
     deflection: FloatArray | None = None
 
+    @property
+    def depth_name(self) -> str:
+        """Header of the column of the depth."""
+        return self.names.get("depth") or self.names.get("piezo", "")
+
+    @property
+    def force_name(self) -> str:
+        """Header of the column of the force."""
+        return self.names.get("force") or self.names.get("deflection", "")
+
     def part(self, rows: IntArray | slice | FloatArray) -> "Recorded":
         """Return some of the rows."""
         time = None if self.time is None else self.time[rows]

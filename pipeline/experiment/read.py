@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.arrays import BoolArray
-from pipeline.experiment.checks import check_contact, check_count, check_order, check_size, without_saturation
+from pipeline.experiment.checks import check_contact, check_count, check_size, without_saturation
 from pipeline.experiment.columns import Recorded, recorded
 from pipeline.experiment.curve import Curve
+from pipeline.experiment.order import check_order
 from pipeline.experiment.reading import ExperimentError, Reading, Window
 from pipeline.experiment.segments import Cycle, cycles_of
 from pipeline.experiment.signs import signed

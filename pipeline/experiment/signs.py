@@ -30,9 +30,9 @@ def signed(found: Recorded, reading: Reading) -> Recorded:
     depth_sign, force_sign = signs_of(found, reading)
     told = []
     if reading.depth_sign is None and depth_sign < 0:
-        told.append(f"depth falls as the tool advances (column `{_name(found, 'depth')}`): its sign is changed")
+        told.append(f"depth falls as the tool advances (column `{found.depth_name}`): its sign is changed")
     if reading.force_sign is None and force_sign < 0:
-        told.append(f"force is negative under pressure (column `{_name(found, 'force')}`): its sign is changed")
+        told.append(f"force is negative under pressure (column `{found.force_name}`): its sign is changed")
     own = _deep_end(found.depth, found.force)
     if own and reading.depth_sign == -own:
         told.append(f"sign.depth = {reading.depth_sign} makes the end with constant force the deep one: is it {own}?")
@@ -40,10 +40,6 @@ def signed(found: Recorded, reading: Reading) -> Recorded:
     if found.deflection is not None:  # the depth is the piezo's way less what the spring yields
         depth = depth - found.deflection * force_sign
     return replace(found, depth=depth, force=force, deflection=None).tell(*told)
-
-
-def _name(found: Recorded, kind: str) -> str:
-    return found.names.get(kind) or found.names["piezo" if kind == "depth" else "deflection"]
 
 
 def _deep_end(depth: FloatArray, force: FloatArray) -> int:

@@ -92,6 +92,24 @@ ERRORS = {
     "rows in no order, without time": (
         {k: GOOD[k] for k in ("depth (mm)", "force (mN)")}, {"change": shuffled}, {}, ["`depth (mm)`", "to and fro"],
     ),
+    "some rows misplaced, without time": (
+        {k: GOOD[k] for k in ("depth (mm)", "force (mN)")},
+        {"change": lambda x: [*x[:50], x[180], *x[50:180], *x[181:]]},
+        {},
+        ["line 51", "`depth (mm)`", "in no order"],
+    ),
+    "a code for a missing force": (
+        GOOD,
+        {"change": cell(120, 2, "-999")},
+        {},
+        ["line 121", "`force (mN)`", "-0.999", "missing value"],
+    ),
+    "codes for missing depths": (
+        GOOD,
+        {"change": lambda x: cell(120, 1, "0")(cell(121, 1, "0")(x))},
+        {},
+        ["line 121", "`depth (mm)`", "missing value"],
+    ),
     "two tests in one file": (
         {"time (s)": TWICE, "depth (mm)": np.tile(DEPTH, 2), "force (mN)": np.tile(FORCE, 2)}, {}, {},
         ["line 202", "time falls from 20 s to 0 s", "second test"],
@@ -131,6 +149,12 @@ TOLD = {
     "gap in depth": (
         GOOD, {"change": lambda lines: lines[:140] + lines[165:]}, ["gap of 0.00026", "depth", "line 141"],
     ),
+    "blocks of rows swapped, without time": (
+        {k: GOOD[k] for k in ("depth (mm)", "force (mN)")},
+        {"change": lambda x: [x[0], *x[121:], *x[1:121]]},
+        ["the depth jumps by 0.002 m before line 82"],
+    ),
+    "rows twice": (GOOD, {"change": lambda x: [x[0], *(r for row in x[1:] for r in (row, row))]}, ["200 rows", "time"]),
     "rows without a value": (GOOD, {"change": cell(149, 2, "")}, ["1 rows", "line 150", "left out"]),
     "rows of nan": (GOOD, {"change": cell(149, 1, "NaN")}, ["1 rows", "line 150", "left out"]),
     "empty column": (GOOD | {"spare": np.nan * TIME}, {}, ["columns without values: spare"]),
