@@ -21,7 +21,7 @@ from pipeline.identify.start import start
 
 # A law does not fit if a smooth deviation from it is so much more likely, as logarithm of the ratio of the evidence:
 # on synthetic curves of the right law this happens to less than 2 % (docs/identification.md).
-MISFIT = 1.5
+MISFIT = 1.2
 # An unknown is not seen if its bar covers this share of its range, or of what was known before.
 _BLIND = 0.75
 # Unknowns that are far from normal whatever the fit says.

@@ -17,7 +17,7 @@ from pipeline.identify.noise import DEVIATIONS, TERMS, WEIGHTS, Grams, deviation
 # Precision of an unknown that is only known to be within its range: that of a uniform distribution.
 _UNIFORM = 12.0
 # Probability beforehand of a deviation from the law, relative to that of none.
-_BENT = 0.2
+_BENT = 1.0
 # Steps to the standard deviation of the noise, a fixed point.
 _SCALES = 4
 # Sweeps until the middle of all hypotheses moves by less than this share of their spread.
@@ -165,8 +165,11 @@ class Fit:
 
     @property
     def misfit(self) -> float:
-        """Logarithm of the evidence for deviations from the law, relative to that for none, of all curves."""
-        return max(belief.misfit for belief in self.beliefs)
+        """Logarithm of the evidence for deviations from the law, relative to that for none, in the worst curve.
+
+        The worst of many is worse by chance: it is one of so many.
+        """
+        return max(belief.misfit for belief in self.beliefs) - float(np.log(len(self.beliefs)))
 
 
 def fit(model: Model, start: FloatArray) -> Fit:
