@@ -11,6 +11,7 @@ from pipeline.arrays import FloatArray
 from pipeline.identify.bars import TAIL, interval
 from pipeline.identify.fit import Fit, fit
 from pipeline.identify.hidden import hidden_bars
+from pipeline.identify.limits import cut, out_of_range
 from pipeline.identify.model import Model
 from pipeline.identify.noise import GRID
 from pipeline.identify.parts import SOURCES, CurveFit, Estimate, Measured, NoiseFound, Profile, Unknown, Window
@@ -18,6 +19,7 @@ from pipeline.identify.profiles import Likelihood, ends, profile
 from pipeline.identify.seen import combinations
 from pipeline.identify.sources import mesh, shares
 from pipeline.identify.start import start
+from pipeline.study.identified import FITS
 
 # A law does not fit if a smooth deviation from it is so much more likely, as logarithm of the ratio of the evidence:
 # on synthetic curves of the right law this happens to less than 2 % (docs/identification.md).
@@ -46,7 +48,9 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
     hidden_low, hidden_high = hidden_bars(found, wanted)
     sides = [low, high, np.fmin(low, hidden_low), np.fmax(high, hidden_high)]
     estimate, low, high, low_hidden, high_hidden = (_values(model, np.clip(side, 0.0, 1.0)) for side in [x, *sides])
-    does_fit = found.misfit <= MISFIT
+    beyond = out_of_range(found)
+    verdict = beyond or _verdict(found)
+    does_fit = verdict == FITS
     seen = _seen(model, sides[0], sides[1])
     scale = np.sqrt(np.diag(found.mixture.spread))
     nothing = np.full(len(x), np.nan)
@@ -60,12 +64,12 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
         part=_parts(found, sides[0], sides[1], ours) * ((high - low) / 2)[:, None],
         correlation=found.mixture.spread / np.outer(scale, scale),
         seen=seen,
-        verdict="fits" if does_fit else _refusal(found),
+        verdict=verdict,
         curves=tuple(_curve(found, number) for number in range(len(measured))),
         profiles=profiles,
-        windows=() if does_fit else _windows(measured, unknowns, found),
+        windows=() if does_fit or beyond else _windows(measured, unknowns, found),
         evidence=found.misfit,
-        told=combinations(found, seen),
+        told=(*combinations(found, seen), *(cut(found) if does_fit else ())),
     )
 
 
@@ -133,8 +137,10 @@ def _curve(found: Fit, number: int) -> CurveFit:
     )
 
 
-def _refusal(found: Fit) -> str:
-    """Return in words by how much, and where, the law does not fit."""
+def _verdict(found: Fit) -> str:
+    """Return whether the law fits; if not, by how much it does not."""
+    if found.misfit <= MISFIT:
+        return FITS
     number = int(np.argmax([belief.misfit for belief in found.beliefs]))
     force, measured = found.force[number], found.model.measured[number]
     residual = measured.curve.force - force

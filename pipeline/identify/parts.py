@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from pipeline.arrays import FloatArray
 from pipeline.experiment.curve import Curve
+from pipeline.study.identified import FITS
 
 Values = Mapping[str, float]
 """Values of unknowns by name, in SI units."""
@@ -177,7 +178,7 @@ class Estimate:
     @property
     def fits(self) -> bool:
         """Whether the declared law fits the curves."""
-        return self.verdict == "fits"
+        return self.verdict == FITS
 
     def place(self, name: str) -> int:
         """Return the index of an unknown by its name."""

@@ -1,0 +1,59 @@
+"""Ranges that are too narrow: no value within fits, or the bar ends where the range does."""
+
+import numpy as np
+
+from pipeline.identify.bars import interval
+from pipeline.identify.fit import Fit
+from pipeline.report.identified import engineering, title
+
+# An unknown that is out of its range by as many half widths of its bar is not there by chance.
+_OUT = 1.0
+# Forces of the model, relative to the measured ones, below which the noise is what is fitted.
+_WEAK = 0.5
+
+
+def out_of_range(found: Fit) -> str:
+    """Return as a verdict which unknowns would fit only outside their ranges; "" for none."""
+    beyond = [text for place in range(len(found.x)) if (text := _beyond(found, place))] or _too_weak(found)
+    if not beyond:
+        return ""
+    return f"does not fit within the ranges of [identify]: {'; '.join(beyond)}: widen them, unless a unit is wrong"
+
+
+def cut(found: Fit) -> tuple[str, ...]:
+    """Return in sentences which bars end where a range ends, though it has no natural end there."""
+    space, told = found.model.space, []
+    for place, unknown in enumerate(space.unknowns):
+        is_free = unknown.prior is None and (unknown.is_logarithmic or unknown.name.startswith("contact_point"))
+        if not is_free or not (unknown.is_wanted or unknown.name.startswith("contact_point")):
+            continue
+        low, high = interval(found.mixture, place)
+        ends = [end for end, is_cut in ((unknown.low, low < 0), (unknown.high, high > 1)) if is_cut]
+        if len(ends) == 1:
+            where = engineering(ends[0], unknown.unit)
+            told.append(f"The error bar of {title(unknown.name)} ends where its range does, at {where}.")
+    return tuple(told)
+
+
+def _too_weak(found: Fit) -> list[str]:
+    """Return which curves have a far larger force than the largest moduli would give with the earliest contact."""
+    model, x = found.model, found.x.copy()
+    x[[name.endswith("young") for name in model.names]] = 1.0
+    x[[name.startswith("contact_point") for name in model.names]] = 0.0
+    values, weak = model.space.values(x), []
+    for number, one in enumerate(model.measured):
+        share = float(np.max(model.predict(number, values) - model.offset(number, values)) / np.ptp(one.curve.force))
+        if share < _WEAK:
+            weak.append(f'"{one.curve.name}" has {1 / max(share, 1e-12):.2g} times the largest force within them')
+    return weak
+
+
+def _beyond(found: Fit, place: int) -> str:
+    """Return where an unknown is that is out of its range; "" if it is in it, but for chance."""
+    unknown, (low, high) = found.model.space.unknowns[place], interval(found.mixture, place)
+    slack = _OUT * (high - low) / 2
+    if low - slack > 1:
+        return f"{title(unknown.name)} is above {engineering(unknown.high, unknown.unit)}"
+    if high + slack < 0:
+        return f"{title(unknown.name)} is below {engineering(unknown.low, unknown.unit)}"
+    return ""

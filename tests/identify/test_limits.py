@@ -1,0 +1,52 @@
+"""Ranges that do not include the truth have no bar, and those that cut a bar are told."""
+
+import numpy as np
+import pytest
+
+from pipeline.identify.estimate import identify
+from pipeline.identify.parts import Unknown
+from tests.identify.synthetic import POISSON, YOUNG, Ball, Punch, measured, noise
+
+
+def _found(low: float, high: float, seed: int = 1):
+    error = 0.003 * noise(np.random.default_rng(seed), 200, 0.6)
+    young = Unknown("young", low, high, "Pa", is_logarithmic=True)
+    return identify([measured(Ball(), {"young": 25e3}, error, 2e-4)], [young])
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [
+        (1e3, 1e4, "E is above 10.0 kPa"),
+        (4e4, 1e6, "E is below 40.0 kPa"),
+        (1.0, 40.0, "times the largest force within them"),
+        (1e6, 1e9, "E is below 1.00 MPa"),
+    ],
+)
+def test_a_range_without_the_truth_has_no_bar(low, high, words):
+    found = _found(low, high)
+    assert "within the ranges" in found.verdict
+    assert words in found.verdict
+    assert np.isnan(found.low).all()
+    assert not found.windows
+
+
+def test_a_bar_that_its_range_cuts_is_told_of():
+    found = _found(1e3, 25.05e3)
+    assert found.fits
+    assert found.told == ("The error bar of E ends where its range does, at 25.1 kPa.",)
+    assert found.low[0] <= 25e3 <= found.high[0]
+    assert not _found(1e3, 1e6).told
+
+
+def test_a_truth_at_the_end_of_its_range_is_not_refused():
+    values = {"young": 2e4, "poisson": 0.5}
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        curves = [
+            measured(Punch(1e-3 * k, layer), values, 0.005 * noise(rng, 150, 0.9), 2e-4, name=f"punch {k}")
+            for k, layer in ((1, 0.05), (5, 1.0))
+        ]
+        found = identify(curves, [YOUNG, POISSON])
+        assert found.fits
+        assert found.high[1] == pytest.approx(0.5)
