@@ -17,7 +17,27 @@ GOOD = [
     if "file =" not in (text := path.read_text(encoding="utf-8"))
     for raw in [tomllib.loads(text)]
 ]
-_UNITS = ("mm", "m", "cm", "µm", "kPa", "Pa", "MPa", "%", "deg", "s", "kg/m^3", "m/s^2", "kpa", "mmHg", "")
+# Measurements name files that are read by `epsmesh identify` only.
+GOOD.append(tomllib.loads(Path("studies/identify-two-punches.toml").read_text(encoding="utf-8")))
+_UNITS = (
+    "mm",
+    "m",
+    "cm",
+    "µm",
+    "kPa",
+    "Pa",
+    "MPa",
+    "%",
+    "deg",
+    "s",
+    "kg/m^3",
+    "m/s^2",
+    "kpa",
+    "mmHg",
+    "N/mm",
+    "mN",
+    "",
+)
 _NUMBERS = (
     "0",
     "-1",
@@ -47,7 +67,9 @@ _KEYS = (
     "element", "model", "accuracy", "depth_range", "method", "energy_tolerance", "reduced_basis_error",
     "exact", "timing", "repeats",
     "without", "stop_near_exact", "gravity", "traction", "layer", "inclusion", "path", "file", "unit", "slice",
-    "incision", "title", "body", "mesh", "probe", "x", "épsilon", "a b", "", "\0", "\u202e",
+    "incision", "title", "measurement", "identify", "columns",
+    "window", "sign", "machine_stiffness", "unknown", "may_hide",
+    "body", "mesh", "probe", "x", "épsilon", "a b", "", "\0", "\u202e",
 )  # fmt: skip
 
 quantities = st.builds("{} {}".format, st.one_of(st.sampled_from(_NUMBERS), st.integers(-99, 99).map(str)),

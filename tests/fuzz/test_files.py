@@ -10,6 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.experiment.read import read_curve
+from pipeline.experiment.reading import ExperimentError, Reading
 from pipeline.plan.plan import make_plan
 from pipeline.realtime import ModelError
 from pipeline.realtime import read as read_model
@@ -21,6 +23,7 @@ from pipeline.shapes.files.read import read_surface
 from pipeline.shapes.files.step import entities_of, named_faces, unit_of
 from pipeline.shapes.triangles import SurfaceError
 from tests.cases import study
+from tests.experiment.curves import cycle, write
 from tests.fuzz.profile import thrown
 from tests.organs import box, write_stl
 from tests.realtime.synthetic import write_random
@@ -160,3 +163,23 @@ def readable(refused: Exception | str) -> None:
     assert str(refused).strip()
     assert "\n" not in str(refused)
     assert len(str(refused)) < 1000
+
+
+@pytest.fixture(scope="module")
+def curve(tmp_path_factory):
+    time, depth, force = cycle(60, hold=20)
+    columns = {"time (s)": time, "depth (mm)": 1e3 * depth, "force (mN)": 1e3 * force}
+    return write(tmp_path_factory.mktemp("curve") / "curve.csv", columns)
+
+
+@given(data=st.data(), segment=st.sampled_from(["approach", "hold", "approach+hold", "retract"]))
+@thrown(0.3)
+def test_a_damaged_curve_is_read_or_refused(curve, data, segment):
+    path = curve.with_name("damaged.csv")
+    path.write_bytes(data.draw(damaged(curve.read_bytes())))
+    try:
+        found = read_curve(path, Reading(segment=segment))
+    except ExperimentError as error:
+        assert str(path) in str(error)
+        return
+    assert np.isfinite(found.depth).all() and np.isfinite(found.force).all()

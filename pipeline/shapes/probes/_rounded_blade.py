@@ -37,7 +37,8 @@ class RoundedBlade(Indenter):
     @property
     def section(self) -> Rounded:
         """Across its shorter side: a flat face, and a quarter of a circle."""
-        return Rounded(0.0, self.edge, min(self.length, self.width) / 2 - self.edge)
+        flat = max(min(self.length, self.width) / 2 - self.edge, 0.0)  # none is left of it: see `check`
+        return Rounded(0.0, self.edge, flat)
 
     def _sides(self, beyond: float) -> FloatArray:
         """Return half the length and half the width (m) of the part up to ``beyond`` (m) outside of the flat face."""

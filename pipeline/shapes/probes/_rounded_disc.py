@@ -24,7 +24,7 @@ class RoundedDisc(RoundIndenter):
     @property
     def section(self) -> Rounded:
         """A flat face, and a quarter of a circle."""
-        return Rounded(0.0, self.edge, self.radius - self.edge)
+        return Rounded(0.0, self.edge, max(self.radius - self.edge, 0.0))  # none is left of it: see `check`
 
     @property
     def limit(self) -> float:
