@@ -136,6 +136,28 @@ class Cases:
         return np.asarray(np.log(value / (unit * depths.power(depth))) - trend_of(domain.ranges, points_of(block)))
 
 
+@dataclass
+class Difference:
+    """What is left of forces after a guess that costs nothing; error bars are those of the forces."""
+
+    cases: Cases
+    guess: Cases
+
+    @property
+    def domain(self) -> Domain:
+        """What both are of."""
+        return self.cases.domain
+
+    @property
+    def bars(self) -> list[float]:
+        """Relative error bars of the forces."""
+        return self.cases.bars
+
+    def logs(self, block: Block, depths: Depths) -> FloatArray:
+        """Return the logarithm of forces over their guesses (points, depths): see :meth:`Cases.logs`."""
+        return self.cases.logs(block, depths) - self.guess.logs(block, depths)
+
+
 def _check(dataset: "xr.Dataset", study: Study, output: Output) -> None:
     """Raise an exception if a case has no output, or one that is not positive."""
     if output.name not in dataset:

@@ -15,12 +15,11 @@ from pipeline.study.identification import Sought
 from pipeline.study.parameters import DEPTH
 from pipeline.study.problems import Problem, StudyError
 from pipeline.study.sweep import Study
-from pipeline.surrogate.build import build
+from pipeline.surrogate.build import surrogate
 from pipeline.surrogate.cases import Solve, domain_of
-from pipeline.surrogate.derived import FORCE, Output
+from pipeline.surrogate.derived import Output
 from pipeline.surrogate.sobol import Indices, sobol
 from pipeline.surrogate.table import Table
-from pipeline.surrogate.wide import wide_solve
 
 _WORDS = {
     "output": "variable of the study's dataset",
@@ -74,9 +73,7 @@ def _explained(study: Study, output: Output, solve: Solve) -> Explained:
     varied = study.spread.varied
     bounds = {one.parameter.name: (one.low, one.high) for one in varied if one.parameter != DEPTH}
     shallowest, deepest = _depths(study)
-    domain = domain_of(study, bounds, deepest, shallowest, output)
-    wide = wide_solve(domain, solve) if output == FORCE else None
-    table = build(domain, wide or solve)
+    table = surrogate(domain_of(study, bounds, deepest, shallowest, output), solve)
 
     def function(points: FloatArray) -> FloatArray:
         values = {one.parameter.name: _quantiles(one, x) for one, x in zip(varied, points.T, strict=True)}

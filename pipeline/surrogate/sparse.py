@@ -42,6 +42,14 @@ class SparseGrid:
             basis *= hierarchical(x[:, dimension])[:, numbers]
         return np.asarray(basis @ self.surplus)
 
+    def at_nodes(self, weights: FloatArray) -> "SparseGrid":
+        """Return the interpolation of other outputs, with ``weights`` (others, outputs) of these."""
+        return SparseGrid(self.numbers, self.surplus @ weights.T)
+
+    def plus(self, other: "SparseGrid") -> "SparseGrid":
+        """Return the sum of two interpolations, which may have points in common."""
+        return SparseGrid(np.vstack([self.numbers, other.numbers]), np.vstack([self.surplus, other.surplus]))
+
     def with_block(self, index: Index, values: FloatArray) -> tuple["SparseGrid", float]:
         """Return the interpolation with the values (points, outputs) of an index, and its largest surplus."""
         block = block_of(index)

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 # Relative error of forces between the depths that are computed, and of the integral equation itself.
 _ERROR = 1e-5
-# The equation replaces solves if it differs by less from three cases with their sides.
-_ACCEPTED = 1e-3
+# Largest difference from solves of the sides with which the equation is a guess of them: what is left is smoother.
+_ALIKE = 0.3
 # Supports below the whole tissue. Sides, fixed or free, are far away.
 _SUPPORTS = ("bottom", "bottom+sides")
 
@@ -112,14 +112,15 @@ def _by_scene(study: Study) -> list[tuple[tuple[LayeredBody, Profile], list[Case
     return list(scenes.values())
 
 
-def wide_solve(domain: Domain, solve: Solve) -> Solve | None:
-    """Return what solves the cases of a surrogate by the equation; None if it does not have their scene or its sides.
+def wide_solve(domain: Domain, solve: Solve) -> tuple[Solve, float] | None:
+    """Return what solves the cases of a surrogate by the equation, and how much it differs from solves (relative).
 
-    Three cases are solved by ``solve``, at the largest depth: in the middle of all ranges, and at both ends. The error
-    bars of all cases are then the largest sum of theirs and of what the equation differs there.
+    It is None if the equation does not have their scene, or not at all their sides. Three cases are solved by
+    ``solve``, at the largest depth: in the middle of all ranges, and at both ends. The error bars of all cases are then
+    the largest sum of theirs and of what the equation differs there.
     """
     middle = np.zeros(len(domain.ranges))
-    error = _ERROR
+    error, most = _ERROR, 0.0
     for place in (middle, middle - 1, middle + 1):
         values = [one.value(np.array([x])) for one, x in zip(domain.ranges, place, strict=True)]
         study = domain.study(values, np.array([domain.deepest]))
@@ -129,7 +130,7 @@ def wide_solve(domain: Domain, solve: Solve) -> Solve | None:
         force, bar = (np.ravel(solved[name]) for name in ("force", "force_error"))
         wide = np.ravel(solve_wide(study)["force"])
         differs = float(np.abs(wide / force - 1).max())
-        if not differs <= _ACCEPTED:
+        if not differs <= _ALIKE:
             return None
-        error = max(error, differs + float((bar / force).max()))
-    return partial(solve_wide, error=error)
+        error, most = max(error, differs + float((bar / force).max())), max(most, differs)
+    return partial(solve_wide, error=error), most

@@ -61,6 +61,26 @@ def test_layers_of_unknown_moduli_and_thickness_are_within_the_error(tolerance):
         assert np.all(table.error(DEPTH, values) < 2 * tolerance + 0.2 * (DEPTH < 1e-6 * 1.1))
 
 
+def test_a_guess_leaves_little_to_solve():
+    """Sides take off up to a tenth of the force, the more the stiffer the skin is."""
+    ranges = {"young": (5e3, 2e4), "skin_young": (1e4, 1e5), "skin_thickness": (5e-4, 2e-3)}
+    domain = domain_of(read_mapping(LAYERED, "scene"), ranges, 1e-4)
+
+    def narrow(case):
+        (skin,) = case.body.layer
+        share = skin.thickness / 2e-3 + np.log(skin.young / case.material.young) / 10
+        return _layered(case) / (1 + 0.1 * share * (case.probe.depth / 1e-4) ** 0.5)
+
+    asked, alone = [], []
+    guess = solved_by(_layered, bar=0.0)
+    table = build(domain, solved_by(narrow, asked=asked), 3e-3, guess=guess)
+    plain = build(domain, solved_by(narrow, asked=alone), 3e-3)
+    values = {"young": 8e3, "skin_young": 7e4, "skin_thickness": 1.2e-3}
+    assert 2 * len(set(asked)) < len(set(alone))
+    assert np.all(abs(table.force(DEPTH, values) / plain.force(DEPTH, values) - 1) < 3e-3)
+    assert np.all(table.error(DEPTH, values)[1:] < 4e-3)
+
+
 def test_with_one_known_modulus_the_other_is_the_only_parameter():
     table = _built(LAYERED, {"young": (5e3, 2e4)}, _layered)
     assert table.names == ("young",) and table.reference.name == "skin_young"
