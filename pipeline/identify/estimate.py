@@ -8,6 +8,7 @@ import numpy.typing as npt
 from scipy.special import stdtrit
 
 from pipeline.arrays import FloatArray
+from pipeline.experiment.curve import Curve
 from pipeline.identify.bars import TAIL, interval
 from pipeline.identify.fit import Fit, fit
 from pipeline.identify.hidden import hidden_bars
@@ -28,6 +29,8 @@ MISFIT = 1.2
 _BLIND = 0.75
 # Unknowns that are far from normal whatever the fit says.
 _CURVED = ("poisson", "relaxation_")
+# A curve has at least so many points.
+_FEWEST = 10
 _WINDOWS = (0.25, 0.5, 1.0)
 
 
@@ -37,8 +40,10 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
     Contact point and baseline of each curve are always unknown. Ranges with an infinite end are those of the curve.
 
     Raises:
-        ValueError: if a curve is fitted at depths for which its force is not known.
+        ValueError: if a curve is no curve, or is fitted at depths for which its force is not known.
     """
+    for one in measured:
+        _check(one.curve)
     model = Model.of(measured, unknowns)
     found = fit(model, start(model))
     x, low, high, profiles = _bars(found)
@@ -71,6 +76,17 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
         evidence=found.misfit,
         told=(*combinations(found, seen), *(cut(found) if does_fit else ())),
     )
+
+
+def _check(curve: Curve) -> None:
+    """Refuse what is no curve."""
+    if len(curve.force) < _FEWEST:
+        raise ValueError(f"curve {curve.name}: has {len(curve.force)} points: at least {_FEWEST} are needed")
+    columns = [curve.depth, curve.force, *([] if curve.time is None else [curve.time])]
+    if not all(np.isfinite(column).all() for column in columns):
+        raise ValueError(f"curve {curve.name}: has numbers that are not finite")
+    if not (np.ptp(curve.force) > 0 and np.ptp(curve.depth) > 0):
+        raise ValueError(f"curve {curve.name}: force or depth is constant")
 
 
 def _values(model: Model, x: FloatArray) -> FloatArray:
@@ -162,6 +178,9 @@ def _windows(measured: Sequence[Measured], unknowns: Sequence[Unknown], found: F
     windows = []
     for share in _WINDOWS:
         cut = [_cut(one, depth <= share * most) for one, depth in zip(measured, depths, strict=True)]
+        pressed = [int(np.sum((depth > 0) & (depth <= share * most))) for depth in depths]
+        if min(pressed) < _FEWEST or any(np.ptp(one.curve.force) == 0 for one in cut):
+            continue
         model = Model.of(cut, unknowns)
         windows.append(Window(share * most, float(model.space.value(place, start(model)[place]))))
     return tuple(windows)

@@ -130,3 +130,25 @@ def test_the_second_bar_holds_a_hidden_base():
     for one in found:
         assert one.low_hidden[0] <= one.low[0] or not one.fits
         assert one.low_hidden[0] <= 2e4 <= one.high_hidden[0] or not one.fits
+
+
+def test_a_modulus_beyond_its_range_is_no_fit():
+    error = 0.003 * noise(np.random.default_rng(6), 200, 0.3)
+    found = identify([measured(Ball(), {"young": 5e6}, error, 2e-4)], [YOUNG])
+    assert found.verdict.startswith("does not fit within the ranges")
+    assert np.isnan(found.high[0])
+
+
+def test_noise_without_contact_tells_nothing():
+    depth, force = np.linspace(0, 1e-3, 200), 1e-5 * noise(np.random.default_rng(7), 200, 0.3)
+    found = identify([Measured(Curve("air", depth, force), Ball())], [YOUNG])
+    assert not found.seen[0]
+
+
+@pytest.mark.parametrize(
+    ("force", "words"),
+    [(np.zeros(50), "constant"), (np.linspace(0, 1, 5), "5 points"), (np.full(50, np.nan), "not finite")],
+)
+def test_what_is_no_curve_is_refused(force, words):
+    with pytest.raises(ValueError, match=words):
+        identify([Measured(Curve("wrong", np.linspace(0, 1e-3, len(force)), force), Ball())], [YOUNG])
