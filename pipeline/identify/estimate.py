@@ -9,6 +9,7 @@ from scipy.special import stdtrit
 
 from pipeline.arrays import FloatArray
 from pipeline.experiment.curve import Curve
+from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.bars import TAIL, interval
 from pipeline.identify.fit import Fit, fit
 from pipeline.identify.hidden import hidden_bars
@@ -40,7 +41,7 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
     Contact point and baseline of each curve are always unknown. Ranges with an infinite end are those of the curve.
 
     Raises:
-        ValueError: if a curve is no curve, or is fitted at depths for which its force is not known.
+        ExperimentError: if a curve is no curve, or is fitted at depths for which its force is not known.
     """
     for one in measured:
         _check(one.curve)
@@ -81,12 +82,12 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
 def _check(curve: Curve) -> None:
     """Refuse what is no curve."""
     if len(curve.force) < _FEWEST:
-        raise ValueError(f"curve {curve.name}: has {len(curve.force)} points: at least {_FEWEST} are needed")
+        raise ExperimentError(curve.name, f"has {len(curve.force)} points: at least {_FEWEST} are needed")
     columns = [curve.depth, curve.force, *([] if curve.time is None else [curve.time])]
     if not all(np.isfinite(column).all() for column in columns):
-        raise ValueError(f"curve {curve.name}: has numbers that are not finite")
+        raise ExperimentError(curve.name, "has numbers that are not finite")
     if not (np.ptp(curve.force) > 0 and np.ptp(curve.depth) > 0):
-        raise ValueError(f"curve {curve.name}: force or depth is constant")
+        raise ExperimentError(curve.name, "force or depth is constant")
 
 
 def _values(model: Model, x: FloatArray) -> FloatArray:

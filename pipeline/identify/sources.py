@@ -3,6 +3,7 @@
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.bars import interval
 from pipeline.identify.fit import Fit, Mixture
 from pipeline.identify.model import OF_CURVE
@@ -46,7 +47,7 @@ def mesh(found: Fit) -> FloatArray:
     """Return half widths (u,), in coordinates, by the errors of the forward models, of one sign over each curve.
 
     Raises:
-        ValueError: if a curve is fitted at depths for which its force is not known.
+        ExperimentError: if a curve is fitted at depths for which its force is not known.
     """
     top = found.mixture.covariance[int(np.argmax(found.mixture.weight))]
     model, values = found.model, found.model.space.values(found.x)
@@ -58,7 +59,7 @@ def mesh(found: Fit) -> FloatArray:
         error = measured.forward.error(depth, values)
         if not np.isfinite(error).all():
             name, deepest = measured.curve.name, 1e3 * float(depth.max())
-            raise ValueError(f"curve {name}: the fit is {deepest:.4g} mm deep, for which the force is not computed")
+            raise ExperimentError(name, f"the fit is {deepest:.4g} mm deep, for which the force is not computed")
         wrong = contact * error
         share = contact / np.maximum(np.abs(contact).max(), np.finfo(float).tiny)
         columns = model.thinned(np.column_stack([found.jacobian[number], wrong]))

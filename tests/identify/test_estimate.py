@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.experiment.curve import Curve
+from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.estimate import identify
 from pipeline.identify.parts import SOURCES, Measured, Unknown
 from tests.identify.synthetic import DRIFT, POISSON, YOUNG, Ball, Punch, measured, noise
@@ -150,5 +151,5 @@ def test_noise_without_contact_tells_nothing():
     [(np.zeros(50), "constant"), (np.linspace(0, 1, 5), "5 points"), (np.full(50, np.nan), "not finite")],
 )
 def test_what_is_no_curve_is_refused(force, words):
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(ExperimentError, match=words):
         identify([Measured(Curve("wrong", np.linspace(0, 1e-3, len(force)), force), Ball())], [YOUNG])
