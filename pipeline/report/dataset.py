@@ -80,7 +80,7 @@ _OF_FAILURES = {*_COSTS, *_RELATIVE, "machine_load", "memory", "surface_deviatio
 _MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # Where the probe touches, and along which unit vector it advances.
 _PLACE = ("at_x", "at_y", "at_z")
-_OF_CLOSURE = "of half balls closed by a far field, error bars are those of the mesh alone, not of the closure"
+_OF_CLOSURE = "error bars of half balls that a far field closes are those of the mesh alone, not of the closure"
 _MISSING = -1  # of counts, which have no NaN
 
 

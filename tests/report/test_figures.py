@@ -142,7 +142,7 @@ def test_where_nothing_has_a_force_the_figure_says_why(tmp_path):
 
 def test_what_is_missing_is_told():
     data = dataset(failed=3, pending=2, **FIGURE)
-    assert any("cases: 3 failed (×), 3 not yet run" in text.get_text() for text in figure(data, "ratio").texts)
+    assert any("Cases: 3 failed (×), 3 not yet run" in text.get_text() for text in figure(data, "ratio").texts)
     data["force_error"].attrs["comment"] = "not of the closure"
     assert any("not of the closure" in text.get_text().replace("\n", " ") for text in figure(data, "ratio").texts)
 

@@ -125,9 +125,10 @@ def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
     title = _plain(str(dataset.attrs.get("title", ""))) if titled else ""
     with mpl.rc_context(STYLE):
         shown = dataset if kind in _OVER_TIME else at_peak(dataset)
-        drawn = _DRAWN[kind](_with_short_names(shown), title, _missing(dataset))
+        missing = _missing(dataset)
+        drawn = _DRAWN[kind](_with_short_names(shown), title, missing)
         if titled and (warnings := warnings_of(dataset)):
-            add_note(drawn, f"{counted(len(warnings), 'warning')} about the model: see the report.")
+            add_note(drawn, f"{counted(len(warnings), 'warning')} about the model: see the report.", missing)
     return drawn
 
 
@@ -168,4 +169,5 @@ def _missing(dataset: xr.Dataset) -> str:
     counts = {word: int((dataset["status"] == state).sum()) for state, word in words.items()}
     text = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
     comment = str(dataset["force_error"].attrs.get("comment", "")) if "force_error" in dataset else ""
-    return "; ".join(filter(None, (f"cases: {text}" if text else "", comment)))
+    found = "; ".join(filter(None, (f"cases: {text}" if text else "", comment)))
+    return f"{found[:1].upper()}{found[1:]}"

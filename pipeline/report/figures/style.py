@@ -73,11 +73,11 @@ def finish(figure: Figure, title: str, caption: str = "", warning: str = "", *, 
     figure.align_ylabels()
 
 
-def add_note(figure: Figure, note: str) -> None:
-    """Add a sentence to the caption."""
+def add_note(figure: Figure, note: str, warning: str = "") -> None:
+    """Add a sentence to the caption, which stays red with a warning."""
     figure.set_label(f"{figure.get_label()} {note}".strip())
     words = textwrap.fill(str(figure.get_label()), int(_LETTERS * figure.get_figwidth()))
-    figure.supxlabel(words, x=0.01, ha="left", fontsize=SIZE)
+    figure.supxlabel(words, x=0.01, ha="left", fontsize=SIZE, color=FAILED if warning else QUIET)
 
 
 def write_legend(figure: Figure, above: Axes | None = None) -> None:
