@@ -18,6 +18,8 @@ from pipeline.units import canonical, parse_quantity
 _MOST = 1000
 # Bounds of a value with an error: this many times the error, which is two standard deviations.
 _ERRORS = 2.5
+# Ends of the names of what is a property of the tissue, not of one specimen or tool.
+_OF_TISSUE = ("young", "poisson")
 # A range, and a value, as a study writes them, by SI unit.
 _EXAMPLES = {
     "Pa": ('["1 kPa", "1 MPa"]', '"10 kPa"'),
@@ -108,7 +110,6 @@ def read_identify(
         if parameter and name not in raw:
             given[name] = Sought(parameter, parameter.low, parameter.high)
     _add_implied(given, known, measurements, problems)
-    _check_radius(given, measurements, problems)
     _check_relaxation(given, measurements, problems)
     return Identification(tuple(given.values()), identify.may_hide)
 
@@ -224,11 +225,24 @@ def _add_machine(
         problems.error(f"identify.{stiffness.name}", None, allowed)
 
 
-def _check_radius(given: Mapping[str, Sought], measurements: tuple[Measurement, ...], problems: Problems) -> None:
-    """Report a radius of several tools."""
-    own = [one.name for one in measurements if one.probe and {"radius", "name", "shape"} & one.probe.keys()]
-    if "radius" in given and own:
-        problems.error("identify.radius", None, f'is that of [probe], but the measurement "{own[0]}" has its own')
+def check_shared(
+    found: Identification, measurement: Measurement, known: Mapping[str, Parameter], problems: Problems
+) -> None:
+    """Report lengths and friction that are unknown, but that the scene of a ``measurement`` has others of.
+
+    ``known`` are the parameters of its scene. A modulus may be declared differently: it is one unknown all the same.
+    """
+    for one in found.sought:
+        own = known.get(one.parameter.name)
+        if own is None or one.parameter.name.endswith(_OF_TISSUE) or not one.parameter.place:
+            continue
+        if own.value != one.parameter.value:
+            problems.error(
+                f"identify.{one.parameter.name}",
+                None,
+                f"is one unknown, {one.parameter.value:g} in [{one.parameter.place[0]}], but the measurement "
+                f'"{measurement.name}" has its own, {own.value:g} (SI): leave it known',
+            )
 
 
 def _check_relaxation(given: Mapping[str, Sought], measurements: tuple[Measurement, ...], problems: Problems) -> None:

@@ -12,7 +12,7 @@ from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
 from pipeline.study.check import check_sense
 from pipeline.study.check_loads import check_loads
-from pipeline.study.identification import Identification, read_identify, read_measurements
+from pipeline.study.identification import Identification, check_shared, read_identify, read_measurements
 from pipeline.study.identified import with_identified
 from pipeline.study.loads import Load
 from pipeline.study.measurement import Measurement
@@ -136,10 +136,13 @@ def _read_experiment(
     measurements = read_measurements(raw["measurement"], problems) if "measurement" in raw else ()
     if problems.errors or not (measurements or "identify" in raw):
         return measurements, Identification()
+    found = read_identify(raw.get("identify", {}), measurements, _parameters(sections), problems)
     for number, measurement in enumerate(measurements, start=1):
         if measurement.probe or measurement.body:
-            _scene(raw, measurement, f"measurement[{number}]", file, problems)
-    return measurements, read_identify(raw.get("identify", {}), measurements, _parameters(sections), problems)
+            scene = _scene(raw, measurement, f"measurement[{number}]", file, problems)
+            if scene is not None:
+                check_shared(found, measurement, _parameters(scene.sections), problems)
+    return measurements, found
 
 
 def _read_spread(raw: dict[str, Any], sections: dict[str, tuple[Section, ...]], problems: Problems) -> Spread:

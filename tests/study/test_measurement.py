@@ -77,7 +77,14 @@ MISTAKES = {
     ),
     "may hide": ([{}], {"may_hide": ["skin"]}, ["identify.may_hide", "'layer', 'base' or 'strain'"]),
     "radius of several tools": (
-        [{"probe": {"radius": "2 mm"}}], {"unknown": ["radius"]}, ["identify.radius", '"punch" has its own'],
+        [{"probe": {"radius": "2 mm"}}],
+        {"unknown": ["radius"]},
+        ["identify.radius", '"punch" has its own', "0.003", "0.002"],
+    ),
+    "thickness of several specimens": (
+        [{"body": {"size": ["40 mm", "40 mm", "8 mm"]}}],
+        {"unknown": ["thickness"]},
+        ["identify.thickness", '"punch" has its own', "0.02", "0.008"],
     ),
     "relaxation without a hold": (
         [{}], {"unknown": ["relaxation_share_1", "relaxation_time_1"]}, ["relaxation_share_1", "approach+hold"],
