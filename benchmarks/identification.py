@@ -38,6 +38,7 @@ from pipeline.study.read import parse
 from pipeline.study.sweep import Study
 from pipeline.surrogate.build import build
 from pipeline.surrogate.cases import domain_of
+from pipeline.surrogate.derived import ON_MERIDIAN
 from pipeline.surrogate.wide import profile_of
 
 SEED, COUNT = 20260, 300
@@ -99,7 +100,7 @@ def tools(store: Path) -> list[Tool]:
         }
         study = parse(raw, file=f"{name}.toml")
         domain = domain_of(study, {"young": (1e3, 1e6), "thickness": (2.6e-3, 3.4e-3)}, DEEPEST)
-        found.append(Tool(name, study, build(domain, stored_in(store, MPI.COMM_SELF))))
+        found.append(Tool(name, study, build(domain, stored_in(store, MPI.COMM_SELF), ON_MERIDIAN)))
     return found
 
 
@@ -118,7 +119,8 @@ def force_of(tool: Tool, rng: np.random.Generator, hides: str, young: float, dep
     """Return the true force (N), by the integral equation, of a body that hides something; "" for nothing."""
     profile, thickness = profile_of(tool.probe), THICKNESS * (1 + 0.025 * rng.normal())
     contact = np.sqrt(2e-3 * depth.max()) if tool.name == "ball" else 1e-3
-    layers = (Layer(young, POISSON, thickness),)
+    assert profile is not None  # both tools are round
+    layers: tuple[Layer, ...] = (Layer(young, POISSON, thickness),)
     if hides == "layer":
         stiffer = np.exp(rng.choice([-1, 1]) * rng.uniform(np.log(1.5), np.log(5)))
         layers = (Layer(young * stiffer, POISSON, contact * np.exp(rng.uniform(np.log(0.2), np.log(1.5)))), *layers)
@@ -160,7 +162,8 @@ def least_squares(measured: Measured, unknowns: Sequence[Unknown]) -> tuple[floa
     jacobian, residual = model.jacobian(0, x, force), measured.curve.force - force
     variance = residual @ residual / (len(force) - len(x))
     spread = np.sqrt(np.linalg.inv(jacobian.T @ jacobian / variance + prior(model)[1])[0, 0])
-    return tuple(float(model.space.value(0, x[0] + side * 1.96 * spread)) for side in (-1, 1))
+    low, high = (float(model.space.value(0, x[0] + side * 1.96 * spread)) for side in (-1, 1))
+    return low, high
 
 
 def trial(tool: Tool, seed: tuple[int, int], correlation: float, hides: str) -> Trial:

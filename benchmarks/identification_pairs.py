@@ -8,7 +8,7 @@ is missed: 1.3 times that bound for two punches, 15 % for the modulus of the lay
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from statistics import median
@@ -25,6 +25,7 @@ from pipeline.identify.parts import Estimate, Forward, Measured, Unknown, Values
 from pipeline.study.read import parse
 from pipeline.surrogate.build import build
 from pipeline.surrogate.cases import domain_of
+from pipeline.surrogate.derived import ON_MERIDIAN
 from pipeline.surrogate.wide import solve_wide
 
 COUNT, SEED = 40, 20270
@@ -52,7 +53,7 @@ class Pair:
     wanted: str
 
 
-def _forward(body: object, probe: Values | dict[str, object], unknowns: Sequence[Unknown], deepest: float) -> Forward:
+def _forward(body: object, probe: Mapping[str, object], unknowns: Sequence[Unknown], deepest: float) -> Forward:
     raw = {
         "body": body,
         "material": {"young": "10 kPa", "poisson": 0.45},
@@ -60,7 +61,7 @@ def _forward(body: object, probe: Values | dict[str, object], unknowns: Sequence
         "mesh": {"accuracy": "0.1 %"},
     }
     bounds = {unknown.name: (unknown.low, unknown.high) for unknown in unknowns}
-    return build(domain_of(parse(raw, file="pair.toml"), bounds, 1.2 * deepest), solve_wide)
+    return build(domain_of(parse(raw, file="pair.toml"), bounds, 1.2 * deepest), solve_wide, ON_MERIDIAN)
 
 
 def pairs() -> list[Pair]:
