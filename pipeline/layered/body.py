@@ -6,10 +6,11 @@ from math import inf, log, pi
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
+from scipy.special import j0
 
 from pipeline.arrays import FloatArray
 from pipeline.layered.compliance import Layer, Solid, compliance
-from pipeline.layered.contact import WIDEST, Profile, Touch, flat, touch, waves_below
+from pipeline.layered.contact import WIDEST, Profile, Touch, flat, too_wide, touch, waves_below
 
 RIGID = Solid(inf, 0.0)
 # Contact radii of a table: so many, from this share of the largest on.
@@ -65,6 +66,10 @@ class LayeredBody:
         """What the tool touches."""
         return self.layers[0] if self.layers else self.base
 
+    @property
+    def _top_thickness(self) -> float:
+        return self.layers[0].thickness if self.layers else inf
+
     def compliance(self, wavenumber: FloatArray) -> FloatArray:
         """Return L (n,) at wavenumbers (n,), in 1/m: see :func:`pipeline.layered.compliance.compliance`."""
         return compliance(self.layers, self.base, wavenumber)
@@ -93,17 +98,30 @@ class LayeredBody:
         scale = (1 - self.top.poisson**2) / pi
         return scale * float(beyond.sum()), -scale / 2 * float(beyond @ waves**2)
 
+    def point_load(self, distance: float) -> float:
+        """Return the displacement (m/N) of the surface at a ``distance`` (m) from a point force of 1 N."""
+        waves, weights = waves_below(self.layers, distance)
+        beyond = (weights * (self.compliance(waves) - 1)) @ j0(waves * distance)
+        return float((1 / distance + beyond) / (pi * self.top.plane))
+
     def table(self, profile: Profile, deepest: float) -> Table:
-        """Return F / E* over depth up to ``deepest`` (m)."""
+        """Return F / E* over depth up to ``deepest`` (m).
+
+        Raises:
+            ValueError: if contact is too wide for the equation.
+        """
         if profile.flat >= profile.limit:
             return Table(self.touch(profile, np.array([profile.limit])))
-        widest = self._widest(profile, max(deepest, 1e-300)) - profile.flat
-        return Table(self.touch(profile, profile.flat + widest * np.geomspace(_FIRST, 1.0, _NODES)))
+        widest = self._widest(profile, max(deepest, 1e-300))
+        radii = profile.flat + (widest - profile.flat) * np.geomspace(_FIRST, 1.0, _NODES)
+        touched = self.touch(profile, radii)
+        if touched.depth[-1] < deepest and widest < _END * profile.limit:
+            raise ValueError(f"a depth of {deepest:.3g} m is too large: {too_wide(widest, self._top_thickness)}")
+        return Table(touched)
 
     def _widest(self, profile: Profile, depth: float) -> float:
         """Return a contact radius (m) that is as deep, or slightly deeper, or that of the tool's end."""
-        top = self.layers[0].thickness if self.layers else inf
-        end = min(_END * profile.limit, WIDEST * top)
+        end = min(_END * profile.limit, WIDEST * self._top_thickness)
         radius, exponent = _half_space_radius(profile, depth, end), 2.0
         tried: tuple[float, float] | None = None
         for _ in range(_STEPS):

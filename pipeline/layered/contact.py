@@ -28,10 +28,10 @@ _PANEL = 16
 _LONGEST = 1e-3
 # Gauss' points along a contact radius, at least, and more for each thickness of the top layer.
 _LEAST, _MORE = 20, 8
-# So many radii are solved for at once, with the points that the largest needs.
-_AT_ONCE = 8
-# Widest contact, in thicknesses of the top layer: beyond, the equation would take minutes.
-WIDEST = 100.0
+# So many radii are solved for at once, if contact is less wide than so many thicknesses of the top layer.
+_AT_ONCE, _WIDE = 8, 15.0
+# Widest contact, in thicknesses of the top layer: a table then takes seconds.
+WIDEST = 50.0
 # Gauss' points over a quarter of a turn, of each part between kinks.
 _TURN = 32
 
@@ -92,16 +92,25 @@ def touch(layers: tuple[Layer, ...], base: Solid, profile: Profile, radius: Floa
     """
     top = layers[0].thickness if layers else inf
     if (widest := float(np.max(radius))) > WIDEST * top:
-        raise ValueError(
-            f"contact of radius {widest:.3g} m is too wide for a top layer of {top:.3g} m: at most 100 times"
-        )
+        raise ValueError(too_wide(widest, top))
+    size = _AT_ONCE if widest < _WIDE * top else 1
+    parts = [_together(layers, base, profile, some) for some in np.split(radius, range(size, len(radius), size))]
+    return Touch(radius, *np.concatenate(parts, axis=1))
+
+
+def too_wide(radius: float, top: float) -> str:
+    """Return that contact of a ``radius`` (m) is too wide for a top layer of a thickness (m)."""
+    return f"contact of radius {radius:.3g} m is too wide for a top layer of {top:.3g} m: at most {WIDEST:g} times"
+
+
+def _together(
+    layers: tuple[Layer, ...], base: Solid, profile: Profile, radius: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return depth, force and stiffness (n,) at each radius (n,), with the points that the largest needs."""
+    widest, top = float(np.max(radius)), layers[0].thickness if layers else inf
     waves, weights = waves_below(layers, widest)
     weights = weights * (1 - compliance(layers, base, waves))
-    parts = [
-        _solved(profile, some, waves, weights, _LEAST + ceil(_MORE * float(np.max(some)) / top))
-        for some in np.split(radius, range(_AT_ONCE, len(radius), _AT_ONCE))
-    ]
-    return Touch(radius, *np.concatenate(parts, axis=1))
+    return _solved(profile, radius, waves, weights, _LEAST + ceil(_MORE * widest / top))
 
 
 def _solved(

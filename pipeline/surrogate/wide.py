@@ -6,10 +6,13 @@ that are solved with their sides tell whether it replaces solves, in a surrogate
 
 from collections.abc import Hashable
 from functools import partial
+from itertools import product
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pipeline.arrays import FloatArray
 from pipeline.layered.body import RIGID, LayeredBody
 from pipeline.layered.compliance import Layer
 from pipeline.layered.contact import Profile, flat
@@ -17,7 +20,7 @@ from pipeline.shapes.body import Layered
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.shapes.probes.disc import Disc
-from pipeline.states import OK
+from pipeline.states import FAILED, OK
 from pipeline.study.case import Case
 from pipeline.study.sweep import Study
 from pipeline.surrogate.cases import Domain, Solve
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
 _ERROR = 1e-5
 # Largest difference from solves of the sides with which the equation is a guess of them: what is left is smoother.
 _ALIKE = 0.3
+# Corners of the ranges that are solved with their sides.
+_CORNERS = 2
 # Supports below the whole tissue. Sides, fixed or free, are far away.
 _SUPPORTS = ("bottom", "bottom+sides")
 
@@ -86,17 +91,15 @@ def solve_wide(study: Study, error: float = _ERROR) -> "xr.Dataset":
     """
     import xarray as xr  # noqa: PLC0415 (slow to import, and only needed here)
 
-    force = np.full(study.shape, np.nan)
+    force, message = np.full(study.shape, np.nan), np.full(study.shape, "", dtype=object)
     for (body, profile), cases in _by_scene(study):
-        depth = np.array([case.probe.depth for case in cases])
-        for case, value in zip(cases, body.force(profile, depth), strict=True):
-            force[case.index] = value
-    data = {
-        "force": force,
-        "force_error": error * force,
-        "status": np.full(study.shape, OK, dtype=object),
-        "message": np.full(study.shape, "", dtype=object),
-    }
+        depth, places = np.array([case.probe.depth for case in cases]), tuple(np.transpose([c.index for c in cases]))
+        try:
+            force[places] = body.force(profile, depth)
+        except ValueError as too_wide:
+            message[places] = str(too_wide)
+    status = np.where(np.isfinite(force), OK, FAILED).astype(object)
+    data = {"force": force, "force_error": error * force, "status": status, "message": message}
     return xr.Dataset({name: ([axis.name for axis in study.axes], values) for name, values in data.items()})
 
 
@@ -115,22 +118,45 @@ def _by_scene(study: Study) -> list[tuple[tuple[LayeredBody, Profile], list[Case
 def wide_solve(domain: Domain, solve: Solve) -> tuple[Solve, float] | None:
     """Return what solves the cases of a surrogate by the equation, and how much it differs from solves (relative).
 
-    It is None if the equation does not have their scene, or not at all their sides. Three cases are solved by
-    ``solve``, at the largest depth: in the middle of all ranges, and at both ends. The error bars of all cases are then
-    the largest sum of theirs and of what the equation differs there.
+    It is None if the equation does not have their scene, or not at all their sides. Up to three cases are solved by
+    ``solve``, at the largest depth: in the middle of all ranges, and at the two corners at which the surface moves most
+    at the body's sides. The error bars of all cases are then the largest sum of theirs and of what the equation differs
+    there.
     """
-    middle = np.zeros(len(domain.ranges))
-    error, most = _ERROR, 0.0
-    for place in (middle, middle - 1, middle + 1):
-        values = [one.value(np.array([x])) for one, x in zip(domain.ranges, place, strict=True)]
-        study = domain.study(values, np.array([domain.deepest]))
-        if any(layered_body(case) is None for case in study.cases()):
-            return None
-        solved = solve(study)
+    middle, error, most = np.zeros(len(domain.ranges)), _ERROR, 0.0
+    if any(layered_body(case) is None for case in _study(domain, middle).cases()):
+        return None
+    for place in (middle, *_corners(domain)):
+        study = _study(domain, place)
+        solved, wide = solve(study), solve_wide(study)["force"]
         force, bar = (np.ravel(solved[name]) for name in ("force", "force_error"))
-        wide = np.ravel(solve_wide(study)["force"])
-        differs = float(np.abs(wide / force - 1).max())
+        differs = float(np.abs(np.ravel(wide) / force - 1).max())
         if not differs <= _ALIKE:
             return None
         error, most = max(error, differs + float((bar / force).max())), max(most, differs)
     return partial(solve_wide, error=error), most
+
+
+def _study(domain: Domain, place: FloatArray) -> Study:
+    """Return the study of the case at a place (ranges,) in [-1, 1], at the largest depth."""
+    values = [one.value(np.array([x])) for one, x in zip(domain.ranges, place, strict=True)]
+    return domain.study(values, np.array([domain.deepest]))
+
+
+def _corners(domain: Domain) -> list[FloatArray]:
+    """Return the corners of all ranges, in [-1, 1], at which the surface moves most at the body's sides."""
+    corners = [np.array(corner) for corner in product((-1.0, 1.0), repeat=len(domain.ranges))] if domain.ranges else []
+    moved = [_moved(_study(domain, corner).case((0,) * (len(domain.ranges) + 2))) for corner in corners]
+    return [corners[k] for k in np.argsort(moved)[::-1][:_CORNERS]]
+
+
+def _moved(case: Case) -> float:
+    """Return how far the surface moves at the nearest side, over the depth."""
+    body, profile = layered_body(case), profile_of(case.probe)
+    assert body is not None and profile is not None
+    depth = case.probe.depth
+    try:
+        force = float(body.force(profile, np.array([depth]))[0])
+    except ValueError:  # contact is too wide for the equation: so is that of the solve with the case
+        return inf
+    return abs(body.point_load(case.body.gap(case.frame.point))) * force / depth

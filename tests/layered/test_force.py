@@ -114,3 +114,10 @@ def test_a_tool_that_ends_goes_on_as_a_punch():
 def test_too_wide_a_contact_is_refused():
     with pytest.raises(ValueError, match="too wide"):
         on_rigid(0.4, 1e-6).touch(PARABOLA, np.array([1e-3]))
+
+
+def test_a_point_load_moves_a_half_space_everywhere_and_a_layer_near_it():
+    assert HALF_SPACE.point_load(0.02) == pytest.approx(1 / (pi * PLANE * 0.02))
+    near, far = (on_rigid(0.4, 1e-2).point_load(distance) for distance in (1e-4, 5e-2))
+    assert near == pytest.approx(0.99 * (1 - 0.4**2) / (pi * E * 1e-4), rel=0.01)
+    assert abs(far) < 1e-2 * (1 - 0.4**2) / (pi * E * 5e-2)

@@ -100,3 +100,11 @@ def test_a_narrow_body_is_left_to_solves():
 def test_the_study_of_a_scene_without_layers_is_refused():
     with pytest.raises(ValueError, match="is no round frictionless tool"):
         partial(solve_wide, parse(changed(WIDE, probe=DISC | {"contact": "bonded"}), file="bonded.toml"))()
+
+
+def test_contact_too_wide_for_the_equation_is_a_case_without_force():
+    thin = changed(WIDE, body={"layer": [SKIN | {"thickness": "0.005 mm"}]}, probe={"depth": "1 mm"})
+    dataset = solve_wide(parse(thin, file="thin.toml"))
+    assert np.isnan(dataset["force"])
+    assert dataset["status"] == "failed"
+    assert "too wide" in str(dataset["message"].values)
