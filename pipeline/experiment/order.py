@@ -10,7 +10,7 @@ from pipeline.experiment.segments import turning_points
 # Turns of the depth, by more than a twentieth of its range, of rows that are in no order: this share of the rows.
 _JUMP, _MOST_TURNS = 0.05, 0.2
 # A step this many times the usual one, and at least this share of all, is a gap.
-_GAP, _SHARE = 10.0, 0.02
+_GAP, _SHARE = 4.0, 0.02
 # A change of the depth by this share of its range from row to row is a jump.
 _FALL = 0.2
 # A value off both neighbours by this share of the range of most values, and so many usual steps, is none of the curve.

@@ -2,13 +2,14 @@
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import StringIO
 
 import numpy as np
 import pandas as pd
 
 from pipeline.arrays import FloatArray, IntArray
+from pipeline.experiment.clock import is_clock, seconds
 from pipeline.experiment.header import Header, is_comment
 from pipeline.experiment.headings import headers_of
 from pipeline.experiment.layout import MISSING, Layout, find_layout
@@ -59,7 +60,8 @@ def table_of(lines: Sequence[str], file: str) -> Table:
         raise ExperimentError(file, f"has {width} columns, others have {layout.width}", line=wrong[0] + 1)
     told = [f"{_of_lines(odd)} no row of {layout.width} columns: left out"] if odd else []
     numbers = np.array(kept) + 1
-    values, strange = _values([lines[n] for n in kept], layout, numbers)
+    values, strange, clocks = _values([lines[n] for n in kept], layout, numbers)
+    headers = tuple(replace(one, unit="s") if n in clocks else one for n, one in enumerate(headers))
     return Table(file, headers, values, numbers, strange, tuple(told), layout)
 
 
@@ -106,8 +108,10 @@ def _of_lines(odd: Sequence[int]) -> str:
     return f"{len(odd)} lines, such as line {odd[0] + 1}, are"
 
 
-def _values(rows: Sequence[str], layout: Layout, lines: IntArray) -> tuple[FloatArray, dict[int, tuple[int, str]]]:
-    """Return the numbers of rows, and the first text that is none of each column."""
+def _values(
+    rows: Sequence[str], layout: Layout, lines: IntArray
+) -> tuple[FloatArray, dict[int, tuple[int, str]], set[int]]:
+    """Return the numbers of rows, the first text that is none of each column, and the columns that have clock times."""
     separator = r"\s+" if layout.separator == " " else layout.separator
     if any('"' in row for row in rows):
         rows, separator = [_UNIT.join(layout.fields(row)) for row in rows], _UNIT
@@ -124,11 +128,16 @@ def _values(rows: Sequence[str], layout: Layout, lines: IntArray) -> tuple[Float
         low_memory=False,
     )
     found = np.empty(frame.shape)
-    strange = {}
+    strange: dict[int, tuple[int, str]] = {}
+    clocks: set[int] = set()
     for number in range(layout.width):
         column = frame[number]
         if column.dtype in (object, bool):
             text = column.astype(str).str.strip()
+            if is_clock(text.iloc[0]):
+                found[:, number] = seconds(text)
+                clocks.add(number)
+                continue
             plain = text.str.replace(",", ".", regex=False) if layout.decimal == "," else text
             numbers = pd.to_numeric(plain, errors="coerce")
             wrong = numbers.isna() & column.notna() & ~text.str.lower().isin(MISSING)
@@ -140,7 +149,7 @@ def _values(rows: Sequence[str], layout: Layout, lines: IntArray) -> tuple[Float
             column = numbers
         found[:, number] = column.to_numpy(float)
     found[~np.isfinite(found)] = np.nan
-    return found, strange
+    return found, strange, clocks
 
 
 def _check_decimals(headers: tuple[Header, ...], before: Sequence[str], layout: Layout, file: str, begin: int) -> None:

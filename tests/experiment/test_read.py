@@ -270,3 +270,20 @@ def test_exports_of_testing_machines(tmp_path, machine):
     end = "\t" if "tabs" in machine else ""
     path = write(tmp_path / "a.txt", IN_MM, before=before, change=lambda x: [f"{row}{end}" for row in x[1:]], **how)
     assert is_the_approach(read(path))
+
+
+@pytest.mark.parametrize("form", ["{:02.0f}:{:02.0f}:{:06.3f}", "2025-10-30 {:02.0f}:{:02.0f}:{:06.3f}"])
+def test_clock_times_over_midnight(tmp_path, form):
+    def clock(lines):
+        rows = [line.split(",") for line in lines[1:]]
+        times = [(23 * 3600 + 59 * 60 + 50 + float(row[0])) % 86400 for row in rows]
+        texts = [form.format(t // 3600, t % 3600 // 60, t % 60) for t in times]
+        return [
+            lines[0].replace("time (s)", "Time"),
+            *(",".join([t, *row[1:]]) for t, row in zip(texts, rows, strict=True)),
+        ]
+
+    curve = read(write(tmp_path / "a.csv", IN_MM, change=clock))
+    assert curve.time is not None
+    np.testing.assert_allclose(curve.time, TIME, atol=2e-3)
+    np.testing.assert_allclose(curve.force, FORCE, atol=1e-7)
