@@ -8,6 +8,7 @@ import typer
 from pipeline.cli.cases import find_case
 from pipeline.cli.console import is_json_wanted, say, warning
 from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, as_data, fail, of_study, print_faults, refusing
+from pipeline.cli.forecast import forecasts, told
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     File,
@@ -84,6 +85,7 @@ def plan(
         fail("a plan is of one study, or of one case of it; with --check several files are looked at")
     from pipeline.plan.describe import summary
     from pipeline.run.room import MEMORY_SHARE, machine_room
+    from pipeline.study.problems import StudyError
 
     (study,) = read_all([file])
     chosen = find_case(study, more[0]) if more else None
@@ -95,6 +97,10 @@ def plan(
     room = machine_room() if memory is None else 1e9 * memory
     most = MEMORY_SHARE * room
     found |= {"memory_available": room, "too_large": sum(step["memory"] > most for step in found["steps"])}
+    try:
+        found["forecasts"] = forecasts(study, made.cost)
+    except StudyError as wrong:
+        fail(*of_study(wrong))
     _show(study, found, quiet=quiet, verbose=verbose)
     # Where all cases are too large, that of F_exact may still be solved: for nothing.
     asked = [step for step in found["steps"] if not step["exact"]] or found["steps"]
@@ -172,6 +178,8 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool) 
         ground = f"{counted(found['fitted_to'], 'case')} on record" if found["fitted_to"] else "no case on record yet"
         print(f"    ({ground}; a step's time is typically right within a factor of {found['factor']:.1f})")
         _list_steps(found["steps"], None if verbose else _MOST_STEPS)
+    for forecast in found["forecasts"]:
+        print(told(forecast))
 
 
 def _list_steps(steps: list[dict[str, Any]], most: int | None) -> None:

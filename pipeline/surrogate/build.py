@@ -91,7 +91,7 @@ class _Found:
 
 def _over_all(cases: Cases | Difference, tolerance: float, most: int) -> _Found:
     """Return the interpolation over parameters and depth to a tolerance."""
-    depths, place = _first(cases.domain), cases.domain.middle
+    depths, place = first_depths(cases.domain), cases.domain.middle
     while True:
         depths, _ = _finer(cases, depths, place, _OF_DEPTH * tolerance)
         found = _over_parameters(cases, depths, (1 - _OF_DEPTH) * tolerance, most)
@@ -102,7 +102,7 @@ def _over_all(cases: Cases | Difference, tolerance: float, most: int) -> _Found:
         depths = enough
 
 
-def _first(domain: Domain) -> Depths:
+def first_depths(domain: Domain) -> Depths:
     """Return the nodes of the depth to begin with."""
     if domain.is_proportional or domain.shallowest == domain.deepest:
         return Depths(domain.deepest, domain.exponent, 1)

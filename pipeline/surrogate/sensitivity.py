@@ -16,8 +16,8 @@ from pipeline.study.parameters import DEPTH
 from pipeline.study.problems import Problem, StudyError
 from pipeline.study.sweep import Study
 from pipeline.surrogate.build import surrogate
-from pipeline.surrogate.cases import Solve, domain_of
-from pipeline.surrogate.derived import Output
+from pipeline.surrogate.cases import Domain, Solve, domain_of
+from pipeline.surrogate.derived import FORCE, Output
 from pipeline.surrogate.sobol import Indices, sobol
 from pipeline.surrogate.table import Table
 
@@ -69,15 +69,24 @@ def explain(study: Study, solve: Solve) -> list[Explained]:
     return [_explained(study, Output(name), solve) for name in study.spread.outputs]
 
 
-def _explained(study: Study, output: Output, solve: Solve) -> Explained:
-    varied = study.spread.varied
-    bounds = {one.parameter.name: (one.low, one.high) for one in varied if one.parameter != DEPTH}
+def spread_domain(study: Study, output: Output = FORCE) -> Domain:
+    """Return the domain of the surrogate of an output over the section [sensitivity] of a study.
+
+    Raises:
+        StudyError: if the study is not one scene.
+    """
+    bounds = {one.parameter.name: (one.low, one.high) for one in study.spread.varied if one.parameter != DEPTH}
     shallowest, deepest = _depths(study)
-    table = surrogate(domain_of(study, bounds, deepest, shallowest, output), solve)
+    return domain_of(study, bounds, deepest, shallowest, output)
+
+
+def _explained(study: Study, output: Output, solve: Solve) -> Explained:
+    domain, varied = spread_domain(study, output), study.spread.varied
+    table = surrogate(domain, solve)
 
     def function(points: FloatArray) -> FloatArray:
         values = {one.parameter.name: _quantiles(one, x) for one, x in zip(varied, points.T, strict=True)}
-        return table.sampled(values, values.pop(DEPTH.name, np.full(len(points), deepest)))
+        return table.sampled(values, values.pop(DEPTH.name, np.full(len(points), domain.deepest)))
 
     return Explained(output.name, sobol(function, len(varied), table.interpolation + table.mesh), table)
 

@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 _ERROR = 1e-5
 # Largest difference from solves of the sides with which the equation is a guess of them: what is left is smoother.
 _ALIKE = 0.3
-# Corners of the ranges that are solved with their sides.
+# Corners of the ranges that are solved with their sides, and all solves: the middle, too.
 _CORNERS = 2
+CHECKS = 1 + _CORNERS
 # Supports below the whole tissue. Sides, fixed or free, are far away.
 _SUPPORTS = ("bottom", "bottom+sides")
 

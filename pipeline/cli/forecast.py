@@ -1,0 +1,50 @@
+"""What `epsmesh plan` tells of the forces that `epsmesh identify` and `epsmesh sensitivity` need."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from pipeline.printable import counted
+from pipeline.run.remaining import format_seconds
+
+if TYPE_CHECKING:
+    from pipeline.plan.cost import CostModel
+    from pipeline.study.sweep import Study
+    from pipeline.surrogate.cases import Domain
+
+
+def forecasts(study: "Study", cost: "CostModel") -> list[dict[str, Any]]:
+    """Return about what each table of forces costs, by the command that needs it; none for studies without them.
+
+    Depths of a measured curve are taken to be those of the study's probe.
+    """
+    if not (study.measurements or study.spread.varied):
+        return []
+    from pipeline.surrogate.forecast import forecast
+
+    return [
+        {"command": command, "of": name, **vars(forecast(domain, cost))} for command, name, domain in _domains(study)
+    ]
+
+
+def told(found: dict[str, Any]) -> str:
+    """Write a forecast as a line."""
+    most = f"{counted(found['most'], 'solve')}, {format_seconds(found['most_seconds'])}"
+    text = f"about {most}"
+    if found["least"] < found["most"]:
+        least = f"{counted(found['least'], 'solve')}, {format_seconds(found['least_seconds'])}"
+        text = f"{least}, if the sides of the body are far away; if not, {text}"
+    return f"  {found['command']}, forces of {found['of']}: {text}; less what is stored"
+
+
+def _domains(study: "Study") -> "Iterator[tuple[str, str, Domain]]":
+    from pipeline.identify.forward import unknown_domain
+    from pipeline.identify.unknowns import unknowns
+    from pipeline.study.read import scene_of
+    from pipeline.surrogate.sensitivity import spread_domain
+
+    for measurement in study.measurements:
+        scene = scene_of(study, measurement)
+        deepest = max(probe.depth for probe in scene.probes)
+        yield "identify", measurement.name, unknown_domain(scene, unknowns(study), deepest)
+    if study.spread.varied:
+        yield "sensitivity", "the scene", spread_domain(study)

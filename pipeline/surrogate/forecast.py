@@ -1,0 +1,45 @@
+"""What a surrogate will cost, before any of its cases is solved."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.plan.cost import CostModel
+from pipeline.plan.describe import summary
+from pipeline.plan.plan import make_plan
+from pipeline.surrogate.build import first_depths
+from pipeline.surrogate.cases import Domain
+from pipeline.surrogate.derived import FORCE
+from pipeline.surrogate.wide import CHECKS, layered_body
+
+# Points of tables of so many parameters, besides the modulus that is a factor, to the tolerances of these: typical ones
+# of a ball and of a punch on layers.
+_POINTS = (1, 5, 29, 69, 137)
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Solves and seconds on one rank: if the integral equation replaces solves, and if it does not.
+
+    Both are the same for scenes that it does not have. What is in a case store need not be solved.
+    """
+
+    least: int
+    most: int
+    least_seconds: float
+    most_seconds: float
+
+
+def forecast(domain: Domain, cost: CostModel) -> Forecast:
+    """Return about what the surrogate of a domain costs, with times of a cost model."""
+    nodes = first_depths(domain)
+    depths = nodes if nodes.count == 1 else nodes.with_count(5)
+    study = domain.study([one.value(np.zeros(1)) for one in domain.ranges], depths.values)
+    found = summary(replace(make_plan(study), cost=cost))
+    points = _POINTS[min(len(domain.ranges), len(_POINTS) - 1)]
+    most, seconds = points * found["solves"], points * found["seconds"]
+    case = study.case((0,) * len(study.axes))
+    if domain.output != FORCE or layered_body(case) is None:
+        return Forecast(most, most, seconds, seconds)
+    least = min(CHECKS, most)
+    return Forecast(least, CHECKS + most, least * found["seconds"] / found["solves"], seconds)
