@@ -1,7 +1,8 @@
 """Values of a dataset's arrays in the words and units that people use: mm, kPa, mN, per cent."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import takewhile
 from math import isfinite
 from typing import Any
 
@@ -15,6 +16,7 @@ _NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 # Of sizes and semi-axes, the last word of their dimensions' names.
 _SIZES = ("size", "axes")
 _POINT = re.compile(rf"{_NUMBER} (?P<unit>[a-zµ]+)(?: {_NUMBER} (?P=unit))+\b")
+_WORD = re.compile(rf"{_POINT.pattern}|\S+")
 
 
 def scale(array: xr.DataArray) -> tuple[float, str]:
@@ -64,6 +66,20 @@ def points(text: str) -> str:
         return f"({numbers}) {found['unit']}"
 
     return _POINT.sub(written, text)
+
+
+def without_shared(names: Sequence[str]) -> list[str]:
+    """Return ``names`` without the first and the last words that all of them have; a point is one word."""
+    words = [[found[0] for found in _WORD.finditer(name)] for name in names]
+    most = min(map(len, words)) - 1
+    first = min(_shared(words), most)
+    last = min(_shared([each[::-1] for each in words]), most - first)
+    return [" ".join(each[first : len(each) - last]) for each in words]
+
+
+def _shared(words: Sequence[list[str]]) -> int:
+    """Return how many first words are the same in all."""
+    return sum(1 for _ in takewhile(lambda each: len(set(each)) == 1, zip(*words, strict=False)))
 
 
 def symbol(coordinate: xr.DataArray) -> str:

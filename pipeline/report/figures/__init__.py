@@ -21,7 +21,7 @@ from pipeline.report.figures.ratio import ratio, ratio_facets
 from pipeline.report.figures.style import STYLE, add_note, save
 from pipeline.report.table import study_of, warnings_of
 from pipeline.report.values import at_peak
-from pipeline.report.words import is_numeric
+from pipeline.report.words import is_numeric, without_shared
 from pipeline.states import FAILED, LOST, PARTIAL, PENDING, SKIPPED
 from pipeline.study.vocabulary import FIGURES
 
@@ -51,6 +51,8 @@ _NEEDS = {
     "nothing": "that no case has a force",
 }
 _LONG_NAME = 34  # letters of a name that a figure shows
+_SHARED = 24  # letters of a value beyond which words that all values share are left out
+_NAMED = ("probe", "body")  # their values are names that a study gives
 
 
 def choose(dataset: xr.Dataset) -> list[str]:
@@ -141,8 +143,10 @@ def _with_short_names(dataset: xr.Dataset) -> xr.Dataset:
     """Return ``dataset`` with names that fit a figure, differ from one another, and are no formulas."""
     plain = {}
     for dim in (dim for dim in swept(dataset) if not is_numeric(dataset[dim])):
-        names = [str(value) for value in dataset[dim].values]
-        short = [_plain(textwrap.shorten(name, _LONG_NAME, placeholder="…")) for name in names]
+        names = own = [str(value) for value in dataset[dim].values]
+        if dim not in _NAMED and max(len(name) for name in names) > _SHARED:
+            own = without_shared(names)
+        short = [_plain(textwrap.shorten(name, _LONG_NAME, placeholder="…")) for name in own]
         if len(set(short)) == len(names) and short != names:
             plain[dim] = (dim, short, dataset[dim].attrs)
     return dataset.assign_coords(plain) if plain else dataset
