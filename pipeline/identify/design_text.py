@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.identify.design import POINTS, USUAL, Design, Widths
 from pipeline.identify.parts import Unknown
-from pipeline.report.identified import engineering, title
+from pipeline.report.identified import engineering, title, words_of_hidden
 from pipeline.report.words import percent
 
 UNSEEN = "not seen"
@@ -32,7 +32,7 @@ def lines(design: Design) -> Iterator[str]:
         f"{POINTS} points of a test to the next."
     )
     if design.may_hide:
-        yield f"hidden: if the body may hide {' or '.join(design.may_hide)}."
+        yield f"hidden: if the body may hide {words_of_hidden(design.may_hide)}."
 
 
 def _cells(design: Design, names: list[str], widths: Widths) -> list[str]:

@@ -1,7 +1,7 @@
 """An identification in words: values with both error bars, what the curves do not tell, and the material to paste."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import floor, isfinite, log10
 
 import numpy as np
@@ -83,7 +83,12 @@ def of_unknown(dataset: xr.Dataset, name: str, *, is_short: bool = False) -> str
 
 def hidden_words(dataset: xr.Dataset) -> str:
     """Return what the second error bar includes."""
-    kinds = [_HIDDEN.get(kind, kind) for kind in str(dataset.attrs.get("may_hide", "")).split()]
+    return words_of_hidden(str(dataset.attrs.get("may_hide", "")).split())
+
+
+def words_of_hidden(may_hide: Sequence[str]) -> str:
+    """Return what a body may hide, by the words of the key ``may_hide``."""
+    kinds = [_HIDDEN.get(kind, kind) for kind in may_hide]
     return " or ".join(filter(None, (", ".join(kinds[:-1]), *kinds[-1:])))
 
 

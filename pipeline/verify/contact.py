@@ -18,7 +18,7 @@ from pipeline.study.read import parse
 from pipeline.verify import known
 from pipeline.verify.compare import against_meridian, solve
 from pipeline.verify.row import Row
-from pipeline.verify.sections import Section
+from pipeline.verify.sections import Section, layers
 
 _YOUNG, _POISSON = 10e3, 0.3
 _ACCURACY = {"2D": "0.1 %", "3D": "0.3 %"}
@@ -29,6 +29,8 @@ _FAR = 20_000
 _FINITE, _FINITE_ERROR = 3.97e-3, 3e-5
 _BALL, _ANGLE = 50.0, 60.0  # mm, degrees
 _LAYERS = (3.0, 1.0, 1 / 3)  # thickness over the radius of contact
+# Thickness (mm), Young's modulus (kPa) and Poisson's ratio, from the top down.
+_STACK = ((0.3, 60.0, 0.45), (0.7, 5.0, 0.3), (0.5, 20.0, 0.48))
 # Relative difference of F between roundings along a circle, as the tool has it, and a parabola.
 _PARABOLA = 1e-4
 # Tools on a body of six contact radii, in three dimensions.
@@ -162,6 +164,20 @@ def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
             record = _solved(comm, "2D", body, {"shape": "sphere", "radius": f"{_BALL} mm"}, depth, nu)
             name = f"layer on a rigid base, sphere, a/h = {1 / thick:.2g}, ν = {nu:g}"
             yield _row(name, "2D", force * _YOUNG / (1 - nu**2), _LAYER_SOURCE, record, 1e-6)
+    if not quick:
+        yield from _stacks(comm, ball)
+
+
+def _stacks(comm: MPI.Comm, ball: Profile) -> Iterator[Row]:
+    """Three layers, of which the first is the stiffest or the softest, as thick together as contact is wide."""
+    for stack in (_STACK, _STACK[::-1]):
+        body = LayeredBody(tuple(Layer(1e3 * young, nu, 1e-3 * thickness) for thickness, young, nu in stack))
+        touched = body.touch(ball, np.array([1e-3]))
+        height = sum(thickness for thickness, *_ in stack)
+        scene = _cylinder(1 + 20 * height, height) | {"layer": layers(stack)}
+        record = _solved(comm, "2D", scene, {"shape": "sphere", "radius": f"{_BALL} mm"}, float(touched.depth[0]))
+        name = f"three layers on a rigid base, sphere, the first of {stack[0][1]:g} kPa"
+        yield _row(name, "2D", body.top.plane * float(touched.force[0]), known.LAYERED, record, 1e-6)
 
 
 def _row(name: str, path: str, force: float, source: str, record: Record, reference_bar: float) -> Row:
