@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 def design(studies: "Sequence[Study]", store: Path, howto: str, *, quiet: bool) -> None:
     """Print for each study which test to make next; its forces are cases in the ``store``."""
     if without := [study for study in studies if not study.identification.sought]:
-        fail(*(Fault(f"{study.file}: has no [identify]: name what is not known", study.file, howto=howto)
-               for study in without))  # fmt: skip
+        what = "has no [identify]: name what is not known"
+        fail(*(Fault(f"{study.file}: {what}", study.file, howto=howto) for study in without))
     found = [_ranked(study, store, quiet=quiet) for study in studies]
     if is_json_wanted():
         print_json({"status": DONE, "studies": found})
@@ -29,6 +29,7 @@ def _ranked(study: "Study", store: Path, *, quiet: bool) -> dict[str, Any]:
     from pipeline.identify.design import rank
     from pipeline.identify.design_text import as_data, lines
     from pipeline.identify.forward import stored_in
+    from pipeline.identify.run import telling
     from pipeline.study.problems import StudyError
     from pipeline.surrogate.cases import SurrogateError
 
@@ -37,7 +38,7 @@ def _ranked(study: "Study", store: Path, *, quiet: bool) -> dict[str, Any]:
             print(f"  {line}", file=sys.stderr, flush=True)
 
     try:
-        found = rank(study, stored_in(store), say)
+        found = rank(study, telling(stored_in(store), say), say)
     except StudyError as wrong:
         fail(*of_study(wrong))
     except SurrogateError as wrong:

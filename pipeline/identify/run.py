@@ -43,7 +43,7 @@ def identification(study: Study, output: Path, store: Path, say: Callable[[str],
             say(f"{curve.name}: {line}")
     for line in doubts_of_scale(study, found):
         say(line)
-    scenes = scenes_of(study, unknowns(study), found, _told(stored_in(store), say))
+    scenes = scenes_of(study, unknowns(study), found, telling(stored_in(store), say))
     doubts = [line for one in found for line in doubts_of_force(scenes.measured(one), unknowns(study))][:_MOST_TOLD]
     if len(found) == 1:
         one = _estimate(study, scenes, found[0])
@@ -76,7 +76,7 @@ def _as_dataset(study: Study, specimen: Specimen, found: Estimate) -> xr.Dataset
     return dataset_of(found, _attributes(study), [curve.time for curve in specimen.curves])
 
 
-def _told(solve: Solve, say: Callable[[str], None]) -> Solve:
+def telling(solve: Solve, say: Callable[[str], None]) -> Solve:
     """Return what solves studies, and says how many cases there were every few seconds."""
     start, count, printed = time.monotonic(), 0, time.monotonic()
 
