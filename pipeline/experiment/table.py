@@ -7,6 +7,7 @@ from io import StringIO
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import is_bool_dtype, is_numeric_dtype
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.experiment.clock import is_clock, seconds
@@ -121,7 +122,7 @@ def _values(
         quoting=csv.QUOTE_NONE,
         decimal=layout.decimal,
         header=None,
-        names=range(layout.width),
+        names=list(range(layout.width)),
         index_col=False,
         skipinitialspace=True,
         skip_blank_lines=False,
@@ -132,8 +133,8 @@ def _values(
     clocks: set[int] = set()
     for number in range(layout.width):
         column = frame[number]
-        if column.dtype in (object, bool):
-            text = column.astype(str).str.strip()
+        if not is_numeric_dtype(column) or is_bool_dtype(column):
+            text = column.map(str).str.strip()
             if is_clock(text.iloc[0]):
                 found[:, number] = seconds(text)
                 clocks.add(number)
