@@ -24,6 +24,7 @@ from pipeline.cli.words import (
     warn,
 )
 from pipeline.files import STORE_NAME, result_files
+from pipeline.launcher import is_first_rank
 from pipeline.printable import printable_lines
 from pipeline.run.remaining import format_seconds
 
@@ -82,10 +83,10 @@ def identify(
     check_machine()
     found = []
     for study in studies:
-        if not is_json_wanted():
+        if not is_json_wanted() and is_first_rank():
             warn(study)
-        found.append(_identify(study, output, path, quiet=quiet or is_json_wanted()))
-    if is_json_wanted():
+        found.append(_identify(study, output, path, quiet=quiet or is_json_wanted() or not is_first_rank()))
+    if is_json_wanted() and is_first_rank():
         print_json({"status": DONE, "studies": found})
 
 
@@ -113,6 +114,7 @@ def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict
     from pipeline.identify.run import identification
     from pipeline.report.figures.identification import draw
     from pipeline.report.identified import answer
+    from pipeline.run.store import StoreError
     from pipeline.study.problems import StudyError
     from pipeline.surrogate.cases import SurrogateError
 
@@ -121,9 +123,13 @@ def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict
         with refusing(ExperimentError, file=study.file, howto=_OF_CURVES):
             dataset = identification(study, output, store, (lambda _: None) if quiet else _tell)
     except StudyError as wrong:
-        fail(*of_study(wrong))
+        fail(*of_study(wrong), on_all_ranks=True)
+    except StoreError as wrong:
+        fail(Fault(str(wrong), file=str(store)), on_all_ranks=True)
     except SurrogateError as wrong:
-        fail(Fault(str(wrong), file=study.file), status=SOME_FAILED)
+        fail(Fault(str(wrong), file=study.file), status=SOME_FAILED, on_all_ranks=True)
+    if not is_first_rank():
+        return {}
     file = output / f"{study.name}.nc"
     write(dataset, file)
     written = [file, *draw(dataset, file.with_suffix(""))]

@@ -20,6 +20,7 @@ from pipeline.cli.words import (
     warn,
 )
 from pipeline.files import STORE_NAME, result_files
+from pipeline.launcher import is_first_rank
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,9 +53,12 @@ def sensitivity(
     files = result_files(output, name)
     check_output(path, *files)
     check_machine()
-    warn(study)
+    if is_first_rank():
+        warn(study)
     start = time.perf_counter()
     dataset = _dataset(study, path)
+    if not is_first_rank():
+        return
     from pipeline.netcdf import write_netcdf
     from pipeline.report.figures.sensitivity import draw
     from pipeline.report.sensitivity import answer
@@ -69,6 +73,7 @@ def sensitivity(
 
 def _dataset(study: "Study", store: Path) -> "xr.Dataset":
     """Return the indices of the study's outputs; exit if they cannot be had."""
+    from pipeline.run.store import StoreError
     from pipeline.study.problems import StudyError
     from pipeline.surrogate.cases import SurrogateError, stored_in
     from pipeline.surrogate.sensitivity import dataset_of, explain
@@ -76,9 +81,11 @@ def _dataset(study: "Study", store: Path) -> "xr.Dataset":
     try:
         return dataset_of(study, explain(study, stored_in(store)))
     except StudyError as wrong:
-        fail(*of_study(wrong))
+        fail(*of_study(wrong), on_all_ranks=True)
+    except StoreError as wrong:
+        fail(Fault(str(wrong), file=str(store)), on_all_ranks=True)
     except SurrogateError as wrong:
-        fail(Fault(str(wrong), file=study.file, howto=_HOWTO), status=SOME_FAILED)
+        fail(Fault(str(wrong), file=study.file, howto=_HOWTO), status=SOME_FAILED, on_all_ranks=True)
 
 
 def _as_data(dataset: "xr.Dataset") -> dict[str, object]:
