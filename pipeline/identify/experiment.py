@@ -66,15 +66,19 @@ def specimens(study: Study) -> tuple[Specimen, ...]:
     )
 
 
-def scenes_of(study: Study, unknowns: Sequence[Unknown], found: Sequence[Specimen], solve: Solve) -> Scenes:
+def scenes_of(
+    study: Study, unknowns: Sequence[Unknown], found: Sequence[Specimen], solve: Solve, times: float = 1.0
+) -> Scenes:
     """Return the forces of all scenes of a study; ``solve`` runs their cases.
+
+    They are computed down to a depth that curves usually do not go beyond, or ``times`` that.
 
     Raises:
         StudyError: if a scene cannot be run.
         SurrogateError: if a case that a force needs has none.
     """
     scenes = [scene_of(study, measurement) for measurement in study.measurements]
-    deepest = [_deepest([one.curves[number] for one in found]) for number in range(len(scenes))]
+    deepest = [_deepest([one.curves[number] for one in found], times) for number in range(len(scenes))]
     made: dict[str, Forward] = {}
     for scene in scenes:
         most = max(depth for other, depth in zip(scenes, deepest, strict=True) if other.text == scene.text)
@@ -86,9 +90,9 @@ def scenes_of(study: Study, unknowns: Sequence[Unknown], found: Sequence[Specime
     return Scenes(study.measurements, tuple(made[scene.text] for scene in scenes), tuple(hidden))
 
 
-def _deepest(curves: Sequence[Curve]) -> float:
+def _deepest(curves: Sequence[Curve], times: float) -> float:
     """Return the depth (m) that no curve goes beyond, with two digits: the same for curves that are nearly the same."""
-    most = max(map(_depth_of, curves))
+    most = times * max(map(_depth_of, curves))
     digit = 10.0 ** (floor(log10(most)) - 1)
     return ceil(most / digit) * digit
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from pipeline.arrays import FloatArray
 from pipeline.experiment.curve import Curve
+from pipeline.experiment.reading import ExperimentError
 from pipeline.study.identified import FITS
 
 Values = Mapping[str, float]
@@ -71,6 +72,10 @@ class Hidden(Protocol):
     def factor(self, depth: FloatArray, values: Values) -> FloatArray:
         """Return the factor (n,) of the force at depths (m) of the tool below the surface."""
         ...
+
+
+class TooDeepError(ExperimentError):
+    """A fit is deeper than the force of its scene is known for."""
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,13 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.advice import advice
 from pipeline.identify.dataset import dataset_of, joined
 from pipeline.identify.doubts import doubts_of_force, doubts_of_moduli, doubts_of_scale
@@ -15,14 +17,17 @@ from pipeline.identify.estimate import identify
 from pipeline.identify.experiment import Scenes, Specimen, scenes_of, specimens
 from pipeline.identify.forward import stored_in
 from pipeline.identify.kept import Kept
-from pipeline.identify.parts import Estimate
+from pipeline.identify.parts import Estimate, TooDeepError
 from pipeline.identify.unknowns import unknowns
 from pipeline.run.provenance import provenance
+from pipeline.study.problems import StudyError
 from pipeline.study.sweep import Study
 from pipeline.surrogate.cases import Solve
 
 # Seconds between two lines of progress.
 _SILENCE = 10.0
+# Depths that forces are computed for, in turn, as multiples of what is enough if there is air before the contact.
+_DEEPER = (1.0, 1.6, 2.5)
 # Doubts about files of a folder beyond these are like those.
 _MOST_TOLD = 5
 
@@ -43,8 +48,9 @@ def identification(study: Study, output: Path, store: Path, say: Callable[[str],
             say(f"{curve.name}: {line}")
     for line in doubts_of_scale(study, found):
         say(line)
-    scenes = scenes_of(study, unknowns(study), found, telling(stored_in(store), say))
-    doubts = [line for one in found for line in doubts_of_force(scenes.measured(one), unknowns(study))][:_MOST_TOLD]
+    solve, sought = telling(stored_in(store), say), unknowns(study)
+    scenes = cache(lambda times: scenes_of(study, sought, found, solve, times))
+    doubts = [line for one in found for line in doubts_of_force(scenes(1.0).measured(one), sought)][:_MOST_TOLD]
     if len(found) == 1:
         one = _estimate(study, scenes, found[0])
         advised = replace(one, told=(*one.told, *advice(study, one)))
@@ -68,8 +74,24 @@ def _doubted(dataset: xr.Dataset, doubts: list[str]) -> xr.Dataset:
     return dataset.assign_attrs({"told": "\n".join(lines)} if lines else {})
 
 
-def _estimate(study: Study, scenes: Scenes, specimen: Specimen) -> Estimate:
-    return identify(scenes.measured(specimen), unknowns(study))
+def _estimate(study: Study, scenes: Callable[[float], Scenes], specimen: Specimen) -> Estimate:
+    """Return what a specimen's curves say; ``scenes`` has forces down to a multiple of the usual depth.
+
+    Raises:
+        ExperimentError: if the fit is deeper than any of these.
+    """
+    why = ""
+    for times in _DEEPER:
+        try:
+            return identify(scenes(times).measured(specimen), unknowns(study))
+        except TooDeepError as error:
+            why = error.why
+        except StudyError as error:  # such as a ball deeper than its radius
+            if not why:
+                raise
+            why = f"{why}, and cannot be: {error.problems[0]}"
+            break
+    raise ExperimentError(specimen.name, f"{why}: record air before the contact, or give a `window` that ends earlier")
 
 
 def _as_dataset(study: Study, specimen: Specimen, found: Estimate) -> xr.Dataset:

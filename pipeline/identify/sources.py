@@ -3,12 +3,11 @@
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.bars import interval
 from pipeline.identify.fit import Fit, Mixture
 from pipeline.identify.model import OF_CURVE
 from pipeline.identify.noise import GRID, whiten
-from pipeline.identify.parts import SOURCES
+from pipeline.identify.parts import SOURCES, TooDeepError
 
 
 def shares(found: Fit) -> FloatArray:
@@ -47,7 +46,7 @@ def mesh(found: Fit) -> FloatArray:
     """Return half widths (u,), in coordinates, by the errors of the forward models, of one sign over each curve.
 
     Raises:
-        ExperimentError: if a curve is fitted at depths for which its force is not known.
+        TooDeepError: if a curve is fitted at depths for which its force is not known.
     """
     top = found.mixture.covariance[int(np.argmax(found.mixture.weight))]
     model, values = found.model, found.model.space.values(found.x)
@@ -59,7 +58,7 @@ def mesh(found: Fit) -> FloatArray:
         error = measured.forward.error(depth, values)
         if not np.isfinite(error).all():
             name, deepest = measured.curve.name, 1e3 * float(depth.max())
-            raise ExperimentError(name, f"the fit is {deepest:.4g} mm deep, for which the force is not computed")
+            raise TooDeepError(name, f"the fit is {deepest:.4g} mm deep, for which the force is not computed")
         wrong = contact * error
         share = contact / np.maximum(np.abs(contact).max(), np.finfo(float).tiny)
         columns = model.thinned(np.column_stack([found.jacobian[number], wrong]))

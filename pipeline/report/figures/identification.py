@@ -19,6 +19,7 @@ _WIDTH, _CURVES, _RESIDUALS, _PROFILES, _BESIDE = 7.6, 2.4, 1.2, 1.9, 1.4  # inc
 _MOST_CURVES, _MOST_PROFILES = 3, 4
 _MEASURED, _FIT, _HIDDEN = COLOURS[1], COLOURS[4], COLOURS[3]
 _MOST_POINTS = 400
+_LINES = 300  # points of lines beside one another that fill a figure
 _HELD = 0.02  # share of the depth within which a tool is held
 _NORMAL = 3.84  # fall of the likelihood at the ends of a 95 % interval
 _HIGHEST = 6.0
@@ -159,6 +160,7 @@ def _of_files(dataset: xr.Dataset, name: str) -> Figure:
     fits = (dataset["verdict"] == FITS).values
     order = np.argsort(dataset["estimate"].sel(unknown=shown[0]).values)
     place = np.arange(1, len(order) + 1)
+    thick = float(np.clip(_LINES / len(order), 0.8, 2.5))
     for ax, unknown in zip(axes, shown, strict=True):
         one = dataset.sel(unknown=unknown).isel(file=order)
         good = fits[order]
@@ -166,8 +168,8 @@ def _of_files(dataset: xr.Dataset, name: str) -> Figure:
         factor = _factor(one["estimate"].values, str(one["unit"].values))
         for end, colour in (("_hidden", _HIDDEN), ("", _MEASURED)):
             low, high = (factor * one[f"{side}{end}"].values for side in ("low", "high"))
-            ax.vlines(place[good], low[good], high[good], color=colour, linewidth=1.5 if end else 2.5)
-        ax.plot(place[good], values[good], ".", color=LINE)
+            ax.vlines(place[good], low[good], high[good], color=colour, linewidth=thick * (0.6 if end else 1.0))
+        ax.plot(place[good], values[good], ".", color=LINE, markersize=1.2 * thick)
         ax.plot(place[~good], values[~good], "x", color=FAILED)
         ax.set_ylabel(f"{title(unknown)}{f', {unit}' if unit else ''}")
     axes[-1].set_xlabel(f"files, in the order of {title(shown[0])}")
