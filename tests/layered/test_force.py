@@ -121,3 +121,29 @@ def test_a_point_load_moves_a_half_space_everywhere_and_a_layer_near_it():
     near, far = (on_rigid(0.4, 1e-2).point_load(distance) for distance in (1e-4, 5e-2))
     assert near == pytest.approx(0.99 * (1 - 0.4**2) / (pi * E * 1e-4), rel=0.01)
     assert abs(far) < 1e-2 * (1 - 0.4**2) / (pi * E * 5e-2)
+
+
+def test_any_tool_on_any_layers_has_a_force_that_grows_ever_faster_and_has_no_scale():
+    """Moduli over six decades, layers from a tenth to thirty radii, depths from 1e-4 to 0.5 radii."""
+    rng = np.random.default_rng(5)
+    for number in range(15):
+        young, share = 10 ** rng.uniform(2, 8, 4), 10 ** rng.uniform(-1, 1.5, 4)
+        poisson = rng.choice([0.0, 0.3, 0.45, 0.5], 4)
+        depth, count = np.linspace(0, 10 ** rng.uniform(-4, -0.3), 101), rng.integers(1, 4)
+        forces = []
+        for radius, modulus in ((1.0, 1.0), (1e-7, 1e3)):
+            layers = tuple(
+                Layer(modulus * one, nu, radius * part)
+                for one, nu, part in zip(young[:count], poisson[:count], share[:count], strict=True)
+            )
+            body = LayeredBody(layers, Solid(modulus * young[-1], 0.3))
+            rounded = Rounded(0.0, 0.2 * radius, flat=0.8 * radius)
+            tools = (
+                Profile(Rounded(0.0, radius).slope, limit=radius),
+                flat(radius),
+                Profile(rounded.slope, limit=radius, flat=0.8 * radius),
+            )
+            forces.append(body.force(tools[number % 3], radius * depth) / (modulus * radius**2))
+        assert np.all(np.diff(forces[0]) > 0)
+        assert np.diff(forces[0], 2).min() > -1e-5 * forces[0][-1]
+        assert forces[1] == pytest.approx(forces[0], rel=1e-9)
