@@ -25,7 +25,7 @@ from pipeline.cli.words import (
 )
 from pipeline.files import STORE_NAME, result_files
 from pipeline.launcher import is_first_rank
-from pipeline.printable import printable_lines
+from pipeline.printable import printable, printable_lines
 from pipeline.run.remaining import format_seconds
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict
 
 
 def _tell(line: str) -> None:
-    print(f"  {line}", file=sys.stderr, flush=True)
+    print(f"  {printable(line)}", file=sys.stderr, flush=True)
 
 
 def _print(study: "Study", dataset: "xr.Dataset", file: Path) -> None:

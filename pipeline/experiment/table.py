@@ -18,6 +18,8 @@ from pipeline.experiment.reading import ExperimentError
 
 # Lines of other widths among the rows, beyond which a file is more than one table.
 _MOST_ODD = 0.05
+# Letters of a text among numbers that a message repeats.
+_QUOTED = 40
 # Rows one after the other that are a table.
 _ROWS = 4
 # The separator of fields that ASCII has: no text has it.
@@ -146,7 +148,7 @@ def _values(
                 wrong |= text.str.contains(".", regex=False) & column.notna()
             if wrong.any():
                 first = int(np.argmax(wrong.to_numpy()))
-                strange[number] = (int(lines[first]), str(text.iloc[first]))
+                strange[number] = (int(lines[first]), str(text.iloc[first])[:_QUOTED])
             column = numbers
         found[:, number] = column.to_numpy(float)
     found[~np.isfinite(found)] = np.nan

@@ -132,6 +132,10 @@ def test_a_curve_without_a_study_is_described(folder, epsmesh):
     assert '[[measurement]]\nname = "gel_8"' in result.stdout
     assert "[[measurement]]" in json.loads(epsmesh("identify", path, "--json").stdout)["curves"][str(path)]
     assert epsmesh("identify", path, folder / "punch.toml").exit_code == 2
+    (folder / "evil.csv").write_text(path.read_text().replace("force", "\x1b]0;x\x07force"))
+    assert "\x1b" not in epsmesh("identify", folder / "evil.csv").output
+    (folder / "evil.toml").write_text(STUDY.format(file="evil.csv", may_hide="[]"))
+    assert "\x1b" not in epsmesh("identify", folder / "evil.toml", "--output", folder / "results").output
     (folder / "letter.txt").write_text("Dear all,\n")
     result = epsmesh("identify", folder / "letter.txt")
     assert (result.exit_code, "no table of numbers" in result.stderr) == (2, True)
