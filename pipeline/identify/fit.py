@@ -21,7 +21,7 @@ _BENT = 1.0
 # Steps to the standard deviation of the noise, a fixed point.
 _SCALES = 4
 # Sweeps until the middle of all hypotheses moves by less than this share of their spread.
-_SWEEPS, _CLOSE = 12, 0.03
+_SWEEPS, _CLOSE = 12, 0.1
 # Hypotheses of several curves are drawn this often, and those of one curve kept from this weight on.
 _DRAWS, _LIGHT = 128, 1e-4
 

@@ -16,7 +16,7 @@ from pipeline.identify.parts import Profile
 _MOST, _OF_RANGE, _OF_SPREAD, _GROWTH = 24, 0.08, 0.6, 1.3
 # Gauss-Newton steps at each point, which begins where its neighbour ended; halvings of a step that is too long.
 _NEWTON, _HALVINGS = 6, 5
-_CLOSE = 1e-3
+_CLOSE = 1e-2
 
 
 @dataclass(frozen=True)
