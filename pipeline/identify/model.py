@@ -26,7 +26,7 @@ ALWAYS = ("contact_point", "baseline")
 _STEP = 1e-6
 # Longer curves are averaged over blocks of neighbours: their noise is then correlated and white noise as before.
 LONGEST = 1500
-# Newton steps to the force that bends the machine: from the measured force, one leaves an error of the square of the noise.
+# Newton steps from the measured force to the one that bends the machine: one leaves the square of the noise.
 _NEWTON = 1
 
 
