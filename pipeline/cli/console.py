@@ -8,6 +8,7 @@ from io import TextIOWrapper
 from math import inf, isfinite
 from typing import Any, TextIO
 
+from pipeline.launcher import is_first_rank
 from pipeline.printable import printable_json, printable_lines
 
 # For the running command: whether the user wants JSON, and whether any was printed.
@@ -49,7 +50,9 @@ def print_json(value: Any) -> None:
 
 
 def say(data: Any, *lines: str) -> None:
-    """Print a command's result: ``data`` as JSON with --json, else ``lines``."""
+    """Print a command's result on the first rank: ``data`` as JSON with --json, else ``lines``."""
+    if not is_first_rank():
+        return
     if is_json_wanted():
         print_json(data)
     elif lines:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from pipeline.cli.console import is_json_wanted, print_json
+from pipeline.cli.console import is_json_wanted, say
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_study
+from pipeline.launcher import is_first_rank
 
 if TYPE_CHECKING:
     from pipeline.study.sweep import Study
@@ -21,7 +22,7 @@ def design(studies: "Sequence[Study]", store: Path, howto: str, *, quiet: bool) 
         fail(*(Fault(f"{study.file}: {what}", study.file, howto=howto) for study in without))
     found = [_ranked(study, store, quiet=quiet) for study in studies]
     if is_json_wanted():
-        print_json({"status": DONE, "studies": found})
+        say({"status": DONE, "studies": found})
     raise typer.Exit(DONE)
 
 
@@ -33,17 +34,16 @@ def _ranked(study: "Study", store: Path, *, quiet: bool) -> dict[str, Any]:
     from pipeline.study.problems import StudyError
     from pipeline.surrogate.cases import SurrogateError
 
-    def say(line: str) -> None:
-        if not quiet:
+    def tell(line: str) -> None:
+        if not quiet and is_first_rank():
             print(f"  {line}", file=sys.stderr, flush=True)
 
     try:
-        found = rank(study, telling(stored_in(store), say), say)
+        found = rank(study, telling(stored_in(store), tell), tell)
     except StudyError as wrong:
         fail(*of_study(wrong))
     except SurrogateError as wrong:
         fail(Fault(str(wrong), file=study.file), status=SOME_FAILED)
     if not is_json_wanted():
-        print(study.title)
-        print("\n".join(f"  {line}" for line in lines(found)))
+        say({}, study.title, *(f"  {line}" for line in lines(found)))
     return {"study": study.file, **as_data(found)}

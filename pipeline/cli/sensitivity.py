@@ -63,8 +63,10 @@ def sensitivity(
     from pipeline.report.figures.sensitivity import draw
     from pipeline.report.sensitivity import answer
 
-    write_netcdf(dataset, files[0], "NETCDF4")
-    written = [files[0], *draw(dataset, output / name)]
+    written = [files[0]]
+    if is_first_rank():
+        write_netcdf(dataset, files[0], "NETCDF4")
+        written += draw(dataset, output / name)
     seconds = time.perf_counter() - start
     lines = [] if quiet else answer(dataset)
     wrote = f"{study.file}: wrote {', '.join(map(str, written))}; {seconds:.3g} s"

@@ -31,7 +31,8 @@ def cut(found: Fit) -> tuple[str, ...]:
         ends = [end for end, is_cut in ((unknown.low, low < 0), (unknown.high, high > 1)) if is_cut]
         if len(ends) == 1:
             where = engineering(ends[0], unknown.unit)
-            told.append(f"The error bar of {title(unknown.name)} ends where its range does, at {where}.")
+            text = f"The error bar of {title(unknown.name)} ends where its range does, at {where}"
+            told.append(f"{text}{'' if unknown.is_wanted else ': all bars may be too small, widen it in [identify]'}.")
     return tuple(told)
 
 

@@ -19,6 +19,7 @@ from pipeline.identify.forward import stored_in
 from pipeline.identify.kept import Kept
 from pipeline.identify.parts import Estimate, TooDeepError
 from pipeline.identify.unknowns import unknowns
+from pipeline.printable import counted
 from pipeline.run.provenance import provenance
 from pipeline.study.problems import StudyError
 from pipeline.study.sweep import Study
@@ -108,7 +109,7 @@ def telling(solve: Solve, say: Callable[[str], None]) -> Solve:
         count += len(study)
         if time.monotonic() - printed > _SILENCE:
             printed = time.monotonic()
-            say(f"forces over the ranges of the unknowns: {count} cases so far, {printed - start:.0f} s")
+            say(f"forces over the ranges of the unknowns: {counted(count, 'case')} so far, {printed - start:.0f} s")
         return dataset
 
     return told

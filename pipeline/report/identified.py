@@ -10,7 +10,7 @@ import xarray as xr
 from pipeline.printable import counted
 from pipeline.quantities import quantity_of
 from pipeline.report.words import percent
-from pipeline.study.identified import FITS
+from pipeline.study.identified import FITS, is_of_test
 
 # What a body may hide, in words.
 _HIDDEN = {"layer": "a layer", "base": "a stiff base", "strain": "stiffening with strain"}
@@ -157,24 +157,36 @@ def engineering(value: float, unit: str, digits: int = 3) -> str:
     power = 3 * floor(log10(abs(float(f"{value:.{digits}g}"))) / 3) if value else 0
     power = max(min(power, max(_PREFIXES)), min(_PREFIXES))
     scaled = f"{value / 10.0**power:#.{digits}g}".rstrip(".")
+    if "e" in scaled:
+        scaled = f"{float(scaled):.0f}"
     return f"{scaled} {_PREFIXES[power]}{unit}"
 
 
 def material(dataset: xr.Dataset) -> str:
-    """Return what was found as lines of a study file; "" if there is no one material."""
+    """Return what was found of the tissue as lines of a study file; "" if there is no one material.
+
+    Lines of layers and inclusions belong into their tables, which are named above them.
+    """
     if "file" in dataset.dims or dataset.attrs["verdict"] != FITS:
         return ""
     lines: dict[str, list[str]] = {"[material]": []}
+    terms: dict[str, list[str]] = {}
     for name in wanted(dataset):
         owner, _, key = name.rpartition("_")
-        if not bool(dataset["seen"].sel(unknown=name)) or owner.startswith("relaxation"):
+        if not bool(dataset["seen"].sel(unknown=name)) or is_of_test(name):
             continue
         value = written(dataset, name, float(dataset["estimate"].sel(unknown=name)), 4)
-        text = value if _is_absolute(name) else json.dumps(value, ensure_ascii=False)
+        text = json.dumps(value, ensure_ascii=False) if str(dataset["unit"].sel(unknown=name).values) != "1" else value
+        if owner.startswith("relaxation_"):
+            terms.setdefault(key, []).append(f"{owner.removeprefix('relaxation_')} = {text}")
+            continue
         second = bar(dataset, name, hidden=True)
         comment = f"{bar(dataset, name)}{f'; {second} with what it may hide' if second else ''}"
-        heading = f"[[body.layer]]  # {owner}" if owner else "[material]"
+        heading = f'# in the table of "{owner}":' if owner else "[material]"
         lines.setdefault(heading, []).append(f"{key} = {text}  # {comment}")
+    if terms:
+        own = ", ".join(f"{{ {', '.join(terms[key])} }}" for key in sorted(terms))
+        lines["[material]"].append(f"relaxation = [{own}]")
     return "\n".join("\n".join((heading, *rows)) for heading, rows in lines.items() if rows)
 
 

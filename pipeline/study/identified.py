@@ -11,8 +11,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_validator
 
+from pipeline.arrays import FloatArray
 from pipeline.shapes.section import Words
 from pipeline.study.problems import Problems, StudyError, tuples
 from pipeline.study.text import toml_of
@@ -118,6 +120,8 @@ def _filled(raw: dict[str, Any], material: dict[str, Any], found: Identified, pr
             allowed = f"must be {json.dumps(found.known[key])}, with which {found.file} was found, or left out"
             problems.error(f"material.{key}", own[key], allowed)
     filled = raw | {"material": found.known | own | new}
+    if not filled["material"]:  # layers have all that was found
+        del filled["material"]
     if body := raw.get("body"):
         filled["body"] = [_body(b, found.values) for b in body] if isinstance(body, list) else _body(body, found.values)
     return filled
@@ -204,11 +208,13 @@ def _table(path: str, dataset: "xr.Dataset") -> dict[str, Any]:
     Raises:
         _UnusableError: if a parameter is not in the curves.
     """
-    tissue = [name for name in map(str, dataset["unknown"].values) if not _is_of_test(name)]
-    if "young" not in tissue:
+    tissue = [name for name in map(str, dataset["unknown"].values) if not is_of_test(name)]
+    if not any(name == "young" or name.endswith("_young") for name in tissue):
         raise _UnusableError("has no `young`: identify it")
     own = dataset.sel(unknown=tissue, unknown_2=tissue)
-    if unseen := [name for name in tissue if not bool(own["seen"].sel(unknown=name))]:
+    # What was known beforehand and only widens the bars of others need not be in the curves.
+    sought = own["seen"].where(own["wanted"] == 1, 1) if "wanted" in own else own["seen"]
+    if unseen := [name for name in tissue if not bool(sought.sel(unknown=name))]:
         what = f"{', '.join(unseen)} cannot be told from its curves: "
         raise _UnusableError(f"{what}give a value in the study of the identification, or add a curve that tells it")
     ends = {end: own.get(f"{end}_hidden", own[end]) for end in ("low", "high")}
@@ -223,11 +229,22 @@ def _table(path: str, dataset: "xr.Dataset") -> dict[str, Any]:
         "unknown": tissue,
         "estimate": own["estimate"].values.tolist(),
         **{end: values.values.tolist() for end, values in ends.items()},
-        "correlation": own["correlation"].values.tolist(),
+        "correlation": _correlation(own, ends).tolist(),
     } | ({"known": known} if known else {})
 
 
-def _is_of_test(name: str) -> bool:
+def _correlation(own: "xr.Dataset", wider: "Mapping[str, xr.DataArray]") -> FloatArray:
+    """Return the correlation (u, u) of errors that are within the wider bars.
+
+    That of the dataset is of the narrower ones. What a body may hide moves each parameter on its own, as far as known.
+    """
+    share = ((own["high"] - own["low"]) / (wider["high"] - wider["low"])).clip(0, 1).fillna(1).values
+    found = own["correlation"].values * np.outer(share, share)
+    np.fill_diagonal(found, 1.0)
+    return np.asarray(found)
+
+
+def is_of_test(name: str) -> bool:
     """Return whether an unknown belongs to the experiment or its specimen, not to the tissue."""
     return name in ("friction", "radius", "thickness") or name.startswith(_OF_TEST)
 
