@@ -16,7 +16,7 @@ from pipeline.study.parameters import DEPTH, Parameter
 from pipeline.study.problems import Problem, StudyError
 from pipeline.study.sweep import Study
 from pipeline.surrogate.depths import Depths
-from pipeline.surrogate.derived import FORCE, IN_SPACE, ON_MERIDIAN, Output, derive, has_mesh, in_order
+from pipeline.surrogate.derived import FORCE, IN_SPACE, ON_MERIDIAN, Output, derive, has_mesh, in_order, path_of
 from pipeline.surrogate.moduli import Bounds, Reference, ranges_of, reference_of
 from pipeline.surrogate.ranges import Range, trend_of
 from pipeline.surrogate.sparse import Block, points_of
@@ -86,6 +86,7 @@ def domain_of(
         StudyError: if the study cannot be run, or its forces are not proportional to its moduli.
     """
     reference = reference_of(scene, bounds)
+    _check_swept(scene, reference)
     found = Domain(scene, ranges_of(scene, bounds, reference), reference, deepest, shallowest=shallowest, output=output)
     found = found if has_mesh(scene) else replace(found, accuracy=ON_MERIDIAN)
     study = found.study([one.value(np.zeros(1)) for one in found.ranges], np.array([deepest]))
@@ -100,6 +101,15 @@ def domain_of(
         return replace(found, exponent=0.0)
     exponent = (case.probe.force_exponent if case.probe.is_unilateral else None) or 1.0
     return replace(found, exponent=exponent, is_proportional=case.moves_in_proportion == ("depth",))
+
+
+def _check_swept(scene: Study, reference: Reference) -> None:
+    """Raise an exception if the modulus of reference is a list: it is known, and its first value is no other."""
+    path = path_of(reference.parameter)
+    for axis in scene.axes:
+        if reference.is_known and axis.path == path:
+            allowed = f"is a list of {len(axis)}: one value is needed, or a range of `{reference.name}`"
+            raise StudyError(scene.file, [Problem(path, None, allowed)])
 
 
 def stored_in(store: Path, comm: "MPI.Comm | None" = None) -> Solve:
@@ -131,6 +141,8 @@ class Cases:
         value = in_order(study, domain.order, dataset[name]).reshape(-1, len(depth))
         if (error := f"{name}_error") in dataset:
             bar = in_order(study, domain.order, dataset[error]).reshape(-1, len(depth))
+            if np.isnan(bar).any():
+                raise SurrogateError(f"{study.file}: a case has no {error}, so that the surrogate would have none")
             self.bars += (bar / value).ravel().tolist()
         unit = domain.reference.young if domain.output.is_proportional else 1.0
         return np.asarray(np.log(value / (unit * depths.power(depth))) - trend_of(domain.ranges, points_of(block)))

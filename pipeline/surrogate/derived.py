@@ -67,7 +67,7 @@ def derive(scene: Study, values: Mapping[Parameter, Sequence[float]], accuracy: 
     for parameter, found in values.items():
         raw = placed(raw, [(_sweep(parameter.place), [_written(raw, parameter, value) for value in found])])
     study = parse(raw, file=scene.file, text=to_toml(raw, scene.file))
-    own = {_path(parameter) for parameter in values}
+    own = {path_of(parameter) for parameter in values}
     if swept := [axis for axis in study.axes if axis.path not in own]:
         problems = [Problem(axis.path, None, f"is a list of {len(axis)}: one value is needed") for axis in swept]
         raise StudyError(scene.file, problems)
@@ -77,7 +77,7 @@ def derive(scene: Study, values: Mapping[Parameter, Sequence[float]], accuracy: 
 def in_order(study: Study, order: Sequence[Parameter], values: Any) -> FloatArray:
     """Return an array of a dataset (xarray) with the dimensions of parameters in their order."""
     names = {axis.path: axis.name for axis in study.axes}
-    return np.asarray(values.transpose(*(names[_path(parameter)] for parameter in order)), dtype=float)
+    return np.asarray(values.transpose(*(names[path_of(parameter)] for parameter in order)), dtype=float)
 
 
 def _elastic(raw: Mapping[str, Any]) -> dict[str, Any]:
@@ -95,7 +95,7 @@ def _sweep(place: Place) -> Place:
     return place[:-1] if isinstance(place[-1], int) else place
 
 
-def _path(parameter: Parameter) -> str:
+def path_of(parameter: Parameter) -> str:
     """Return a parameter's place as the axes of studies have it."""
     section, *rest = _sweep(parameter.place)
     return f"{section}.{written(tuple(rest))}"

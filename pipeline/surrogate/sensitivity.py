@@ -16,7 +16,7 @@ from pipeline.study.parameters import DEPTH
 from pipeline.study.problems import Problem, StudyError
 from pipeline.study.sweep import Study
 from pipeline.surrogate.build import surrogate
-from pipeline.surrogate.cases import Domain, Solve, domain_of
+from pipeline.surrogate.cases import Domain, Solve, SurrogateError, domain_of
 from pipeline.surrogate.derived import FORCE, Output
 from pipeline.surrogate.sobol import Indices, sobol
 from pipeline.surrogate.table import Table
@@ -39,6 +39,8 @@ _WORDS = {
     "unit": "unit of the parameter",
     "output_unit": "unit of the output",
 }
+# Relative differences of an output that are round-off.
+_ALIKE = 1e-9
 _SHARES = ("first", "first_error", "total", "total_error", "deviation", "surrogate_error", "cases")
 
 
@@ -88,6 +90,10 @@ def _explained(study: Study, output: Output, solve: Solve) -> Explained:
         values = {one.parameter.name: _quantiles(one, x) for one, x in zip(varied, points.T, strict=True)}
         return table.sampled(values, values.pop(DEPTH.name, np.full(len(points), domain.deepest)))
 
+    ends = function(np.array([[0.0] * len(varied), [0.5] * len(varied), [1.0] * len(varied)]))
+    if np.ptp(ends) <= _ALIKE * abs(ends[0]):
+        names = ", ".join(one.parameter.name for one in varied)
+        raise SurrogateError(f"{study.file}: {output.name} depends on none of {names}")
     return Explained(output.name, sobol(function, len(varied), table.interpolation + table.mesh), table)
 
 

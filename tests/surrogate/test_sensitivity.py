@@ -4,9 +4,11 @@ import json
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_mapping
+from pipeline.surrogate.cases import SurrogateError
 from pipeline.surrogate.sensitivity import dataset_of, explain
 from pipeline.surrogate.sobol import sobol
 from tests.surrogate.scenes import BALL, PUNCH, hertz, solved_by
@@ -96,12 +98,38 @@ def test_outputs_that_are_no_force_do_not_depend_on_the_modulus():
             {"sensitivity": {"poisson": [0, 0.5]}, "probe": PUNCH["probe"] | {"depth": ["1 mm", "2 mm"]}},
             r"probe\.depth: is a list of 2",
         ),
+        (
+            {"sensitivity": {"poisson": [0, 0.5]}, "material": {"young": ["1 kPa", "2 kPa"], "poisson": 0.3}},
+            r"material\.young: is a list of 2: one value is needed, or a range of `young`",
+        ),
     ],
-    ids=["none", "name", "order", "experiment", "output", "empty", "depths"],
+    ids=["none", "name", "order", "experiment", "output", "empty", "depths", "young"],
 )
 def test_mistakes_are_told_by_their_key(section, message):
     with pytest.raises(StudyError, match=message):
         explain(read_mapping(PUNCH | section, "punch"), solved_by(_punch))
+
+
+def test_one_parameter_makes_all_of_the_spread():
+    study = read_mapping(PUNCH | {"sensitivity": {"poisson": [0.0, 0.5]}}, "punch")
+    (found,) = explain(study, solved_by(_punch))
+    assert found.indices.first == pytest.approx(1, abs=0.01) and found.indices.total == pytest.approx(1, abs=0.01)
+
+
+def test_an_output_that_no_parameter_changes_is_told():
+    def solve(study):
+        dataset = solved_by(hertz)(study)
+        return dataset.assign(contact_area=xr.ones_like(dataset["force"]))
+
+    varied = {"young": ["5 kPa", "20 kPa"], "outputs": ["contact_area"]}
+    with pytest.raises(SurrogateError, match="contact_area depends on none of young"):
+        explain(read_mapping(BALL | {"sensitivity": varied}, "ball"), solve)
+
+
+def test_a_case_without_an_error_bar_is_told():
+    study = read_mapping(BALL | {"sensitivity": {"friction": [0.0, 0.5]}}, "ball")
+    with pytest.raises(SurrogateError, match="a case has no force_error"):
+        explain(study, solved_by(hertz, bar=np.nan))
 
 
 def test_the_command_writes_a_dataset_and_a_figure_and_tells_what_matters_most(epsmesh, tmp_path):
