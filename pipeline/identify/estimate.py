@@ -30,6 +30,8 @@ MISFIT = 1.2
 _BLIND = 0.75
 # Unknowns that are far from normal whatever the fit says.
 _CURVED = ("poisson", "relaxation_")
+# Profiles are scaled so that they are this high at the ends of a bar: twice the fall of a normal likelihood.
+_AT_BAR = 3.84
 # A curve has at least so many points.
 _FEWEST = 10
 _WINDOWS = (0.25, 0.5, 1.0)
@@ -116,7 +118,7 @@ def _bars(found: Fit) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, Pro
         low[place], high[place] = ends(curve, threshold)
         x[place] = best
         values = np.array([float(model.space.value(place, at)) for at in curve.value])
-        profiles[model.names[place]] = Profile(values, curve.fall * float(student**2) / threshold)
+        profiles[model.names[place]] = Profile(values, curve.fall * _AT_BAR / threshold)
     return x, low, high, profiles
 
 

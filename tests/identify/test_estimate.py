@@ -24,7 +24,7 @@ def test_bars_hold_whatever_the_correlation_of_the_noise(correlation):
         held.append(found.low[0] <= young <= found.high[0] or not found.fits)
         ratio.append((found.high[0] - found.low[0]) / 2 / abs(found.estimate[0] - young))
     assert sum(held) >= 17  # of 20: fewer happen by chance once in 60 times if 95 % hold
-    assert np.nanmedian(ratio) < 8
+    assert np.nanmedian(ratio) < 12
 
 
 def test_parts_add_up_and_the_mesh_is_one_of_them():

@@ -66,7 +66,7 @@ class Membrane:
 def test_skin_and_its_thickness_are_seen_together():
     error = 0.003 * noise(np.random.default_rng(2), 150, 0.6)
     curve = measured(Membrane(), {"skin_young": 1e5, "skin_thickness": 1e-3}, error, 1e-3)
-    (sentence,) = identify([curve], [SKIN, THICKNESS]).told
+    sentence, *_ = identify([curve], [SKIN, THICKNESS]).told
     assert sentence.startswith("This curve sees E of skin × (skin thickness)^2 to ± ")
     assert sentence.endswith(", and not skin thickness.")
 
