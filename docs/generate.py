@@ -8,6 +8,7 @@ from typing import Any
 import typer
 
 from pipeline.cli import app
+from pipeline.identify.dataset import WORDS
 from pipeline.plan.plan import make_plan
 from pipeline.quantities import RUN, attributes
 from pipeline.report.dataset import build
@@ -116,7 +117,7 @@ def features_page() -> str:
 
 def dataset_page() -> str:
     """Return the page of every variable of a dataset."""
-    of_files = ("surface_deviation", "body_message")
+    of_files = ("surface_deviation", "body_message", "force_uncertainty")
     found: dict[str, dict[str, Any]] = {name: attributes(name) for name in of_files}
     for changes in _VARIANTS:
         study = tomllib.loads(starter("study"))
@@ -152,6 +153,9 @@ def dataset_page() -> str:
         for name in names:
             unit = found[name].get("units", _WITHOUT_UNIT.get(name, "text"))
             lines.append(_row(f"`{name}`", "" if unit == "1" else unit, found[name].get("long_name", "")))
+    lines += ["", "## Identification", "", "`results/<study>.nc` of `epsmesh identify`; many files are the dimension "
+              "`file`.", "", *_table(("variable", "unit", "meaning"))]  # fmt: skip
+    lines += [_row(f"`{name}`", "" if unit == "1" else unit, meaning) for name, (unit, meaning) in WORDS.items()]
     lines += [
         "",
         "Values are missing (NaN; -1 for counts) where a case failed, was skipped or has not been run. Where a "

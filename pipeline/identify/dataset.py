@@ -11,7 +11,8 @@ from pipeline.arrays import FloatArray
 from pipeline.identify.parts import SOURCES, CurveFit, Estimate
 from pipeline.netcdf import write_netcdf
 
-_WORDS: dict[str, tuple[str, str]] = {
+# Unit and meaning of each variable.
+WORDS: dict[str, tuple[str, str]] = {
     "unknown": ("", "parameter that was identified"),
     "unknown_2": ("", "parameter that was identified"),
     "source": ("", "source of an error"),
@@ -82,7 +83,7 @@ def dataset_of(
     }
     dataset = xr.Dataset(values, coordinates)
     for name in dataset.variables:
-        unit, meaning = _WORDS[str(name)]
+        unit, meaning = WORDS[str(name)]
         dataset[name].attrs = {"long_name": meaning} | ({"units": unit} if unit else {})
     told = {"told": "\n".join(found.told)} if found.told else {}
     return dataset.assign_attrs({"Conventions": "CF-1.8", "verdict": found.verdict, **told, **attributes})
@@ -101,7 +102,7 @@ def joined(found: Sequence[xr.Dataset], files: Sequence[str]) -> xr.Dataset:
     whole = whole.assign({name: found[0][name] for name in ("unit", "wanted")})
     whole["file"] = ("file", np.array(files, dtype=object))
     for name in ("file", "verdict"):
-        whole[name].attrs["long_name"] = _WORDS[name][1]
+        whole[name].attrs["long_name"] = WORDS[name][1]
     return whole.assign_attrs({key: value for key, value in found[0].attrs.items() if key not in ("verdict", "told")})
 
 

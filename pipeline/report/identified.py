@@ -20,7 +20,7 @@ _SOURCES = {
     "machine": "machine",
     "thickness": "thickness and radius",
     "law": "law",
-    "mesh": "mesh",
+    "mesh": "mesh and interpolation",
 }
 _NAMES = {
     "contact_point": "contact point",
@@ -131,7 +131,7 @@ def mesh_share(dataset: xr.Dataset, name: str) -> float:
 
 
 def _is_absolute(name: str) -> bool:
-    return name.endswith(_ABSOLUTE) or name.startswith(_SHARES)
+    return name.partition(" of ")[0].endswith(_ABSOLUTE) or name.startswith(_SHARES)
 
 
 def title(name: str) -> str:

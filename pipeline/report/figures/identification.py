@@ -26,9 +26,10 @@ _HIGHEST = 6.0
 _NEAR = 1.3  # error bars, on both sides of the estimate, that a profile shows
 
 
-def identification(dataset: xr.Dataset, name: str) -> Figure:
-    """Measured forces and their fit, what is left, and the profiles of the unknowns."""
-    return _of_files(dataset, name) if "file" in dataset.dims else _of_curves(dataset, name)
+def identification(dataset: xr.Dataset, name: str, *, answered: bool = True) -> Figure:
+    """Measured forces, their fit, what is left, and profiles of the unknowns; the caption has the answer, too."""
+    lines = answer(dataset) if answered else []
+    return _of_files(dataset, name, lines) if "file" in dataset.dims else _of_curves(dataset, name, lines)
 
 
 def draw(dataset: xr.Dataset, stem: Path, formats: Sequence[str] = FIGURE_FORMATS) -> list[Path]:
@@ -38,7 +39,7 @@ def draw(dataset: xr.Dataset, stem: Path, formats: Sequence[str] = FIGURE_FORMAT
         return [save(drawn, stem.with_name(f"{stem.name}.{ending}")) for ending in formats]
 
 
-def _of_curves(dataset: xr.Dataset, name: str) -> Figure:
+def _of_curves(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
     shown = wanted(dataset)[:_MOST_PROFILES]
     shown = [one for one in shown if bool(np.isfinite(dataset["low"].sel(unknown=one)))]
     count = min(dataset.sizes["measurement"], _MOST_CURVES)
@@ -57,7 +58,7 @@ def _of_curves(dataset: xr.Dataset, name: str) -> Figure:
         row = grid[1].subgridspec(1, len(shown))
         for number, unknown in enumerate(shown):
             _draw_profile(figure.add_subplot(row[number]), dataset, unknown, is_first=number == 0)
-    finish(figure, name, _caption(dataset, count, bool(shown)), legend=False)
+    finish(figure, name, _caption(dataset, lines, count, bool(shown)), legend=False)
     figure.axes[0].legend(loc="upper left", frameon=False)
     return figure
 
@@ -139,9 +140,9 @@ def _bars(dataset: xr.Dataset, unknown: str) -> str:
     return f"{first}\nmay hide: {second}" if second and second != first else first
 
 
-def _caption(dataset: xr.Dataset, count: int, has_profiles: bool) -> str:
+def _caption(dataset: xr.Dataset, lines: Sequence[str], count: int, has_profiles: bool) -> str:
     """Return the answer, and what the panels show."""
-    parts = [*answer(dataset)[:2]]
+    parts = [*lines[:2]]
     more = dataset.sizes["measurement"] - count
     parts += [f"The first {count} of {dataset.sizes['measurement']} curves are shown."] if more else []
     if has_profiles:
@@ -152,7 +153,7 @@ def _caption(dataset: xr.Dataset, count: int, has_profiles: bool) -> str:
     return " ".join(parts)
 
 
-def _of_files(dataset: xr.Dataset, name: str) -> Figure:
+def _of_files(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
     """Draw each unknown of each file, in the order of their values, with both error bars."""
     shown = wanted(dataset)[:_MOST_PROFILES]
     figure = new_figure(_WIDTH, 2.4 * len(shown) + _BESIDE)
@@ -177,7 +178,7 @@ def _of_files(dataset: xr.Dataset, name: str) -> Figure:
     bars = "Thick lines: 95 % error bars if the body is as declared"
     bars += f"; thin ones: if it may hide {hidden}." if hidden else "."
     failed = " Crosses: the law does not fit." if not fits.all() else ""
-    finish(figure, name, f"{answer(dataset)[0]} {bars}{failed}", legend=False)
+    finish(figure, name, " ".join([*lines[:1], f"{bars}{failed}"]), legend=False)
     return figure
 
 

@@ -52,7 +52,7 @@ def render(dataset: xr.Dataset, name: str) -> str:
 def _figure(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the figure as SVG, for a wide page and for a phone."""
     with mpl.rc_context(STYLE):
-        drawn = identification(dataset, "")
+        drawn = identification(dataset, "", answered=False)
         caption = drawn.get_label()
         svg, width = inline_svg(drawn, "identification")
         phone, _ = inline_svg(stack(drawn), "identification-phone")
@@ -66,7 +66,8 @@ def _of_one(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
     for name in names:
         value = written(dataset, name, float(dataset["estimate"].sel(unknown=name)))
         seen = bool(dataset["seen"].sel(unknown=name))
-        bars = [bar(dataset, name), bar(dataset, name, hidden=True)] if seen else ["not in the curves", ""]
+        unseen = "not in the curves" if name in wanted(dataset) else "as known before"
+        bars = [bar(dataset, name), bar(dataset, name, hidden=True)] if seen else [unseen, ""]
         rows.append([title(name), value, *bars])
     return ["", "value", "if the body is as declared", f"if it may hide {hidden_words(dataset) or 'nothing'}"], rows
 
