@@ -15,7 +15,7 @@ from pipeline.identify.bars import interval
 from pipeline.identify.fit import Fit, Mixture, fit, prior
 from pipeline.identify.model import Model, Space
 from pipeline.identify.profiles import Likelihood
-from pipeline.identify.tabulated import Tabulated, tabulated
+from pipeline.identify.tabulated import Proportional, Scaled, tabulated
 
 # Points along each hidden unknown by their number; with fewer effective points than this, a fit follows the best.
 _POINTS = {1: 9, 2: 6, 3: 4}
@@ -76,7 +76,7 @@ def _of_kind(found: Fit, kind: str) -> list[Mixture]:
     return [mixture, fit(model, np.concatenate([places[best], points[best]])).mixture]
 
 
-def _tables(found: Fit) -> list[Tabulated]:
+def _tables(found: Fit) -> list[Proportional | Scaled]:
     """Return tables of the force of each curve's scene about the fit."""
     model, values = found.model, found.model.space.values(found.x)
     depths = [float(model.depth(number, values, force).max()) for number, force in enumerate(found.force)]

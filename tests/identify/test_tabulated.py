@@ -1,0 +1,26 @@
+"""Forces times factors: exact wherever the unknowns are."""
+
+import numpy as np
+import pytest
+
+from pipeline.identify.tabulated import Proportional, Scaled, tabulated
+from tests.identify.synthetic import POISSON, YOUNG, Ball, Punch
+
+DEPTH = np.linspace(-1e-5, 2e-4, 50)
+
+
+@pytest.mark.parametrize(
+    ("forward", "kind"),
+    [(Ball(), Proportional), (Punch(layer=1.0), Scaled), (Ball(names=("young", "poisson")), Scaled)],
+)
+def test_forces_with_a_factor_are_those_of_the_scene(forward, kind):
+    about = {name: value for name, value in (("young", 2e4), ("poisson", 0.45)) if name in forward.names}
+    made = tabulated(forward, [YOUNG, POISSON], about, 2e-4)
+    assert isinstance(made, kind)
+    bent = made.times(1 + 1e3 * made.roots**2)
+    for young, poisson in ((2e4, 0.45), (9e5, 0.2), (2e3, 0.5)):
+        values = {name: value for name, value in (("young", young), ("poisson", poisson)) if name in forward.names}
+        expected = forward.force(DEPTH, values)
+        small = 1e-6 * expected.max()
+        assert made.force(DEPTH, values) == pytest.approx(expected, rel=1e-3, abs=small)
+        assert bent.force(DEPTH, values) == pytest.approx(expected * (1 + 1e3 * DEPTH), rel=2e-3, abs=small)
