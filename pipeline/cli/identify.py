@@ -139,6 +139,7 @@ def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict
     return {
         "study": study.file,
         "answer": answer(dataset),
+        **_verdicts(dataset),
         "values": _as_data(dataset),
         "files": list(map(str, written)),
         "seconds": round(time.monotonic() - start, 3),
@@ -157,6 +158,13 @@ def _print(study: "Study", dataset: "xr.Dataset", file: Path) -> None:
     print("\n".join(f"  {line}" for line in answer(dataset)))
     if block := material(dataset):
         print(f'\n{block}\n\n# or, with the error bars:\n[material]\nfrom = "{file}"\n')
+
+
+def _verdicts(dataset: "xr.Dataset") -> dict[str, Any]:
+    """Return whether the law fits: "fits", or why not; lists with the names of the files where there are many."""
+    if "file" not in dataset.dims:
+        return {"verdict": dataset.attrs["verdict"]}
+    return {name: dataset[name].values.astype(str).tolist() for name in ("file", "verdict")}
 
 
 def _as_data(dataset: "xr.Dataset") -> dict[str, Any]:

@@ -61,14 +61,15 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
     does_fit = verdict == FITS
     seen = _seen(model, sides[0], sides[1])
     scale = np.sqrt(np.diag(found.mixture.spread))
-    nothing = np.full(len(x), np.nan)
+    if not does_fit:
+        low, high, low_hidden, high_hidden = np.full((4, len(x)), np.nan)
     return Estimate(
         unknowns=model.space.unknowns,
         estimate=estimate,
-        low=low if does_fit else nothing,
-        high=high if does_fit else nothing,
-        low_hidden=low_hidden if does_fit else nothing,
-        high_hidden=high_hidden if does_fit else nothing,
+        low=low,
+        high=high,
+        low_hidden=low_hidden,
+        high_hidden=high_hidden,
         part=_parts(found, sides[0], sides[1], ours) * ((high - low) / 2)[:, None],
         correlation=found.mixture.spread / np.outer(scale, scale),
         seen=seen,

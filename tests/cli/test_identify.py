@@ -84,6 +84,7 @@ def test_forces_are_computed_once(folder, epsmesh, found):
     data = json.loads(again.stdout)
     (study,) = data["studies"]
     assert data["status"] == 0
+    assert study["verdict"] == "fits"
     assert study["values"]["young"]["unit"] == "Pa"
     before = xr.load_dataset(folder / "results" / "punch.nc").sel(unknown="young")
     assert study["values"]["young"]["estimate"] == pytest.approx(float(before["estimate"]))
