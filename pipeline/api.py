@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline.files import STORE_NAME
+from pipeline.launcher import is_first_rank
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.progress import Terminal
@@ -118,6 +119,31 @@ class RunnableStudy:
             case, message = outcome.failures[0]
             text = f"{self.name}: {len(outcome.failures)} failed, the first: {case}: {message}"
             warnings.warn(text, RuntimeWarning, stacklevel=2)
+        return dataset
+
+    def identify(self, *, output: str | Path = "results", store: str | Path | None = None) -> "xr.Dataset":
+        """Find the parameters of the study from its measured curves, and return the dataset of what was found.
+
+        Writes ``<study>.nc`` and its figure into ``output``; forces are cases of ``store`` (``cases.sqlite`` in
+        ``output``), computed once.
+
+        Raises:
+            ValueError: if the study has no measurements.
+            ExperimentError: if a file is no force curve.
+            StudyError: if the scene of a measurement cannot be run.
+            SurrogateError: if a case that the forces need has none.
+        """
+        from pipeline.identify.dataset import write  # noqa: PLC0415 (MPI starts as it is imported)
+        from pipeline.identify.run import identification  # noqa: PLC0415
+        from pipeline.report.figures.identification import draw  # noqa: PLC0415
+
+        if not self.declared.measurements:
+            raise ValueError(f"{self.declared.file}: has no [[measurement]]")
+        path = Path(output) / f"{self.name}.nc"
+        dataset = identification(self.declared, Path(output), Path(store or Path(output) / STORE_NAME), lambda _: None)
+        if is_first_rank():
+            write(dataset, path)
+            draw(dataset, path.with_suffix(""))
         return dataset
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import pipeline
 from pipeline.layered.body import RIGID, LayeredBody
 from pipeline.layered.compliance import Layer
 from scripts.make_curves import TRUTH, Machine, disc, main, pressed, write
@@ -114,6 +115,21 @@ def test_the_cases_of_the_study_do_not_replace_what_was_found(folder, epsmesh, f
     result = epsmesh("run", folder / "punch.toml", "--output", folder / "results")
     assert result.exit_code == 2
     assert "is what `epsmesh identify" in result.stderr
+
+
+def test_python_gets_the_dataset(folder, found):
+    dataset = pipeline.read(folder / "punch.toml").identify(output=folder / "results")
+    xr.testing.assert_equal(dataset, xr.load_dataset(folder / "results" / "punch.nc"))
+
+
+def test_forces_are_computed_deeper_for_a_curve_without_air(folder, epsmesh, found):
+    rows = np.loadtxt(folder / "curves" / "gel_8.csv", delimiter=",", skiprows=1)
+    write(folder / "late.csv", ("depth (mm)", "force (mN)"), rows[90:], (1.0, 1.0))
+    (folder / "late.toml").write_text(STUDY.format(file="late.csv", may_hide="[]"))
+    result = epsmesh("identify", folder / "late.toml", "--output", folder / "results")
+    assert result.exit_code == 0, result.output
+    young = xr.load_dataset(folder / "results" / "late.nc").sel(unknown="young")
+    assert young["low"] < YOUNG < young["high"]
 
 
 def test_what_cannot_be_identified_is_refused_before_anything_is_computed(folder, epsmesh, small):
