@@ -8,15 +8,16 @@ import xarray as xr
 from pipeline import __version__
 from pipeline.identify.dataset import write
 from pipeline.identify.experiment import Specimen
+from pipeline.run.provenance import git_commit
 from pipeline.study.sweep import Study
 
 
 class Kept:
-    """The folder of what is known of a study's files, in the folder of results; names follow from study and curves."""
+    """The folder of what is known of a study's files; names of files in it follow from program, study and curves."""
 
     def __init__(self, output: Path, study: Study):
         self._folder = output / "identified"
-        self._study = f"{__version__}\n{study.text}"
+        self._study = f"{__version__} {git_commit()}\n{study.text}"
 
     def read(self, specimen: Specimen) -> xr.Dataset | None:
         """Return what was kept of a specimen, None if nothing was, or if it cannot be read."""
