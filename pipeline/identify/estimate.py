@@ -53,12 +53,12 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
     ours = mesh(found)
     low, high = x - np.hypot(x - low, ours), x + np.hypot(high - x, ours)
     wanted = tuple(k for k, unknown in enumerate(model.space.unknowns) if unknown.is_wanted)
-    hidden_low, hidden_high = hidden_bars(found, wanted)
-    sides = [low, high, np.fmin(low, hidden_low), np.fmax(high, hidden_high)]
-    estimate, low, high, low_hidden, high_hidden = (_values(model, np.clip(side, 0.0, 1.0)) for side in [x, *sides])
     beyond = out_of_range(found)
     verdict = beyond or _verdict(found)
     does_fit = verdict == FITS
+    hidden_low, hidden_high = hidden_bars(found, wanted) if does_fit else (low, high)
+    sides = [low, high, np.fmin(low, hidden_low), np.fmax(high, hidden_high)]
+    estimate, low, high, low_hidden, high_hidden = (_values(model, np.clip(side, 0.0, 1.0)) for side in [x, *sides])
     seen = _seen(model, sides[0], sides[1])
     scale = np.sqrt(np.diag(found.mixture.spread))
     if not does_fit:
