@@ -104,7 +104,7 @@ class Designer:
         Raises:
             SurrogateError: if a test cannot be computed.
         """
-        measured = [self._measured(number, trial) for number, trial in enumerate(trials)]
+        measured = [self.measured(number, trial) for number, trial in enumerate(trials)]
         model = Model.of(measured, self.unknowns)
         declared = _half_widths(model, self._at(model, self.values), self._noise)
         hidden = [declared]
@@ -115,7 +115,7 @@ class Designer:
         wanted = [k for k, unknown in enumerate(model.space.unknowns) if unknown.is_wanted]
         return {model.names[k]: (float(declared[k]), float(widest[k])) for k in wanted}
 
-    def _measured(self, number: int, trial: Trial) -> Measured:
+    def measured(self, number: int, trial: Trial) -> Measured:
         """Return a test without noise, its contact at 0."""
         forward = self._forward(trial)
         down, time = _course(trial, self.values)
