@@ -54,6 +54,11 @@ def own_name(name: str, number: int, measured: Sequence[Measured]) -> str:
     return name if len(measured) == 1 else f"{name} of {measured[number].curve.name}"
 
 
+def is_of_curve(name: str) -> bool:
+    """Return whether every curve has an unknown of this name of its own: see :func:`own_name`."""
+    return name.partition(" of ")[0] in OF_CURVE
+
+
 @dataclass(frozen=True)
 class Space:
     """Unknowns in coordinates from 0 to 1 over their ranges, logarithmic where they are."""
@@ -167,7 +172,7 @@ class Model:
         measured = self.measured[number]
         if name == "machine_stiffness":
             return measured.machine_compliance is None
-        is_shared = not name.startswith(OF_CURVE)
+        is_shared = not is_of_curve(name)
         return name == self.own("contact_point", number) or (
             is_shared and (name in measured.forward.names or name.startswith(("relaxation_", "hidden_")))
         )

@@ -5,7 +5,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.identify.bars import interval
 from pipeline.identify.fit import Fit, Mixture
-from pipeline.identify.model import OF_CURVE
+from pipeline.identify.model import is_of_curve
 from pipeline.identify.noise import GRID, whiten
 from pipeline.identify.parts import SOURCES, TooDeepError
 
@@ -17,7 +17,7 @@ def shares(found: Fit) -> FloatArray:
     are wider by deviations from the law.
     """
     unknowns = found.model.space.unknowns
-    of_curve = [unknown.name.startswith(OF_CURVE) for unknown in unknowns]
+    of_curve = [is_of_curve(unknown.name) for unknown in unknowns]
     of_machine = [unknown.name == "machine_stiffness" for unknown in unknowns]
     of_geometry = [
         unknown.prior is not None and not (unknown.is_wanted or of_curve[k] or of_machine[k])

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Any, get_args
 
@@ -200,7 +200,8 @@ def _add_implied(
     if not any(one.is_wanted and one.parameter.place for one in given.values()):
         for name, parameter in known.items():
             if name == "young" or name.endswith("_young"):
-                given.setdefault(name, Sought(parameter, parameter.low, parameter.high))
+                asked = given.get(name, Sought(parameter, parameter.low, parameter.high))
+                given[name] = replace(asked, is_wanted=True)
     for name in ("contact_point", "baseline"):
         given.setdefault(name, Sought(known[name], -inf, inf, is_wanted=False))
     _add_machine(given, known["machine_stiffness"], measurements, problems)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.identify.estimate import identify
-from pipeline.identify.parts import Unknown
+from pipeline.identify.parts import Measured, Unknown
 from tests.identify.synthetic import POISSON, YOUNG, Ball, Punch, measured, noise
 
 
@@ -50,3 +50,17 @@ def test_a_truth_at_the_end_of_its_range_is_not_refused():
         found = identify(curves, [YOUNG, POISSON])
         assert found.fits
         assert found.high[1] == pytest.approx(0.5)
+
+
+def test_a_layer_may_have_the_name_of_what_each_curve_has():
+    class OfDrift(Ball):
+        def force(self, depth, values):
+            return super().force(depth, {"young": values["drift_young"]})
+
+    error = 0.003 * noise(np.random.default_rng(1), 200, 0.6)
+    curve = measured(Ball(), {"young": 25e3}, error, 2e-4).curve
+    found = identify(
+        [Measured(curve, OfDrift(names=("drift_young",)))],
+        [Unknown("drift_young", 1e3, 1e6, "Pa", is_logarithmic=True)],
+    )
+    assert found.low[0] <= 25e3 <= found.high[0]

@@ -148,6 +148,12 @@ def test_values_with_errors_widen_bars_and_ranges_are_wanted():
     assert wanted == {"poisson", "radius", "drift"}
 
 
+def test_a_modulus_about_which_something_is_known_is_wanted_if_nothing_else_is():
+    found = {one.name: one for one in unknowns(parse(layered({}, young={"value": "10 kPa", "error": "10 %"})))}
+    assert found["young"].prior == pytest.approx((1e4, 500))
+    assert found["young"].is_wanted and found["skin_young"].is_wanted
+
+
 def test_names_follow_law_inclusions_and_layers_that_fill_the_body():
     fat = {"name": "fat", "young": "5 kPa", "poisson": 0.4, "law": "yeoh", "c2": 0.1}
     ball = {"name": "tumour", "at": ["0 mm", "0 mm", "-10 mm"], "radius": "4 mm", "young": "50 kPa", "poisson": 0.45}
