@@ -139,18 +139,25 @@ def run(
 
 def _check_measured(studies: "list[Study]", output: Path) -> None:
     """Say that measurements are left out; exit if results would replace those of an identification."""
-    from pipeline.report.identified import is_identification
-
     for study in (study for study in studies if study.measurements):
         file = output / f"{study.name}.nc"
-        if file.exists():
-            import xarray as xr
-
-            with xr.open_dataset(file) as dataset:
-                if is_identification(dataset):
-                    what = f"is what `epsmesh identify {quote(study.file)}` found: give another --output for its cases"
-                    fail(of_file(file, what))
+        if file.exists() and _is_identification(file):
+            what = f"is what `epsmesh identify {quote(study.file)}` found: give another --output for its cases"
+            fail(of_file(file, what))
         warning(f"{study.file}: its measurements are for `epsmesh identify`: only its cases are run")
+
+
+def _is_identification(file: Path) -> bool:
+    """Tell the dataset of an identification from others, and from what is none."""
+    import xarray as xr
+
+    from pipeline.report.identified import is_identification
+
+    try:
+        with xr.open_dataset(file) as dataset:
+            return is_identification(dataset)
+    except (OSError, ValueError, RuntimeError):  # damaged: a run replaces it
+        return False
 
 
 def _progress(plan: "Plan", *, verbose: bool) -> "Terminal":

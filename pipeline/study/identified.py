@@ -33,6 +33,10 @@ WORDS = Words(
 # A text that may be of a study with this key.
 FROM = re.compile(r"\bfrom\b")
 _COMMAND = "`epsmesh identify STUDY` writes it"
+# Variables that a study needs, and those that are read; unknowns that an identification has at most.
+_NEEDED = ("estimate", "low", "high", "correlation", "seen", "unknown")
+_READ = (*_NEEDED, "low_hidden", "high_hidden", "wanted", "unknown_2")
+_MOST_UNKNOWNS = 1000
 FITS = "fits"  # the verdict of a model that suits the curves
 # Keys that are filled in, of [material] or of a layer or an inclusion by its name, and units of values.
 _KEYS = ("young", "poisson", "thickness", "radius", "c2", "c3", "limit")
@@ -187,13 +191,20 @@ def _read(path: Any, folder: Path) -> dict[str, Any]:
     import xarray as xr  # noqa: PLC0415 (slow to load, and few studies need it)
 
     try:
-        dataset = xr.load_dataset(place, engine="netcdf4")
-    except (OSError, ValueError, RuntimeError) as error:
+        with xr.open_dataset(place, engine="netcdf4") as opened:
+            known = [name for name in _READ if name in opened.variables]
+            # A few bytes of a packed file may stand for any number of values.
+            if not {*_NEEDED} <= {*known} or opened.sizes["unknown"] > _MOST_UNKNOWNS:
+                raise _UnusableError(f"is not the dataset of an identification; {_COMMAND}")
+            if "file" in opened.sizes:
+                raise _UnusableError(
+                    f"has {opened.sizes['file']} files, each with its own values: identify one of them"
+                )
+            dataset = opened[known].load()
+    except _UnusableError:
+        raise
+    except (OSError, ValueError, RuntimeError, KeyError) as error:
         raise _UnusableError(f"is no netCDF file that can be read: {error}") from None
-    if not {"estimate", "low", "high", "correlation", "seen", "unknown"} <= {*dataset.variables}:
-        raise _UnusableError(f"is not the dataset of an identification; {_COMMAND}")
-    if "file" in dataset.sizes:
-        raise _UnusableError(f"has {dataset.sizes['file']} files, each with its own values: identify one of them")
     if (verdict := str(dataset.attrs.get("verdict", ""))) != FITS:
         raise _UnusableError(f"the law does not describe the curve, so that no value has a bar: {verdict}")
     try:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.identify.dataset import write
+from pipeline.identify.dataset import joined, write
 from pipeline.plan.plan import make_plan
 from pipeline.report.uncertainty import tissue
 from pipeline.study.identified import NOTHING
@@ -69,6 +69,12 @@ def test_files_that_are_no_identification_are_refused(tmp_path):
         using(tmp_path)
     (tmp_path / "one.nc").write_text("not netCDF")
     with pytest.raises(StudyError, match="no netCDF file"):
+        using(tmp_path)
+
+
+def test_many_files_have_no_one_material(tmp_path):
+    write(joined([identification(), identification()], ["a.csv", "b.csv"]), tmp_path / "one.nc")
+    with pytest.raises(StudyError, match="has 2 files"):
         using(tmp_path)
 
 
