@@ -93,7 +93,7 @@ def _of_size(
     for _ in range(_SCALES):
         inner = whole / variance[:, None, None]
         matrix = inner + prior
-        step = np.linalg.solve(matrix, right / variance[:, None] + prior @ centre)
+        step = np.linalg.solve(matrix, (right / variance[:, None] + prior @ centre)[..., None])[..., 0]
         rest = square - 2 * np.einsum("hi,hi->h", step, right) + np.einsum("hi,hij,hj->h", step, whole, step)
         fitted = np.trace(np.linalg.solve(matrix, inner), axis1=1, axis2=2)
         variance = np.maximum(rest, 1e-30 * square) / (products.count - fitted)
