@@ -71,7 +71,9 @@ def test_examples_and_templates_come_along(installed):
     assert done.returncode == 0, done.stderr
     script = "from pathlib import Path; import pipeline.report.page as p; print(*Path(p.__file__).parent.rglob('*.j2'))"
     assert "page.html.j2" in installed("-c", script).stdout
-    assert "meshes/liver.stl: file of the body" in installed("-m", "pipeline", "new", "liver", "--like", "organ").stdout
+    for example, file in (("organ", "meshes/liver.stl"), ("identify-punch", "curves/ball.csv")):
+        made = installed("-m", "pipeline", "new", f"my-{example}", "--like", example)
+        assert f"{file}: copied with the study" in made.stdout
     done = installed("-m", "pipeline", "export", "--evaluator", "c")
     assert "epsmesh_patch.h, " in done.stdout, done.stderr
     assert "examples/hand.h" in done.stdout
