@@ -226,12 +226,10 @@ def _mixture(
         chosen = np.flatnonzero(weight > _LIGHT * weight.max())[:, None]
         weight = weight[chosen[:, 0]] / weight[chosen[:, 0]].sum()
     else:
-        # Points that fill the unit cube evenly, by an additive recurrence (M. Roberts 2018), pick hypotheses by weight.
-        root = float(np.roots([1.0, *[0.0] * (len(found) - 1), -1.0, -1.0]).real.max())
-        steps = root ** -np.arange(1.0, len(found) + 1)
-        points = (0.5 + np.outer(np.arange(_DRAWS), steps)) % 1
-        ends = [np.cumsum(belief.weight) for belief in found]
-        chosen = np.column_stack([np.searchsorted(end, at * end[-1]) for end, at in zip(ends, points.T, strict=True)])
+        # Curves of one machine have alike noise: hypotheses are ranked by how much they say, and all curves have the
+        # same rank. Independent ones would average out what is not known of the noise, with bars that are too small.
+        points = (np.arange(_DRAWS) + 0.5) / _DRAWS
+        chosen = np.column_stack([_ranked(belief, points) for belief in found])
         weight = np.full(_DRAWS, 1 / _DRAWS)
     information = precision + sum(belief.information[at] for belief, at in zip(found, chosen.T, strict=True))
     pull = precision @ (mean - x) + sum(belief.pull[at] for belief, at in zip(found, chosen.T, strict=True))
@@ -239,3 +237,11 @@ def _mixture(
     step = np.einsum("cij,cj->ci", covariance, pull)
     is_law = np.all([belief.size[at] == 0 for belief, at in zip(found, chosen.T, strict=True)], axis=0)
     return Mixture(weight, x + step, covariance, freedom, np.asarray(is_law))
+
+
+def _ranked(belief: Beliefs, points: FloatArray) -> npt.NDArray[np.intp]:
+    """Return the hypotheses at ``points`` (c,) of their cumulative probability, the least informative first."""
+    told = np.log1p(np.diagonal(belief.information, axis1=1, axis2=2)).sum(axis=1)
+    order = np.argsort(told)
+    ends = np.cumsum(belief.weight[order])
+    return np.asarray(order[np.searchsorted(ends, points * ends[-1])])
