@@ -24,6 +24,9 @@ _SCALES = 4
 _SWEEPS, _CLOSE = 12, 0.1
 # Hypotheses of several curves are drawn this often, and those of one curve kept from this weight on.
 _DRAWS, _LIGHT = 128, 1e-4
+# Joint standard deviations of several curves are this much larger: errors of two curves of one ball, at a
+# noise correlation of 0.95, had 1.2 times the rms that bars without it suppose.
+_JOINT = 1.2
 
 
 @dataclass(frozen=True)
@@ -226,22 +229,37 @@ def _mixture(
         chosen = np.flatnonzero(weight > _LIGHT * weight.max())[:, None]
         weight = weight[chosen[:, 0]] / weight[chosen[:, 0]].sum()
     else:
-        # Curves of one machine have alike noise: hypotheses are ranked by how much they say, and all curves have the
-        # same rank. Independent ones would average out what is not known of the noise, with bars that are too small.
-        points = (np.arange(_DRAWS) + 0.5) / _DRAWS
-        chosen = np.column_stack([_ranked(belief, points) for belief in found])
+        # Points that fill the unit cube evenly, by an additive recurrence (M. Roberts 2018), pick hypotheses by weight.
+        # Deviations from the law are each curve's own. Noise is alike in curves of one machine: its hypotheses are
+        # ranked by how much they say, and all curves have the same rank. Independent ones would average out what is
+        # not known of the noise, with bars that are too small.
+        count = len(found) + 1
+        root = float(np.roots([1.0, *[0.0] * (count - 1), -1.0, -1.0]).real.max())
+        points = (0.5 + np.outer(np.arange(_DRAWS), root ** -np.arange(1.0, count + 1))) % 1
+        own, common = points[:, :-1].T, points[:, -1]
+        chosen = np.column_stack([_drawn(belief, at, common) for belief, at in zip(found, own, strict=True)])
         weight = np.full(_DRAWS, 1 / _DRAWS)
     information = precision + sum(belief.information[at] for belief, at in zip(found, chosen.T, strict=True))
     pull = precision @ (mean - x) + sum(belief.pull[at] for belief, at in zip(found, chosen.T, strict=True))
     covariance = np.linalg.inv(information)
     step = np.einsum("cij,cj->ci", covariance, pull)
+    covariance = covariance * (_JOINT**2 if len(found) > 1 else 1.0)
     is_law = np.all([belief.size[at] == 0 for belief, at in zip(found, chosen.T, strict=True)], axis=0)
     return Mixture(weight, x + step, covariance, freedom, np.asarray(is_law))
 
 
-def _ranked(belief: Beliefs, points: FloatArray) -> npt.NDArray[np.intp]:
-    """Return the hypotheses at ``points`` (c,) of their cumulative probability, the least informative first."""
+def _drawn(belief: Beliefs, deviation: FloatArray, noise: FloatArray) -> npt.NDArray[np.intp]:
+    """Return hypotheses (c,) at points of the cumulative probabilities of the deviation, then of the noise.
+
+    Noise that says least of the unknowns comes first.
+    """
     told = np.log1p(np.diagonal(belief.information, axis1=1, axis2=2)).sum(axis=1)
-    order = np.argsort(told)
-    ends = np.cumsum(belief.weight[order])
-    return np.asarray(order[np.searchsorted(ends, points * ends[-1])])
+    weight = np.array([belief.weight[belief.size == place].sum() for place in range(len(DEVIATIONS))])
+    sizes = np.searchsorted(np.cumsum(weight), deviation * weight.sum())
+    found = np.empty(len(sizes), dtype=np.intp)
+    for place in np.unique(sizes):
+        order = np.flatnonzero(belief.size == place)
+        order = order[np.argsort(told[order])]
+        ends = np.cumsum(belief.weight[order])
+        found[sizes == place] = order[np.searchsorted(ends, noise[sizes == place] * ends[-1])]
+    return found
