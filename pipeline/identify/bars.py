@@ -14,7 +14,7 @@ _BISECTIONS = 60
 
 def interval(mixture: Mixture, place: int) -> tuple[float, float]:
     """Return the coordinates between which an unknown is with 95 %, not cut at the ends of its range."""
-    mean, deviation = mixture.mean[:, place], np.sqrt(mixture.covariance[:, place, place])
+    mean, deviation = mixture.mean[:, place], mixture.wider * np.sqrt(mixture.covariance[:, place, place])
     return _quantile(mixture, mean, deviation, TAIL), _quantile(mixture, mean, deviation, 1 - TAIL)
 
 

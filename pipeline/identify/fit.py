@@ -122,7 +122,8 @@ class Mixture:
     """Normal distributions of the unknowns' coordinates: ``weight`` (c,), ``mean`` (c, u), ``covariance`` (c, u, u).
 
     Since the noise is estimated, they have the tails of Student's distribution with ``freedom`` degrees of freedom.
-    ``is_law`` (c,) tells those without a deviation from the law in any curve.
+    ``is_law`` (c,) tells those without a deviation from the law in any curve. Standard deviations are ``wider`` times
+    those of ``covariance``.
     """
 
     weight: FloatArray
@@ -130,6 +131,7 @@ class Mixture:
     covariance: FloatArray
     freedom: float
     is_law: npt.NDArray[np.bool_]
+    wider: float = 1.0
 
     @property
     def middle(self) -> FloatArray:
@@ -140,7 +142,7 @@ class Mixture:
     def spread(self) -> FloatArray:
         """Covariance (u, u) of the mixture."""
         away = self.mean - self.middle
-        own = np.einsum("c,cij->ij", self.weight, self.covariance)
+        own = self.wider**2 * np.einsum("c,cij->ij", self.weight, self.covariance)
         return np.asarray(own + np.einsum("c,ci,cj->ij", self.weight, away, away))
 
     def of_law(self) -> "Mixture | None":
@@ -149,7 +151,7 @@ class Mixture:
             return None
         weight = self.weight[self.is_law] / self.weight[self.is_law].sum()
         mean, covariance = self.mean[self.is_law], self.covariance[self.is_law]
-        return Mixture(weight, mean, covariance, self.freedom, self.is_law[self.is_law])
+        return Mixture(weight, mean, covariance, self.freedom, self.is_law[self.is_law], self.wider)
 
 
 @dataclass(frozen=True)
@@ -243,9 +245,8 @@ def _mixture(
     pull = precision @ (mean - x) + sum(belief.pull[at] for belief, at in zip(found, chosen.T, strict=True))
     covariance = np.linalg.inv(information)
     step = np.einsum("cij,cj->ci", covariance, pull)
-    covariance = covariance * (_JOINT**2 if len(found) > 1 else 1.0)
     is_law = np.all([belief.size[at] == 0 for belief, at in zip(found, chosen.T, strict=True)], axis=0)
-    return Mixture(weight, x + step, covariance, freedom, np.asarray(is_law))
+    return Mixture(weight, x + step, covariance, freedom, np.asarray(is_law), _JOINT if len(found) > 1 else 1.0)
 
 
 def _drawn(belief: Beliefs, deviation: FloatArray, noise: FloatArray) -> npt.NDArray[np.intp]:
