@@ -59,7 +59,7 @@ def _of_curves(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
         for number, unknown in enumerate(shown):
             _draw_profile(figure.add_subplot(row[number]), dataset, unknown, is_first=number == 0)
     finish(figure, name, _caption(dataset, lines, count, bool(shown)), legend=False)
-    figure.axes[0].legend(loc="upper left", frameon=False)
+    figure.axes[0].legend(loc="best", frameon=False)
     return figure
 
 
