@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from pipeline.cli.console import is_json_wanted, say
-from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_study
+from pipeline.cli.faults import DONE, Fault, fail, refusing_cases
 from pipeline.launcher import is_first_rank
 
 if TYPE_CHECKING:
@@ -31,19 +31,13 @@ def _ranked(study: "Study", store: Path, *, quiet: bool) -> dict[str, Any]:
     from pipeline.identify.design_text import as_data, lines
     from pipeline.identify.forward import stored_in
     from pipeline.identify.run import telling
-    from pipeline.study.problems import StudyError
-    from pipeline.surrogate.cases import SurrogateError
 
     def tell(line: str) -> None:
         if not quiet and is_first_rank():
             print(f"  {line}", file=sys.stderr, flush=True)
 
-    try:
+    with refusing_cases(study, store):
         found = rank(study, telling(stored_in(store), tell), tell)
-    except StudyError as wrong:
-        fail(*of_study(wrong))
-    except SurrogateError as wrong:
-        fail(Fault(str(wrong), file=study.file), status=SOME_FAILED)
     if not is_json_wanted():
         say({}, study.title, *(f"  {line}" for line in lines(found)))
     return {"study": study.file, **as_data(found)}

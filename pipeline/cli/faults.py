@@ -16,6 +16,7 @@ from pipeline.printable import printable
 if TYPE_CHECKING:
     from pipeline.report.publish import ResultsError
     from pipeline.study.problems import StudyError
+    from pipeline.study.sweep import Study
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 _PATIENCE = 5.0  # seconds
@@ -100,6 +101,23 @@ def refusing(*errors: type[Exception], file: str | Path, howto: str | None = Non
         yield
     except errors as wrong:
         fail(Fault(str(wrong), file=str(file), howto=howto))
+
+
+@contextmanager
+def refusing_cases(study: "Study", store: Path, howto: str | None = None) -> Iterator[None]:
+    """Exit, on all ranks, if the cases that a command needs cannot be run, have no force, or the ``store`` is bad."""
+    from pipeline.run.store import StoreError
+    from pipeline.study.problems import StudyError
+    from pipeline.surrogate.cases import SurrogateError
+
+    try:
+        yield
+    except StudyError as wrong:
+        fail(*of_study(wrong), on_all_ranks=True)
+    except StoreError as wrong:
+        fail(Fault(str(wrong), file=str(store)), on_all_ranks=True)
+    except SurrogateError as wrong:
+        fail(Fault(str(wrong), file=study.file, howto=howto), status=SOME_FAILED, on_all_ranks=True)
 
 
 def print_faults(faults: Iterable[Fault]) -> None:

@@ -9,7 +9,7 @@ import typer
 
 from pipeline.cli.console import is_json_wanted, print_json
 from pipeline.cli.design import design as rank
-from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_study, refusing
+from pipeline.cli.faults import DONE, Fault, fail, refusing, refusing_cases
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     Files,
@@ -114,20 +114,10 @@ def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict
     from pipeline.identify.run import identification
     from pipeline.report.figures.identification import draw
     from pipeline.report.identified import answer
-    from pipeline.run.store import StoreError
-    from pipeline.study.problems import StudyError
-    from pipeline.surrogate.cases import SurrogateError
 
     start = time.monotonic()
-    try:
-        with refusing(ExperimentError, file=study.file, howto=_OF_CURVES):
-            dataset = identification(study, output, store, (lambda _: None) if quiet else _tell)
-    except StudyError as wrong:
-        fail(*of_study(wrong), on_all_ranks=True)
-    except StoreError as wrong:
-        fail(Fault(str(wrong), file=str(store)), on_all_ranks=True)
-    except SurrogateError as wrong:
-        fail(Fault(str(wrong), file=study.file), status=SOME_FAILED, on_all_ranks=True)
+    with refusing_cases(study, store), refusing(ExperimentError, file=study.file, howto=_OF_CURVES):
+        dataset = identification(study, output, store, (lambda _: None) if quiet else _tell)
     if not is_first_rank():
         return {}
     file = output / f"{study.name}.nc"

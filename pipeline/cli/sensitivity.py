@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.cli.console import say
-from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_study
+from pipeline.cli.faults import DONE, refusing_cases
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     File,
@@ -63,10 +63,8 @@ def sensitivity(
     from pipeline.report.figures.sensitivity import draw
     from pipeline.report.sensitivity import answer
 
-    written = [files[0]]
-    if is_first_rank():
-        write_netcdf(dataset, files[0], "NETCDF4")
-        written += draw(dataset, output / name)
+    write_netcdf(dataset, files[0], "NETCDF4")
+    written = [files[0], *draw(dataset, output / name)]
     seconds = time.perf_counter() - start
     lines = [] if quiet else answer(dataset)
     wrote = f"{study.file}: wrote {', '.join(map(str, written))}; {seconds:.3g} s"
@@ -75,19 +73,11 @@ def sensitivity(
 
 def _dataset(study: "Study", store: Path) -> "xr.Dataset":
     """Return the indices of the study's outputs; exit if they cannot be had."""
-    from pipeline.run.store import StoreError
-    from pipeline.study.problems import StudyError
-    from pipeline.surrogate.cases import SurrogateError, stored_in
+    from pipeline.surrogate.cases import stored_in
     from pipeline.surrogate.sensitivity import dataset_of, explain
 
-    try:
+    with refusing_cases(study, store, _HOWTO):
         return dataset_of(study, explain(study, stored_in(store)))
-    except StudyError as wrong:
-        fail(*of_study(wrong), on_all_ranks=True)
-    except StoreError as wrong:
-        fail(Fault(str(wrong), file=str(store)), on_all_ranks=True)
-    except SurrogateError as wrong:
-        fail(Fault(str(wrong), file=study.file, howto=_HOWTO), status=SOME_FAILED, on_all_ranks=True)
 
 
 def _as_data(dataset: "xr.Dataset") -> dict[str, object]:
