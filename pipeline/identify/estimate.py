@@ -13,8 +13,8 @@ from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.bars import TAIL, interval
 from pipeline.identify.fit import Fit, fit
 from pipeline.identify.hidden import hidden_bars
-from pipeline.identify.limits import cut, out_of_range
-from pipeline.identify.model import Model
+from pipeline.identify.limits import begins_later, cut, out_of_range
+from pipeline.identify.model import REACH, Model
 from pipeline.identify.noise import GRID
 from pipeline.identify.parts import SOURCES, CurveFit, Estimate, Measured, NoiseFound, Profile, Unknown, Window
 from pipeline.identify.profiles import Likelihood, ends, profile
@@ -34,6 +34,8 @@ _CURVED = ("poisson", "relaxation_")
 _AT_BAR = 3.84
 # A curve has at least so many points.
 _FEWEST = 10
+# Contact before the first row, in recorded depths: half the depth at contact of 0.5, four fifths of it at 4.
+_REACHES = (REACH, 1.5, 4.0)
 _WINDOWS = (0.25, 0.5, 1.0)
 
 
@@ -47,8 +49,8 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
     """
     for one in measured:
         _check(one.curve)
-    model = Model.of(measured, unknowns)
-    found = fit(model, start(model))
+    found = _fitted(measured, unknowns)
+    model = found.model
     x, low, high, profiles = _bars(found)
     ours = mesh(found)
     low, high = x - np.hypot(x - low, ours), x + np.hypot(high - x, ours)
@@ -76,10 +78,20 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
         verdict=verdict,
         curves=tuple(_curve(found, number) for number in range(len(measured))),
         profiles=profiles,
-        windows=() if does_fit or beyond else _windows(measured, unknowns, found),
+        windows=() if does_fit or beyond else _windows(measured, found),
         evidence=found.misfit,
         told=(*combinations(found, seen), *(cut(found) if does_fit else ())),
     )
+
+
+def _fitted(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Fit:
+    """Return the fit, with contact as far before the first row as a curve that begins deep in contact says."""
+    for reach in _REACHES:
+        model = Model.of(measured, unknowns, reach)
+        found = fit(model, start(model))
+        if not begins_later(found):
+            break
+    return found
 
 
 def _check(curve: Curve) -> None:
@@ -172,7 +184,7 @@ def _verdict(found: Fit) -> str:
     )
 
 
-def _windows(measured: Sequence[Measured], unknowns: Sequence[Unknown], found: Fit) -> tuple[Window, ...]:
+def _windows(measured: Sequence[Measured], found: Fit) -> tuple[Window, ...]:
     """Return the modulus by least squares, without deviations from the law, up to larger and larger depths."""
     if "young" not in found.model.names:
         return ()
@@ -185,7 +197,7 @@ def _windows(measured: Sequence[Measured], unknowns: Sequence[Unknown], found: F
         pressed = [int(np.sum((depth > 0) & (depth <= share * most))) for depth in depths]
         if min(pressed) < _FEWEST or any(np.ptp(one.curve.force) == 0 for one in cut):
             continue
-        model = Model.of(cut, unknowns)
+        model = Model(cut, found.model.space)
         windows.append(Window(share * most, float(model.space.value(place, start(model)[place]))))
     return tuple(windows)
 

@@ -10,6 +10,8 @@ from pipeline.report.identified import engineering, title
 _OUT = 1.0
 # Forces of the model, relative to the measured ones, below which the noise is what is fitted.
 _WEAK = 0.5
+# What to do about a contact point at the end of its range.
+_TOO_SMALL = ": all bars may be too small; widen it in [identify], or give `baseline` there if air was recorded as 0"
 
 
 def out_of_range(found: Fit) -> str:
@@ -32,8 +34,21 @@ def cut(found: Fit) -> tuple[str, ...]:
         if len(ends) == 1:
             where = engineering(ends[0], unknown.unit)
             text = f"The error bar of {title(unknown.name)} ends where its range does, at {where}"
-            told.append(f"{text}{'' if unknown.is_wanted else ': all bars may be too small, widen it in [identify]'}.")
+            told.append(f"{text}{'' if unknown.is_wanted else _TOO_SMALL}.")
     return tuple(told)
+
+
+def begins_later(found: Fit) -> bool:
+    """Return whether a curve says where contact was, and that is before what the range of its contact point allows.
+
+    A bar that both ends of the range cut says nothing, as that of a flat punch without air: any contact point fits.
+    """
+    for place, unknown in enumerate(found.model.space.unknowns):
+        if unknown.name.startswith("contact_point") and unknown.prior is None:
+            low, high = interval(found.mixture, place)
+            if low < 0 and high < 1:
+                return True
+    return False
 
 
 def _too_weak(found: Fit) -> list[str]:

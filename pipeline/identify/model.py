@@ -22,6 +22,9 @@ OF_CURVE = ("contact_point", "baseline", "drift")
 ALWAYS = ("contact_point", "baseline")
 """Unknowns of every fit, named or not."""
 
+REACH = 0.5
+"""Contact is this much before the first depth at most, in recorded depths, of a curve that begins in air or near it."""
+
 # Step of finite differences, as a share of an unknown's range, and of the largest depth.
 _STEP = 1e-6
 # Longer curves are averaged over blocks of neighbours: their noise is then correlated and white noise as before.
@@ -30,15 +33,19 @@ LONGEST = 1500
 _NEWTON = 1
 
 
-def default_unknown(name: str, measured: Measured) -> Unknown:
-    """Return contact point, baseline or drift with a range wide enough for any curve that can be used."""
+def default_unknown(name: str, measured: Measured, reach: float = REACH) -> Unknown:
+    """Return contact point, baseline or drift with a range that the curve gives.
+
+    Contact is at most ``reach`` times the recorded depths before the first of them.
+    """
     curve = measured.curve
     depth, force = float(np.ptp(curve.depth)), float(np.ptp(curve.force))
     least, most = float(curve.depth.min()), float(curve.depth.max())
     if name == "contact_point":
-        return Unknown(name, least - depth / 2, most, "m", is_wanted=False)
+        return Unknown(name, least - reach * depth, most, "m", is_wanted=False)
     if name == "baseline":
-        return Unknown(name, float(curve.force.min()) - force, float(curve.force.max()) + force, "N", is_wanted=False)
+        low, high = float(curve.force.min()) - 2 * reach * force, float(curve.force.max()) + force
+        return Unknown(name, low, high, "N", is_wanted=False)
     duration = float(np.ptp(times_of(measured)))
     return Unknown(name, -force / duration, force / duration, "N/s", is_wanted=False)
 
@@ -106,9 +113,12 @@ class Model:
         self._terms = sum(name.startswith("relaxation_time_") for name in self.names)
 
     @classmethod
-    def of(cls, measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> "Model":
-        """Return the model with these unknowns, and contact point and baseline of each curve."""
-        return cls(measured, Space(_all_unknowns(measured, unknowns)))
+    def of(cls, measured: Sequence[Measured], unknowns: Sequence[Unknown], reach: float = REACH) -> "Model":
+        """Return the model with these unknowns, and contact point and baseline of each curve.
+
+        Curves begin at most ``reach`` times their depths after contact, where ``unknowns`` do not say it.
+        """
+        return cls(measured, Space(_all_unknowns(measured, unknowns, reach)))
 
     def with_unknowns(self, unknowns: Sequence[Unknown]) -> "Model":
         """Return the model with further shared unknowns after its own, such as those of a hidden layer."""
@@ -203,12 +213,12 @@ class Model:
         return relaxed(force, self.times[number], terms)
 
 
-def _all_unknowns(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
+def _all_unknowns(measured: Sequence[Measured], unknowns: Sequence[Unknown], reach: float) -> tuple[Unknown, ...]:
     """Return shared unknowns, then those of each curve: a finite range holds for all, others are those of the curve."""
     named = {unknown.name: unknown for unknown in unknowns}
 
     def ranged(name: str, one: Measured) -> Unknown:
-        given, usual = named.get(name), default_unknown(name, one)
+        given, usual = named.get(name), default_unknown(name, one, reach)
         if given is None:
             return usual
         low, high = (own if isfinite(own) else by for own, by in ((given.low, usual.low), (given.high, usual.high)))

@@ -28,7 +28,7 @@ from pipeline.surrogate.cases import Solve
 # Seconds between two lines of progress.
 _SILENCE = 10.0
 # Depths that forces are computed for, in turn, as multiples of what is enough if there is air before the contact.
-_DEEPER = (1.0, 1.6, 2.5)
+_DEEPER = (1.0, 1.6, 2.5, 4.5)
 # Doubts about files of a folder beyond these are like those.
 _MOST_TOLD = 5
 

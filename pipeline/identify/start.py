@@ -7,9 +7,10 @@ from pipeline.arrays import FloatArray
 from pipeline.identify.fit import prior
 from pipeline.identify.model import Model
 
-# Contact points that are tried, as shares of the recorded depths, then between those next to the best; coordinates of
-# the other unknowns without prior.
+# Contact points that are tried, as shares of the recorded depths, and farther before the first row where the range
+# has them, then between those next to the best; coordinates of the other unknowns without prior.
 _CONTACTS = np.linspace(-0.2, 0.95, 24)
+_FARTHER = -0.2 * 1.3 ** np.arange(1, 13)
 _FINER = np.linspace(-0.9, 0.9, 7)
 _OTHERS = (0.5, 0.15, 0.85)
 # Least squares follows the best starts, for so many evaluations of derivatives.
@@ -40,10 +41,12 @@ def _place(model: Model, other: float) -> FloatArray:
     for number, measured in enumerate(model.measured):
         depth = measured.curve.depth
         own, span = float(depth.min()), float(np.ptp(depth))
-        step = float(_CONTACTS[1] - _CONTACTS[0])
-        tried = [_proportion(model, number, x, own + share * span) for share in _CONTACTS]
+        first = model.space.unknowns[model.names.index(model.own("contact_point", number))].low
+        shares = np.append(_FARTHER[own + _FARTHER * span >= first][::-1], _CONTACTS)
+        tried = [_proportion(model, number, x, own + share * span) for share in shares]
         best = min(range(len(tried)), key=lambda k: tried[k][0])
-        finer = [_proportion(model, number, x, own + (_CONTACTS[best] + step * by) * span) for by in _FINER]
+        step = abs(float(shares[best] - shares[best - 1])) if best else float(shares[1] - shares[0])
+        finer = [_proportion(model, number, x, own + (shares[best] + step * by) * span) for by in _FINER]
         _, x, scale = min([tried[best], *finer], key=lambda one: one[0])
         scales.append(scale)
     for place, name in enumerate(model.names):

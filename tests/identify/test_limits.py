@@ -1,5 +1,7 @@
 """Ranges that do not include the truth have no bar, and those that cut a bar are told."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -29,6 +31,27 @@ def test_a_range_without_the_truth_has_no_bar(low, high, words):
     assert words in found.verdict
     assert np.isnan(found.low).all() and np.isnan(found.part).all()
     assert not found.windows
+
+
+@pytest.mark.parametrize("begins", [0.5, 0.7])
+@pytest.mark.parametrize("is_zeroed", [False, True])
+def test_a_curve_that_begins_deep_in_contact_has_a_bar_that_holds(begins, is_zeroed):
+    """Rows from a share of the depth on; contact was as far before the first row as 1 to 2.3 times the rest."""
+    widths = []
+    for seed in range(3):
+        error = 0.003 * noise(np.random.default_rng((seed, int(10 * begins))), 200, 0.6)
+        one = measured(Ball(), {"young": 25e3}, error, 2e-4, air=0.0)
+        keep = one.curve.depth >= 1e-4 + begins * 2e-4
+        zero = 0.1 * np.ptp(one.curve.force)
+        late = replace(one.curve, depth=one.curve.depth[keep], force=one.curve.force[keep] - zero, time=None)
+        baseline = [Unknown("baseline", -0.2 * zero, 0.2 * zero, "N", False, (0.0, 0.08 * zero), False)]
+        found = identify([replace(one, curve=late)], [YOUNG, *(baseline if is_zeroed else [])])
+        assert found.fits
+        place = found.place("contact_point")
+        for at, truth in ((0, 25e3), (place, 1e-4)):
+            assert found.low[at] <= truth <= found.high[at]
+        widths.append((found.high[0] - found.low[0]) / 2 / 25e3)
+    assert max(widths) < (0.4 if is_zeroed else 1.0)
 
 
 def test_a_bar_that_its_range_cuts_is_told_of():
