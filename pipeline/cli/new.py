@@ -11,6 +11,7 @@ from pipeline.cli.console import say
 from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study
 from pipeline.cli.words import Json
 from pipeline.files import atomic, write_new, write_whole
+from pipeline.shapes.files.label_names import CLASS_MAPS
 from pipeline.study.named import NAME, SCHEMA, SHORT, examples, is_name
 
 _FOLDER = Path("studies")
@@ -181,8 +182,8 @@ def _named(text: str) -> list[str]:
         return []
     measurements = study.get("measurement")
     tables = [study.get("body"), *(measurements if isinstance(measurements, list) else [])]
-    names = [table.get("file") for table in tables if isinstance(table, dict)]
-    return list(dict.fromkeys(name for name in names if isinstance(name, str)))
+    names = [table.get(key) for table in tables if isinstance(table, dict) for key in ("file", "names")]
+    return list(dict.fromkeys(name for name in names if isinstance(name, str) and name not in CLASS_MAPS))
 
 
 def _known() -> dict[str, Path]:

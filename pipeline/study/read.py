@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.shapes.body import Body
+from pipeline.shapes.files.label_names import CLASS_MAPS
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
@@ -189,10 +190,11 @@ def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
     def found(value: Any) -> Any:
         if isinstance(value, list):
             return [found(v) for v in value]
-        return str(folder / value) if isinstance(value, str) else value
+        return str(folder / value) if isinstance(value, str) and value and value not in CLASS_MAPS else value
 
     def table(body: Any) -> Any:
-        return body | {"file": found(body["file"])} if isinstance(body, dict) and "file" in body else body
+        files = [key for key in ("file", "names") if isinstance(body, dict) and key in body]
+        return body | {key: found(body[key]) for key in files} if files else body
 
     bodies = raw.get("body")
     return raw | {"body": [table(b) for b in bodies] if isinstance(bodies, list) else table(bodies)} if bodies else raw

@@ -16,10 +16,25 @@ from pipeline.units import Travel
 class FromImage(FromFile, Scanned):
     """The voxels of one label, in the patient's frame: x to the right, y to the front, z to the head."""
 
-    READ_BY: ClassVar[frozenset[str]] = frozenset({"label", "unit", "smooth"})
+    READ_BY: ClassVar[frozenset[str]] = frozenset({"label", "names", "unit", "smooth"})
 
     shape: Literal["image"]
-    label: Annotated[int, Field(gt=0, exclude=True), Words("Label of the body: the value of its voxels.", "1")]
+    label: Annotated[
+        Annotated[int, Field(gt=0)] | Annotated[str, Field(min_length=1)],
+        Field(exclude=True),
+        Words("Label of the body: the value of its voxels, or its name, as the image or `names` has it.", '"liver"'),
+    ]
+    names: Annotated[
+        str,
+        Field(exclude=True),
+        Words(
+            "Names of the labels: a file (dataset.json of nnU-Net, label descriptions of ITK-SNAP, a colour table of "
+            "3D Slicer), its path from the folder of the study; or totalsegmentator, totalsegmentator_mr for the "
+            "labels of its tasks total and total_mr.",
+            '"labels.txt"',
+            "those in the image",
+        ),
+    ] = ""
     unit: Annotated[
         Literal["m", "cm", "mm", "um", "µm"] | None,
         Field(exclude=True),
@@ -45,4 +60,4 @@ class FromImage(FromFile, Scanned):
         from pipeline.shapes.files.image import read_image  # noqa: PLC0415 (only when a file is read)
 
         unit = UNITS[given["unit"]] if given["unit"] else None
-        return read_image(Path(file), given["label"], unit, given["smooth"])
+        return read_image(Path(file), given["label"], unit, given["smooth"], given["names"])

@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.checked import kept_image
+from pipeline.shapes.files.label_names import CLASS_MAPS
 from pipeline.shapes.files.labels import LARGEST_IMAGE, LabelMap, files_of, of_label, read_labels
 from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.files.raw import Raw
@@ -34,32 +35,43 @@ _AWAY = 0.005
 _CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 
 
-def read_image(path: Path, label: int, unit: float | None = None, smooth: float | None = None) -> Loaded:
-    """Return the surface of the voxels with a ``label`` in a NIfTI or NRRD file, and notices of what was changed.
+def read_image(
+    path: Path, label: int | str, unit: float | None = None, smooth: float | None = None, names: str = ""
+) -> Loaded:
+    """Return the surface of the voxels with a ``label``, a number or a name, and notices of what was changed.
 
-    ``unit`` (m) is needed only if the header names none; ``smooth`` (m) is the standard deviation of the filter. Files
-    are read again only when they have changed, and the surface is cached on disk.
+    ``unit`` (m) is needed only if the header names none; ``smooth`` (m) is the standard deviation of the filter;
+    ``names`` is that of :func:`read_labels`. Files are read again only when they have changed, and the surface is
+    cached on disk.
 
     Raises:
         SurfaceError: if the label does not bound one piece of tissue; the message says what was found and how to repair
             it.
     """
-    header, *data = _files(path, state_of(path))
-    try:
-        states = (state_of(header), *map(state_of, data))
-    except SurfaceError as error:
-        raise SurfaceError(f"the data file of its header, `{data[0]}`, {error}") from error
-    return _load((header, *data), states, label, unit, smooth)
+    header, *others = _files(path, state_of(path), names)
+    states = [state_of(header)]
+    for other in others:
+        try:
+            states.append(state_of(other))
+        except SurfaceError as error:
+            what = "`names`:" if str(other) == names else "the data file of its header,"
+            raise SurfaceError(f"{what} `{other}`, {error}") from error
+    return _load((header, *others), tuple(states), label, unit, smooth, names)
 
 
 @lru_cache(maxsize=8)
-def _files(path: Path, _state: tuple[int, int]) -> tuple[Path, ...]:
-    return files_of(path)
+def _files(path: Path, _state: tuple[int, int], names: str) -> tuple[Path, ...]:
+    return files_of(path, names)
 
 
 @lru_cache(maxsize=8)
 def _load(
-    files: tuple[Path, ...], states: tuple[tuple[int, int], ...], label: int, unit: float | None, smooth: float | None
+    files: tuple[Path, ...],
+    states: tuple[tuple[int, int], ...],
+    label: int | str,
+    unit: float | None,
+    smooth: float | None,
+    names: str,
 ) -> Loaded:
     path = files[0]
     if not all(size for _, size in states):
@@ -68,10 +80,10 @@ def _load(
         raise SurfaceError(f"has {largest / 1e9:.2g} GB, more than {LARGEST_IMAGE / 1e9:g}: crop or resample it")
 
     def make() -> tuple[Triangles, tuple[str, ...]]:
-        found = surface_of(read_labels(path, unit), label, smooth)
+        found = surface_of(read_labels(path, unit, names), label, smooth)
         return found.triangles, found.notices
 
-    given = f"{_METHOD} {path.suffix.lower()} {label} {unit!r} {smooth!r}"
+    given = f"{_METHOD} {path.suffix.lower()} {label!r} {unit!r} {smooth!r} {names if names in CLASS_MAPS else ''}"
     try:
         return Loaded(*kept_image(files, given, make))
     except OSError as error:
@@ -86,7 +98,7 @@ def default_smooth(spacing: FloatArray) -> float:
     return max(1.5 * float(np.prod(spacing)) ** (1 / 3), float(spacing.max()))
 
 
-def surface_of(labels: LabelMap, label: int, smooth: float | None = None) -> Loaded:
+def surface_of(labels: LabelMap, label: int | str, smooth: float | None = None) -> Loaded:
     """Return the surface of the voxels with a ``label``."""
     mask = of_label(labels, label)
     mask, start, notices = _one_piece(mask, float(np.prod(labels.spacing)))

@@ -1,0 +1,172 @@
+"""A label map: an integer for each voxel, the positions of the voxels, and the names of the labels."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.shapes.triangles import SurfaceError
+
+UNITS = {"m": 1.0, "meter": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "micron": 1e-6}
+MOST_VOXELS = 1_000_000_000
+# Most bytes of values, also after unpacking: a larger label map does not fit into memory.
+LARGEST_IMAGE = 4_000_000_000
+_SHOWN = 20
+
+
+@dataclass(frozen=True)
+class LabelMap:
+    """``values`` (nx, ny, nz), integers, and the ``affine`` (3, 4) from voxel indices to positions.
+
+    Positions are in m, in the patient's frame: x to the right, y to the front (anterior), z to the head (superior).
+    ``names`` are those of labels, as far as known; labels without voxels may have one.
+    """
+
+    values: Any
+    affine: FloatArray
+    notices: tuple[str, ...] = ()
+    names: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def spacing(self) -> FloatArray:
+        """Sizes (3,) of a voxel (m)."""
+        size: FloatArray = np.linalg.norm(self.affine[:, :3], axis=0)
+        return size
+
+    @property
+    def labels(self) -> tuple[int, ...]:
+        """Labels of voxels, without 0."""
+        return tuple(int(k) for k in np.unique(self.values) if k)
+
+    def number(self, label: int | str) -> int:
+        """Return the number of a label that is given by number or name.
+
+        Letters may be capital or small, and spaces may be underscores, if one label alone is then meant.
+
+        Raises:
+            SurfaceError: if no label, or more than one, has the name; the message has the names that exist.
+        """
+        if isinstance(label, int):
+            return label
+        for same in (str, _simple):
+            found = [number for number, name in self.names.items() if same(name) == same(label)]
+            if len(found) == 1:
+                return found[0]
+            if found:
+                several = ", ".join(map(str, found))
+                raise SurfaceError(f"`{label}` is the name of labels {several}: give the number")
+        if not self.names:
+            raise SurfaceError(
+                f'names no labels, and the study has label = "{label}": give the number, one of '
+                f'{_listed(self.labels)}, or `names`, such as names = "labels.txt"'
+            )
+        there = [self.names[number] for number in self.labels if number in self.names]
+        near = get_close_matches(_simple(label), {_simple(name): name for name in there}, n=3)
+        meant = f"; is it {' or '.join(name for name in there if _simple(name) in near)}?" if near else ""
+        raise SurfaceError(f"no label has the name `{label}`; names are {_listed(there)}{meant}")
+
+    def written(self, label: int) -> str:
+        """Return a label with its name, for messages."""
+        return f"{label} ({self.names[label]})" if label in self.names else str(label)
+
+
+def _simple(name: str) -> str:
+    return name.casefold().replace(" ", "_").replace("-", "_")
+
+
+def _listed(values: Sequence[Any]) -> str:
+    return ", ".join(map(str, values[:_SHOWN])) + (f", … ({len(values)} in all)" if len(values) > _SHOWN else "")
+
+
+def of_label(found: LabelMap, label: int | str) -> Any:
+    """Return a mask of the voxels with a label, given by number or name.
+
+    Raises:
+        SurfaceError: if there are none; the message names the labels that exist.
+    """
+    number = found.number(label)
+    mask = found.values == number
+    if not mask.any():
+        labels = [found.written(one) for one in found.labels]
+        raise SurfaceError(
+            f"no voxel has label {found.written(number)}; "
+            + (f"labels are {_listed(labels)}" if labels else "all are 0: it is empty")
+        )
+    return mask
+
+
+def painted(segments: Sequence[tuple[int, Any]], names: Mapping[int, str]) -> tuple[Any, tuple[str, ...]]:
+    """Return the values of a label map with a mask (nx, ny, nz) for each label, and notices.
+
+    Where segments overlap, the smaller one has the voxel: a tumour within an organ is not lost.
+
+    Raises:
+        SurfaceError: if there is no segment.
+    """
+    if not segments:
+        raise SurfaceError("contains no segments: it is empty")
+    sizes = [int(mask.sum()) for _, mask in segments]
+    values = np.zeros(segments[0][1].shape, np.uint16)
+    taken: Counter[tuple[int, int]] = Counter()
+    for place in sorted(range(len(segments)), key=lambda k: -sizes[k]):
+        label, mask = segments[place]
+        below, counts = np.unique(values[mask], return_counts=True)
+        taken.update({(int(b), label): int(c) for b, c in zip(below, counts, strict=True) if b})
+        values[mask] = label
+    notices = [
+        f"segments {names.get(large, large)} and {names.get(small, small)} overlap in {count:,} voxels, which become "
+        f"part of {names.get(small, small)}"
+        for (large, small), count in sorted(taken.items())
+    ]
+    return values, tuple(notices)
+
+
+def check_shape(shape: tuple[int, ...], size: int = 1) -> None:
+    """Refuse a map that is not three-dimensional, or too large; a voxel's value has ``size`` bytes."""
+    if len(shape) < 3 or any(k != 1 for k in shape[3:]):
+        sizes = " × ".join(map(str, shape))
+        raise SurfaceError(
+            f"has {len(shape)} dimensions, {sizes}: allowed is one label map of 3; export one segment or time"
+        )
+    if min(shape) < 1:
+        raise SurfaceError(f"has {' × '.join(map(str, shape))} voxels: export it again")
+    voxels = shape[0] * shape[1] * shape[2]
+    if voxels > MOST_VOXELS:
+        raise SurfaceError(f"has {' × '.join(map(str, shape))} voxels, more than {MOST_VOXELS:,}: crop or resample it")
+    if voxels * size > LARGEST_IMAGE:
+        raise SurfaceError(
+            f"has {voxels * size / 1e9:.2g} GB of values, more than {LARGEST_IMAGE / 1e9:g}: export it with whole "
+            "numbers of 8 or 16 bits, or crop it"
+        )
+
+
+def unit_of(named: str | None, given: float | None) -> float:
+    """Return the unit of length (m) that a header has ``named``, or the one ``given`` in the study.
+
+    Raises:
+        SurfaceError: if there is none, or both differ.
+    """
+    if named is None and given is None:
+        raise SurfaceError('its header names no unit of length: add one to the study, such as unit = "mm"')
+    if named is not None and given is not None and not np.isclose(UNITS[named], given):
+        raise SurfaceError(f"its header says {named}, and the study another unit: leave out `unit`")
+    return UNITS[named] if named is not None else float(given or 0.0)
+
+
+def whole(values: Any) -> Any:
+    """Return labels after checking that they are integers."""
+    if values.dtype.kind in "uib":
+        return values
+    if values.dtype.kind != "f":
+        raise SurfaceError("contains colours, not labels: export the segmentation as a label map")
+    if not (values == np.floor(values)).all():
+        low, high = np.nanmin(values), np.nanmax(values)
+        raise SurfaceError(
+            f"contains values between {low:g} and {high:g} that are not integers: it is an image, or a probability; "
+            "export the segmentation as a label map"
+        )
+    return values
