@@ -21,6 +21,7 @@ from pipeline.mesh.regions import inclusion_sizes
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body
+from pipeline.shapes.complex import Complex
 from pipeline.shapes.scanned import Scanned
 
 # Passes of surface meshing: only in the second pass points are dense where sizes change fast.
@@ -96,7 +97,8 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     sheet = untangled(sheet, np.unique(sheet.facets[sheet.group == PROBE]))
     _check_whole(sheet, scene.body.volume)
     deviation = _deviation(sheet, scene.body, field)
-    points, cells, regions = fill(sheet.points, sheet.facets, field, inclusion_surfaces(scene.body.inclusion, field))
+    inner = inclusion_surfaces(scene.body.inclusion, field)
+    points, cells, regions = fill(Complex.nested([(sheet.points, sheet.facets), *inner]), field)
     if (flat := flat_cells(points, cells)).any():
         raise TangledError.at(points[cells[flat]], "gmsh left a flat tetrahedron")
     facets = {name: sheet.facets[sheet.group == number] for number, name in group_names().items()}

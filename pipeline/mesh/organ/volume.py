@@ -1,6 +1,6 @@
-"""Tetrahedra within a closed surface of triangles, and on both sides of surfaces inside it, all unchanged."""
+"""Tetrahedra on both sides of the surfaces that divide a body into regions; the surfaces remain unchanged."""
 
-from collections.abc import Sequence
+from dataclasses import replace
 
 import gmsh
 import numpy as np
@@ -11,7 +11,7 @@ from pipeline.mesh.generate import MeshError, model_options
 from pipeline.mesh.organ.field import Field
 from pipeline.mesh.organ.untangle import TangledError
 from pipeline.mesh.reason import reason
-from pipeline.shapes.triangles import enclosed
+from pipeline.shapes.complex import Complex
 from pipeline.stages import stage
 
 # Cells below this quality are optimised. With gmsh's default, 0.3, flat cells may remain that have all four corners in
@@ -22,30 +22,23 @@ MODEL_SIZE = 100.0  # extent of the model, in its unit
 # Relative tolerance on the volume of tetrahedra against that of their surface.
 _SAME = 1e-9
 
-Surface = tuple[FloatArray, IntArray]
-
 
 @stage("gmsh")
-def fill(
-    points: FloatArray, facets: IntArray, field: Field, inner: Sequence[Surface] = ()
-) -> tuple[FloatArray, IntArray, IntArray | None]:
-    """Return the points (n, 3) and cells (m, 4) of a mesh, and the number (m) of the surface around each cell.
+def fill(surfaces: Complex, field: Field) -> tuple[FloatArray, IntArray, IntArray | None]:
+    """Return the points (n, 3) and cells (m, 4) of a mesh, and the region number (m) of each cell.
 
-    The first points, and the boundary, are those given; then come the ``inner`` surfaces, points and facets of each,
-    which are closed and do not touch each other. Surface numbers count these from 1, and are 0 outside of them; they
-    are None without inner surfaces.
+    The first points are those of the ``surfaces``, whose facets are facets of cells. Region numbers are None if there
+    is one region.
 
     Raises:
-        MeshError: with gmsh's own message, if it fails.
+        MeshError: with gmsh's own message, if it fails, or if the cells of a region do not fill it.
     """
-    scale = float(np.ptp(points, axis=0).max()) / MODEL_SIZE
-    surfaces = [(points, facets), *inner]
-    given = np.vstack([corners for corners, _ in surfaces])
-    scaled = given / scale
+    scale = float(np.ptp(surfaces.points, axis=0).max()) / MODEL_SIZE
+    scaled = surfaces.points / scale
     with gmsh_session():
         model_options()
         model = gmsh.model
-        volumes = _add_volumes([(corners / scale, triangles) for corners, triangles in surfaces])
+        volumes = _add_volumes(replace(surfaces, points=scaled))
         field.set(scale, model.geo)
         gmsh.option.setNumber("Mesh.OptimizeThreshold", _OPTIMISED)
         try:
@@ -59,25 +52,31 @@ def fill(
         order = np.argsort(found)
         place = coordinates.reshape(-1, 3)[order]
         cells = np.searchsorted(found[order], np.concatenate(parts)).reshape(-1, 4)
-    points, cells = _first(given, scaled, place * scale, place, cells)
-    if not inner:
+    points, cells = _first(surfaces.points, scaled, place * scale, place, cells)
+    if len(parts) == 1:
         return points, cells, None
-    numbers = np.repeat(np.arange(len(parts)), [len(part) // 4 for part in parts])
-    _check_filled(points, cells, numbers, inner)
+    numbers = np.repeat(surfaces.regions, [len(part) // 4 for part in parts])
+    _check_filled(points, cells, numbers, surfaces)
     return points, cells, numbers
 
 
-def _add_volumes(surfaces: Sequence[Surface]) -> list[int]:
-    """Add to the model the volume between the first surface and the others, and that inside each of the others."""
-    model, skins, first = gmsh.model, [], 1
-    for points, facets in surfaces:
+def _add_volumes(surfaces: Complex) -> list[int]:
+    """Add the regions to the model: one discrete surface for each pair of regions, with common points at junctions."""
+    model, skins = gmsh.model, []
+    walls, wall = surfaces.walls()
+    # A point belongs to the first wall that it is in.
+    owner = np.empty(len(surfaces.points), dtype=np.int64)
+    for number in reversed(range(len(walls))):
+        owner[surfaces.facets[wall == number]] = number
+    for number in range(len(walls)):
         skin = model.addDiscreteEntity(2)
-        model.mesh.addNodes(2, skin, np.arange(first, first + len(points)), points.ravel())
-        model.mesh.addElementsByType(skin, _TRIANGLE, [], (facets + first).ravel())
+        mine = np.flatnonzero(owner == number)
+        model.mesh.addNodes(2, skin, mine + 1, surfaces.points[mine].ravel())
         skins.append(skin)
-        first += len(points)
-    loops = [model.geo.addSurfaceLoop([skin]) for skin in skins]
-    volumes = [model.geo.addVolume(loops), *(model.geo.addVolume([loop]) for loop in loops[1:])]
+    for number, skin in enumerate(skins):
+        model.mesh.addElementsByType(skin, _TRIANGLE, [], (surfaces.facets[wall == number] + 1).ravel())
+    around = [np.flatnonzero((walls == region).any(axis=1)) for region in surfaces.regions]
+    volumes = [model.geo.addVolume([model.geo.addSurfaceLoop([skins[k] for k in beside])]) for beside in around]
     model.geo.synchronize()
     return volumes
 
@@ -91,14 +90,14 @@ def _named(words: str, scale: float) -> MeshError:
     return TangledError(places, np.zeros(len(places)), words)
 
 
-def _check_filled(points: FloatArray, cells: IntArray, numbers: IntArray, inner: Sequence[Surface]) -> None:
-    """Check that the tetrahedra with the number of an ``inner`` surface fill its volume."""
+def _check_filled(points: FloatArray, cells: IntArray, numbers: IntArray, surfaces: Complex) -> None:
+    """Check that the tetrahedra of each region fill it."""
     corners = points[cells]
     volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
-    filled = np.bincount(numbers, volumes)[1:]
-    wanted = np.array([abs(enclosed(*surface)) for surface in inner])
+    filled = np.bincount(numbers, volumes)[surfaces.regions]
+    wanted = [surfaces.volume(region) for region in surfaces.regions]
     if not np.allclose(filled, wanted, rtol=_SAME, atol=0):
-        raise MeshError("gmsh did not fill the surface of an inclusion: it meets another one; use a smaller `fine`")
+        raise MeshError("gmsh did not fill the surface of a region: it meets another one; use a smaller `fine`")
 
 
 def _first(
