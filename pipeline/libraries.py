@@ -5,7 +5,7 @@ _FENICS = f"`make setup` {_SOURCE} installs it on Debian, `conda env create -f e
 _PIP = "`pip install '{}'` " + _SOURCE + " installs it (on Debian: `make setup`)"
 _REMEDIES = {
     **dict.fromkeys(("dolfinx", "ufl", "basix", "ffcx", "petsc4py", "mpi4py", "gmsh"), _FENICS),
-    **dict.fromkeys(("igl", "nibabel", "nrrd", "mmgpy"), _PIP.format(".[organs]")),
+    **dict.fromkeys(("igl", "nibabel", "nrrd", "pydicom", "mmgpy"), _PIP.format(".[organs]")),
     "pyvista": _PIP.format(".[view]"),
 }
 

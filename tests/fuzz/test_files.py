@@ -27,6 +27,7 @@ from tests.experiment.curves import cycle, write
 from tests.fuzz.profile import thrown
 from tests.organs import box, write_stl
 from tests.realtime.synthetic import write_random
+from tests.shapes.files import dicoms
 
 PLAN = make_plan(study(material={"young": "10 kPa", "poisson": [0.3, 0.4]}))
 STEP = b"""ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;
@@ -70,6 +71,7 @@ def good(tmp_path_factory):
         nibabel.save(image, folder / f"ball.{ending}")
     nrrd.write(str(folder / "ball.nrrd"), ball, {"space directions": 2 * np.eye(3), "space origin": np.zeros(3),
                "space": "right-anterior-superior", "space units": ["mm"] * 3})  # fmt: skip
+    dicoms.segmentation(folder / "ball.dcm", dicoms.frames(dicoms.values()))
     write_random(folder / "box.epsm.nc")
     store = Store(folder / "cases.sqlite")
     for key in PLAN.keys:
@@ -96,7 +98,7 @@ def test_surfaces(good, thrown_at, data, ending, repair):
         assert np.isfinite(loaded.triangles.points).all() and loaded.triangles.volume > 0
 
 
-@given(data=st.data(), ending=st.sampled_from(["nii", "nii.gz", "nrrd"]))
+@given(data=st.data(), ending=st.sampled_from(["nii", "nii.gz", "nrrd", "dcm"]))
 @thrown(0.2)
 def test_label_maps(good, thrown_at, data, ending):
     file = thrown_at / f"ball.{ending}"

@@ -51,7 +51,11 @@ class FromImage(FromFile, Scanned):
         ),
     ] = None
     file: Annotated[
-        str, Words("File of a label map, NIfTI or NRRD: its path from the folder of the study.", '"liver.nii.gz"')
+        str,
+        Words(
+            "File of a label map (NIfTI, NRRD, DICOM), or folder of a DICOM series: its path from the study's folder.",
+            '"liver.nii.gz"',
+        ),
     ]
 
     @classmethod

@@ -48,24 +48,32 @@ def read_image(
         SurfaceError: if the label does not bound one piece of tissue; the message says what was found and how to repair
             it.
     """
-    header, *others = _files(path, state_of(path), names)
-    states = [state_of(header)]
-    for other in others:
+    files = _files(path, _changed(path), names)
+    states = []
+    for file in files:
         try:
-            states.append(state_of(other))
+            states.append(state_of(file))
         except SurfaceError as error:
-            what = "`names`:" if str(other) == names else "the data file of its header,"
-            raise SurfaceError(f"{what} `{other}`, {error}") from error
-    return _load((header, *others), tuple(states), label, unit, smooth, names)
+            if file == path:
+                raise
+            what = "`names`:" if str(file) == names else "the data file of its header,"
+            raise SurfaceError(f"{what} `{file}`, {error}") from error
+    return _load(path, files, tuple(states), label, unit, smooth, names)
+
+
+def _changed(path: Path) -> int:
+    """Return the time of a last change (ns) of a file, or of a folder, with DICOM files."""
+    return path.stat().st_mtime_ns if path.is_dir() else state_of(path)[0]
 
 
 @lru_cache(maxsize=8)
-def _files(path: Path, _state: tuple[int, int], names: str) -> tuple[Path, ...]:
+def _files(path: Path, _time: int, names: str) -> tuple[Path, ...]:
     return files_of(path, names)
 
 
 @lru_cache(maxsize=8)
 def _load(
+    path: Path,
     files: tuple[Path, ...],
     states: tuple[tuple[int, int], ...],
     label: int | str,
@@ -73,7 +81,6 @@ def _load(
     smooth: float | None,
     names: str,
 ) -> Loaded:
-    path = files[0]
     if not all(size for _, size in states):
         raise SurfaceError("is empty: copy or export it again")
     if (largest := max(size for _, size in states)) > LARGEST_IMAGE:

@@ -99,8 +99,14 @@ def of_label(found: LabelMap, label: int | str) -> Any:
     return mask
 
 
-def painted(segments: Sequence[tuple[int, Any]], names: Mapping[int, str]) -> tuple[Any, tuple[str, ...]]:
-    """Return the values of a label map with a mask (nx, ny, nz) for each label, and notices.
+# Voxels of a segment: where they are in the map, an array there, and its value for them.
+Piece = tuple[Any, Any, int]
+
+
+def painted(
+    shape: tuple[int, ...], segments: Mapping[int, Sequence[Piece]], names: Mapping[int, str]
+) -> tuple[Any, tuple[str, ...]]:
+    """Return the values (``shape``) of a label map from the pieces of each label's segment, and notices.
 
     Where segments overlap, the smaller one has the voxel: a tumour within an organ is not lost.
 
@@ -109,14 +115,16 @@ def painted(segments: Sequence[tuple[int, Any]], names: Mapping[int, str]) -> tu
     """
     if not segments:
         raise SurfaceError("contains no segments: it is empty")
-    sizes = [int(mask.sum()) for _, mask in segments]
-    values = np.zeros(segments[0][1].shape, np.uint16)
+    sizes = {label: sum(int((array == own).sum()) for _, array, own in pieces) for label, pieces in segments.items()}
+    values = np.zeros(shape, np.uint16)
     taken: Counter[tuple[int, int]] = Counter()
-    for place in sorted(range(len(segments)), key=lambda k: -sizes[k]):
-        label, mask = segments[place]
-        below, counts = np.unique(values[mask], return_counts=True)
-        taken.update({(int(b), label): int(c) for b, c in zip(below, counts, strict=True) if b})
-        values[mask] = label
+    for label in sorted(segments, key=lambda one: -sizes[one]):
+        for index, array, own in segments[label]:
+            mask = array == own
+            part = values[index]
+            below, counts = np.unique(part[mask], return_counts=True)
+            taken.update({(int(b), label): int(c) for b, c in zip(below, counts, strict=True) if b})
+            part[mask] = label
     notices = [
         f"segments {names.get(large, large)} and {names.get(small, small)} overlap in {count:,} voxels, which become "
         f"part of {names.get(small, small)}"
@@ -158,9 +166,14 @@ def unit_of(named: str | None, given: float | None) -> float:
 
 
 def whole(values: Any) -> Any:
-    """Return labels after checking that they are integers."""
-    if values.dtype.kind in "uib":
+    """Return labels after checking that they are integers, none of them negative."""
+    if values.dtype.kind in "ub" or (values.dtype.kind == "i" and values.min() >= 0):
         return values
+    if values.dtype.kind == "i":
+        raise SurfaceError(
+            f"contains values from {values.min()} to {values.max()}: it is an image, such as a CT; export its "
+            "segmentation as a label map"
+        )
     if values.dtype.kind != "f":
         raise SurfaceError("contains colours, not labels: export the segmentation as a label map")
     if not (values == np.floor(values)).all():

@@ -77,7 +77,7 @@ def segments_of_header(header: Mapping[str, Any]) -> list[tuple[int, int, str]]:
     for number in sorted(int(key[1]) for key in map(_SEGMENT.match, header) if key):
         # Files of 3D Slicer 4.10 and before have a layer for each segment, and no fields of label and layer.
         layer, label = (header.get(f"Segment{number}_{what}") for what in ("Layer", "LabelValue"))
-        name = _clean(header[f"Segment{number}_Name"])
+        name = clean(header[f"Segment{number}_Name"])
         found.append((number if layer is None else int(layer), 1 if label is None else int(label), name))
     return found
 
@@ -92,15 +92,15 @@ def _of_json(text: str) -> Names:
     found: Names = {}
     for key, value in table.items() if isinstance(table, dict) else ():
         if isinstance(value, int) and not isinstance(value, bool):
-            found[value] = _clean(key)
+            found[value] = clean(key)
         elif isinstance(value, str) and key.isdecimal():
-            found[int(key)] = _clean(value)
+            found[int(key)] = clean(value)
     return _without_background(found)
 
 
 def _of_lines(text: str) -> Names:
     rows = (match for line in text.splitlines() if (match := _SNAP.match(line) or _TABLE.match(line)))
-    return _without_background({int(match[1]): _clean(match[2]) for match in rows})
+    return _without_background({int(match[1]): clean(match[2]) for match in rows})
 
 
 def _of_xml(text: str) -> Names:
@@ -109,12 +109,13 @@ def _of_xml(text: str) -> Names:
     except ElementTree.ParseError:
         return {}
     found = ((one.get("Key", ""), "".join(one.itertext())) for one in labels)
-    return _without_background({int(key): _clean(name) for key, name in found if key.isdecimal()})
+    return _without_background({int(key): clean(name) for key, name in found if key.isdecimal()})
 
 
 def _without_background(names: Names) -> Names:
     return {label: name for label, name in names.items() if label > _BACKGROUND and name}
 
 
-def _clean(name: Any) -> str:
+def clean(name: Any) -> str:
+    """Return a name that others wrote as one line that can be shown."""
     return printable(str(name).strip())[:_LONGEST]

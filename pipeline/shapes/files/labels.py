@@ -1,11 +1,13 @@
-"""Reader of label maps, NIfTI and NRRD: an integer for each voxel, positions, and names."""
+"""Reader of label maps, NIfTI, NRRD and DICOM: an integer for each voxel, positions, and names."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pipeline.shapes.files.dicom_labels import read_dicom, series_files
 from pipeline.shapes.files.label_map import LARGEST_IMAGE, UNITS, LabelMap, check_shape, of_label, unit_of, whole
 from pipeline.shapes.files.label_names import CLASS_MAPS, names_of_extensions, read_names
 from pipeline.shapes.files.nrrd_labels import data_file, read_nrrd
@@ -13,21 +15,26 @@ from pipeline.shapes.triangles import SurfaceError
 
 __all__ = ["ENDINGS", "LARGEST_IMAGE", "LabelMap", "files_of", "is_image", "of_label", "read_labels"]
 
-_NIFTI, _NRRD = (".nii", ".nii.gz"), (".nrrd", ".nhdr")
-ENDINGS = (*_NIFTI, *_NRRD)
+_NIFTI, _NRRD, _DICOM = (".nii", ".nii.gz"), (".nrrd", ".nhdr"), (".dcm",)
+ENDINGS = (*_NIFTI, *_NRRD, *_DICOM)
 _SINGULAR = 1e-9
 
 
 def is_image(path: Path) -> bool:
-    """Return whether a file is a label map, by its name."""
-    return path.name.lower().endswith(ENDINGS)
+    """Return whether a file is a label map, by its name; a folder is that of a DICOM series."""
+    return path.name.lower().endswith(ENDINGS) or path.is_dir()
 
 
 def files_of(path: Path, names: str = "") -> tuple[Path, ...]:
-    """Return the files of a label map: its own, the data file if a NRRD header names one, and that of ``names``."""
+    """Return the files of a label map: its own, the data file if a NRRD header names one, and that of ``names``.
+
+    Raises:
+        SurfaceError: if it is a folder that is not of a DICOM series.
+    """
     data = data_file(path) if path.name.lower().endswith(_NRRD) else None
+    own = series_files(path) if path.is_dir() else (path,)
     others = [] if not names or names in CLASS_MAPS else [Path(names)]
-    return (path, *([] if data is None else [data]), *others)
+    return (*own, *([] if data is None else [data]), *others)
 
 
 def read_labels(path: Path, unit: float | None, names: str = "") -> LabelMap:
@@ -40,7 +47,7 @@ def read_labels(path: Path, unit: float | None, names: str = "") -> LabelMap:
     """
     if not is_image(path):
         raise SurfaceError(f"its name ends in `{path.suffix}`; allowed label maps are {', '.join(ENDINGS)}")
-    kind, read = ("NIfTI", _nifti) if path.name.lower().endswith(_NIFTI) else ("NRRD", read_nrrd)
+    kind, read = _reader(path)
     try:
         found = read(path, unit)
     except (SurfaceError, MemoryError, ModuleNotFoundError):
@@ -53,6 +60,13 @@ def read_labels(path: Path, unit: float | None, names: str = "") -> LabelMap:
     if abs(np.linalg.det(found.affine[:, :3] / found.spacing.max())) < _SINGULAR or not np.isfinite(found.affine).all():
         raise SurfaceError("its header gives voxels without volume: export it again with spacing and directions")
     return replace(found, names=read_names(names)) if names else found
+
+
+def _reader(path: Path) -> tuple[str, Callable[[Path, float | None], LabelMap]]:
+    name = path.name.lower()
+    if path.is_dir() or name.endswith(_DICOM):
+        return "DICOM", read_dicom
+    return ("NIfTI", _nifti) if name.endswith(_NIFTI) else ("NRRD", read_nrrd)
 
 
 def _nifti(path: Path, unit: float | None) -> LabelMap:

@@ -62,8 +62,8 @@ def read_nrrd(path: Path, unit: float | None) -> LabelMap:
     if any(layer >= sizes[0] for layer, _, _ in segments):
         raise SurfaceError(f"its segments name more layers than the {sizes[0]} that it has: export it again")
     names = {number: name for number, (_, _, name) in enumerate(segments, start=1)}
-    masks = [(number, values[layer] == label) for number, (layer, label, _) in enumerate(segments, start=1)]
-    one, told = painted(masks, names)
+    pieces = {n: [(..., values[layer], label)] for n, (layer, label, _) in enumerate(segments, start=1)}
+    one, told = painted(shape, pieces, names)
     return LabelMap(one, affine, (*notices, *told), names)
 
 

@@ -157,6 +157,7 @@ def test_what_is_no_label_map_is_refused(scan: Path, tmp_path: Path):
         "missing.nii": (values, 5, "no voxel has label 5; labels are 2"),
         "nothing.nii": (values * 0, 1, "all are 0"),
         "grey.nii": (values * np.float32(0.37), 1, "not integers"),
+        "ct.nii": (values.astype(np.int16) - 1000, 2, "it is an image, such as a CT"),
         "times.nii": (np.stack([values, values], 3), 2, "4 dimensions"),
         "two.nii": (two, 2, "which one is meant"),
         "hollow.nii": (shell, 2, "encloses"),
