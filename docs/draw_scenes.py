@@ -71,13 +71,14 @@ def draw(path: Path) -> Path:
     from mpi4py import MPI
     from PIL import Image
 
+    from pipeline.run.solved import solve_alone
     from pipeline.study.read import read_study
-    from pipeline.view.compute import compute_fields, solve_to_view
+    from pipeline.view.compute import compute_fields
     from pipeline.view.picture import draw_mesh
 
     study = read_study(path)
     (case,) = study.cases()
-    fields = compute_fields(solve_to_view(study, case), MPI.COMM_SELF, mesh_only=True)
+    fields = compute_fields(solve_alone(study, case), MPI.COMM_SELF, mesh_only=True)
     assert fields is not None
     PICTURES.mkdir(parents=True, exist_ok=True)
     picture = draw_mesh(fields, PICTURES / f"{path.stem}.png", study.title)

@@ -13,11 +13,14 @@ from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.progress import Terminal
 from pipeline.study.named import NAME, is_name
 from pipeline.study.read import read_mapping, read_study
+from pipeline.study.select import the_case
 from pipeline.study.sweep import Study
 
 if TYPE_CHECKING:
     import xarray as xr
     from mpi4py import MPI
+
+    from pipeline.run.case_solution import CaseSolution
 
 
 @dataclass(frozen=True)
@@ -120,6 +123,46 @@ class RunnableStudy:
             text = f"{self.name}: {len(outcome.failures)} failed, the first: {case}: {message}"
             warnings.warn(text, RuntimeWarning, stacklevel=2)
         return dataset
+
+    def solve(
+        self,
+        labels: Mapping[str, float | int | str] | None = None,
+        comm: "MPI.Comm | None" = None,
+        *,
+        meshes: str | Path | None = None,
+        **more: float | int | str,
+    ) -> "CaseSolution":
+        """Solve one case on the ranks of ``comm`` (all there are) and return its fields; collective.
+
+        The case is chosen by its labels, as in xarray's ``sel``: numbers in SI units, or text (``depth="2 mm"``). Mesh,
+        elements, contact and accuracy are those of a run, and so is the force. Nothing is read from a store or written
+        to it; meshes are kept in ``meshes`` if that is given.
+
+        Raises:
+            ValueError: if not exactly one case has these labels, or the tool has no contact at its place.
+            RuntimeError: if the case cannot be meshed or solved.
+        """
+        from pipeline import workflow  # noqa: PLC0415 (MPI starts as it is imported)
+        from pipeline.mesh.generate import MeshError  # noqa: PLC0415
+        from pipeline.run.case_solution import CaseSolution  # noqa: PLC0415
+        from pipeline.run.mesh_cache import MeshCache  # noqa: PLC0415
+        from pipeline.run.problem import CaseFailure  # noqa: PLC0415
+        from pipeline.run.solved import solve_alone, solve_fields  # noqa: PLC0415
+        from pipeline.solve import SolveError  # noqa: PLC0415
+        from pipeline.states import FAILURES  # noqa: PLC0415
+
+        case = the_case(self.declared, {**(labels or {}), **more})
+        if case.lost_contact:
+            raise ValueError(f"{case}: {case.lost_contact}")
+        comm = workflow.world() if comm is None else comm
+        cache = MeshCache(Path(meshes)) if meshes else None
+        try:
+            solved = solve_fields(solve_alone(self.declared, case), comm, cache=cache)
+        except (CaseFailure, MeshError, SolveError) as failure:
+            raise RuntimeError(f"{case}: {failure}") from failure
+        if solved.record.status in FAILURES:
+            warnings.warn(f"{case}: {solved.record.message}", RuntimeWarning, stacklevel=2)
+        return CaseSolution(solved)
 
     def identify(self, *, output: str | Path = "results", store: str | Path | None = None) -> "xr.Dataset":
         """Find the parameters of the study from its measured curves, and return the dataset of what was found.

@@ -170,10 +170,11 @@ def _scene_at_hand(dataset: "xr.Dataset") -> str:
     from pipeline.mesh.generate import MeshError
     from pipeline.run.mesh_cache import MeshCache
     from pipeline.run.problem import CaseFailure
-    from pipeline.view.compute import compute_fields, solve_to_view
+    from pipeline.run.solved import solve_alone
+    from pipeline.view.compute import compute_fields
     from pipeline.view.page import render
 
-    solve = solve_to_view(study, case)
+    solve = solve_alone(study, case)
     if cells(solve.case) > _MOST_CELLS:
         return ""
     kept = MeshCache(DEFAULT_MESHES) if DEFAULT_MESHES.is_dir() else None

@@ -67,8 +67,9 @@ def fields_of(
     from pipeline.mesh.generate import MeshError
     from pipeline.run.mesh_cache import MeshCache
     from pipeline.run.problem import CaseFailure
+    from pipeline.run.solved import solve_alone
     from pipeline.solve import SolveError
-    from pipeline.view.compute import compute_fields, solve_to_view
+    from pipeline.view.compute import compute_fields
 
     if case.lost_contact:
         why, howto = case.lost_contact, "docs/howto/path.md"
@@ -76,7 +77,7 @@ def fields_of(
     note = error if comm.rank == 0 else lambda _: None
     note(str(case))
     try:
-        solve = solve_to_view(study, case)
+        solve = solve_alone(study, case)
         return compute_fields(solve, comm, mesh_only=mesh_only, bar=bar, cache=MeshCache(meshes), note=note)
     except (CaseFailure, MeshError, SolveError) as failure:
         why = f"failed: {failure}"

@@ -182,9 +182,12 @@ def _moved(far: PointForce | BodyField, centre: Place) -> FarField:
     return far.moved(centre)
 
 
-def law_of(case: Case) -> MaterialLaw:
-    """Return laws and parameters of the body's regions; with their relaxation where time steps need it."""
-    within = [_parameters(tissue, case.frame.turn) for tissue in case.tissues]
+def law_of(case: Case, *, in_body: bool = False) -> MaterialLaw:
+    """Return laws and parameters of the body's regions; with their relaxation where time steps need it.
+
+    Directions are those on the mesh, which is turned so that the probe presses along -z, or ``in_body`` coordinates.
+    """
+    within = [_parameters(tissue, None if in_body else case.frame.turn) for tissue in case.tissues]
     beyond = [Parameters.of_moduli(each.young, each.poisson) for each in case.tissues if case.is_linear_beyond]
     found = (*within, *beyond)
     if case.is_stepped:

@@ -58,6 +58,10 @@ class PointLaw:
         if len(self._fields) > 1:
             _ = self._coupling
 
+    def compile_stress(self) -> None:
+        """Compile the stress alone."""
+        _ = self._stress
+
     def moduli(self, law: Parameters) -> PointKernel:
         """Return ∂²ψ/∂F², (9, 9), with the parameters of a region."""
         return self._bound(self._moduli, law)

@@ -30,6 +30,7 @@ from pipeline.solve.estimate import error_bar, stiffness_bars
 from pipeline.solve.linear_solver import LinearSolver
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.points.state import State
 from pipeline.solve.prescribed import PrescribedMotion, respond
 from pipeline.solve.response import LoadResponse, Response, shares
 from pipeline.solve.solution import Problem, Request, Solution
@@ -227,10 +228,10 @@ class QuasiStaticProblem(Problem):
         finally:
             found.close()
 
-    def fields(self) -> tuple[Any, FloatArray]:
-        """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
+    def state(self) -> State:
+        """Return a copy of the last solution's fields, which outlives the problem; collective."""
         assert self._law is not None
-        return self.elements.displacements.forms.displacement, self._values.principal_strains(self._law)
+        return self.elements.state(self._law)
 
     def largest(self, law: MaterialLaw, displacement: PETSc.Vec) -> dict[str, Any]:
         """Return the cell maxima of ``displacement`` by name; collective."""

@@ -11,8 +11,9 @@ from pipeline.plan.plan import make_plan
 from pipeline.plan.recipe import Rung
 from pipeline.run.execute import compute
 from pipeline.run.problem import CaseFailure
+from pipeline.run.solved import solve_alone
 from pipeline.scene.model import FIXED, PROBE
-from pipeline.view.compute import compute_fields, solve_to_view
+from pipeline.view.compute import compute_fields
 from tests.cases import BLADE, solve, study
 
 WORLD = MPI.COMM_WORLD
@@ -21,7 +22,7 @@ WORLD = MPI.COMM_WORLD
 def fields(comm=MPI.COMM_SELF, mesh_only=False, **changes):
     made = study(**changes)
     (case,) = made.cases()
-    return compute_fields(solve_to_view(made, case), comm, mesh_only=mesh_only)
+    return compute_fields(solve_alone(made, case), comm, mesh_only=mesh_only)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +67,7 @@ def test_round_scene_is_shown_in_three_dimensions():
     body = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm"}
     made = study(body=body, plan={"without": []}, mesh={"epsilon": "8 mm", "outside": "free"})
     (case,) = made.cases()
-    found = compute_fields(solve_to_view(made, case), MPI.COMM_SELF, mesh_only=True)
+    found = compute_fields(solve_alone(made, case), MPI.COMM_SELF, mesh_only=True)
     # What is kept is the column: the longest distance from its axis is ε.
     assert np.hypot(*found.points[:, :2].T).max() == pytest.approx(8e-3, rel=1e-9)
     assert np.ptp(found.points[:, 2]) == pytest.approx(20e-3, rel=1e-9)
@@ -98,7 +99,7 @@ def test_nothing_is_solved_where_the_mesh_alone_is_asked_for(monkeypatch):
     def refuse(*_, **__):
         raise AssertionError("solved")
 
-    monkeypatch.setattr("pipeline.view.compute.solve_problem", refuse)
+    monkeypatch.setattr("pipeline.run.solved.solve_problem", refuse)
     found = fields(mesh_only=True)
     assert found.displacement is None
     assert found.strain is None
@@ -112,7 +113,7 @@ def test_accuracy_is_shown_on_the_mesh_that_proves_it():
     made = study(**changes)
     (case,) = made.cases()
     # A first mesh that cannot do it is passed over.
-    first = solve_to_view(made, case)
+    first = solve_alone(made, case)
     poor = first.case.mesh.model_copy(update={"fine": 10e-3, "coarse": 10e-3, "rim": 2e-3, "degree": 2})
     later = (Rung(first.case.mesh, first.expected), *first.later)
     start = replace(first, case=replace(first.case, mesh=poor), later=later, expected=nan)
@@ -153,7 +154,7 @@ def test_force_of_a_place_on_a_path_is_the_run_s():
     records = compute(plan, MPI.COMM_SELF)
     for case in list(made.cases())[:2]:
         record = records[next(solve.key for solve in plan.solves if case.index in solve.serves)]
-        found = compute_fields(solve_to_view(made, case), MPI.COMM_SELF)
+        found = compute_fields(solve_alone(made, case), MPI.COMM_SELF)
         assert found.force == pytest.approx(record.force, rel=1e-9)
         at = np.unique(found.facets[PROBE])
         np.testing.assert_allclose(found.points[at].mean(axis=0), case.frame.point, atol=1e-5)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from pipeline.run.solved import solve_alone
 from pipeline.scene.model import PROBE
-from pipeline.view.compute import compute_fields, solve_to_view
+from pipeline.view.compute import compute_fields
 from pipeline.view.export import write_fields
 from tests.cases import study
 
@@ -18,7 +19,7 @@ pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="writes files of
 def fields(mesh_only=False, **mesh):
     made = study(mesh={"epsilon": "8 mm"} | mesh)
     (case,) = made.cases()
-    return compute_fields(solve_to_view(made, case), MPI.COMM_SELF, mesh_only=mesh_only)
+    return compute_fields(solve_alone(made, case), MPI.COMM_SELF, mesh_only=mesh_only)
 
 
 @pytest.fixture(scope="module")

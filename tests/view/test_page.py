@@ -14,9 +14,10 @@ from matplotlib.image import imread
 from mpi4py import MPI
 
 from pipeline.report.page import write_page as write_report
+from pipeline.run.solved import solve_alone
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.shapes.frame import Frame
-from pipeline.view.compute import compute_fields, solve_to_view
+from pipeline.view.compute import compute_fields
 from pipeline.view.numbers import FACES, mesh_arrays
 from pipeline.view.page import render, write_page
 from pipeline.view.tool import tool_of
@@ -34,7 +35,7 @@ def fields():
     """A box of two regions, of which the lower one begins 5 mm below its top."""
     made = study(mesh={"epsilon": "8 mm"})
     (case,) = made.cases()
-    found = compute_fields(solve_to_view(made, case), MPI.COMM_SELF, bar=True)
+    found = compute_fields(solve_alone(made, case), MPI.COMM_SELF, bar=True)
     return replace(found, regions=(found.centres[:, 2] < -5e-3).astype(int), region_names=NAMES)
 
 
@@ -106,7 +107,7 @@ def test_displacement_is_stored_to_a_share_of_the_largest(fields, numbers):
 def test_mesh_alone_has_no_force_and_no_displacement():
     made = study()
     (case,) = made.cases()
-    found = compute_fields(solve_to_view(made, case), MPI.COMM_SELF, mesh_only=True)
+    found = compute_fields(solve_alone(made, case), MPI.COMM_SELF, mesh_only=True)
     text = render(found, "mesh")
     assert "<p>F = " not in text
     assert [c["name"] for c in json.loads(element(text, "told"))["colours"]] == ["region", "element size"]
@@ -121,7 +122,7 @@ def test_a_triangle_that_bounds_nothing_is_refused(fields):
 def test_a_ball_has_its_shape_and_its_depth():
     made = study(probe={"shape": "sphere", "radius": "6 mm", "depth": "0.5 mm", "contact": "unilateral"})
     (case,) = made.cases()
-    found = compute_fields(solve_to_view(made, case), MPI.COMM_SELF)
+    found = compute_fields(solve_alone(made, case), MPI.COMM_SELF)
     tool, centre = tool_of(found), found.contact + np.array((0, 0, 6e-3))
     below = tool.points[tool.points[:, 2] < 5e-3]
     np.testing.assert_allclose(np.linalg.norm(below - centre, axis=1), 6e-3, rtol=1e-6)
@@ -143,7 +144,7 @@ def test_a_tilted_ball_is_where_tissue_touches_it():
         mesh={"rim": "0.1 mm"},
     )
     (case,) = made.cases()
-    found = compute_fields(solve_to_view(made, case), MPI.COMM_SELF)
+    found = compute_fields(solve_alone(made, case), MPI.COMM_SELF)
     tool, outward = tool_of(found), np.array(case.frame.outward)
     tip = tool.points[np.argmin(tool.points @ outward)] + tool.moved[0]
     surface = np.unique(np.vstack(list(found.facets.values())))

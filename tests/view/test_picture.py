@@ -21,11 +21,12 @@ pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="draws on one pr
 
 
 def fields(mesh_only=False, **changes):
-    from pipeline.view.compute import compute_fields, solve_to_view
+    from pipeline.run.solved import solve_alone
+    from pipeline.view.compute import compute_fields
 
     made = study(**changes)
     (case,) = made.cases()
-    return compute_fields(solve_to_view(made, case), MPI.COMM_SELF, mesh_only=mesh_only)
+    return compute_fields(solve_alone(made, case), MPI.COMM_SELF, mesh_only=mesh_only)
 
 
 def colours(path):

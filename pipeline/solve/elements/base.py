@@ -8,6 +8,7 @@ from math import nan
 from typing import Any, Protocol
 
 import numpy as np
+from dolfinx import fem
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray, Int32Array
@@ -21,6 +22,7 @@ from pipeline.solve.krylov import is_direct
 from pipeline.solve.linear_solver import Level
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.points.state import State
 from pipeline.solve.response import Contact, LoadResponse, Response
 from pipeline.solve.spaces import ElasticSpace
 
@@ -284,9 +286,22 @@ class Elements(ElementFields, ABC):
     def tangent(self, law: MaterialLaw) -> Tangent:
         """Return the tangent of a law of large displacements; the caller closes it."""
 
+    def state(self, law: MaterialLaw) -> State:
+        """Return a copy of the forms' fields, with the ``law`` of their solution."""
+        pressure = self._pressure(law)
+        p = None if pressure is None else _copied(pressure[0], self.unit(law))
+        return State(self.body, _copied(self.displacements.forms.displacement), p, law)
+
     def _pressure(self, law: MaterialLaw) -> tuple[Any, Any] | None:
         """Return the pressure of the forms and its compliance, or None."""
         return None
+
+
+def _copied(function: Any, factor: float = 1.0) -> Any:
+    """Return ``factor`` times a function, on the same space, ghosts included."""
+    found = fem.Function(function.function_space)
+    found.x.array[:] = factor * function.x.array
+    return found
 
 
 def level_of(space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool = False) -> Level:

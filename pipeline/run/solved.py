@@ -1,0 +1,164 @@
+"""One case solved as a run solves it, with its fields in hand: meshes are tried and judged as in a run."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from threadpoolctl import threadpool_limits
+
+from pipeline.mesh.distribute import BodyMesh, distribute
+from pipeline.mesh.generate import MeshArrays, MeshError
+from pipeline.mesh.of_case import upright
+from pipeline.plan import estimate
+from pipeline.plan.plan import declare, first_attempts, make_plan
+from pipeline.plan.steps import Solve
+from pipeline.plan.symmetry import model_planes
+from pipeline.run.attempts import Attempts
+from pipeline.run.compile import prepare
+from pipeline.run.measure import record_of
+from pipeline.run.memory import FreeMemory
+from pipeline.run.mesh_cache import MeshCache
+from pipeline.run.meshing import cached_arrays, on_first_rank
+from pipeline.run.problem import (
+    CaseFailure,
+    check_memory,
+    lacks_memory,
+    law_of,
+    memory_of,
+    meridian_problem,
+    problem_of,
+    solve_problem,
+)
+from pipeline.run.record import Record
+from pipeline.solve import SolveError
+from pipeline.solve.compiled import compiling
+from pipeline.solve.points.state import State, compile_stress
+from pipeline.solve.spaces import Spaces
+from pipeline.study.case import Case
+from pipeline.study.sweep import Study
+
+Note = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A case that was solved in three dimensions: how (``solve``), its ``record`` and the fields of the last attempt.
+
+    ``arrays`` is the mesh of the modelled part as it was made, on rank 0 only. The ``state`` is in the body's
+    coordinates. ``dofs`` counts the unknowns of the whole body. The force of the record ``on_meridian`` is that of the
+    axisymmetric scene in the half plane.
+    """
+
+    solve: Solve
+    record: Record
+    state: State
+    arrays: MeshArrays | None
+    dofs: int
+    on_meridian: bool = False
+
+
+def solve_alone(study: Study, case: Case) -> Solve:
+    """Return how ``case`` is computed to have its fields: in three dimensions, on what symmetry leaves of the body.
+
+    As in a run, its force may come from a meridian (``axisymmetric``), and its far field from a mesh that the places of
+    the study share.
+    """
+    run = next(solve for solve in make_plan(study).solves if case.index in solve.serves)
+    solve = next(solve for solve in first_attempts(declare(study)).solves if case.index in solve.serves)
+    mirrors = model_planes(case) if case.mesh.model == "auto" else ()
+    shown = replace(solve.case, far_region=run.case.far_region)
+    return replace(solve, case=shown, mirrors=mirrors, axisymmetric=run.axisymmetric)
+
+
+def solve_fields(
+    solve: Solve,
+    comm: MPI.Comm,
+    *,
+    bar: bool = True,
+    cache: MeshCache | None = None,
+    note: Note = lambda text: None,
+) -> Solved:
+    """Return the solution of a case; collective.
+
+    With an accuracy, meshes are tried and judged as in a run: the fields are those of its mesh, with its force. With
+    ``bar`` the force has its error bar, if there is the memory for it. ``note`` receives, on every rank, what is being
+    worked on.
+
+    Raises:
+        CaseFailure: if the memory is too small.
+        MeshError: if the first mesh fails.
+        SolveError: if the first solve fails.
+    """
+    run, solve = solve, replace(solve, axisymmetric=False)
+    with threadpool_limits(limits=1, user_api="blas"):
+        attempts = Attempts()
+        best = latest = _attempt(solve, comm, bar, cache, note)
+        while (judged := attempts.judge(solve, latest.record)) is None:
+            (solve,) = attempts.take_again()
+            try:
+                latest = _attempt(solve, comm, bar, cache, note)
+            except (CaseFailure, MeshError, SolveError):
+                break  # no finer mesh: a run concludes with the best force so far, too
+            if latest.record.force_error < best.record.force_error:
+                best = latest
+        if judged is not None and not judged.is_ok:
+            best = replace(best, record=replace(best.record, status=judged.status, message=judged.message))
+        return _with_force_of_meridian(run, best, comm) if run.axisymmetric else best
+
+
+def _with_force_of_meridian(run: Solve, solved: Solved, comm: MPI.Comm) -> Solved:
+    """Return the solution with the record that a run finds on the meridian; collective."""
+    prepare(comm, [run])
+    problem = meridian_problem(run.case)
+    record = on_first_rank(comm, lambda: record_of(run, solve_problem(run.case, problem, estimate=True)))
+    return replace(solved, record=comm.bcast(record), on_meridian=True)
+
+
+def _attempt(solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, note: Note) -> Solved:
+    """Solve on one mesh; return the record that a run would have of it, and the fields; collective."""
+    case, meshed = solve.case, solve.meshed_case
+    arrays = modelled_arrays(solve, comm, cache, note)
+    prepare(comm, [solve])
+    mesh = distribute(comm, arrays and upright(meshed, arrays))
+    with Spaces(mesh) as spaces, problem_of(spaces, meshed) as problem:
+        needed, with_bar = memory_of(case, problem.dofs)
+        check_memory(FreeMemory(comm), needed, "solving")
+        room = bar and not lacks_memory(FreeMemory(comm), with_bar, "")
+        note(f"solving for {problem.dofs} unknowns")
+        # Of a history, fields are those of the elastic body.
+        still = replace(case, probe=case.probe.model_copy(update={"history": None}))
+        solution = solve_problem(still, problem, estimate=room or solve.goal is not None, meshed=meshed)
+        state = problem.state()
+    _compile_stress(comm, state)
+    _put_back(case, meshed, mesh, state)
+    state = replace(state, law=law_of(still, in_body=True))
+    return Solved(solve, record_of(solve, solution), state, arrays, solution.dofs)
+
+
+def modelled_arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -> MeshArrays | None:
+    """Return, on rank 0, the mesh of the part of the body that is modelled; of a half ball, where a run makes it."""
+    case = solve.meshed_case
+    check_memory(FreeMemory(comm), estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
+    note("meshing")
+    return on_first_rank(comm, lambda: cached_arrays(case, solve.mirrors, cache))
+
+
+def _compile_stress(comm: MPI.Comm, state: State) -> None:
+    """Compile what the stress of large displacements needs, under the lock of the cache; collective."""
+    if comm.rank == 0 and not state.law.is_linear:
+        with compiling():
+            compile_stress(state)
+    comm.barrier()
+
+
+def _put_back(case: Case, meshed: Case, mesh: BodyMesh, state: State) -> None:
+    """Bring mesh and displacement from the solver's frame to the body's coordinates, and to the place of ``case``."""
+    x: Any = mesh.mesh.geometry.x
+    if (turn := case.frame.turn) is not None:
+        x[:] = x @ turn
+        values = state.displacement.x.array
+        values[:] = (values.reshape(-1, 3) @ turn).reshape(-1)
+    if (shift := np.subtract(case.frame.point, meshed.frame.point)).any():
+        x[:] += shift
