@@ -95,7 +95,7 @@ def _wide(file: Path, machine: str) -> dict[str, Any]:
     """Return the authors' scene of a well: Hertz's half-space."""
     return _ball(file, machine) | {
         "body": {"shape": "cylinder", "radius": "100 mm", "height": "100 mm", "fixed": "bottom"},
-        "material": {"young": "10 MPa", "poisson": 0.3},
+        "material": {"poisson": 0.3},
     }
 
 
@@ -103,7 +103,7 @@ def _well(file: Path) -> dict[str, Any]:
     """Return a well with elastomer that its walls hold, of unknown depth."""
     found = _ball(file, ["50 N/mm", "64 N/mm"]) | {
         "body": {"shape": "cylinder", "radius": "3.2 mm", "height": "8 mm", "fixed": "bottom+sides"},
-        "material": {"young": "10 MPa", "poisson": 0.48},
+        "material": {"poisson": 0.48},
     }
     found["identify"] = found["identify"] | {"thickness": ["4 mm", "11 mm"]}
     return found
@@ -111,8 +111,7 @@ def _well(file: Path) -> dict[str, Any]:
 
 def _ball(file: Path, machine: Any) -> dict[str, Any]:
     return {
-        "probe": {"shape": "sphere", "radius": "2.5 mm", "depth": "0.5 mm", "contact": "unilateral"},
-        "mesh": {"accuracy": "1 %"},
+        "probe": {"shape": "sphere", "radius": "2.5 mm", "contact": "unilateral"},
         "measurement": [{"name": "ball", "file": str(file), "columns": _COLUMNS, "sign": {"depth": -1, "force": -1},
                          "machine_stiffness": machine}],
         "identify": {"young": ["100 kPa", "1 GPa"]},
@@ -124,9 +123,8 @@ def _between_plates(file: Path, contact: str) -> dict[str, Any]:
     columns = {"depth": "Compression (mm)", "force": "Load (N)", "time": "Time (s)"}
     return {
         "body": {"shape": "cylinder", "radius": "25 mm", "height": "30 mm", "fixed": "bottom"},
-        "material": {"young": "50 kPa", "poisson": 0.495},
-        "probe": {"shape": "disc", "radius": "24.9 mm", "depth": "3 mm", "contact": contact},
-        "mesh": {"accuracy": "1 %"},
+        "material": {"poisson": 0.495},
+        "probe": {"shape": "disc", "radius": "24.9 mm", "contact": contact},
         "measurement": [{"name": "plates", "file": str(file), "columns": columns, "window": ["0 mm", "3 mm"]}],
         "identify": {"young": ["1 kPa", "1 MPa"], "may_hide": ["strain"]},
     }

@@ -15,7 +15,11 @@ if TYPE_CHECKING:
 def forecasts(study: "Study", cost: "CostModel") -> list[dict[str, Any]]:
     """Return about what each table of forces costs, by the command that needs it; none for studies without them.
 
-    Depths of a measured curve are taken to be those of the study's probe.
+    Depths of a measured curve are taken to be those of the study's probe, if it has any.
+
+    Raises:
+        StudyError: if a scene cannot be run.
+        ExperimentError: if the depths are those of files that are no curves.
     """
     if not (study.measurements or study.spread.varied):
         return []
@@ -37,14 +41,19 @@ def told(found: dict[str, Any]) -> str:
 
 
 def _domains(study: "Study") -> "Iterator[tuple[str, str, Domain]]":
+    from pipeline.identify.experiment import deepest_of
     from pipeline.identify.forward import unknown_domain
     from pipeline.identify.unknowns import unknowns
+    from pipeline.study.curves import curves_of
     from pipeline.study.read import scene_of
     from pipeline.surrogate.sensitivity import spread_domain
 
     for measurement in study.measurements:
         scene = scene_of(study, measurement)
-        deepest = max(probe.depth for probe in scene.probes)
+        if any(problem.key == "probe.depth" for problem in study.lacking):
+            deepest = deepest_of(curves_of(study, measurement))
+        else:
+            deepest = max(probe.depth for probe in scene.probes)
         yield "identify", measurement.name, unknown_domain(scene, unknowns(study), deepest)
     if study.spread.varied:
         yield "sensitivity", "the scene", spread_domain(study)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipeline.cli.console import is_json_wanted, print_json
+from pipeline.cli.console import is_json_wanted, print_json, warning
 from pipeline.cli.design import design as rank
 from pipeline.cli.faults import DONE, Fault, fail, refusing, refusing_cases
 from pipeline.cli.words import (
@@ -21,7 +21,6 @@ from pipeline.cli.words import (
     check_output,
     check_store,
     read_all,
-    warn,
 )
 from pipeline.files import STORE_NAME, result_files
 from pipeline.launcher import is_first_rank
@@ -68,7 +67,7 @@ def identify(
     if curves := [file for file in files if file.suffix.lower() in _CURVES]:
         _describe(curves, [file for file in files if file not in curves])
         return
-    studies = read_all(files)
+    studies = read_all(files, have_cases=False)
     if store:
         check_store(store)
     path = store or output / STORE_NAME
@@ -84,7 +83,9 @@ def identify(
     found = []
     for study in studies:
         if not is_json_wanted() and is_first_rank():
-            warn(study)
+            for text in study.warnings:
+                if "probe.depth" not in text:  # curves have depths of their own
+                    warning(text)
         found.append(_identify(study, output, path, quiet=quiet or is_json_wanted() or not is_first_rank()))
     if is_json_wanted() and is_first_rank():
         print_json({"status": DONE, "studies": found})

@@ -31,6 +31,7 @@ from pipeline.printable import counted
 from pipeline.run.remaining import format_seconds
 
 if TYPE_CHECKING:
+    from pipeline.plan.cost import CostModel
     from pipeline.plan.plan import Plan
     from pipeline.run.record import Record
     from pipeline.study.case import Case
@@ -85,9 +86,10 @@ def plan(
         fail("a plan is of one study, or of one case of it; with --check several files are looked at")
     from pipeline.plan.describe import summary
     from pipeline.run.room import MEMORY_SHARE, machine_room
-    from pipeline.study.problems import StudyError
 
-    (study,) = read_all([file])
+    (study,) = read_all([file], have_cases=bool(more))
+    if study.lacking:
+        _show_forecasts(study)
     chosen = find_case(study, more[0]) if more else None
     made, records = _planned(study, store or output / STORE_NAME, check_names(without))
     if chosen is not None:
@@ -97,10 +99,7 @@ def plan(
     room = machine_room() if memory is None else 1e9 * memory
     most = MEMORY_SHARE * room
     found |= {"memory_available": room, "too_large": sum(step["memory"] > most for step in found["steps"])}
-    try:
-        found["forecasts"] = forecasts(study, made.cost)
-    except StudyError as wrong:
-        fail(*of_study(wrong))
+    found["forecasts"] = _forecasts(study, made.cost)
     _show(study, found, quiet=quiet, verbose=verbose)
     # Where all cases are too large, that of F_exact may still be solved: for nothing.
     asked = [step for step in found["steps"] if not step["exact"]] or found["steps"]
@@ -135,6 +134,28 @@ def _check(files: list[Path]) -> NoReturn:
             print(f"{file}: fine; {counted(cases, 'case')}{axes_of(study)}")
     say(report)
     raise typer.Exit(BAD_INPUT if any(one["errors"] for one in report) else DONE)
+
+
+def _forecasts(study: "Study", cost: "CostModel") -> list[dict[str, Any]]:
+    """Return about what the tables of forces of a study cost; exit if there can be none."""
+    from pipeline.experiment.reading import ExperimentError
+    from pipeline.study.problems import StudyError
+
+    try:
+        with refusing(ExperimentError, file=study.file):
+            return forecasts(study, cost)
+    except StudyError as wrong:
+        fail(*of_study(wrong))
+
+
+def _show_forecasts(study: "Study") -> NoReturn:
+    """Print what `epsmesh identify` costs for a study that has no cases besides, and exit."""
+    from pipeline.plan.cost import CostModel
+
+    warn(study)
+    found = _forecasts(study, CostModel())
+    say({"study": study.file, "forecasts": found}, study.title, *map(told, found))
+    raise typer.Exit(DONE)
 
 
 def _planned(study: "Study", path: Path, without: tuple[str, ...]) -> "tuple[Plan, dict[str, Record]]":

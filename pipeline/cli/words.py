@@ -79,8 +79,11 @@ Without = Annotated[
 ]
 
 
-def read_all(files: list[Path]) -> "list[Study]":
-    """Read studies, or exit with every problem of every file; on several ranks only the first one prints."""
+def read_all(files: list[Path], *, have_cases: bool = True) -> "list[Study]":
+    """Read studies, or exit with every problem of every file; on several ranks only the first one prints.
+
+    Studies of measured curves may lack what cases need, unless they must ``have_cases``.
+    """
     from pipeline.study.problems import StudyError
     from pipeline.study.read import read_study
 
@@ -88,6 +91,8 @@ def read_all(files: list[Path]) -> "list[Study]":
     for file in files:
         try:
             studies.append(read_study(file))
+            if have_cases and studies[-1].lacking:
+                raise StudyError(str(file), studies[-1].lacking)
         except StudyError as wrong:
             faults += of_study(wrong, meant(file))
     names = [study.name for study in studies]

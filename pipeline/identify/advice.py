@@ -5,7 +5,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from pipeline.identify.candidates import candidates
+from pipeline.identify.candidates import candidates, pressed_to
 from pipeline.identify.design import Designer, Recorded
 from pipeline.identify.design_text import UNSEEN, bar
 from pipeline.identify.noise import Noise
@@ -27,7 +27,8 @@ def advice(study: Study, found: Estimate) -> tuple[str, ...]:
         return ()
     worst = max(found.curves, key=_level)
     noise = Recorded(_level(worst), Noise(worst.noise.correlation, worst.noise.white, worst.noise.growth))
-    designer = Designer(study, _never, values, noise)
+    depths = [float(np.nanmax(curve.depth)) for curve in found.curves]
+    designer = Designer(pressed_to(study, depths), _never, values, noise)
     names = [name for name in wanted if name in parameters(designer.planned[0].scene)]
     return tuple(_sentences(designer, names))
 

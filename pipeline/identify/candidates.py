@@ -1,13 +1,16 @@
 """Tests that could be made: those of a study as planned, and further ones that may tell more."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
+from pipeline.experiment.reading import ExperimentError
+from pipeline.identify.experiment import depth_of
 from pipeline.report.identified import engineering
 from pipeline.shapes.probe import Probe
 from pipeline.study.case import Case
-from pipeline.study.problems import StudyError
+from pipeline.study.curves import curves_of
+from pipeline.study.problems import Problem, StudyError
 from pipeline.study.read import parse, scene_of
 from pipeline.study.schema import SECTIONS
 from pipeline.study.sweep import Study
@@ -64,12 +67,33 @@ class Candidate:
 def planned_trials(study: Study) -> tuple[Trial, ...]:
     """Return the tests of a study: its measurements, whose files need not exist; or that of its scene.
 
+    Depths are those of the study, or else of its curves.
+
     Raises:
-        StudyError: if a scene of it has several values of a key.
+        StudyError: if a scene of it has several values of a key, or there is neither a depth nor a curve.
     """
     if not study.measurements:
         return (Trial("test", _parsed(study, study.raw)),)
+    if any(problem.key == "probe.depth" for problem in study.lacking):
+        study = pressed_to(study, _recorded(study))
     return tuple(Trial(one.name, scene_of(study, one), one.machine_compliance) for one in study.measurements)
+
+
+def pressed_to(study: Study, depths: Sequence[float]) -> Study:
+    """Return a study whose measurements have these depths (m), whatever it declares."""
+    rows = zip(study.measurements, depths, strict=True)
+    own = [(one, (one.probe or {}) | {"depth": f"{depth:.6g} m"}) for one, depth in rows]
+    return replace(study, measurements=tuple(one.model_copy(update={"probe": probe}) for one, probe in own))
+
+
+def _recorded(study: Study) -> list[float]:
+    """Return about how deep (m) the curves of each measurement are."""
+    try:
+        found = [curves_of(study, measurement) for measurement in study.measurements]
+    except ExperimentError as wrong:
+        allowed = f"is required: the depth of the planned test, of which there is no curve ({wrong})"
+        raise StudyError(study.file, [Problem("probe.depth", None, allowed)]) from None
+    return [max(map(depth_of, curves)) for curves in found]
 
 
 def candidates(planned: tuple[Trial, ...], *, relaxes: bool) -> Iterator[Candidate]:
@@ -130,4 +154,4 @@ def case_of(scene: Study) -> Case:
 
 def _parsed(study: Study, raw: Mapping[str, Any]) -> Study:
     own = {name: value for name, value in raw.items() if name in SECTIONS}
-    return parse(own, file=study.file, text=to_toml(own, study.file))
+    return parse(own, file=study.file, text=to_toml(own, study.file), is_scene=True)

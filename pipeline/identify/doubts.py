@@ -8,8 +8,14 @@ import xarray as xr
 
 from pipeline.experiment.curve import Curve
 from pipeline.identify.experiment import Specimen
-from pipeline.identify.parts import Measured, Unknown
+from pipeline.identify.parts import CurveFit, Measured, Unknown
+from pipeline.report.identified import engineering
+from pipeline.shapes.indenter import Indenter
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.study.case import Case
+from pipeline.study.check import warn_of_depth
+from pipeline.study.problems import Problems
 from pipeline.study.read import scene_of
 from pipeline.study.sweep import Study
 
@@ -38,12 +44,32 @@ def doubts_of_scale(study: Study, found: Sequence[Specimen]) -> tuple[str, ...]:
 
 def _of_curve(curve: Curve, case: Case) -> Iterator[str]:
     """Yield a doubt about the depths of a curve that was measured on the scene of a case."""
-    way, width, thickness = float(np.ptp(curve.depth)), case.probe.half_width, case.body.thickness(case.frame)
+    way, width, thickness = float(np.ptp(curve.depth)), _size(case.probe), case.body.thickness(case.frame)
     question = "is its unit right, or that of the study?"
     if not _DEPTHS[0] <= way / width <= _DEPTHS[1]:
         yield f"{curve.name}: the depth changes by {way:.3g} m, {way / width:.3g} half widths of the tool: {question}"
     elif way > thickness:
         yield f"{curve.name}: the depth changes by {way:.3g} m, and the tissue is {thickness:.3g} m thick: {question}"
+
+
+def _size(probe: Probe) -> float:
+    """Return half the width or length (m) of a tool, whatever its depth."""
+    if isinstance(probe, RoundIndenter):
+        return probe.limit
+    return (probe.half_length if isinstance(probe, Indenter) else 0.0) or probe.half_width
+
+
+def doubts_of_depth(study: Study, found: Sequence[CurveFit]) -> Iterator[str]:
+    """Yield for each fitted curve of a study why its law may be an extrapolation at the depth that it reaches."""
+    for measurement, curve in zip(study.measurements, found, strict=True):
+        case = next(scene_of(study, measurement).cases())
+        if case.material.is_large or any(region.is_large for region in case.body.regions):
+            continue
+        problems, deepest = Problems(), float(np.nanmax(curve.depth))
+        warn_of_depth(case.probe.model_copy(update={"depth": deepest, "history": None}), problems)
+        for problem in problems.warnings:
+            depth = f"its depth of {engineering(deepest, 'm')}"
+            yield f"{curve.name}: {depth if problem.allowed.startswith('is ') else f'at {depth}'} {problem.allowed}"
 
 
 def doubts_of_force(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> tuple[str, ...]:

@@ -78,7 +78,7 @@ def scenes_of(
         SurrogateError: if a case that a force needs has none.
     """
     scenes = [scene_of(study, measurement) for measurement in study.measurements]
-    deepest = [_deepest([one.curves[number] for one in found], times) for number in range(len(scenes))]
+    deepest = [deepest_of([one.curves[number] for one in found], times) for number in range(len(scenes))]
     made: dict[str, Forward] = {}
     for scene in scenes:
         most = max(depth for other, depth in zip(scenes, deepest, strict=True) if other.text == scene.text)
@@ -90,20 +90,20 @@ def scenes_of(
     return Scenes(study.measurements, tuple(made[scene.text] for scene in scenes), tuple(hidden))
 
 
-def _deepest(curves: Sequence[Curve], times: float) -> float:
-    """Return the depth (m) that no curve goes beyond, with two digits: the same for curves that are nearly the same."""
-    most = times * max(map(_depth_of, curves))
+def deepest_of(curves: Sequence[Curve], times: float = 1.0) -> float:
+    """Return a depth (m) that curves hardly go beyond, with two digits: the same for nearly the same curves."""
+    most = times * _DEEPER * max(map(depth_of, curves))
     digit = 10.0 ** (floor(log10(most)) - 1)
     return ceil(most / digit) * digit
 
 
-def _depth_of(curve: Curve) -> float:
-    """Return a depth (m) that a curve does not go beyond, from where its force is small."""
+def depth_of(curve: Curve) -> float:
+    """Return about how deep (m) a curve is, from where its force is small."""
     force = curve.force - np.median(curve.force[: max(1, len(curve.force) // 20)])
     top = int(np.argmax(curve.depth))
     pressed = np.flatnonzero(force[: top + 1] > _SMALL * force.max())
     start = curve.depth[pressed[0]] if pressed.size else curve.depth[0]
-    return float(min(_DEEPER * (curve.depth[top] - start), _DEEPER * np.ptp(curve.depth)))
+    return float(min(curve.depth[top] - start, np.ptp(curve.depth)))
 
 
 def _poisson(study: Study, unknowns: Sequence[Unknown]) -> float:

@@ -12,7 +12,7 @@ import xarray as xr
 from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.advice import advice
 from pipeline.identify.dataset import dataset_of, joined
-from pipeline.identify.doubts import doubts_of_force, doubts_of_moduli, doubts_of_scale
+from pipeline.identify.doubts import doubts_of_depth, doubts_of_force, doubts_of_moduli, doubts_of_scale
 from pipeline.identify.estimate import identify
 from pipeline.identify.experiment import Scenes, Specimen, scenes_of, specimens
 from pipeline.identify.forward import stored_in
@@ -96,7 +96,8 @@ def _estimate(study: Study, scenes: Callable[[float], Scenes], specimen: Specime
 
 
 def _as_dataset(study: Study, specimen: Specimen, found: Estimate) -> xr.Dataset:
-    return dataset_of(found, _attributes(study), [curve.time for curve in specimen.curves])
+    told = (*found.told, *(doubts_of_depth(study, found.curves) if found.fits else ()))
+    return dataset_of(replace(found, told=told), _attributes(study), [curve.time for curve in specimen.curves])
 
 
 def telling(solve: Solve, say: Callable[[str], None]) -> Solve:

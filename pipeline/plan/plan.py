@@ -14,6 +14,7 @@ from pipeline.plan.work import NO_RECORD, EndPlans, Plan, Struck
 from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.case import Case
 from pipeline.study.ends import ends_of_bars
+from pipeline.study.problems import StudyError
 from pipeline.study.schema import Mesh, Solving
 from pipeline.study.sweep import Study
 
@@ -49,7 +50,10 @@ def make_plan(
 
     Raises:
         ValueError: if ``without`` has an unknown name.
+        StudyError: if the study leaves to its measured curves what cases need.
     """
+    if study.lacking:
+        raise StudyError(study.file, study.lacking)
     left_out = {*without, *study.planning.without}
     if unknown := left_out - {*REDUCTIONS, "stored", "all"}:
         raise ValueError(f"unknown reduction {', '.join(sorted(unknown))}; there are {', '.join(REDUCTIONS)}")

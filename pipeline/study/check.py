@@ -51,7 +51,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     problems.each(_tell_notices, body=bodies)
     linear = [material for material in materials if not material.is_large]
     if linear:
-        problems.each(_check_depth, probe=probes)
+        problems.each(warn_of_depth, probe=probes)
     problems.each(lambda probe, _: probe.check(problems), probe=probes)
     problems.each(check_history, probe=probes)
     problems.each(check_sizes, mesh=meshes)
@@ -112,7 +112,7 @@ def _placed(
     return fitting
 
 
-def _check_depth(probe: Probe, problems: Problems) -> None:
+def warn_of_depth(probe: Probe, problems: Problems) -> None:
     """Warn of depths at which strains at the edge of a tool are large for linear elasticity."""
     if isinstance(probe, Indenter):
         probe.warn_of_strains(problems)

@@ -92,7 +92,11 @@ def study_schema() -> Schema:
         definitions[model.__name__]["additionalProperties"] = _SOUGHT
     material = definitions["Material"]
     material["properties"]["from"] = {"description": IDENTIFIED.text, "type": "string"}
-    del material["required"]  # `from` has them, too
+    del material["required"]  # `from` and [identify] have them, too
+    for name in ("Layer", "Inclusion"):
+        definitions[name]["required"] = [k for k in definitions[name]["required"] if k not in ("young", "poisson")]
+    for probe in _models("probe"):  # measured curves have depths
+        definitions[probe.__name__]["required"].remove("depth")
     found = {name: _section(name, models, definitions) for name, models in sections.items()}
     title = {"description": "Title of the study, in figures and reports.", "type": "string"}
     return {

@@ -16,6 +16,7 @@ from pipeline.study.check_loads import check_loads
 from pipeline.study.identification import Identification, check_shared, read_identify, read_measurements
 from pipeline.study.identified import with_identified
 from pipeline.study.loads import Load
+from pipeline.study.measured import MESH, completed
 from pipeline.study.measurement import Measurement
 from pipeline.study.parameters import DEPTH, Parameter, parameters_of
 from pipeline.study.problems import Problem, Problems, StudyError, nearest
@@ -65,14 +66,16 @@ def read_text(text: str, file: str) -> Study:
     return parse(toml_of(text, file), file=file, text=text)
 
 
-def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
+def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene: bool = False) -> Study:
     """Turn a study, read from TOML into ``raw``, into a :class:`Study`.
 
-    ``file`` is for messages, and the files of bodies are looked for from its folder.
+    ``file`` is for messages, and the files of bodies are looked for from its folder. ``is_scene`` tells the scene of a
+    measurement, which may lack a mesh.
     """
     problems = Problems(tables=_names_of(raw))
     given, text, identified = with_identified(raw, text, file, problems)
-    raw = _beside(given, Path(file).parent)
+    given, lacking = completed(given, is_scene=is_scene)
+    raw = _beside(given if "mesh" in given or not lacking else given | {"mesh": MESH}, Path(file).parent)
     _check_top(raw, problems)
     axes: list[Axis] = []
     sections: dict[str, tuple[Section, ...]] = {}
@@ -96,7 +99,7 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
     warnings = tuple(f"{file}: {warning}" for warning in problems.told_once())
     title = str(raw.get("title", Path(file).stem))
     experiment = (given, measurements, identification, identified, spread)
-    return Study(file, Path(file).stem, title, text, every_axis, sections, warnings, *experiment)
+    return Study(file, Path(file).stem, title, text, every_axis, sections, warnings, *experiment, lacking)
 
 
 def scene_of(study: Study, measurement: Measurement) -> Study:
@@ -123,7 +126,7 @@ def _scene(raw: Mapping[str, Any], measurement: Measurement, where: str, file: s
     if len(problems.errors) > before:
         return None
     try:
-        return parse(content, file=file, text=to_toml(content, file))
+        return parse(content, file=file, text=to_toml(content, file), is_scene=True)
     except StudyError as error:
         for problem in error.problems:
             problems.error(f"{where}.{problem.key}", problem.value, problem.allowed)

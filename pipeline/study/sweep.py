@@ -15,6 +15,7 @@ from pipeline.study.case import Case
 from pipeline.study.identification import Identification
 from pipeline.study.identified import NOTHING, Identified
 from pipeline.study.measurement import Measurement
+from pipeline.study.problems import Problem
 from pipeline.study.schema import Drawing, Material, Planning, Solving, material_of
 from pipeline.study.sensitivity import Spread
 
@@ -38,6 +39,7 @@ class Study:
     identification: Identification = field(default_factory=Identification)
     identified: Identified = NOTHING
     spread: Spread = field(default_factory=Spread)
+    lacking: tuple[Problem, ...] = ()  # what its cases need, and the study of measured curves does not say
 
     @property
     def shape(self) -> tuple[int, ...]:

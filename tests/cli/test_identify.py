@@ -10,6 +10,7 @@ import xarray as xr
 import pipeline
 from pipeline.layered.body import RIGID, LayeredBody
 from pipeline.layered.compliance import Layer
+from pipeline.study.problems import StudyError
 from scripts.make_curves import TRUTH, Machine, disc, main, pressed, write
 
 YOUNG = 20e3
@@ -20,15 +21,11 @@ radius = "40 mm"
 height = "10 mm"
 fixed = "bottom"
 [material]
-young = "10 kPa"
 poisson = 0.4
 [probe]
 shape = "disc"
 radius = "2 mm"
-depth = "0.2 mm"
 contact = "frictionless"
-[mesh]
-accuracy = "0.5 %"
 [[measurement]]
 name = "punch"
 file = "{file}"
@@ -111,8 +108,31 @@ def test_the_report_is_a_page_with_the_answer(folder, epsmesh, found):
     assert "if the body is as declared" in (folder / "results" / "punch.html").read_text()
 
 
+@pytest.mark.parametrize("command", [("run",), ("export",), ("view", "0"), ("status", "--merge")])
+def test_what_curves_and_ranges_give_is_needed_for_cases(folder, epsmesh, command):
+    result = epsmesh(command[0], folder / "punch.toml", *command[1:], "--output", folder / "results")
+    assert result.exit_code == 2
+    for key in ("[mesh]", "probe.depth", "[material]"):
+        assert f"{key}: " in result.stderr
+    with pytest.raises(StudyError, match="is required for the study's cases"):
+        pipeline.read(folder / "punch.toml").plan()
+
+
+def test_a_plan_has_the_cost_of_the_forces_alone(folder, epsmesh):
+    result = epsmesh("plan", folder / "punch.toml", "--output", folder / "results")
+    assert result.exit_code == 0, result.output
+    assert "identify, forces of punch: " in result.stdout
+    assert epsmesh("plan", folder / "none.toml").exit_code == 2  # no curve to have its depth from
+    (forecast,) = json.loads(epsmesh("plan", folder / "punch.toml", "--json").stdout)["forecasts"]
+    assert forecast["least"] >= 1
+
+
 def test_the_cases_of_the_study_do_not_replace_what_was_found(folder, epsmesh, found):
-    result = epsmesh("run", folder / "punch.toml", "--output", folder / "results")
+    text = (folder / "punch.toml").read_text().replace("poisson", 'young = "10 kPa"\npoisson')
+    text = text.replace('radius = "2 mm"', 'radius = "2 mm"\ndepth = "0.2 mm"') + '[mesh]\naccuracy = "1 %"\n'
+    (folder / "whole").mkdir()
+    (folder / "whole" / "punch.toml").write_text(text)
+    result = epsmesh("run", folder / "whole" / "punch.toml", "--output", folder / "results")
     assert result.exit_code == 2
     assert "is what `epsmesh identify" in result.stderr
 
@@ -191,11 +211,17 @@ def test_bars_of_the_studies_hold_what_their_curves_were_made_with(name, tmp_pat
 
 def test_design_ranks_tests_without_any_curve(folder, epsmesh, tmp_path):
     """A study whose file does not exist yet: what one more test would do to the error bars of E."""
-    done = epsmesh("identify", folder / "none.toml", "--design", "--output", tmp_path)
+    path = tmp_path / "planned.toml"
+    path.write_text((folder / "none.toml").read_text())
+    done = epsmesh("identify", path, "--design", "--output", tmp_path)
+    assert done.exit_code == 2
+    assert "probe.depth: is required: the depth of the planned test" in done.stderr
+    path.write_text(path.read_text().replace('radius = "2 mm"', 'radius = "2 mm"\ndepth = "0.2 mm"'))
+    done = epsmesh("identify", path, "--design", "--output", tmp_path)
     assert done.exit_code == 0, done.output
     assert "as planned" in done.output
     assert "a further punch of radius 6.00 mm" in done.output
-    data = json.loads(epsmesh("identify", folder / "none.toml", "--design", "--json", "--output", tmp_path).stdout)
+    data = json.loads(epsmesh("identify", path, "--design", "--json", "--output", tmp_path).stdout)
     (study,) = data["studies"]
     assert {one["test"] for one in study["ranked"]} >= {"a further punch of radius 600 µm", "the same test, bonded"}
     assert all(one["half_widths"]["young"][0] > 0 for one in study["ranked"])
@@ -203,6 +229,8 @@ def test_design_ranks_tests_without_any_curve(folder, epsmesh, tmp_path):
 
 def test_design_needs_unknowns(folder, epsmesh, tmp_path):
     text = STUDY.format(file="x.csv", may_hide="[]").partition("[[measurement]]")[0]
+    text = text.replace("poisson", 'young = "10 kPa"\npoisson').replace("[probe]", '[probe]\ndepth = "0.2 mm"')
+    text += '[mesh]\naccuracy = "1 %"\n'
     (tmp_path / "known.toml").write_text(text)
     done = epsmesh("identify", tmp_path / "known.toml", "--design", "--output", tmp_path)
     assert done.exit_code == 2

@@ -220,3 +220,35 @@ def test_a_study_with_measurements_is_written_and_read_again():
     assert measurement.columns is not None and measurement.columns.force == "F / mN"
     assert measurement.window is not None and (measurement.window.high, measurement.window.unit) == (1e-3, "m")
     assert measurement.machine_compliance == 0
+
+
+def test_what_is_to_be_found_need_not_have_a_value():
+    """Values of ranges, or with errors, stand in: the scene of a measurement is whole, and the study has no cases."""
+    layers = [{"name": "skin", "poisson": 0.48}, {"name": "fat", "poisson": 0.48}]
+    content = raw(body={"layer": layers}) | {
+        "measurement": [CURVE],
+        "identify": {
+            "skin_young": ["1 kPa", "100 kPa"],
+            "fat_young": ["1 kPa", "9 kPa"],
+            "skin_thickness": {"value": "2 mm", "error": "5 %"},
+        },
+    }
+    del content["mesh"], content["probe"]["depth"], content["material"]
+    study = parse(content)
+    assert [problem.key for problem in study.lacking] == ["[mesh]", "probe.depth", "[body]"]
+    (body,) = scene_of(study, study.measurements[0]).sections["body"]
+    assert [layer.young for layer in body.layer] == pytest.approx([10e3, 3e3])
+    assert body.layer[0].thickness == pytest.approx(2e-3)
+    del content["identify"]["fat_young"]
+    with pytest.raises(StudyError, match=r"body\.layer\[2\]\.young: is required"):
+        parse(content)
+
+
+def test_a_value_that_nothing_gives_is_required():
+    content = raw() | {"material": {"poisson": 0.3}}
+    with pytest.raises(StudyError, match=r"material\.young: is required"):
+        parse(content)
+    assert parse(content | {"measurement": [CURVE]}).lacking
+    assert not parse(raw() | {"measurement": [CURVE]}).lacking
+    with pytest.raises(StudyError, match=r"material\.poisson: is required"):
+        parse(raw() | {"material": {"young": "1 kPa"}, "measurement": [CURVE]})
