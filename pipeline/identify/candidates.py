@@ -83,7 +83,9 @@ def pressed_to(study: Study, depths: Sequence[float]) -> Study:
     """Return a study whose measurements have these depths (m), whatever it declares."""
     rows = zip(study.measurements, depths, strict=True)
     own = [(one, (one.probe or {}) | {"depth": f"{depth:.6g} m"}) for one, depth in rows]
-    return replace(study, measurements=tuple(one.model_copy(update={"probe": probe}) for one, probe in own))
+    pressed = tuple(one.model_copy(update={"probe": probe}) for one, probe in own)
+    lacking = tuple(problem for problem in study.lacking if problem.key != "probe.depth")
+    return replace(study, measurements=pressed, lacking=lacking)
 
 
 def _recorded(study: Study) -> list[float]:

@@ -15,8 +15,8 @@ from tests.identify.test_seen import punches
 PAD = {
     "body": {"shape": "cylinder", "radius": "100 mm", "height": "10 mm", "fixed": "bottom"},
     "material": {"young": "10 kPa", "poisson": 0.4},
-    "probe": {"shape": "disc", "radius": "1 mm", "depth": "0.2 mm", "contact": "frictionless"},
-    "mesh": {"accuracy": "0.1 %"},
+    "probe": {"shape": "disc", "radius": "1 mm", "contact": "frictionless"},
+    "measurement": [{"name": "narrow", "file": "narrow.csv"}],
     "identify": {"young": ["1 kPa", "1 MPa"], "poisson": [0.2, 0.5]},
 }
 
