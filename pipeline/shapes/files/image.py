@@ -108,7 +108,7 @@ def default_smooth(spacing: FloatArray) -> float:
 def surface_of(labels: LabelMap, label: int | str, smooth: float | None = None) -> Loaded:
     """Return the surface of the voxels with a ``label``."""
     mask = of_label(labels, label)
-    mask, start, notices = _one_piece(mask, float(np.prod(labels.spacing)))
+    mask, start, notices = one_piece(mask, float(np.prod(labels.spacing)))
     deviation = default_smooth(labels.spacing) if smooth is None else smooth
     sigma = deviation / labels.spacing
     margin = np.ceil(_REACH * sigma).astype(int) + 2
@@ -122,7 +122,7 @@ def surface_of(labels: LabelMap, label: int | str, smooth: float | None = None) 
     return Loaded(triangles, (*labels.notices, *notices, *apart, *more))
 
 
-def _one_piece(mask: Any, voxel: float) -> tuple[Any, IntArray, list[str]]:
+def one_piece(mask: Any, voxel: float) -> tuple[Any, IntArray, list[str]]:
     """Return the largest piece of a mask, cropped and without hollows, the index of its corner, and notices."""
     from scipy import ndimage  # noqa: PLC0415
 

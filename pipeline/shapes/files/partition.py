@@ -1,0 +1,180 @@
+"""Surfaces between several labels of a label map, smoothed together: neighbours share them.
+
+The surface of the body, the union of all labels, is that of a single label (:mod:`pipeline.shapes.files.image`): labels
+within it do not dent it. Inside, the indicator of every label passes the same filter, and a point belongs to the label
+with the largest one, times a factor by which the label keeps its volume.
+"""
+
+from collections.abc import Sequence
+from math import pi, sqrt
+from typing import Any
+
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.shapes.complex import OUTSIDE, Complex
+from pipeline.shapes.files.image import default_smooth, one_piece
+from pipeline.shapes.files.labels import LabelMap, of_label
+from pipeline.shapes.files.marching import march
+from pipeline.shapes.triangles import SurfaceError, doubled_normals
+
+_REACH = 4.0  # truncation of the filter, in standard deviations
+# Tolerance on volumes in the search for the factors, most steps, and largest step (of a logarithm).
+_SAME_VOLUME, _STEPS, _LARGEST = 5e-4, 12, 0.5
+# A step's part of what was wanted that is believed.
+_LEAST_GAIN, _MOST_GAIN = 0.1, 3.0
+# A region must keep its volume within this share; parts below this number of voxels are left to their neighbours.
+MOST_VOLUME, CRUMB = 0.01, 8
+# The filter of a thin label is narrowed by this factor until its largest value shows that the label is thick enough for
+# it: 0.97 is that in the middle of a ball of three standard deviations. It is not narrowed below this share of a voxel.
+_THICK, _NARROWER, _NARROWEST = 0.97, 0.8, 0.4
+_TINY, _EVEN = 1e-6, 0.5
+
+
+def partition_of(
+    found: LabelMap, labels: Sequence[int | str], smooth: float | None = None
+) -> tuple[Complex, tuple[str, ...]]:
+    """Return the surfaces (m) between a body's label, those of its regions, and what is outside, and notices.
+
+    The body, the union of all ``labels``, is one piece without hollows. The first label has the number 0, that of the
+    body's own tissue, the others 1 and so on. ``smooth`` (m) is the standard deviation of the filter.
+
+    Raises:
+        SurfaceError: if a label has no voxels, or is thinner than the filter.
+    """
+    masks = [of_label(found, label) for label in labels]
+    body, start, notices = one_piece(np.logical_or.reduce(masks), float(np.prod(found.spacing)))
+    box = tuple(slice(s, s + n) for s, n in zip(start, body.shape, strict=True))
+    number = np.where(body, 0, OUTSIDE)
+    for region, mask in enumerate(masks[1:], start=1):
+        number[mask[box] & body] = region
+    sigma = (default_smooth(found.spacing) if smooth is None else smooth) / found.spacing
+    margin = np.ceil(_REACH * sigma).astype(int) + 2
+    number = np.pad(number, [(m, m) for m in margin], constant_values=OUTSIDE)
+    whole, width = _filtered(number != OUTSIDE, sigma, may_narrow=smooth is None)
+    weights, said = _without_crumbs(whole, _weights(number, len(labels), sigma, may_narrow=smooth is None), labels)
+    points, facets, sides = _keeping_volumes(whole, weights, number, (width, sigma), labels)
+    places = (points + (start - margin)) @ found.affine[:, :3].T + found.affine[:, 3]
+    if np.linalg.det(found.affine[:, :3]) < 0:  # a mirrored frame
+        facets = np.ascontiguousarray(facets[:, ::-1])
+    return Complex(places, facets, sides), (*found.notices, *notices, *said)
+
+
+def _filtered(mask: Any, sigma: FloatArray, *, may_narrow: bool) -> tuple[Any, FloatArray]:
+    """Return the filtered indicator of a mask, and the width (3,) of the filter, narrowed for thin ones."""
+    from scipy import ndimage  # noqa: PLC0415
+
+    steps = mask.astype(np.float32)
+    while True:
+        values = ndimage.gaussian_filter(steps, sigma, truncate=_REACH)
+        if not may_narrow or values.max() >= _THICK or sigma.max() * _NARROWER <= _NARROWEST:
+            return values, sigma
+        sigma = sigma * _NARROWER
+
+
+def _weights(number: IntArray, count: int, sigma: FloatArray, *, may_narrow: bool) -> FloatArray:
+    """Return the filtered indicators (count, nx, ny, nz) of the labels.
+
+    A thin label, with its narrower filter, comes first; the others share what it leaves.
+    """
+    filtered = [_filtered(number == label, sigma, may_narrow=may_narrow and label > 0) for label in range(count)]
+    weights = np.stack([values for values, _ in filtered])
+    wide = [label for label, (_, width) in enumerate(filtered) if width is sigma]
+    if len(wide) < count:
+        thin = [label for label in range(count) if label not in wide]
+        # The share of the other labels among themselves, without what is outside.
+        among = np.stack([_filtered(number == label, sigma, may_narrow=False)[0] for label in thin]).sum(axis=0)
+        rest, inside = weights[wide].sum(axis=0), weights[wide].sum(axis=0) + among
+        weights[wide] *= np.maximum(inside - weights[thin].sum(axis=0), 0.0) / np.maximum(rest, _TINY)
+    return np.asarray(weights)
+
+
+def _without_crumbs(whole: Any, weights: FloatArray, labels: Sequence[int | str]) -> tuple[FloatArray, list[str]]:
+    """Return the weights with parts of a few voxels left to their neighbours, and notices of them.
+
+    Loose parts of the ``whole`` body are removed from it, and hollows closed, in place.
+    """
+    from scipy import ndimage  # noqa: PLC0415
+
+    def parts(mask: Any) -> tuple[Any, Any]:
+        part, _ = ndimage.label(mask, np.ones((3, 3, 3)))
+        sizes = np.bincount(part.ravel())
+        sizes[0] = 0
+        return part, sizes
+
+    for is_inside in (True, False):
+        part, sizes = parts((whole >= _EVEN) == is_inside)
+        whole[(part > 0) & (part != sizes.argmax())] = 1.0 - is_inside
+    largest, said = weights.argmax(axis=0), []
+    inside = whole >= _EVEN
+    for label in range(len(weights)):
+        part, sizes = parts(inside & (largest == label))
+        crumbs = (sizes < CRUMB) & (sizes > 0)
+        if crumbs.any():
+            weights[label][crumbs[part]] = 0.0
+            said.append(
+                f"label {labels[label]}: parts of less than {CRUMB} voxels, {sizes[crumbs].sum():,} in all, left to "
+                "their neighbours"
+            )
+    return weights, said
+
+
+def _keeping_volumes(
+    whole: Any,
+    weights: FloatArray,
+    number: IntArray,
+    widths: tuple[FloatArray, FloatArray],
+    labels: Sequence[int | str],
+) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return the surfaces (see :func:`march`) at which the body and all labels keep their volumes.
+
+    Newton's method: across a plane, the filtered indicator has the slope 1 / (√(2π) σ), so that the logarithm of a
+    factor moves it by √(2π) σ / 4. The ``widths`` are σ of the body and of its labels, in voxels.
+    """
+    count = len(weights)
+    wanted = np.bincount(number[number != OUTSIDE], minlength=count).astype(np.float64)
+    move, within = (sqrt(2 * pi) * float(np.prod(width)) ** (1 / 3) / 4 for width in widths)
+    logarithm, of_body = np.zeros(count), 0.0
+    gain, before = np.ones(count), np.full(count, np.nan)
+    for _ in range(_STEPS):
+        factors = np.exp(logarithm).astype(np.float32)[:, None, None, None]
+        points, facets, sides = march(1 - whole * np.float32(1 + np.exp(of_body)), weights * factors)
+        shares = _volumes(points, facets, sides, count) / wanted
+        if not move or np.abs(shares - 1).max() < _SAME_VOLUME or (shares <= 0).any():
+            break
+        # Thin labels, and curved surfaces, move by more or less than that.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            came = (shares - before) / (1 - before)
+        known = (came > _LEAST_GAIN) & (abs(before - 1) > _SAME_VOLUME)
+        gain, before = np.where(known, gain / np.minimum(came, _MOST_GAIN), gain), shares
+        areas = np.linalg.norm(doubled_normals(points, facets), axis=1) / 2
+        skin = sides[:, 1] == OUTSIDE
+        of_body += float(np.clip((wanted * (1 - shares)).sum() / (move * areas[skin].sum()), -_LARGEST, _LARGEST))
+        if count == 1:
+            continue
+        slope = np.zeros((count, count))
+        np.add.at(slope, tuple(sides[~skin].T), -within * areas[~skin])
+        slope += slope.T
+        slope -= np.diag(slope.sum(axis=1))
+        # What the body's surface gives to a label that it bounds.
+        excess = (wanted * (1 - shares)).sum() / areas[skin].sum()
+        given = excess * np.bincount(sides[skin, 0], areas[skin], minlength=count)
+        step = np.linalg.solve(slope[1:, 1:], (gain * (wanted * (1 - shares) - given))[1:])
+        logarithm[1:] += np.clip(step, -_LARGEST, _LARGEST)
+    off = np.abs(shares - 1)
+    if move and (off > MOST_VOLUME).any():
+        worst = int(off.argmax())
+        raise SurfaceError(
+            f"label {labels[worst]} is thinner than the width of the filter, which would change its volume by "
+            f"{shares[worst] - 1:+.0%}: give a smaller `smooth`"
+        )
+    return points, facets, sides
+
+
+def _volumes(points: FloatArray, facets: IntArray, sides: IntArray, count: int) -> FloatArray:
+    """Return the volumes of the labels, in voxels."""
+    a, b, c = (points[facets[:, k]] - points.mean(axis=0) for k in range(3))
+    parts = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    behind = np.bincount(sides[:, 0], parts, minlength=count)
+    inner = sides[:, 1] != OUTSIDE
+    return np.asarray(behind - np.bincount(sides[inner, 1], parts[inner], minlength=count))

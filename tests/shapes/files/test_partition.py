@@ -1,0 +1,94 @@
+"""Surfaces between several labels: closed around each of them, common to neighbours, accurate, and of their volume."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from pipeline.shapes.complex import OUTSIDE
+from pipeline.shapes.files.crossings import crossings
+from pipeline.shapes.files.labels import LabelMap
+from pipeline.shapes.files.marching import march
+from pipeline.shapes.files.partition import partition_of
+from pipeline.shapes.triangles import SurfaceError, half_edges
+
+AXES = np.array([36.0, 27.0, 20.0])  # mm
+CENTRE, INNER = np.array([-12.0, 3.0, 0.0]), np.array([13.0, 9.0, 8.0])
+
+
+def scene(spacing: tuple[float, float, float]) -> LabelMap:
+    """Return an ellipsoid with another inside it, and a third part that ends at the surface, by voxels in mm."""
+    steps = np.array(spacing)
+    count = np.ceil(2 * (AXES + 4) / steps).astype(int)
+    origin = (0.5 - count / 2) * steps
+    x = np.moveaxis(np.indices(count), 0, -1) * steps + origin
+    labels = (((x / AXES) ** 2).sum(axis=-1) < 1).astype(int)
+    labels[(labels == 1) & (((x - CENTRE) / INNER) ** 2 < 1 / 3).all(axis=-1)] = 1
+    labels[(((x - CENTRE) / INNER) ** 2).sum(axis=-1) < 1] = 7
+    labels[(labels == 1) & (x[..., 0] > 18)] = 5
+    return LabelMap(labels, 1e-3 * np.column_stack([np.diag(steps), origin]))
+
+
+def are_closed(facets, sides, regions) -> bool:
+    """Return whether each region's boundary has every edge once in either direction."""
+    for region in regions:
+        behind, before = (np.asarray(sides) == region).T
+        around = np.vstack([facets[behind], facets[before][:, ::-1]])
+        times = Counter(map(tuple, half_edges(around).tolist()))
+        if any(count != 1 or times[b, a] != 1 for (a, b), count in times.items()):
+            return False
+    return True
+
+
+@pytest.mark.parametrize("spacing", [(2, 2, 2), (3, 3, 3), (1.5, 1.5, 3)])
+def test_labels_share_accurate_surfaces_and_keep_their_volumes(spacing):
+    image = scene(spacing)
+    body, notices = partition_of(image, (1, 7, 5))
+    assert not notices
+    for region, label in enumerate((1, 7, 5)):
+        wanted = (image.values == label).sum() * np.prod(image.spacing)
+        assert body.volume(region) == pytest.approx(wanted, rel=1e-3)
+    assert {*map(tuple, body.walls()[0].tolist())} == {(OUTSIDE, 0), (OUTSIDE, 2), (0, 1), (0, 2)}
+    assert are_closed(body.facets, body.sides, (OUTSIDE, 0, 1, 2))
+    within = body.points[np.unique(body.facets[(body.sides == (1, 0)).all(axis=1)])] * 1e3
+    level = np.linalg.norm((within - CENTRE) / INNER, axis=1)
+    slope = np.linalg.norm((within - CENTRE) / INNER**2, axis=1) / level
+    assert np.sqrt((((level - 1) / slope) ** 2).mean()) < 0.2 * max(spacing)
+    plane = body.points[np.unique(body.facets[(body.sides == (2, 0)).all(axis=1)])] * 1e3
+    inner = np.linalg.norm(plane[:, 1:] / AXES[1:], axis=1) < 0.4
+    assert np.abs(plane[inner, 0] - 18).max() < 0.5 * max(spacing) + 0.1
+
+
+def test_two_labels_have_the_surface_of_one():
+    image = scene((2, 2, 2))
+    alone, _ = partition_of(image, (1, 5))
+    whole, _ = partition_of(LabelMap(np.where(image.values == 5, 1, image.values), image.affine), (1,))
+    assert alone.volume(0) + alone.volume(1) == pytest.approx(whole.volume(0), rel=1e-3)
+    skin = alone.points[np.unique(alone.facets[alone.sides[:, 1] == OUTSIDE])]
+    distance = np.array([np.linalg.norm(skin - point, axis=1).min() for point in whole.points[::20]])
+    assert np.median(distance) < 0.01e-3
+    assert np.quantile(distance, 0.95) < 0.3e-3  # also where the labels meet at the surface
+
+
+@pytest.mark.parametrize("count", [2, 3, 6])
+def test_no_facets_cross_between_labels_at_random(count):
+    weights, outside = np.random.default_rng(count).random((count, 7, 6, 5)), np.ones((7, 6, 5))
+    outside[1:-1, 1:-1, 1:-1] = np.random.default_rng(9).random((5, 4, 3)) - 0.6
+    points, facets, sides = march(outside, weights)
+    assert are_closed(facets, sides, range(OUTSIDE, count))
+    assert not len(crossings(points, facets))
+
+
+def test_what_is_too_thin_or_too_small_is_told():
+    image = scene((2, 2, 2))
+    values = image.values.copy()
+    sheet = np.zeros_like(values, dtype=bool)
+    sheet[:, values.shape[1] // 2] = True
+    values[sheet & (values == 1)] = 3
+    with pytest.raises(SurfaceError, match=r"label 3 is thinner than the width of the filter.*smaller `smooth`"):
+        partition_of(LabelMap(values, image.affine), (1, 7, 5, 3), 6e-3)
+    values = image.values.copy()
+    values[20, 20, 12] = 7
+    assert values.shape > (20, 20, 12) and image.values[20, 20, 12] == 1
+    _, notices = partition_of(LabelMap(values, image.affine), (1, 7, 5), 0.8e-3)
+    assert len(notices) == 1 and "label 7: parts of less than 8 voxels" in notices[0]
