@@ -44,14 +44,14 @@ def _domains(study: "Study") -> "Iterator[tuple[str, str, Domain]]":
     from pipeline.identify.experiment import deepest_of
     from pipeline.identify.forward import unknown_domain
     from pipeline.identify.unknowns import unknowns
-    from pipeline.study.curves import curves_of
+    from pipeline.study.curves import curves_of, sound
     from pipeline.study.read import scene_of
     from pipeline.surrogate.sensitivity import spread_domain
 
     for measurement in study.measurements:
         scene = scene_of(study, measurement)
         if any(problem.key == "probe.depth" for problem in study.lacking):
-            deepest = deepest_of(curves_of(study, measurement))
+            deepest = deepest_of(sound(curves_of(study, measurement)))
         else:
             deepest = max(probe.depth for probe in scene.probes)
         yield "identify", measurement.name, unknown_domain(scene, unknowns(study), deepest)

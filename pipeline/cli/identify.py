@@ -9,7 +9,7 @@ import typer
 
 from pipeline.cli.console import is_json_wanted, print_json, warning
 from pipeline.cli.design import design as rank
-from pipeline.cli.faults import DONE, Fault, fail, refusing, refusing_cases
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, refusing, refusing_cases
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     Files,
@@ -24,7 +24,7 @@ from pipeline.cli.words import (
 )
 from pipeline.files import STORE_NAME, result_files
 from pipeline.launcher import is_first_rank
-from pipeline.printable import printable, printable_lines
+from pipeline.printable import counted, printable, printable_lines
 from pipeline.run.remaining import format_seconds
 
 if TYPE_CHECKING:
@@ -52,7 +52,8 @@ def identify(
 
     A study says where the curves are ([[measurement]]), on which body and with which tool they were measured, and what
     is to be found ([identify]). Written are <study>.nc and its figure; `epsmesh report` makes a page of them. Forces
-    over the ranges of the unknowns are cases in the store, computed once. An interrupted run goes on where it was.
+    over the ranges of the unknowns are cases in the store, computed once. An interrupted run goes on where it was. Of
+    many files, those that are no curve have the status "failed", and the exit status is 1; ranks of mpirun share them.
 
     Of a curve without a study (CSV, TXT), it prints what is in the file, and a [[measurement]] to paste into a study.
 
@@ -87,8 +88,10 @@ def identify(
                 if "probe.depth" not in text:  # curves have depths of their own
                     warning(text)
         found.append(_identify(study, output, path, quiet=quiet or is_json_wanted() or not is_first_rank()))
+    ended = SOME_FAILED if any(one["failed"] for one in found) else DONE
     if is_json_wanted() and is_first_rank():
-        print_json({"status": DONE, "studies": found})
+        print_json({"status": ended, "studies": found})
+    raise typer.Exit(ended)
 
 
 def _describe(curves: list[Path], others: list[Path]) -> None:
@@ -114,23 +117,27 @@ def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict
     from pipeline.identify.dataset import write
     from pipeline.identify.run import identification
     from pipeline.report.figures.identification import draw
-    from pipeline.report.identified import answer
+    from pipeline.report.identified import answer, failures
 
     start = time.monotonic()
     with refusing_cases(study, store), refusing(ExperimentError, file=study.file, howto=_OF_CURVES):
         dataset = identification(study, output, store, (lambda _: None) if quiet else _tell)
+    failed = failures(dataset)
     if not is_first_rank():
-        return {}
+        return {"failed": failed}
     file = output / f"{study.name}.nc"
     write(dataset, file)
     written = [file, *draw(dataset, file.with_suffix(""))]
     if not is_json_wanted():
         _print(study, dataset, file)
         print(f"{study.file}: wrote {', '.join(map(str, written))}; {format_seconds(time.monotonic() - start)}")
+        if failed:
+            print(f"{study.file}: {len(failed)} of {counted(dataset.sizes['file'], 'file')} failed")
     return {
         "study": study.file,
         "answer": answer(dataset),
         **_verdicts(dataset),
+        "failed": failed,
         "values": _as_data(dataset),
         "files": list(map(str, written)),
         "seconds": round(time.monotonic() - start, 3),

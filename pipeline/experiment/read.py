@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Sequence
 from glob import has_magic
 from pathlib import Path
 
@@ -46,25 +47,35 @@ def _by_number(path: Path) -> list[tuple[int, int | str]]:
     return [(0, int(part)) if part.isdecimal() else (1, part) for part in parts]
 
 
-def read_curves(pattern: str, reading: Reading, folder: Path = Path()) -> tuple[Curve, ...]:
-    """Return the curves of all files that a ``pattern`` names.
+def read_curves(pattern: str, reading: Reading, folder: Path = Path()) -> tuple[Curve | ExperimentError, ...]:
+    """Return the curve of each file that a ``pattern`` names, or why it has none.
 
     Raises:
-        ExperimentError: with the first few files that have no such curve.
+        ExperimentError: if none has a curve, with the first few reasons.
     """
-    curves, errors = [], []
+    found: list[Curve | ExperimentError] = []
     for path in files_of(pattern, folder):
         try:
-            curves.append(read_curve(path, reading))
+            found.append(read_curve(path, reading))
         except ExperimentError as error:
-            errors.append(error)
+            found.append(error)
+    return some(found, pattern)
+
+
+def some(found: Sequence[Curve | ExperimentError], pattern: str) -> tuple[Curve | ExperimentError, ...]:
+    """Return what was found in the files of a ``pattern``, if there is a curve.
+
+    Raises:
+        ExperimentError: if there is none, with the first few reasons.
+    """
+    errors = [one for one in found if isinstance(one, ExperimentError)]
+    if len(errors) < len(found):
+        return tuple(found)
     if len(errors) == 1:
         raise errors[0]
-    if errors:
-        told = [str(error) for error in errors[:_MOST_TOLD]]
-        more = [f"… and {len(errors) - _MOST_TOLD} more files"] if len(errors) > _MOST_TOLD else []
-        raise ExperimentError(pattern, "\n".join([f"{len(errors)} files have no such curve:", *told, *more]))
-    return tuple(curves)
+    told = [str(error) for error in errors[:_MOST_TOLD]]
+    more = [f"… and {len(errors) - _MOST_TOLD} more files"] if len(errors) > _MOST_TOLD else []
+    raise ExperimentError(pattern, "\n".join([f"{len(errors)} files, and none has such a curve:", *told, *more]))
 
 
 def read_curve(path: Path, reading: Reading) -> Curve:

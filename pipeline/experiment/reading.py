@@ -1,7 +1,8 @@
 """What a study says of the file of a force curve, and the error of a file that is none."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal
 
 Segment = Literal["approach", "hold", "approach+hold", "retract"]
@@ -45,3 +46,7 @@ class ExperimentError(Exception):
         place = [f"line {line}"] if line is not None else []
         place += [f"column `{column}`"] if column else []
         super().__init__(f"{file}: {', '.join(place)}{': ' if place else ''}{why}")
+
+    def __reduce__(self) -> tuple[Callable[..., "ExperimentError"], tuple[str, str]]:
+        """Return how it is made again on another rank."""
+        return partial(type(self), column=self.column, line=self.line), (self.file, self.why)

@@ -9,7 +9,7 @@ from pipeline.identify.experiment import depth_of
 from pipeline.report.identified import engineering
 from pipeline.shapes.probe import Probe
 from pipeline.study.case import Case
-from pipeline.study.curves import curves_of
+from pipeline.study.curves import curves_of, sound
 from pipeline.study.problems import Problem, StudyError
 from pipeline.study.read import parse, scene_of
 from pipeline.study.schema import SECTIONS
@@ -91,7 +91,7 @@ def pressed_to(study: Study, depths: Sequence[float]) -> Study:
 def _recorded(study: Study) -> list[float]:
     """Return about how deep (m) the curves of each measurement are."""
     try:
-        found = [curves_of(study, measurement) for measurement in study.measurements]
+        found = [sound(curves_of(study, measurement)) for measurement in study.measurements]
     except ExperimentError as wrong:
         allowed = f"is required: the depth of the planned test, of which there is no curve ({wrong})"
         raise StudyError(study.file, [Problem("probe.depth", None, allowed)]) from None

@@ -8,8 +8,10 @@ import numpy as np
 import xarray as xr
 
 from pipeline.arrays import FloatArray
+from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.parts import SOURCES, CurveFit, Estimate
 from pipeline.netcdf import write_netcdf
+from pipeline.states import FAILED, OK
 
 # Unit and meaning of each variable.
 WORDS: dict[str, tuple[str, str]] = {
@@ -29,6 +31,9 @@ WORDS: dict[str, tuple[str, str]] = {
     "wanted": ("1", "whether the study asks for the parameter; others widen the bars of these"),
     "verdict": ("", "whether the declared law fits the curves"),
     "file": ("", "file of the curve"),
+    "status": ("", "whether the file has been fitted: ok or failed"),
+    "message": ("", "why a file has not been fitted"),
+    "told": ("", "what else is to be known of a file's values, in sentences"),
     "profile_value": ("", "values of a parameter at which all others were fitted anew"),
     "profile": ("1", "twice the fall of the logarithm of the likelihood; 3.84 at the ends of a 95 % bar"),
     "depth": ("m", "depth of the tool below the surface"),
@@ -43,6 +48,8 @@ WORDS: dict[str, tuple[str, str]] = {
     "window_young": ("Pa", "Young's modulus of that fit"),
     "evidence": ("1", "logarithm of the evidence for a deviation from the law, relative to that for none"),
 }
+# Words of each of many files.
+_OF_FILES = ("verdict", "told", "status", "message")
 _OF_CURVES = ("depth", "force", "fit", "band", "residual")
 
 
@@ -89,27 +96,38 @@ def dataset_of(
     return dataset.assign_attrs({"Conventions": "CF-1.8", "verdict": found.verdict, **told, **attributes})
 
 
-def joined(found: Sequence[xr.Dataset], files: Sequence[str]) -> xr.Dataset:
-    """Return identifications of many files as one dataset with the dimension `file`."""
-    longest = {dim: max(one.sizes.get(dim, 0) for one in found) for dim in ("sample", "point", "window")}
+def joined(found: Sequence[xr.Dataset | ExperimentError], files: Sequence[str]) -> xr.Dataset:
+    """Return identifications of many files as one dataset with the dimension `file`; at least one is a dataset.
+
+    Files of which nothing is known have no values, the status "failed", and a message.
+    """
+    good = [one for one in found if isinstance(one, xr.Dataset)]
+    longest = {dim: max(one.sizes.get(dim, 0) for one in good) for dim in ("sample", "point", "window")}
+    rows = [_row(one, good[0]) for one in found]
     padded = [
-        _one_of_many(one).pad({dim: (0, length - one.sizes[dim]) for dim, length in longest.items() if dim in one.dims})
-        for one in found
+        one.pad({dim: (0, length - one.sizes[dim]) for dim, length in longest.items() if dim in one.dims})
+        for one in rows
     ]
     whole = xr.concat(padded, "file", data_vars="all", coords="minimal", compat="override", combine_attrs="drop")
     for name, variable in whole.variables.items():
-        variable.attrs = found[0][name].attrs if name in found[0].variables else {}
-    whole = whole.assign({name: found[0][name] for name in ("unit", "wanted")})
+        variable.attrs = next((one[name].attrs for one in good if name in one.variables), {})
+    whole = whole.assign({name: good[0][name] for name in ("unit", "wanted")})
     whole["file"] = ("file", np.array(files, dtype=object))
-    for name in ("file", "verdict"):
+    for name in ("file", *_OF_FILES):
         whole[name].attrs["long_name"] = WORDS[name][1]
-    return whole.assign_attrs({key: value for key, value in found[0].attrs.items() if key not in ("verdict", "told")})
+    return whole.assign_attrs({key: value for key, value in good[0].attrs.items() if key not in ("verdict", "told")})
 
 
-def _one_of_many(one: xr.Dataset) -> xr.Dataset:
-    """Return an identification with its verdict as a variable, and names of curves that all files share."""
-    names = [f"{number}" for number in range(1, one.sizes["measurement"] + 1)]
-    return one.assign(verdict=((), one.attrs["verdict"])).assign_coords(measurement=names)
+def _row(found: xr.Dataset | ExperimentError, like: xr.Dataset) -> xr.Dataset:
+    """Return what is known of a file, with its words as variables; nothing, ``like`` that of another, if it failed."""
+    if isinstance(found, xr.Dataset):
+        words = {name: str(found.attrs.get(name, "")) for name in ("verdict", "told")} | {"status": OK, "message": ""}
+    else:
+        words = {"verdict": "", "told": "", "status": FAILED, "message": str(found)}
+        found = like.map(lambda values: xr.full_like(values, np.nan if values.dtype.kind == "f" else 0)
+                         if values.dtype.kind in "fi" else values)  # fmt: skip
+    names = [f"{number}" for number in range(1, found.sizes["measurement"] + 1)]
+    return found.assign({name: ((), words[name]) for name in _OF_FILES}).assign_coords(measurement=names)
 
 
 def _profiles(found: Estimate, names: Sequence[str]) -> dict[str, Any]:

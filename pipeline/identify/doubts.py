@@ -7,7 +7,6 @@ import numpy as np
 import xarray as xr
 
 from pipeline.experiment.curve import Curve
-from pipeline.identify.experiment import Specimen
 from pipeline.identify.parts import CurveFit, Measured, Unknown
 from pipeline.report.identified import engineering
 from pipeline.shapes.indenter import Indenter
@@ -16,8 +15,6 @@ from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.study.case import Case
 from pipeline.study.check import warn_of_depth
 from pipeline.study.problems import Problems
-from pipeline.study.read import scene_of
-from pipeline.study.sweep import Study
 
 # Depths in half widths of a tool, and moduli (Pa) from gels to hard plastics, beyond which a unit is probably wrong.
 _DEPTHS = (1e-4, 30.0)
@@ -28,18 +25,10 @@ _BEGUN, _LEAST_WAY = 0.05, 1e-3
 _ROUGH = 3.0
 
 
-def doubts_of_scale(study: Study, found: Sequence[Specimen]) -> tuple[str, ...]:
-    """Return what is doubtful about the depths of the curves of a study.
-
-    Raises:
-        StudyError: if a measurement has no scene.
-    """
-    doubts: list[str] = []
-    for number, measurement in enumerate(study.measurements):
-        case = next(scene_of(study, measurement).cases())
-        for specimen in found:
-            doubts += _of_curve(specimen.curves[number], case)
-    return tuple(doubts)
+def doubts_of_scale(cases: Sequence[Case], curves: Sequence[Curve]) -> Iterator[str]:
+    """Yield what is doubtful about the depths of curves, each measured on the scene of a case."""
+    for case, curve in zip(cases, curves, strict=True):
+        yield from _of_curve(curve, case)
 
 
 def _of_curve(curve: Curve, case: Case) -> Iterator[str]:
@@ -59,10 +48,9 @@ def _size(probe: Probe) -> float:
     return (probe.half_length if isinstance(probe, Indenter) else 0.0) or probe.half_width
 
 
-def doubts_of_depth(study: Study, found: Sequence[CurveFit]) -> Iterator[str]:
-    """Yield for each fitted curve of a study why its law may be an extrapolation at the depth that it reaches."""
-    for measurement, curve in zip(study.measurements, found, strict=True):
-        case = next(scene_of(study, measurement).cases())
+def doubts_of_depth(cases: Sequence[Case], found: Sequence[CurveFit]) -> Iterator[str]:
+    """Yield for each fitted curve, on the scene of a case, why its law may be an extrapolation at its depth."""
+    for case, curve in zip(cases, found, strict=True):
         if case.material.is_large or any(region.is_large for region in case.body.regions):
             continue
         problems, deepest = Problems(), float(np.nanmax(curve.depth))

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, log10
+from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -14,7 +15,8 @@ from pipeline.identify.may_hide import hidden_parts
 from pipeline.identify.parts import Forward, Hidden, Measured, Unknown
 from pipeline.identify.tools import tip_of_probe
 from pipeline.shapes.probe import Probe
-from pipeline.study.curves import curves_of
+from pipeline.study.case import Case
+from pipeline.study.curves import curves_of, sound
 from pipeline.study.measurement import Measurement
 from pipeline.study.read import scene_of
 from pipeline.study.schema import Material
@@ -28,17 +30,19 @@ _SMALL, _DEEPER = 0.05, 1.4
 
 @dataclass(frozen=True)
 class Specimen:
-    """What is identified together: one curve of each measurement."""
+    """What is identified together: one curve of each measurement; none, and an ``error``, if a file has no curve."""
 
     name: str
     curves: tuple[Curve, ...]
+    error: ExperimentError | None = None
 
 
 @dataclass(frozen=True)
 class Scenes:
-    """What all specimens share: for each measurement the force of its scene, and what the body may hide."""
+    """What all specimens share: for each measurement a case and the force of its scene, and what the body may hide."""
 
     measurements: tuple[Measurement, ...]
+    cases: tuple[Case, ...]
     forwards: tuple[Forward, ...]
     hidden: tuple[tuple[Hidden, ...], ...]
 
@@ -52,18 +56,36 @@ def specimens(study: Study) -> tuple[Specimen, ...]:
     """Return the specimens of a study, one for each file of a pattern.
 
     Raises:
-        ExperimentError: if a file is no curve, or the measurements have different numbers of files.
+        ExperimentError: if no specimen has all its curves, or the measurements have different numbers of files.
     """
     found = [curves_of(study, measurement) for measurement in study.measurements]
     counts = {len(curves) for curves in found}
     if len(counts) > 1:
         text = ", ".join(f"{len(curves)} of {one.file}" for one, curves in zip(study.measurements, found, strict=True))
         raise ExperimentError(study.file, f"measurements need one curve of each specimen, in the same order: {text}")
-    names = [one.name for one in study.measurements]
-    return tuple(
-        Specimen(curves[0].name, tuple(replace(curve, name=name) for curve, name in zip(curves, names, strict=True)))
-        for curves in zip(*found, strict=True)
-    )
+    made = tuple(_specimen(study, curves) for curves in zip(*found, strict=True))
+    if all(one.error for one in made):
+        raise ExperimentError(study.file, f"no specimen has all its curves; the first: {made[0].error}")
+    return made
+
+
+def _specimen(study: Study, found: Sequence[Curve | ExperimentError]) -> Specimen:
+    """Return a specimen of what was found in its files."""
+    first, *_ = found
+    name = first.name if isinstance(first, Curve) else Path(first.file).stem
+    if error := next((one for one in found if isinstance(one, ExperimentError)), None):
+        return Specimen(name, (), error)
+    rows = zip(sound(found), study.measurements, strict=True)
+    return Specimen(name, tuple(replace(curve, name=one.name) for curve, one in rows))
+
+
+def cases_of(study: Study) -> tuple[Case, ...]:
+    """Return the first case of the scene of each measurement; its depth is none of a curve.
+
+    Raises:
+        StudyError: if a scene cannot be run.
+    """
+    return tuple(next(scene_of(study, measurement).cases()) for measurement in study.measurements)
 
 
 def scenes_of(
@@ -78,7 +100,7 @@ def scenes_of(
         SurrogateError: if a case that a force needs has none.
     """
     scenes = [scene_of(study, measurement) for measurement in study.measurements]
-    deepest = [deepest_of([one.curves[number] for one in found], times) for number in range(len(scenes))]
+    deepest = [deepest_of([one.curves[number] for one in found if one.curves], times) for number in range(len(scenes))]
     made: dict[str, Forward] = {}
     for scene in scenes:
         most = max(depth for other, depth in zip(scenes, deepest, strict=True) if other.text == scene.text)
@@ -87,7 +109,7 @@ def scenes_of(
     probes = [cast(Probe, scene.sections["probe"][0]) for scene in scenes]
     tips = [tip_of_probe(probe, depth) for probe, depth in zip(probes, deepest, strict=True)]
     hidden = hidden_parts(study.identification.may_hide, tips, deepest, _poisson(study, unknowns))
-    return Scenes(study.measurements, tuple(made[scene.text] for scene in scenes), tuple(hidden))
+    return Scenes(study.measurements, cases_of(study), tuple(made[scene.text] for scene in scenes), tuple(hidden))
 
 
 def deepest_of(curves: Sequence[Curve], times: float = 1.0) -> float:

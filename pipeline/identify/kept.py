@@ -7,17 +7,18 @@ import xarray as xr
 
 from pipeline import __version__
 from pipeline.identify.dataset import write
-from pipeline.identify.experiment import Specimen
+from pipeline.identify.experiment import Specimen, cases_of
 from pipeline.run.provenance import git_commit
 from pipeline.study.sweep import Study
 
 
 class Kept:
-    """The folder of what is known of a study's files; names of files in it follow from program, study and curves."""
+    """The folder of what is known of a study's files; names in it follow from program, study, bodies and curves."""
 
     def __init__(self, output: Path, study: Study):
         self._folder = output / "identified"
-        self._study = f"{__version__} {git_commit()}\n{study.text}"
+        bodies = {case.body.model_dump_json() for case in cases_of(study)}  # with what is in their files
+        self._study = "\n".join((f"{__version__} {git_commit()}", study.text, *sorted(bodies)))
 
     def read(self, specimen: Specimen) -> xr.Dataset | None:
         """Return what was kept of a specimen, None if nothing was, or if it cannot be read."""

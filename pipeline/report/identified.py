@@ -1,7 +1,8 @@
 """An identification in words: values with both error bars, what the curves do not tell, and the material to paste."""
 
 import json
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from math import floor, isfinite, log10
 
 import numpy as np
@@ -10,6 +11,7 @@ import xarray as xr
 from pipeline.printable import counted
 from pipeline.quantities import quantity_of
 from pipeline.report.words import percent
+from pipeline.states import FAILED
 from pipeline.study.identified import FITS, is_of_test
 
 # What a body may hide, in words.
@@ -34,8 +36,9 @@ _ABSOLUTE = ("poisson", "friction", "baseline", "drift", "contact_point", "share
 _SHARES = "relaxation_share_"
 # Error bars whose sides differ by more than this share have no ±.
 _UNEVEN = 0.25
-# Names of files that are listed.
-_MOST = 10
+# Names of files, and reasons why files failed, that are listed.
+_MOST, _MOST_REASONS = 10, 5
+_NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?")
 
 
 def is_identification(dataset: xr.Dataset) -> bool:
@@ -60,8 +63,29 @@ def answer(dataset: xr.Dataset) -> list[str]:
 
 
 def told(dataset: xr.Dataset) -> list[str]:
-    """Return what the fit has to say, in sentences."""
+    """Return what the fit has to say, in sentences; those of many files once."""
+    if "file" in dataset.dims:
+        files, lines = dataset["file"].values.astype(str), dataset["told"].values.astype(str)
+        said = [(file, line) for file, own in zip(files, lines, strict=True) for line in own.splitlines()]
+        return list(once(said, len(files)))
     return [line for line in str(dataset.attrs.get("told", "")).splitlines() if line]
+
+
+def once(said: Iterable[tuple[str, str]], count: int) -> Iterator[str]:
+    """Yield sentences of files, pairs of names and sentences; those that differ in numbers only once, for all files.
+
+    There are ``count`` files: of one, its name is not said.
+    """
+    if count == 1:
+        yield from dict.fromkeys(line for _, line in said)
+        return
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for file, line in said:
+        groups.setdefault(_NUMBER.sub("#", line), []).append((file, line))
+    for (file, line), *others in groups.values():
+        number = len({file, *(other for other, _ in others)})
+        where = "all files" if number == count else f"{file} and {number - 1} more" if number > 1 else file
+        yield f"{where}: {line}"
 
 
 def of_unknown(dataset: xr.Dataset, name: str, *, is_short: bool = False) -> str:
@@ -214,17 +238,31 @@ def _without_bars(dataset: xr.Dataset) -> Iterator[str]:
 
 def _of_files(dataset: xr.Dataset) -> Iterator[str]:
     """Yield how many of many curves the law fits, and medians over these."""
-    fits = (dataset["verdict"] == FITS).values
+    fits, failed = (dataset["verdict"] == FITS).values, failures(dataset)
     yield f"{counted(dataset.sizes['file'], 'file')}: the declared law fits {int(fits.sum())}."
-    if not fits.all():
-        names = [str(name) for name in dataset["file"].values[~fits]]
-        more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
-        yield f"It does not fit {', '.join(names[:_MOST])}{more}."
+    if names := [str(name) for name in dataset["file"].values[~fits] if str(name) not in failed]:
+        yield f"It does not fit {', '.join(names[:_MOST])}{_more(names, _MOST)}."
+    if failed:
+        reasons = list(failed.values())
+        told_of = f"{'; '.join(reasons[:_MOST_REASONS])}{_more(reasons, _MOST_REASONS)}"
+        yield f"{counted(len(failed), 'file')} failed: {told_of}."
     own = dataset.isel(file=np.flatnonzero(fits))
     for name in wanted(dataset) if fits.any() else ():
         one = own.sel(unknown=name)
         low, middle, high = (written(own, name, float(one["estimate"].quantile(q))) for q in (0.1, 0.5, 0.9))
         yield f"{title(name)}: median {middle}; of ten curves, eight have {low} to {high}{_median_bars(own, name)}."
+
+
+def failures(dataset: xr.Dataset) -> dict[str, str]:
+    """Return why files of an identification have not been fitted, by their names; of one file alone it is an error."""
+    if "status" not in dataset:
+        return {}
+    bad = dataset.isel(file=np.flatnonzero((dataset["status"] == FAILED).values))
+    return dict(zip(bad["file"].values.astype(str), bad["message"].values.astype(str), strict=True))
+
+
+def _more(items: Sequence[str], most: int) -> str:
+    return f" and {len(items) - most} more" if len(items) > most else ""
 
 
 def _median_bars(dataset: xr.Dataset, name: str) -> str:

@@ -96,10 +96,36 @@ def test_many_files_are_a_dimension_and_each_is_kept(folder, epsmesh, found, mon
     dataset = xr.load_dataset(folder / "results" / "three.nc")
     assert list(dataset["file"].values) == ["gel_8", "gel_9", "gel_10"]
     assert dataset["estimate"].sel(unknown="young").values == pytest.approx([20e3, 25e3, 30e3], rel=0.03)
-    monkeypatch.setattr("pipeline.identify.run.identify", lambda *_: pytest.fail("is fitted again"))
+    monkeypatch.setattr("pipeline.identify.many.identify", lambda *_: pytest.fail("is fitted again"))
     again = epsmesh("identify", folder / "three.toml", "--output", folder / "results")
     assert again.exit_code == 0, again.output
     xr.testing.assert_equal(xr.load_dataset(folder / "results" / "three.nc"), dataset)
+
+
+def test_a_bad_file_is_a_row_and_what_is_told_of_files_is_told_once(folder, epsmesh, found):
+    many = folder / "many"
+    many.mkdir()
+    for number in (8, 9, 10):
+        head, *rows = (folder / "curves" / f"gel_{number}.csv").read_text().splitlines()
+        (many / f"gel_{number}.csv").write_text("\n".join([head, *rows[90 if number == 9 else 0 :]]))
+    (many / "gel_11.csv").write_text("depth (mm),force (mN)\n" + "1,2\n" * 3)
+    (folder / "many.toml").write_text(STUDY.format(file="many/*.csv", may_hide="[]"))
+    result = epsmesh("identify", folder / "many.toml", "--output", folder / "results")
+    assert result.exit_code == 1
+    assert result.stdout.rstrip().endswith("many.toml: 1 of 4 files failed")
+    assert "1 file failed: " in result.stdout and "gel_11.csv: the file has 3 rows" in result.stdout
+    assert result.stderr.count("force is column `force (mN)`") == 1
+    assert "gel_9: punch: little or no air" in result.stderr
+    dataset = xr.load_dataset(folder / "results" / "many.nc")
+    assert list(dataset["status"].values) == ["ok", "ok", "ok", "failed"]
+    assert "3 rows" in str(dataset["message"].values[3])
+    assert dataset["estimate"].sel(unknown="young").values[:3] == pytest.approx([20e3, 25e3, 30e3], rel=0.03)
+    assert np.isnan(dataset["estimate"].values[3]).all()
+    page = epsmesh("report", folder / "results" / "many.nc")
+    assert page.exit_code == 0, page.output
+    assert "3 rows" in (folder / "results" / "many.html").read_text()
+    data = json.loads(epsmesh("identify", folder / "many.toml", "--output", folder / "results", "--json").stdout)
+    assert data["status"] == 1 and list(data["studies"][0]["failed"]) == ["gel_11"]
 
 
 def test_the_report_is_a_page_with_the_answer(folder, epsmesh, found):

@@ -184,7 +184,12 @@ def test_a_folder_of_curves_in_the_order_of_their_numbers(tmp_path):
     assert [round(curve.force.max() / FORCE.max()) for curve in curves] == [1, 2, 10]
     assert files_of(str(tmp_path / "curves" / "*.csv"), Path("elsewhere")) == files_of("curves/*.csv", tmp_path)
     (tmp_path / "curves" / "well_2.csv").write_text("nothing")
-    with pytest.raises(ExperimentError, match="well_2"):
+    first, second, third = read_curves("curves/*.csv", Reading(), tmp_path)
+    assert (first.name, third.name) == ("well_1", "well_10")
+    assert isinstance(second, ExperimentError) and "well_2" in str(second)
+    for number in (1, 10):
+        (tmp_path / "curves" / f"well_{number}.csv").write_text("nothing")
+    with pytest.raises(ExperimentError, match=r"3 files, and none has such a curve(.|\n)*well_2"):
         read_curves("curves/*.csv", Reading(), tmp_path)
 
 

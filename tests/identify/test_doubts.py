@@ -8,7 +8,7 @@ import xarray as xr
 
 from pipeline.experiment.curve import Curve
 from pipeline.identify.doubts import doubts_of_force, doubts_of_moduli, doubts_of_scale
-from pipeline.identify.experiment import Specimen
+from pipeline.identify.experiment import cases_of
 from pipeline.identify.parts import Measured, Unknown
 from pipeline.study.read import parse
 from tests.cases import raw
@@ -20,7 +20,7 @@ from tests.cases import raw
 def test_depths(factor, part):
     study = parse(raw() | {"measurement": [{"name": "a", "file": "a.csv"}]})  # a tool of 3 mm on 20 mm of tissue
     curve = Curve("a", factor * np.linspace(0, 1e-3, 20), np.linspace(0, 1, 20))
-    said = doubts_of_scale(study, [Specimen("a", (curve,))])
+    said = list(doubts_of_scale(cases_of(study), [curve]))
     assert len(said) == bool(part) and part in "".join(said)
 
 

@@ -77,10 +77,10 @@ def _of_files(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
     names, rows = wanted(dataset), []
     for number, file in enumerate(dataset["file"].values):
         one = dataset.isel(file=number)
-        verdict = str(one["verdict"].values)
+        verdict = str(one["verdict"].values) or f"failed: {one['message'].values}"
         cells = [str(file), verdict]
         for name in names:
-            value = written(one, name, float(one["estimate"].sel(unknown=name)))
+            value = written(one, name, float(one["estimate"].sel(unknown=name))) if str(one["verdict"].values) else ""
             cells += [value, bar(one, name), bar(one, name, hidden=True)] if verdict == FITS else [value, "", ""]
         rows.append(cells)
     heads = [head for name in names for head in (title(name), "as declared", "may hide")]

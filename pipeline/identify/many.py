@@ -1,0 +1,119 @@
+"""Fits of many specimens: shared among ranks, kept as they come, and those that fail are no end of the others."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+import xarray as xr
+
+from pipeline.experiment.reading import ExperimentError
+from pipeline.identify.advice import advice
+from pipeline.identify.dataset import dataset_of
+from pipeline.identify.doubts import doubts_of_depth, doubts_of_force, doubts_of_moduli, doubts_of_scale
+from pipeline.identify.estimate import identify
+from pipeline.identify.experiment import Scenes, Specimen
+from pipeline.identify.kept import Kept
+from pipeline.identify.parts import TooDeepError
+from pipeline.identify.unknowns import unknowns
+from pipeline.run.provenance import provenance
+from pipeline.study.problems import StudyError
+from pipeline.study.sweep import Study
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+Found: TypeAlias = xr.Dataset | ExperimentError
+"""What is known of a specimen, or why nothing is."""
+
+# Seconds between two lines of progress.
+SILENCE = 10.0
+# Depths that forces are computed for, in turn, as multiples of what is enough if there is air before the contact.
+_DEEPER = (1.0, 1.6, 2.5, 4.5)
+_REMEDY = "record air before the contact, or give a `window` that ends earlier"
+
+
+@dataclass(frozen=True)
+class Work:
+    """Specimens of a study to fit, with the forces down to multiples of the usual depth that ``scenes`` returns.
+
+    Of one specimen alone, it is said which test to make next.
+    """
+
+    study: Study
+    specimens: tuple[Specimen, ...]
+    scenes: Callable[[float], Scenes]
+
+    def done(self, comm: "MPI.Comm", kept: Kept, say: Callable[[str], None]) -> list[Found]:
+        """Return what is found of each specimen, on every rank; collective.
+
+        Raises:
+            StudyError: on every rank, if a scene cannot be run.
+            SurrogateError: on every rank, if a case that a force needs has none.
+        """
+        count, printed = len(self.specimens), time.monotonic()
+        mine = {n: one for n, one in enumerate(self.specimens) if n % comm.size == comm.rank}
+        found: dict[int, Found] = {n: one.error for n, one in mine.items() if one.error}
+        known = {n: kept.read(one) for n, one in mine.items() if n not in found} if count > 1 else {}
+        found |= {n: dataset for n, dataset in known.items() if dataset is not None}
+        for number, outcome in self._fitted({n: one for n, one in mine.items() if n not in found}, comm):
+            found[number] = outcome
+            if count > 1 and isinstance(outcome, xr.Dataset):
+                kept.write(mine[number], outcome)
+            if time.monotonic() - printed > SILENCE:
+                printed = time.monotonic()
+                say(f"{min(len(found) * comm.size, count)} of {count} files are fitted")
+        every = {number: one for part in comm.allgather(found) for number, one in part.items()}
+        return [every[number] for number in range(count)]
+
+    def _fitted(self, mine: Mapping[int, Specimen], comm: "MPI.Comm") -> Iterator[tuple[int, Found]]:
+        """Yield what is found of specimens of this rank by number, in any order; all ranks go through it."""
+        left = dict.fromkeys(mine, "")
+        for times in _DEEPER:
+            if not comm.allreduce(len(left)):
+                return
+            try:
+                scenes = self.scenes(times)
+            except StudyError as error:  # such as a ball deeper than its radius
+                if times == _DEEPER[0]:
+                    raise
+                left = {number: f"{why}, and cannot be: {error.problems[0]}" for number, why in left.items()}
+                break
+            for number in tuple(left):
+                outcome = self._of(mine[number], scenes)
+                if isinstance(outcome, TooDeepError):
+                    left[number] = outcome.why
+                else:
+                    del left[number]
+                    yield number, outcome
+        for number, why in left.items():
+            yield number, ExperimentError(mine[number].name, f"{why}: {_REMEDY}")
+
+    def _of(self, specimen: Specimen, scenes: Scenes) -> Found:
+        """Return what the curves of a specimen say."""
+        measured, sought = scenes.measured(specimen), unknowns(self.study)
+        try:
+            found = identify(measured, sought)
+        except ExperimentError as error:
+            return error
+        except np.linalg.LinAlgError as error:
+            return ExperimentError(specimen.name, f"cannot be fitted: {error}")
+        told = [*doubts_of_scale(scenes.cases, specimen.curves), *doubts_of_force(measured, sought), *found.told]
+        told += doubts_of_depth(scenes.cases, found.curves) if found.fits else ()
+        told += advice(self.study, found) if len(self.specimens) == 1 else ()
+        dataset = dataset_of(found, _attributes(self.study), [curve.time for curve in specimen.curves])
+        told += doubts_of_moduli(dataset)
+        return dataset.assign_attrs({"told": "\n".join(told)} if told else {})
+
+
+def _attributes(study: Study) -> dict[str, Any]:
+    return {
+        "title": study.title,
+        "study": study.text,
+        "study_file": Path(study.file).name,
+        "study_folder": str(Path(study.file).absolute().parent),
+        "may_hide": " ".join(study.identification.may_hide),
+        **provenance(ranks=1),
+    }
