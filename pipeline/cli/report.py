@@ -143,7 +143,7 @@ def _scene_of(path: Path, dataset: "xr.Dataset", text: str) -> str:
             fail(of_file(path, f"--scene {_ANSWER} needs an answer: {wrong}; name a case by its number"))
     else:
         chosen = find_case(study, text, "--scene")
-    fields = fields_of(study, chosen, world(), mesh_only=True, bar=False, meshes=DEFAULT_MESHES)
+    fields = fields_of(study, chosen, world(), mesh_only=True, export=None, meshes=DEFAULT_MESHES)
     assert fields is not None  # one process
     return render(fields, study.title)
 

@@ -25,8 +25,9 @@ def view(
     mesh_only: Annotated[bool, typer.Option("--mesh-only", help="Mesh, but do not solve.")] = False,
     export: Annotated[
         Literal["html", "vtu", "xdmf"] | None,
-        typer.Option(help="Write the page or a file for ParaView, without pictures."),
+        typer.Option(help="Write the page or a file for ParaView and PyVista, without pictures."),
     ] = None,
+    vtk: Annotated[bool, typer.Option("--vtk", help="Short for --export vtu.")] = False,
     meshes: Annotated[Path, typer.Option(help="Folder of the mesh cache.")] = DEFAULT_MESHES,
     as_json: Json = False,
 ) -> None:
@@ -41,6 +42,7 @@ def view(
 
     Example: epsmesh view studies/figure3.toml 12 --export html
     """
+    export = export or ("vtu" if vtk else None)
     (study,) = read_all([file])
     chosen = find_case(study, case)
     number = next(n for n, other in enumerate(study.cases()) if other.index == chosen.index)
@@ -55,15 +57,15 @@ def view(
     export = "html" if missing else export
     load_solvers()
     with abort_on_exception(comm), ended_soon():
-        fields = fields_of(study, chosen, comm, mesh_only, export == "html", meshes)
+        fields = fields_of(study, chosen, comm, mesh_only, export, meshes)
         if fields is not None:
             _write(study, fields, stem, export, missing)
 
 
 def fields_of(
-    study: "Study", case: "Case", comm: "MPI.Comm", mesh_only: bool, bar: bool, meshes: Path
+    study: "Study", case: "Case", comm: "MPI.Comm", mesh_only: bool, export: str | None, meshes: Path
 ) -> "Fields | None":
-    """Return the case's fields, on the first rank; if it cannot be computed, exit on all of them."""
+    """Return the case's fields for an ``export``, on the first rank; if it cannot be computed, exit on all of them."""
     from pipeline.mesh.generate import MeshError
     from pipeline.run.mesh_cache import MeshCache
     from pipeline.run.problem import CaseFailure
@@ -78,7 +80,8 @@ def fields_of(
     note(str(case))
     try:
         solve = solve_alone(study, case)
-        return compute_fields(solve, comm, mesh_only=mesh_only, bar=bar, cache=MeshCache(meshes), note=note)
+        wanted = {"bar": export == "html", "stress": export in ("vtu", "xdmf")}
+        return compute_fields(solve, comm, mesh_only=mesh_only, cache=MeshCache(meshes), note=note, **wanted)
     except (CaseFailure, MeshError, SolveError) as failure:
         why = f"failed: {failure}"
     except (MemoryError, RuntimeError) as failure:

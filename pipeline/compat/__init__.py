@@ -17,7 +17,15 @@ from pipeline.compat.code import (
     make_form,
     renumbered_space,
 )
-from pipeline.compat.elements import cell_dofs, degree, element, mixed_element, reference_element
+from pipeline.compat.elements import (
+    cell_dofs,
+    degree,
+    element,
+    equidistant_nodes,
+    mixed_element,
+    reference_element,
+    vtk_order,
+)
 from pipeline.compat.matrices import add_from_ghosts, add_matrix, assemble_matrix, dirichletbc, ghosted_vector
 from pipeline.compat.meshes import (
     cell_tags,
@@ -43,6 +51,7 @@ __all__ = [
     "degree",
     "dirichletbc",
     "element",
+    "equidistant_nodes",
     "function_space",
     "geometry_dofs",
     "ghosted_vector",
@@ -56,6 +65,7 @@ __all__ = [
     "renumbered_space",
     "triangle_nodes",
     "versions",
+    "vtk_order",
 ]
 
 

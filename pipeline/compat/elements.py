@@ -3,6 +3,7 @@
 from typing import Any
 
 import basix
+import dolfinx
 import numpy as np
 import ufl
 
@@ -28,6 +29,17 @@ def reference_element(degree: int) -> Any:
     return basix.create_element(
         basix.ElementFamily.P, basix.CellType.tetrahedron, degree, basix.LagrangeVariant.gll_warped
     )
+
+
+def equidistant_nodes(degree: int) -> np.ndarray:
+    """Return the nodes (n, 3) of a Lagrange element with equidistant nodes, in the order of dolfinx's."""
+    variant = basix.LagrangeVariant.equispaced
+    return np.asarray(basix.create_element(basix.ElementFamily.P, basix.CellType.tetrahedron, degree, variant).points)
+
+
+def vtk_order(nodes: int) -> np.ndarray:
+    """Return the positions in dolfinx's order of the ``nodes`` of a tetrahedron in the order of VTK."""
+    return np.argsort(dolfinx.cpp.io.perm_vtk(dolfinx.cpp.mesh.CellType.tetrahedron, nodes))
 
 
 def degree(space: Any) -> int:

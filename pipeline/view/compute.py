@@ -20,6 +20,7 @@ from pipeline.solve.cell_values import CellValues
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.points.state import State
 from pipeline.view.fields import Fields
+from pipeline.view.lagrange import nodes_of, stresses_of
 
 Note = Callable[[str], None]
 
@@ -30,24 +31,32 @@ def compute_fields(
     *,
     mesh_only: bool = False,
     bar: bool = False,
+    stress: bool = False,
     cache: MeshCache | None = None,
     note: Note = lambda text: None,
 ) -> Fields | None:
     """Return the fields of a case, on rank 0 (None elsewhere); collective.
 
-    See :func:`pipeline.run.solved.solve_fields`; with ``mesh_only``, the fields are those of the first mesh.
+    See :func:`pipeline.run.solved.solve_fields`; with ``mesh_only``, the fields are those of the first mesh. With
+    ``stress`` they have the stress and the nodes of the elements.
     """
     if mesh_only:
         arrays = modelled_arrays(solve, comm, cache, note)
         return _whole(solve, arrays) if arrays is not None else None
-    return fields_of(solve_fields(solve, comm, bar=bar, cache=cache, note=note))
+    return fields_of(solve_fields(solve, comm, bar=bar, cache=cache, note=note), stress=stress)
 
 
-def fields_of(solved: Solved) -> Fields | None:
-    """Return the fields of a solution, on rank 0 (None elsewhere); collective."""
+def fields_of(solved: Solved, *, stress: bool = False) -> Fields | None:
+    """Return the fields of a solution, on rank 0 (None elsewhere); collective.
+
+    ``stress``: see :func:`compute_fields`.
+    """
     arrays, record = solved.arrays, solved.record
     points = solved.state.body.comm.bcast(len(arrays.points) if arrays is not None else 0)
     displacement, strain = _gathered(solved.state, points)
+    mirrors = solved.solve.mirrors
+    nodes = nodes_of(solved.state, mirrors) if stress else None
+    stresses = stresses_of(solved.state, mirrors) if stress else None
     if arrays is None:
         return None
     fields = _whole(solved.solve, arrays, displacement, strain)
@@ -57,6 +66,8 @@ def fields_of(solved: Solved) -> Fields | None:
         force=record.force,
         force_error=record.force_error,
         on_meridian=solved.on_meridian,
+        nodes=nodes,
+        stress=stresses,
     )
 
 

@@ -10,6 +10,7 @@ from pipeline.shapes.bodies.cad import FromCad
 from pipeline.shapes.body import Drawn
 from pipeline.shapes.indenter import Indenter
 from pipeline.study.case import Case
+from pipeline.view.lagrange import LagrangeNodes
 
 # Displacements are drawn so large that the largest is about this share of the body's smallest extent.
 _VISIBLE = 0.15
@@ -25,6 +26,8 @@ class Fields:
     ("x": x = 0); ``dofs`` counts the whole body's unknowns. ``regions`` (m,) numbers the material of each cell, by its
     position in ``region_names``; None where there is one only. ``force`` (N) is the probe's, with its relative error
     bar ``force_error``; not a number where they were not asked for. ``on_meridian`` tells that it was found there.
+    ``nodes`` are those of the displacement's elements, in the order of the cells, and ``stress`` (m, 3, 3), Pa, is that
+    at the centre of each cell; None where they were not asked for.
     """
 
     case: Case
@@ -40,6 +43,8 @@ class Fields:
     force: float = nan
     force_error: float = nan
     on_meridian: bool = False
+    nodes: LagrangeNodes | None = None
+    stress: FloatArray | None = None
 
     @property
     def contact(self) -> FloatArray:

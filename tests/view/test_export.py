@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.solved import solve_alone
+from pipeline.run.solved import solve_alone, solve_fields
 from pipeline.scene.model import PROBE
-from pipeline.view.compute import compute_fields
+from pipeline.view.compute import compute_fields, fields_of
 from pipeline.view.export import write_fields
 from tests.cases import study
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="writes files of
 def fields(mesh_only=False, **mesh):
     made = study(mesh={"epsilon": "8 mm"} | mesh)
     (case,) = made.cases()
-    return compute_fields(solve_alone(made, case), MPI.COMM_SELF, mesh_only=mesh_only)
+    return compute_fields(solve_alone(made, case), MPI.COMM_SELF, mesh_only=mesh_only, stress=True)
 
 
 @pytest.fixture(scope="module")
@@ -80,4 +80,56 @@ def test_mesh_alone_and_straight_elements(tmp_path):
     read = meshio.read(write_fields(found, tmp_path / "case.vtu"))
     assert set(read.cells_dict) == {"tetra"}
     assert set(read.point_data) == {"on_probe", "on_support"}
-    assert set(read.cell_data) == {"element_size", "within_epsilon"}
+    assert set(read.cell_data) == {"element_size", "within_epsilon", "region"}
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_cells_have_the_degree_of_the_displacement_and_the_values_of_the_solution(degree, tmp_path):
+    layer = {"name": "skin", "young": "30 kPa", "poisson": 0.3, "thickness": "4 mm"}
+    made = study(mesh={"degree": degree, "rim": "1.5 mm"}, body={"layer": [layer]}, probe={"radius": "4 mm"})
+    (case,) = made.cases()
+    solved = solve_fields(solve_alone(made, case), MPI.COMM_SELF, bar=False)
+    read = meshio.read(write_fields(fields_of(solved, stress=True), tmp_path / "case.vtu"))
+    ((kind, cells),) = read.cells_dict.items()
+    nodes = {1: "tetra", 2: "tetra10", 3: "VTK_LAGRANGE_TETRAHEDRON"}
+    assert (kind, cells.shape[1]) == (nodes[degree], {1: 4, 2: 10, 3: 20}[degree])
+    if degree == 3:  # VTK's nodes 4 and 5 divide the first edge in three, its node 16 is in the middle of 0, 1 and 3
+        corners, edge, middle = (read.points[cells[:, of]] for of in ([0, 1, 2, 3], [4, 5], [16]))
+        straight = np.abs(edge[:, 0] * 2 - edge[:, 1] - corners[:, 0]).max(axis=1) < 1e-9
+        assert straight.mean() > 0.5
+        np.testing.assert_allclose(edge[straight, 0], (2 * corners[straight, 0] + corners[straight, 1]) / 3, atol=1e-9)
+        assert (np.abs(middle[:, 0] - corners[:, [0, 1, 3]].mean(axis=1)).max(axis=1) < 1e-9).mean() > 0.3
+    volumes = np.linalg.det(read.points[cells[:, 1:4]] - read.points[cells[:, :1]])
+    assert (volumes > 0).all()
+    which = np.random.default_rng(0).choice(len(read.points), 100)
+    values = solved.state.at(read.points[which])
+    inside = np.isfinite(values.displacement[:, 0])
+    assert inside.mean() > 0.95
+    moved = read.point_data["displacement"][which]
+    np.testing.assert_allclose(moved[inside], values.displacement[inside], atol=1e-8)
+    centre = read.points[cells[:, :4]].mean(axis=1)
+    at_centre = solved.state.at(centre)
+    stress = read.cell_data["stress"][0]
+    straight = np.isclose(stress, at_centre.stress.reshape(-1, 9), rtol=1e-6, atol=1e-6).all(axis=1)
+    assert straight.mean() > (0.99 if degree == 1 else 0.3)
+    skin = read.cell_data["region"][0] == 1
+    np.testing.assert_array_equal(skin, centre[:, 2] > -4e-3)
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_pyvista_reads_the_displacement_of_the_solution(degree, tmp_path):
+    pyvista, _vtk = pytest.importorskip("pyvista"), pytest.importorskip("vtkmodules.vtkCommonCore")
+    made = study(mesh={"degree": degree, "rim": "2 mm"})
+    (case,) = made.cases()
+    solved = solve_fields(solve_alone(made, case), MPI.COMM_SELF, bar=False)
+    grid = pyvista.read(write_fields(fields_of(solved, stress=True), tmp_path / "case.vtu"))
+    points = np.random.default_rng(1).uniform([-8e-3, -8e-3, -15e-3], [8e-3, 8e-3, -4e-3], (60, 3))
+    sampled = []
+    for point in points:  # VTK's own functions of the cell
+        cell = grid.get_cell(grid.find_containing_cell(point))
+        weights = [0.0] * cell.n_points
+        place = [0.0] * 3, _vtk.reference(0), [0.0] * 3, _vtk.reference(0.0)
+        cell.EvaluatePosition(point, *place, weights)
+        sampled.append(np.array(weights) @ grid["displacement"][cell.point_ids])
+    np.testing.assert_allclose(sampled, solved.state.at(points).displacement, atol=1e-8)
+    assert {"stress", "von_mises", "region"} <= {*grid.array_names}

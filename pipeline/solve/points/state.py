@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from pipeline import compat
-from pipeline.arrays import FloatArray, Int32Array, IntArray
+from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.scene.model import PROBE
@@ -84,13 +84,23 @@ class State:
         mine = owner == self.body.comm.rank
         found = self.body.comm.allreduce(np.where(mine[:, None], of_rank, 0.0), op=MPI.SUM)
         found[owner < 0] = np.nan
+        return self._values(found, owner >= 0, signs)
+
+    def at_centres(self) -> Values:
+        """Return the values at the centres of the cells that this rank owns, local; collective."""
+        count = self.body.owned_cells
+        located = Located(np.arange(count), np.full((count, 3), 0.25), np.full(count, 0.25))
+        return self._values(self._of_rank(located), np.ones(count, bool), np.ones((count, 3)))
+
+    def _values(self, found: FloatArray, inside: BoolArray, signs: FloatArray) -> Values:
+        """Return what is ``found`` (n, 24) at points, reflected to the part of the body with these ``signs``."""
         turned = signs[:, :, None] * signs[:, None, :]
         return Values(
             displacement=found[:, :3] * signs,
             gradient=found[:, 3:12].reshape(-1, 3, 3) * turned,
             stress=found[:, 12:21].reshape(-1, 3, 3) * turned,
             contact=np.where(found[:, 21] == 1.0, found[:, 22], np.nan),
-            region=np.where(owner < 0, -1, np.nan_to_num(found[:, 23])).astype(int),
+            region=np.where(inside, np.nan_to_num(found[:, 23]), -1).astype(int),
             is_linear=self.law.is_linear,
         )
 
