@@ -26,7 +26,8 @@ def forecasts(study: "Study", cost: "CostModel") -> list[dict[str, Any]]:
     from pipeline.surrogate.forecast import forecast
 
     return [
-        {"command": command, "of": name, **vars(forecast(domain, cost))} for command, name, domain in _domains(study)
+        {"command": command, "of": name, **vars(forecast(domain, cost, corrected=command == "identify"))}
+        for command, name, domain in _domains(study)
     ]
 
 

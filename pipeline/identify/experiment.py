@@ -10,9 +10,9 @@ import numpy as np
 
 from pipeline.experiment.curve import Curve
 from pipeline.experiment.reading import ExperimentError
-from pipeline.identify.forward import forward_of
+from pipeline.identify.forward import SceneForce, forward_of
 from pipeline.identify.may_hide import hidden_parts
-from pipeline.identify.parts import Forward, Hidden, Measured, Unknown
+from pipeline.identify.parts import Estimate, Hidden, Measured, Unknown
 from pipeline.identify.tools import tip_of_probe
 from pipeline.shapes.probe import Probe
 from pipeline.study.case import Case
@@ -22,6 +22,7 @@ from pipeline.study.read import scene_of
 from pipeline.study.schema import Material
 from pipeline.study.sweep import Study
 from pipeline.surrogate.cases import Solve
+from pipeline.surrogate.ranges import Range
 
 # The force is computed this much deeper than from a twentieth of the largest force on: a ball has that at an eighth of
 # its depth, a cone at a fifth, and the contact point is not known beforehand.
@@ -37,19 +38,35 @@ class Specimen:
     error: ExperimentError | None = None
 
 
+Near = tuple[tuple[Range, ...], ...]
+"""The ranges about a fit over which the forces of all scenes are corrected; empty for those that are exact enough."""
+
+
 @dataclass(frozen=True)
 class Scenes:
     """What all specimens share: for each measurement a case and the force of its scene, and what the body may hide."""
 
     measurements: tuple[Measurement, ...]
     cases: tuple[Case, ...]
-    forwards: tuple[Forward, ...]
+    forwards: tuple[SceneForce, ...]
     hidden: tuple[tuple[Hidden, ...], ...]
 
     def measured(self, specimen: Specimen) -> tuple[Measured, ...]:
         """Return the curves of a specimen with their scenes."""
         rows = zip(specimen.curves, self.measurements, self.forwards, self.hidden, strict=True)
         return tuple(Measured(curve, forward, one.machine_compliance, own) for curve, one, forward, own in rows)
+
+    def ranges(self, found: Estimate) -> Near:
+        """Return over which ranges the force of each scene is to be corrected for a fit."""
+        names = [unknown.name for unknown in found.unknowns]
+        low, high = np.fmin(found.estimate, found.low), np.fmax(found.estimate, found.high)
+        ends = [dict(zip(names, end.tolist(), strict=True)) for end in (low, high)]
+        return tuple(forward.ranges(*ends) for forward in self.forwards)
+
+    def near(self, ranges: Near) -> "Scenes":
+        """Return the scenes with forces that are corrected over these ranges; collective where cases are solved."""
+        pairs = zip(self.forwards, ranges, strict=True)
+        return replace(self, forwards=tuple(forward.corrected(own) for forward, own in pairs))
 
 
 def specimens(study: Study) -> tuple[Specimen, ...]:
@@ -101,7 +118,7 @@ def scenes_of(
     """
     scenes = [scene_of(study, measurement) for measurement in study.measurements]
     deepest = [deepest_of([one.curves[number] for one in found if one.curves], times) for number in range(len(scenes))]
-    made: dict[str, Forward] = {}
+    made: dict[str, SceneForce] = {}
     for scene in scenes:
         most = max(depth for other, depth in zip(scenes, deepest, strict=True) if other.text == scene.text)
         if scene.text not in made:

@@ -14,9 +14,9 @@ from pipeline.identify.advice import advice
 from pipeline.identify.dataset import dataset_of
 from pipeline.identify.doubts import doubts_of_depth, doubts_of_force, doubts_of_moduli, doubts_of_scale
 from pipeline.identify.estimate import identify
-from pipeline.identify.experiment import Scenes, Specimen
+from pipeline.identify.experiment import Near, Scenes, Specimen
 from pipeline.identify.kept import Kept
-from pipeline.identify.parts import TooDeepError
+from pipeline.identify.parts import Estimate, TooDeepError
 from pipeline.identify.unknowns import unknowns
 from pipeline.run.provenance import provenance
 from pipeline.study.problems import StudyError
@@ -32,6 +32,8 @@ Found: TypeAlias = xr.Dataset | ExperimentError
 SILENCE = 10.0
 # Depths that forces are computed for, in turn, as multiples of what is enough if there is air before the contact.
 _DEEPER = (1.0, 1.6, 2.5, 4.5)
+# Most fits of a specimen, of which each has forces that are corrected about the one before; so many specimens at once.
+_MOST_FITS, _AT_ONCE = 3, 16
 _REMEDY = "record air before the contact, or give a `window` that ends earlier"
 
 
@@ -81,31 +83,54 @@ class Work:
                     raise
                 left = {number: f"{why}, and cannot be: {error.problems[0]}" for number, why in left.items()}
                 break
-            for number in tuple(left):
-                outcome = self._of(mine[number], scenes)
-                if isinstance(outcome, TooDeepError):
-                    left[number] = outcome.why
-                else:
-                    del left[number]
-                    yield number, outcome
+            waiting = tuple(left)
+            while comm.allreduce(len(waiting)):
+                batch, waiting = waiting[:_AT_ONCE], waiting[_AT_ONCE:]
+                for number, outcome in self._repeated({n: mine[n] for n in batch}, scenes, comm):
+                    if isinstance(outcome, TooDeepError):
+                        left[number] = outcome.why
+                    else:
+                        del left[number]
+                        yield number, outcome
         for number, why in left.items():
             yield number, ExperimentError(mine[number].name, f"{why}: {_REMEDY}")
 
-    def _of(self, specimen: Specimen, scenes: Scenes) -> Found:
-        """Return what the curves of a specimen say."""
+    def _repeated(self, some: Mapping[int, Specimen], scenes: Scenes, comm: "MPI.Comm") -> Iterator[tuple[int, Found]]:
+        """Yield what is found of specimens by number: fits, repeated with forces that are corrected about them.
+
+        All ranks go through it, as they solve the cases of corrections together.
+        """
+        about: dict[int, Near] = {number: ((),) * len(scenes.forwards) for number in some}
+        for repeated in range(_MOST_FITS):
+            fits = {number: _fit(some[number], scenes.near(own), self.study) for number, own in about.items()}
+            wanted = {n: scenes.ranges(fit) for n, fit in fits.items() if isinstance(fit, Estimate)}
+            wanted = {n: own for n, own in wanted.items() if own != about[n] and repeated < _MOST_FITS - 1}
+            for own in dict.fromkeys(own for part in comm.allgather(list(wanted.values())) for own in part):
+                scenes.near(own)
+            for number in (n for n in fits if n not in wanted):
+                fit, near = fits[number], scenes.near(about[number])
+                yield number, self._told(some[number], near, fit) if isinstance(fit, Estimate) else fit
+            about = wanted
+
+    def _told(self, specimen: Specimen, scenes: Scenes, found: Estimate) -> xr.Dataset:
+        """Return the dataset of a fit, with all that is said of it."""
         measured, sought = scenes.measured(specimen), unknowns(self.study)
-        try:
-            found = identify(measured, sought)
-        except ExperimentError as error:
-            return error
-        except np.linalg.LinAlgError as error:
-            return ExperimentError(specimen.name, f"cannot be fitted: {error}")
         told = [*doubts_of_scale(scenes.cases, specimen.curves), *doubts_of_force(measured, sought), *found.told]
         told += doubts_of_depth(scenes.cases, found.curves) if found.fits else ()
         told += advice(self.study, found) if len(self.specimens) == 1 else ()
         dataset = dataset_of(found, _attributes(self.study), [curve.time for curve in specimen.curves])
         told += doubts_of_moduli(dataset)
         return dataset.assign_attrs({"told": "\n".join(told)} if told else {})
+
+
+def _fit(specimen: Specimen, scenes: Scenes, study: Study) -> Estimate | ExperimentError:
+    """Return what the curves of a specimen say."""
+    try:
+        return identify(scenes.measured(specimen), unknowns(study))
+    except ExperimentError as error:
+        return error
+    except np.linalg.LinAlgError as error:
+        return ExperimentError(specimen.name, f"cannot be fitted: {error}")
 
 
 def _attributes(study: Study) -> dict[str, Any]:

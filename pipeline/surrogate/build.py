@@ -25,7 +25,7 @@ _SEVERAL, _OF_SEVERAL = 2, 5e-3
 # Share of the tolerance that a guess may take.
 _OF_GUESS = 0.3
 # Points, after which a surrogate has the error that it has: of solves, and of the integral equation, 20 ms each.
-MOST, _MANY = 300, 800
+MOST, MANY = 300, 800
 
 
 def surrogate(domain: Domain, solve: Solve, tolerance: float | None = None) -> Table:
@@ -43,7 +43,7 @@ def surrogate(domain: Domain, solve: Solve, tolerance: float | None = None) -> T
         return build(domain, solve, tolerance)
     equation, differs = found
     if differs <= tolerance:
-        return build(domain, equation, min(tolerance, ON_MERIDIAN), _MANY)
+        return build(domain, equation, min(tolerance, ON_MERIDIAN), MANY)
     return build(domain, solve, tolerance, guess=equation)
 
 
@@ -57,11 +57,11 @@ def build(domain: Domain, solve: Solve, tolerance: float, most: int = MOST, gues
     """
     cases = Cases(domain, solve)
     if guess is None:
-        found = _over_all(cases, tolerance, most)
+        found = over_all(cases, tolerance, most)
     else:
         guessed = Cases(domain, guess)
-        found = _over_all(guessed, _OF_GUESS * tolerance, _MANY)
-        found = found.plus(_over_all(Difference(cases, guessed), (1 - _OF_GUESS) * tolerance, most))
+        found = over_all(guessed, _OF_GUESS * tolerance, MANY)
+        found = found.plus(over_all(Difference(cases, guessed), (1 - _OF_GUESS) * tolerance, most))
     mesh = max(cases.bars, default=0.0)
     own = domain.output, domain.ranges, domain.reference
     return Table(*own, found.depths, found.grid, found.error, mesh, len(cases.bars))
@@ -74,22 +74,27 @@ def _tolerance(domain: Domain) -> float:
     return ON_MERIDIAN if len(domain.ranges) < _SEVERAL else _OF_SEVERAL
 
 
+def is_corrected(domain: Domain) -> bool:
+    """Return whether tables of a domain are made to more than :data:`ON_MERIDIAN`, and so corrected near a fit."""
+    return domain.is_on_meridian and _tolerance(domain) > ON_MERIDIAN
+
+
 @dataclass(frozen=True)
-class _Found:
+class Found:
     """An interpolation over parameters, at nodes of the depth, with its error."""
 
     depths: Depths
     grid: SparseGrid
     error: float
 
-    def plus(self, other: "_Found") -> "_Found":
+    def plus(self, other: "Found") -> "Found":
         """Return the sum of two interpolations, at the nodes of the one that has more."""
         finest = max(self.depths, other.depths, key=lambda depths: depths.count)
         grids = [one.grid.at_nodes(one.depths.basis(finest.values)) for one in (self, other)]
-        return _Found(finest, grids[0].plus(grids[1]), self.error + other.error)
+        return Found(finest, grids[0].plus(grids[1]), self.error + other.error)
 
 
-def _over_all(cases: Cases | Difference, tolerance: float, most: int) -> _Found:
+def over_all(cases: Cases | Difference, tolerance: float, most: int) -> Found:
     """Return the interpolation over parameters and depth to a tolerance."""
     depths, place = first_depths(cases.domain), cases.domain.middle
     while True:
@@ -98,7 +103,7 @@ def _over_all(cases: Cases | Difference, tolerance: float, most: int) -> _Found:
         place = _where_depth_matters(found, depths)
         enough, of_depth = _finer(cases, depths, place, _OF_DEPTH * tolerance)
         if enough == depths:
-            return _Found(depths, found.grid, found.error + of_depth)
+            return Found(depths, found.grid, found.error + of_depth)
         depths = enough
 
 

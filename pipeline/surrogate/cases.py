@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -148,12 +148,20 @@ class Cases:
         return np.asarray(np.log(value / (unit * depths.power(depth))) - trend_of(domain.ranges, points_of(block)))
 
 
+class Guess(Protocol):
+    """What has logarithms of forces at the points of a block, as :meth:`Cases.logs` returns them."""
+
+    def logs(self, block: Block, depths: Depths) -> FloatArray:
+        """Return logarithms (points, depths)."""
+        ...
+
+
 @dataclass
 class Difference:
     """What is left of forces after a guess that costs nothing; error bars are those of the forces."""
 
     cases: Cases
-    guess: Cases
+    guess: Guess
 
     @property
     def domain(self) -> Domain:

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.plan.cost import CostModel
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import make_plan
-from pipeline.surrogate.build import first_depths
+from pipeline.surrogate.build import first_depths, is_corrected
 from pipeline.surrogate.cases import Domain
 from pipeline.surrogate.derived import FORCE
 from pipeline.surrogate.wide import CHECKS, layered_body
@@ -30,16 +30,22 @@ class Forecast:
     most_seconds: float
 
 
-def forecast(domain: Domain, cost: CostModel) -> Forecast:
-    """Return about what the surrogate of a domain costs, with times of a cost model."""
+def forecast(domain: Domain, cost: CostModel, *, corrected: bool = False) -> Forecast:
+    """Return about what the surrogate of a domain costs, with times of a cost model; ``corrected`` near a point, too.
+
+    A correction is that of :mod:`pipeline.surrogate.near`, to which each parameter adds two points, at few depths.
+    """
     nodes = first_depths(domain)
     depths = nodes if nodes.count == 1 else nodes.with_count(5)
     study = domain.study([one.value(np.zeros(1)) for one in domain.ranges], depths.values)
     found = summary(replace(make_plan(study), cost=cost))
-    points = _POINTS[min(len(domain.ranges), len(_POINTS) - 1)]
-    most, seconds = points * found["solves"], points * found["seconds"]
+    points = float(_POINTS[min(len(domain.ranges), len(_POINTS) - 1)])
+    near = 1 + 2 * len(domain.ranges) if corrected and is_corrected(domain) else 0
+    points += near * nodes.count / depths.count
+    most, seconds = round(points * found["solves"]), points * found["seconds"]
     case = study.case((0,) * len(study.axes))
     if domain.output != FORCE or layered_body(case) is None:
         return Forecast(most, most, seconds, seconds)
-    least = min(CHECKS, most)
-    return Forecast(least, CHECKS + most, least * found["seconds"] / found["solves"], seconds)
+    checks = CHECKS * (2 if near else 1)
+    least = min(checks, most)
+    return Forecast(least, checks + most, least * found["seconds"] / found["solves"], seconds)

@@ -90,15 +90,19 @@ class Table:
         Raises:
             ValueError: if one is outside its range.
         """
-        young, found = self._young(values), []
-        for one in self.ranges:
-            value = np.atleast_1d(values[one.name] / (young if one.is_ratio else 1.0))
+        found = []
+        for one, value in zip(self.ranges, self.reduced(values, values), strict=True):
             if not np.all(one.spans(value)):
                 what = f"{one.name} over {self.reference.name}" if one.is_ratio else one.name
                 wrong = value[~one.spans(value)][0]
                 raise ValueError(f"{what} = {wrong:.6g} is not in its range, {one.low:.6g} to {one.high:.6g}")
             found.append(np.clip(one.position(value), -1, 1))
-        return np.stack(found, axis=1) if found else np.zeros((np.size(young), 0))
+        return np.stack(found, axis=1) if found else np.zeros((np.size(self._young(values)), 0))
+
+    def reduced(self, values: Values, reference: Values) -> list[FloatArray]:
+        """Return values (n,) of the ranges: those of moduli are divided by the modulus of reference, another's."""
+        young = self._young(reference)
+        return [np.atleast_1d(values[one.name] / (young if one.is_ratio else 1.0)) for one in self.ranges]
 
     def _young(self, values: Values) -> float | FloatArray:
         """Return the modulus (Pa) that all others are divided by."""
