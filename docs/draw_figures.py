@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 import pipeline
 from pipeline.report.compliance import sinking
 from pipeline.report.figures import STYLE, figure
+from pipeline.report.figures.insertion import insertion
 from pipeline.report.figures.style import COLOURS
 
 DOCS = Path(__file__).parent
@@ -147,6 +148,7 @@ FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
     "path": ("path", of_kind("map")),
     "path_excess": ("path", path_excess),
     "retractor": ("retractor", of_kind("force")),
+    "insertion": ("scalpel-path_insertion", insertion),
     "deep": ("deep", deep),
     "large_depth": ("large_depth", of_kind("force")),
 }
@@ -163,7 +165,7 @@ def main(names: list[str]) -> int:
             missing += 1
             continue
         with mpl.rc_context(STYLE):
-            drawn = draw(pipeline.open(path))
+            drawn = draw(xr.load_dataset(path) if study.endswith("_insertion") else pipeline.open(path))
             drawn.savefig(PICTURES / f"{name}.png", dpi=DPI)
         plt.close(drawn)
         print(f"{name}: {PICTURES / name}.png")

@@ -35,6 +35,7 @@ hertz = 1 / second = Hz
 gram = [mass] = g
 newton = kilogram * meter / second ** 2 = N
 pascal = newton / meter ** 2 = Pa
+joule = newton * meter = J
 bar = 1e5 * pascal
 percent = 0.01 = %
 radian = [] = rad
@@ -67,6 +68,7 @@ _KINDS = {
     "m/s^2": _Kind("an acceleration", "-9.81 m/s^2", {"m/s^2": 1.0, "mm/s^2": 1e-3}),
     "N": _Kind("a force", "10 mN", {"N": 1.0, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9, "kN": 1e3}),
     "N/m": _Kind("a stiffness", "60 N/mm", {"N/m": 1.0, "N/mm": 1e3, "mN/mm": 1.0, "N/µm": 1e6}),
+    "J/m^2": _Kind("a toughness", "200 J/m^2", {"J/m^2": 1.0, "kJ/m^2": 1e3, "mJ/m^2": 1e-3, "N/m": 1.0, "N/mm": 1e3}),
     "N/s": _Kind("a rate of force", "1 mN/s", {"N/s": 1.0, "mN/s": 1e-3, "µN/s": 1e-6}),
 }
 # Pure numbers by another name: alone they are a unit, within another one they would hide a factor.
@@ -204,6 +206,10 @@ def _density(text: Any) -> float:
     return parse_quantity(text, "kg/m^3")
 
 
+def _toughness(text: Any) -> float:
+    return parse_quantity(text, "J/m^2")
+
+
 def _acceleration(text: Any) -> float:
     return parse_quantity(text, "m/s^2")
 
@@ -237,6 +243,7 @@ Share = Annotated[float, BeforeValidator(_share), Field(json_schema_extra={"unit
 Stress = Annotated[float, BeforeValidator(_pressure), Field(json_schema_extra={"unit": "Pa"})]
 Pressure = Annotated[Stress, Field(gt=0)]
 Density = Annotated[float, BeforeValidator(_density), Field(gt=0, json_schema_extra={"unit": "kg/m^3"})]
+Toughness = Annotated[float, BeforeValidator(_toughness), Field(gt=0, json_schema_extra={"unit": "J/m^2"})]
 Acceleration = Annotated[float, BeforeValidator(_acceleration), Field(json_schema_extra={"unit": "m/s^2"})]
 Duration = Annotated[float, BeforeValidator(_time), Field(ge=0, json_schema_extra={"unit": "s"})]
 Time = Annotated[float, BeforeValidator(_time), Field(gt=0, json_schema_extra={"unit": "s"})]

@@ -82,6 +82,11 @@ def _probe(**keys: Any) -> Callable[[Study], None]:
     return change
 
 
+def _insertion(study: Study) -> None:
+    _probe(**_BLADE, contact="unilateral", toughness="5 J/m^2", insertion={"to": "5 mm", "steps": 5})(study)
+    del study["probe"]["depth"]
+
+
 def _indenter(**keys: Any) -> Callable[[Study], None]:
     """Return the change to a tool that finds its contact, whose edge asks for smaller elements."""
 
@@ -182,6 +187,7 @@ FEATURES = (
     Feature("wedge", "probe", _indenter(shape="wedge", angle="75 deg", length="8 mm", tip="1 mm")),
     Feature("cut", "probe", _probe(**_CUT)),
     Feature("slit", "probe", _probe(**_SLIT)),
+    Feature("insertion", "probe", _insertion),
     Feature("frictionless", "contact", _update("probe", contact="frictionless")),
     Feature("unilateral", "contact", _update("probe", contact="unilateral")),
     Feature("friction", "contact", _update("probe", contact="unilateral", friction=0.3)),

@@ -138,7 +138,10 @@ def run(
 
 
 def _check_measured(studies: "list[Study]", output: Path) -> None:
-    """Say that measurements are left out; exit if results would replace those of an identification."""
+    """Say that measurements, or insertions, are left out; exit if results would replace an identification's."""
+    for study in studies:
+        if any(getattr(probe, "insertion", None) for probe in study.probes):
+            warning(f"{study.file}: its insertion is for `epsmesh insertion`: only the press of the intact body is run")
     for study in (study for study in studies if study.measurements):
         file = output / f"{study.name}.nc"
         if file.exists() and _is_identification(file):

@@ -21,8 +21,8 @@ from pipeline.units import canonical
 # Raise by hand when the same input gives another force: earlier records are then no longer used.
 PHYSICS_VERSION = 6
 
-# Keys of a probe without effect on any force: action is a label.
-_UNPHYSICAL = ("action",)
+# Keys of a probe without effect on the force of a case: action is a label, and an insertion has cases of its own.
+_UNPHYSICAL = ("action", "toughness", "insertion")
 _MANY = 200_000  # sections of a large study
 # Keys of what follows from the elastic force without a solve: pipeline/report/history.py.
 _OF_TIME = ("history", "relaxation")
@@ -137,7 +137,7 @@ def _body_text(body: Body, stress: float | None = None) -> str:
         inclusion.update(axes=ball.surface.axes, radius=None)
     for key in (key for key in PIECES if key in content):
         content[key] = [
-            {name: value for name, value in piece.items() if name not in Tissue.model_fields}
+            {name: value for name, value in piece.items() if name not in (*Tissue.model_fields, "toughness")}
             | ({} if stress is None else _tissue_content(region))
             for piece, region in zip(content[key], getattr(_in_units_of(stress or 1.0, body), key), strict=True)
         ]

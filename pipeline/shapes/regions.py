@@ -5,7 +5,7 @@ from typing import Annotated
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.section import Name, Words
 from pipeline.shapes.tissue import Tissue
-from pipeline.units import Coordinate, Length
+from pipeline.units import Coordinate, Length, Toughness
 
 
 class Region(Tissue):
@@ -27,6 +27,12 @@ class Layer(Region):
     thickness: Annotated[
         Length | None,
         Words("Thickness of the layer. Optional for the last layer, which then reaches the bottom.", '"2 mm"'),
+    ] = None
+    toughness: Annotated[
+        Toughness | None,
+        Words(
+            "Toughness of the layer, for a blade that is inserted.", '"500 J/m^2"', default="that of the probe's key"
+        ),
     ] = None
 
 

@@ -28,6 +28,7 @@ from pipeline.study.check_mesh import (
     check_support,
 )
 from pipeline.study.closure import check_ball
+from pipeline.study.insertion import check_insertion
 from pipeline.study.place import place_error
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
@@ -108,6 +109,7 @@ def _placed(
     for body, probe in placed:
         with problems.about(body=body, probe=probe):
             if _check_thickness(body, probe, problems) and check_slit(body, probe, problems):
+                check_insertion(body, probe, problems)
                 fitting.append((body, probe))
     return fitting
 
@@ -116,6 +118,13 @@ def warn_of_depth(probe: Probe, problems: Problems) -> None:
     """Warn of depths at which strains at the edge of a tool are large for linear elasticity."""
     if isinstance(probe, Indenter):
         probe.warn_of_strains(problems)
+        return
+    if insertion := getattr(probe, "insertion", None):
+        problems.warn(
+            "probe.insertion.to",
+            in_mm(insertion.to),
+            "assumes small strains: before the puncture, and at the blade's tip, linear elasticity is an extrapolation",
+        )
         return
     if probe.half_width <= 0:  # a slit that leaves nothing of a blade says so itself
         return

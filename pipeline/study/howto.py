@@ -24,6 +24,8 @@ _PAGES = {
     "probe.ahead": "howto/cut",
     "probe.ends": "howto/cut",
     "probe.slice": "howto/cut",
+    "probe.insertion": "howto/insertion",
+    "probe.toughness": "howto/insertion",
     "probe.at": "howto/own-body",
     "probe.axis": "howto/own-body",
     "load": "howto/loads",

@@ -34,6 +34,7 @@ _QUANTITIES = {
     "kg/m^3": ("density", "densities"),
     "m/s^2": ("acceleration", "accelerations"),
     "N/m": ("stiffness", "stiffnesses"),
+    "J/m^2": ("toughness", "toughnesses"),
     "": ("number", "numbers"),
 }
 _NAMES = {name for name, _ in _QUANTITIES.values()}
@@ -78,6 +79,8 @@ def study_schema() -> Schema:
     definitions: Schema = schema["$defs"]
     for section, inner in TABLES.items():
         for owner, (key, model) in product(sections[section], inner.items()):
+            if key not in owner.model_fields and any(key in other.model_fields for other in sections[section]):
+                continue  # a table of other shapes
             definitions[owner.__name__]["properties"][key] = {"$ref": f"#/$defs/{model.__name__}"}
     swept: dict[str, type[BaseModel]] = {
         model.__name__: model for model in chain[type[BaseModel]](_swept(), (History, Sine))

@@ -11,6 +11,7 @@ from pydantic import BaseModel, BeforeValidator, Field
 from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.history import History
+from pipeline.shapes.insertion import Insertion
 from pipeline.shapes.regions import Inclusion, Layer
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import Section, Words
@@ -298,7 +299,7 @@ NESTED: dict[str, dict[str, type[Section]]] = {
 SINGLE = ("solve", "plan", "figure")
 # Tables within a section.
 TABLES: dict[str, dict[str, type[BaseModel]]] = {
-    "probe": {"path": Path, "history": History},
+    "probe": {"path": Path, "history": History, "insertion": Insertion},
     "material": {"fibres": Fibres},
     "measurement": {"columns": Columns, "units": ColumnUnits, "sign": Sign},
 }

@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from pipeline.shapes.history import deepest
+from pipeline.shapes.insertion import last_depth
 from pipeline.shapes.registry import specialised
 from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
@@ -39,16 +40,19 @@ def read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
 
 
 def _reaching(raw: Any, problems: Problems) -> Any:
-    """Return the probe's tables with the depth that a table of a history reaches."""
+    """Return the probe's tables with the depth that a table of a history, or an insertion, reaches."""
     if isinstance(raw, list):
         return [_reaching(table, problems) for table in raw]
-    history = raw.get("history") if isinstance(raw, dict) else None
-    if not isinstance(history, dict) or "table" not in history:
+    history, insertion = (raw.get(key) if isinstance(raw, dict) else None for key in ("history", "insertion"))
+    if isinstance(insertion, dict):
+        depth, own = last_depth(insertion), "[probe.insertion]: its last depth is `to`"
+    elif isinstance(history, dict) and "table" in history:
+        depth, own = deepest(history["table"]), "`table` in [probe.history], which has depths of its own"
+    else:
         return raw
     if "depth" in raw:
-        problems.error("probe.depth", raw["depth"], "excludes `table` in [probe.history], which has depths of its own")
+        problems.error("probe.depth", raw["depth"], f"excludes {own}")
         return raw
-    depth = deepest(history["table"])
     return raw if depth is None else {**raw, "depth": depth}
 
 

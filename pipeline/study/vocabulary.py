@@ -34,8 +34,6 @@ NOT_COMPUTED = {
     "plasticity": "plasticity is not computed: materials are elastic",
     "yield": "plasticity is not computed: materials are elastic",
     "anisotropy": 'anisotropy is not computed for itself: fibres are part of law = "holzapfel"',
-    "toughness": "fracture is not computed: a slit does not grow; `energy_release` in the dataset drives it",
-    "insertion": "fracture is not computed: the blade is in an open slit, `incision` deep",
     "temperature": "temperature is not computed",
 }
 

@@ -25,6 +25,9 @@ HAVING = {
     "six motions": {"probe": {"motion": "all"}},
     "slice": {"probe": BLADE | {"slice": "0.1 mm"}},
     "slit": {"probe": BLADE | {"incision": "6 mm"}},
+    "insertion": {
+        "probe": BLADE | {"contact": "unilateral", "toughness": "5 J/m^2", "insertion": {"to": "6 mm"}, "depth": None}
+    },
     "large displacements": {"material": {"law": "neo-hookean"}},
     "time steps": {"material": {"law": "neo-hookean"}, "probe": {"history": {"ramp": "1 s"}}},
     "loads": {"load": {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}, "material": {"density": "1 g/cm^3"}},
@@ -44,7 +47,7 @@ HAVING = {
     "only sides fixed": {"body": {"fixed": "sides"}},
     "free column": {"mesh": {"epsilon": "9 mm", "outside": "free"}},
     "ν < 0.2": {"material": {"poisson": 0.1}},
-    "layers": {"body": {"layer": [{"name": "skin", "thickness": "3 mm", **TISSUE}]}},
+    "layers": {"body": {"layer": [{"name": "skin", "thickness": "6.77 mm", **TISSUE}]}},
     "inclusion": {"body": {"inclusion": [{"name": "a", "at": ["9 mm", "9 mm", "-9 mm"], "radius": "2 mm", **TISSUE}]}},
     "curved body": {"body": {"shape": "ellipsoid", "axes": ["30 mm"] * 3, "fixed": {"below": "-5 mm"}}},
 }

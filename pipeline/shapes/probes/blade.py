@@ -10,12 +10,13 @@ from pydantic import Field
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.insertion import Insertion
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes._edge import Edge
 from pipeline.shapes.punch import Punch
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.shapes.slit import Slit, to_rectangle
-from pipeline.units import Length, Travel
+from pipeline.units import Length, Toughness, Travel
 
 _CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
@@ -63,6 +64,22 @@ class Blade(Punch):
             '"blade"',
         ),
     ] = "blade"
+    toughness: Annotated[
+        Toughness | None,
+        Words(
+            "Toughness of the tissue: energy per area of a cut. An insertion needs it. Layers may have their own.",
+            '"200 J/m^2"',
+            default="none: tissue is not cut",
+        ),
+    ] = None
+    insertion: Annotated[
+        Insertion | None,
+        Words(
+            "Insertion through the surface, as a table: [probe.insertion].",
+            '{to = "15 mm", steps = 30}',
+            default="none: the tissue stays whole",
+        ),
+    ] = None
 
     @classmethod
     def below(cls, tool: Probe, direction: Vector, length: float, width: float) -> "Blade":
@@ -79,8 +96,8 @@ class Blade(Punch):
 
     @property
     def is_rounded(self) -> bool:
-        """Whether contact is found on its rounded edge; a blade that slides, or in a slit, has no such contact."""
-        return self.edge > 0 and self.is_unilateral and not (self.slice or self.incision)
+        """Whether contact is found on its rounded edge; a blade that slides or cuts has no such contact."""
+        return self.edge > 0 and self.is_unilateral and not (self.slice or self.incision or self.insertion)
 
     def travel(self, frame: Frame) -> Vector:
         """Return depth along the axis and slice along the edge (m)."""

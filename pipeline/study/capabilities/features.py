@@ -148,6 +148,9 @@ FEATURES: dict[str, Feature] = {
     "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),
     "open slit": Feature("probe.ends", lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
     "oblique slit": Feature("probe.direction", _is_oblique, ("body",), list),
+    "insertion": Feature(
+        "probe.insertion", lambda s: getattr(s.probe, "insertion", None) is not None, write=lambda one: in_mm(one.to)
+    ),
     "six motions": Feature("probe.motion", lambda s: s.probe.motion == "all"),
     "range of depths": Feature(
         "probe.depth_range",

@@ -133,6 +133,17 @@ REFUSALS: tuple[Refusal, ...] = (
         "accuracy",
         "needs given element sizes: with `accuracy`, each depth has a mesh of its own. Omit one of the two",
     ),
+    # A blade that is inserted.
+    Refusal("slit", "insertion", "a blade that is inserted makes its own slit: omit `incision`"),
+    Refusal("slice", "insertion", "a blade that is inserted moves along its axis: omit it"),
+    Refusal("history", "insertion", "an insertion has no time: omit one of the two"),
+    Refusal("rounded edge", "insertion", "the blade of an insertion has sharp edges: omit it"),
+    Refusal(
+        "insertion", "no flat top", "needs the flat top of a box or a cylinder, and a blade that goes straight down"
+    ),
+    Refusal("insertion", "large displacements", f"{_LINEAR}: cuts at large displacements are not computed"),
+    Refusal("insertion", "inclusion", "needs a body of layers: cuts through inclusions are not computed"),
+    Refusal("insertion", "loads", "cuts in tissue under loads are not computed: omit [load]"),
     # Loads.
     Refusal(
         "truncated body",

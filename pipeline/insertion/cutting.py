@@ -1,0 +1,122 @@
+"""Cutting: a blade whose slit ends where the energy release rate is the toughness.
+
+With tip and front at a fixed distance a, the stored energy U grows by dU/dD = F − 2b G per advance D, where F drives
+the blade at a fixed front, and 2b is the length of the front. Where G = Γ, the blade needs dU/dD + Γ dA/dD: the energy
+that is stored, and the work of fracture.
+"""
+
+from dataclasses import dataclass
+
+from pipeline.insertion.near_tip import EXTENSION_ERROR, NearTip, strength
+from pipeline.insertion.states import SHORT, Cut, Scene
+
+# A front is solved again if it is this much farther ahead than where it was solved.
+_FARTHER = 1.1
+_MOST_ROUNDS = 8
+# The front is ahead by at most this many depths of the tip.
+_SHALLOW = 3.5
+
+
+@dataclass(frozen=True)
+class Cutting:
+    """A blade that cuts, its tip at ``depth`` (m) and the front of the slit ``ahead`` (m).
+
+    ``stored`` and ``fracture`` are energies (J) since the first touch; ``elastic`` and ``cutting`` the parts of the
+    force (N), ``squeeze`` (N) the normal force on each flank. Those with an error have its 95 % bar.
+    """
+
+    depth: float
+    ahead: float
+    stored: float
+    stored_error: float
+    fracture: float
+    elastic: float
+    elastic_error: float
+    cutting: float
+    squeeze: float
+    squeeze_error: float
+    release: float
+
+    @property
+    def energy(self) -> float:
+        """Stored energy and work of fracture (J)."""
+        return self.stored + self.fracture
+
+    @property
+    def slope(self) -> float:
+        """Change of both energies with the depth (N)."""
+        return self.elastic + self.cutting
+
+    @property
+    def crack_depth(self) -> float:
+        """Depth (m) of the front of the slit."""
+        return self.depth + self.ahead
+
+
+def cuttings(scene: Scene, depths: list[float]) -> tuple[list[Cutting], str]:
+    """Return the blade cutting at each depth (m), up to the first that cannot be solved, and why it cannot."""
+    places = {depth: scene.ahead(depth) for depth in depths}
+    found: dict[float, Cutting] = {}
+    message: dict[float, str] = {}
+    for _ in range(_MOST_ROUNDS):
+        again: dict[float, float] = {}
+        for (depth, ahead), cut in scene.cuts(sorted(places.items())).items():
+            if isinstance(cut, str):
+                message[depth] = cut
+                continue
+            one, farthest = _cutting(scene, cut), _room(scene, depth)
+            if one.ahead <= _FARTHER * ahead:
+                found[depth] = one
+            elif farthest <= _FARTHER * ahead:
+                message[depth] = "the slit would run too far ahead of the blade, which would split the tissue"
+            else:
+                again[depth] = min(one.ahead, farthest)
+        if not again:
+            break
+        places = again
+    else:
+        message |= dict.fromkeys(places, "the distance of the slit's front ahead of the blade does not settle")
+    reached = [found[depth] for depth in depths if depth < min(message, default=float("inf"))]
+    return reached, f"{1e3 * min(message):.4g} mm: {message[min(message)]}" if message else ""
+
+
+def _room(scene: Scene, depth: float) -> float:
+    """Return the largest distance (m) of the front ahead of a tip at a depth (m) that can be solved.
+
+    Both the next layer, or the bottom, and the surface must be far enough.
+    """
+    ends = [end for end in (*scene.interfaces, scene.bottom) if end > depth]
+    return min(SHORT * (min(ends) - depth), _SHALLOW * depth)
+
+
+def _cutting(scene: Scene, cut: Cut) -> Cutting:
+    """Return the blade where G is the toughness, from one solved distance of the front."""
+    tissue, length, width = scene.at(cut.depth), scene.blade.length, scene.blade.width
+    field = NearTip.through(strength(tissue.young, tissue.poisson, width / 2), cut.ahead, cut.release)
+    ahead = field.ahead(tissue.toughness)
+    front, solved_front = length + 2 * ahead, length + 2 * cut.ahead
+    # What lies between both distances, and how far the error of G there moves it.
+    near, far = sorted((ahead, cut.ahead))
+    sign = 1.0 if ahead < cut.ahead else -1.0
+    added = sign * field.energy(near, far, length + 2 * cut.depth)
+    widened = sign * 2 * field.per_length(near, far)
+    share = cut.release_error / cut.release
+    stored = cut.energy + added
+    stored_error = cut.energy_error + EXTENSION_ERROR * abs(added) + share * field.strength * (length + 2 * cut.depth)
+    elastic = cut.drive - solved_front * cut.release + widened
+    elastic_error = (
+        cut.drive_error + solved_front * cut.release_error + EXTENSION_ERROR * abs(widened) + 2 * share * field.strength
+    )
+    return Cutting(
+        depth=cut.depth,
+        ahead=ahead,
+        stored=stored,
+        stored_error=stored_error,
+        fracture=front * scene.tear(cut.depth + ahead),
+        elastic=elastic,
+        elastic_error=elastic_error,
+        cutting=front * tissue.toughness,
+        squeeze=2 * stored / width,
+        squeeze_error=2 * stored_error / width,
+        release=field.release(ahead),
+    )

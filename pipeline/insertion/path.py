@@ -1,0 +1,216 @@
+"""The path of an insertion: indentation until a slit takes less energy than the intact body, then cutting.
+
+At equal depth, the intact body stores U = k d² / 2. With a slit of area A in which the blade is, it stores U_slit.
+Tissue is pierced at the depth where U − U_slit = Γ A, at the slit for which that happens first: its front is where
+G = Γ, as in cutting. No threshold is fitted. Friction μ N acts on both flanks, N from the field without friction.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import nan
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
+
+from pipeline.arrays import FloatArray
+from pipeline.insertion.cutting import Cutting, cuttings
+from pipeline.insertion.states import Scene
+from pipeline.study.sweep import Study
+from pipeline.surrogate.cases import Solve, SurrogateError
+
+INDENTATION, PUNCTURE, CUTTING = "indentation", "puncture", "cutting"
+PHASES = (INDENTATION, PUNCTURE, CUTTING)
+# The least depth at which a slit is solved, in widths of the blade.
+_LEAST = 0.25
+# The state after the puncture is so much deeper (m) than the one before: depths of a dataset rise.
+_AFTER = 1e-9
+_TINY = 1e-9
+
+
+@dataclass(frozen=True)
+class Step:
+    """One depth (m) of a path: forces (N) with the error bar of their sum, energies (J) since the first touch."""
+
+    phase: str
+    depth: float
+    elastic: float
+    cutting: float = 0.0
+    friction: float = 0.0
+    error: float = 0.0
+    stored: float = 0.0
+    fracture: float = 0.0
+    rubbed: float = 0.0
+    work: float = 0.0
+    crack_depth: float = 0.0
+
+    @property
+    def force(self) -> float:
+        """Force (N) of the tissue against the advance."""
+        return self.elastic + self.cutting + self.friction
+
+    @property
+    def balance(self) -> float:
+        """Work less stored energy, work of fracture and friction, relative to the work."""
+        return (self.work - self.stored - self.fracture - self.rubbed) / self.work
+
+
+@dataclass(frozen=True)
+class Path:
+    """Steps of an insertion; depth (m) and force (N) of the puncture with error bars, NaN if the tissue stays whole.
+
+    ``message`` says at which depth the path ended early, and why.
+    """
+
+    steps: tuple[Step, ...]
+    puncture: tuple[float, float] = (nan, nan)
+    puncture_error: tuple[float, float] = (nan, nan)
+    message: str = ""
+
+
+def follow(study: Study, solve: Solve) -> Path:
+    """Return the path of the insertion of a study.
+
+    Raises:
+        StudyError: if the study has no insertion, or is not one scene.
+        SurrogateError: if the intact body, or the first step, cannot be solved.
+    """
+    scene = Scene(study, solve)
+    to, count = scene.insertion.to, scene.insertion.steps
+    depths = np.unique([scene.clear(to * number / count) for number in range(1, count + 1)])
+    stiffness, bar = scene.stiffness()
+    whole = _Whole(stiffness, bar)
+    # No slit is cheaper than its work of fracture alone: before, the tissue is whole.
+    first = next((depth for depth in depths if whole.energy(depth) >= scene.blade.length * scene.tear(depth)), np.inf)
+    found, message = cuttings(scene, depths[depths >= first].tolist())
+    intact = [one for one in found if whole.energy(one.depth) < one.energy]
+    cut = found[len(intact) :]
+    if not cut:
+        deepest = intact[-1].depth if intact else max(depths[depths < first], default=0.0)
+        steps = tuple(whole.step(depth) for depth in depths if depth <= deepest)
+        if not steps:
+            raise SurrogateError(f"{study.file}: the path ends at its first step, {message}")
+        return Path(steps, message=message)
+    puncture = _puncture(scene, whole, intact, cut[0], max(depths[depths < first], default=0.0))
+    kept = [whole.step(depth) for depth in depths if depth < puncture.depth]
+    steps = (*kept, *_steps(scene, whole, puncture, cut))
+    return Path(steps, (puncture.depth, stiffness * puncture.depth), puncture.errors(whole), message)
+
+
+@dataclass(frozen=True)
+class _Whole:
+    """The intact body: force over depth (N/m), with its error bar."""
+
+    stiffness: float
+    bar: float
+
+    def energy(self, depth: float) -> float:
+        return self.stiffness * depth**2 / 2
+
+    def step(self, depth: float, phase: str = INDENTATION) -> Step:
+        energy = self.energy(depth)
+        return Step(phase, depth, self.stiffness * depth, error=self.bar * depth, stored=energy, work=energy)
+
+
+@dataclass(frozen=True)
+class _Puncture:
+    """The puncture at a ``depth`` (m): the blade that cuts there, and the bar of the depth (m)."""
+
+    depth: float
+    after: Cutting
+    bar: float
+
+    @classmethod
+    def between(cls, whole: _Whole, before: Cutting, after: Cutting) -> "_Puncture":
+        """Return the puncture between two depths at which the energies of slits are known, with their slopes."""
+        ends = np.array([before.depth, after.depth])
+        energy = CubicHermiteSpline(ends, [before.energy, after.energy], [before.slope, after.slope])
+        depth = float(brentq(lambda d: whole.energy(d) - float(energy(d)), *ends, xtol=1e-9))
+        one = _between(before, after, depth)
+        error = one.stored_error + whole.bar * depth**2 / 2
+        return cls(depth, one, error / (whole.stiffness * depth - one.slope))
+
+    @classmethod
+    def at_touch(cls, first: Cutting) -> "_Puncture":
+        """Return the puncture of tissue that is cut at the first touch, before a depth at which slits are solved."""
+        return cls(first.depth, first, first.depth)
+
+    def errors(self, whole: _Whole) -> tuple[float, float]:
+        """Return the error bars of depth (m) and force (N)."""
+        return self.bar, whole.bar * self.depth + whole.stiffness * self.bar
+
+
+def _puncture(scene: Scene, whole: _Whole, intact: list[Cutting], after: Cutting, low: float) -> _Puncture:
+    """Return the puncture above the first cut, and below the last ``intact`` state or a ``low`` depth (m)."""
+    if not intact:
+        # A slit that the intact body could just tear, without opening it.
+        depth = max(_crossing(scene, whole, low, after.depth), _LEAST * scene.blade.width)
+        found, _ = cuttings(scene, [scene.clear(depth)]) if depth < after.depth else ([], "")
+        if found and whole.energy(depth) >= found[0].energy:
+            return _Puncture.at_touch(found[0])
+        intact = found
+    return _Puncture.between(whole, intact[-1], after) if intact else _Puncture.at_touch(after)
+
+
+def _crossing(scene: Scene, whole: _Whole, low: float, high: float) -> float:
+    """Return the depth (m) at which the intact body stores the work of fracture of a slit alone."""
+
+    def lacks(depth: float) -> float:
+        return whole.energy(depth) - scene.blade.length * scene.tear(depth)
+
+    return float(brentq(lacks, max(low, _TINY * high), high)) if lacks(max(low, _TINY * high)) < 0 else low
+
+
+def _between(before: Cutting, after: Cutting, depth: float) -> Cutting:
+    """Return the cutting blade at a depth (m) between two others."""
+    share = (depth - before.depth) / (after.depth - before.depth)
+    mixed = {name: (1 - share) * getattr(before, name) + share * getattr(after, name) for name in vars(before)}
+    ends = [before.depth, after.depth]
+    stored = CubicHermiteSpline(ends, [before.stored, after.stored], [before.elastic, after.elastic])
+    return Cutting(**(mixed | {"depth": depth, "stored": float(stored(depth))}))
+
+
+def _steps(scene: Scene, whole: _Whole, puncture: _Puncture, cut: list[Cutting]) -> list[Step]:
+    """Return the steps from the puncture on: the peak, the force after it, and cutting."""
+    friction = 2 * scene.blade.friction
+    states = [puncture.after, *(one for one in cut if one.depth > puncture.depth)]
+    depths = np.array([one.depth for one in states])
+    rubs = np.array([friction * one.squeeze for one in states])
+    rubbed = _sums(depths, rubs)
+    elastic = _elastic_work(scene, states)
+    found = [whole.step(puncture.depth, PUNCTURE)]
+    start = puncture.after.energy
+    for number, one in enumerate(states):
+        torn = one.fracture - puncture.after.fracture
+        found.append(
+            Step(
+                phase=CUTTING,
+                depth=one.depth if number else one.depth + _AFTER,
+                elastic=one.elastic,
+                cutting=one.cutting,
+                friction=float(rubs[number]),
+                error=one.elastic_error + friction * one.squeeze_error,
+                stored=one.stored,
+                fracture=one.fracture,
+                rubbed=float(rubbed[number]),
+                work=start + torn + float(elastic[number] + rubbed[number]),
+                crack_depth=one.crack_depth,
+            )
+        )
+    return found
+
+
+def _elastic_work(scene: Scene, states: list[Cutting]) -> FloatArray:
+    """Return the work (J) of the elastic force since the first state; across an interface it is the stored energy."""
+    found = [0.0]
+    for before, after in pairwise(states):
+        if any(before.depth < end < after.depth for end in scene.interfaces):
+            found.append(after.stored - before.stored)
+        else:
+            found.append((before.elastic + after.elastic) / 2 * (after.depth - before.depth))
+    return np.cumsum(found)
+
+
+def _sums(depths: FloatArray, forces: FloatArray) -> FloatArray:
+    """Return the work (J) of forces (N) at depths (m) since the first, by the rule of trapezoids."""
+    return np.concatenate([[0.0], np.cumsum(np.diff(depths) * (forces[1:] + forces[:-1]) / 2)])

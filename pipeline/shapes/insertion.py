@@ -1,0 +1,24 @@
+"""``[probe.insertion]``: a tool that is pushed in until tissue is pierced, and then cuts."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, Field
+
+from pipeline.shapes.section import Section, Words
+from pipeline.units import Length
+
+
+class Insertion(BaseModel):
+    """The last depth of an insertion, and its steps."""
+
+    model_config = Section.model_config
+
+    to: Annotated[Length, Words("Largest depth of the tool's tip below the undeformed surface.", '"15 mm"')]
+    steps: Annotated[
+        int, Field(ge=2, le=1000), Words("Number of depths, in equal steps, at which the force is computed.", "30")
+    ] = 30
+
+
+def last_depth(insertion: object) -> object:
+    """Return the last depth of a table, as its text; None if there is none."""
+    return insertion.get("to") if isinstance(insertion, dict) else None

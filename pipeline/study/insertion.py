@@ -1,0 +1,79 @@
+"""Whether a blade can be inserted as a study says: sound keys, room above the support, layers thicker than a step."""
+
+from math import isfinite
+
+from pipeline.shapes.body import Body, Layered
+from pipeline.shapes.insertion import Insertion
+from pipeline.shapes.probe import STICK, Probe
+from pipeline.shapes.probes.blade import Blade
+from pipeline.shapes.section import in_mm
+from pipeline.study.problems import Problems
+
+# Tissue that must be left beside the path of the tip: widths of the blade.
+ROOM = 2.0
+
+
+def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
+    """Report an insertion for which keys are missing, or for which the body has no room."""
+    if not isinstance(probe, Blade):
+        return
+    insertion, before = probe.insertion, len(problems.errors)
+    if insertion is None:
+        if probe.toughness is not None:
+            problems.error(
+                "probe.toughness", f"{probe.toughness:g} J/m^2", "is for an insertion: add [probe.insertion]"
+            )
+        return
+    _check_keys(probe, problems)
+    if len(problems.errors) == before and isinstance(body, Layered):
+        _check_end(body, probe, insertion, problems)
+        _check_layers(body, probe, insertion, problems)
+
+
+def _check_keys(probe: Blade, problems: Problems) -> None:
+    if probe.toughness is None:
+        problems.error("probe.toughness", None, 'is required for an insertion, such as toughness = "200 J/m^2"')
+    if not probe.is_unilateral:
+        problems.error(
+            "probe.contact", probe.contact, 'tissue slides along a blade that is inserted: use contact = "unilateral"'
+        )
+    if not isfinite(probe.friction):
+        problems.error("probe.friction", STICK, "a blade that is inserted slides: give a coefficient, such as 0.2")
+
+
+def _check_end(body: Layered, probe: Blade, insertion: Insertion, problems: Problems) -> None:
+    """Report a path through the bottom or the support, and one whose slit leaves the top."""
+    low, top = body.heights
+    end = min(top - low, *(top - level for level in body.support.edges()), top - low)
+    room = ROOM * probe.width
+    if insertion.to + room > end:
+        problems.error(
+            "probe.insertion.to",
+            in_mm(insertion.to),
+            f"leaves less than {in_mm(room)}, two widths of the blade, above the bottom or the support: must be at "
+            f"most {in_mm(max(end - room, 0.0))}",
+        )
+    if probe.gap(body, probe.frame_on(body)) < room:
+        problems.error(
+            "probe.length",
+            in_mm(probe.length),
+            f"leaves less than {in_mm(room)}, two widths of the blade, beside its ends: use a shorter blade, or a "
+            "larger body",
+        )
+
+
+def _check_layers(body: Layered, probe: Blade, insertion: Insertion, problems: Problems) -> None:
+    """Report layers that are thinner than a step, or than the blade is wide."""
+    _, upper = body.heights
+    step = insertion.to / insertion.steps
+    least = max(step, ROOM * probe.width)
+    for number, (layer, end) in enumerate(zip(body.layer, body.interfaces, strict=False), start=1):
+        if upper - end < least:
+            what = "a step" if least == step else "two widths of the blade"
+            problems.error(
+                f"body.layer[{number}].thickness",
+                in_mm(upper - end),
+                f"{layer.name} is thinner than {what}, {in_mm(least)}: use more steps, a thinner blade or a thicker "
+                "layer",
+            )
+        upper = end

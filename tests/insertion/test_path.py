@@ -1,0 +1,142 @@
+"""Paths through a body whose states have closed forms: the puncture, the force of cutting, and what failures leave."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from pipeline.insertion.dataset import dataset_of
+from pipeline.insertion.near_tip import NearTip
+from pipeline.insertion.path import PHASES, follow
+from pipeline.study.problems import StudyError
+from pipeline.study.read import read_mapping
+from pipeline.surrogate.cases import SurrogateError
+from tests.insertion.scenes import BLADE, FIELD, LENGTH, SCENE, STIFFNESS, closed_form, elastic, stored
+
+
+def _study(**probe):
+    return read_mapping(SCENE | {"probe": BLADE | probe}, "blade")
+
+
+def _path(study, **how):
+    return dataset_of(study, follow(study, closed_form(**how)))
+
+
+def _cutting_energy(depth, toughness):
+    ahead = FIELD.ahead(toughness)
+    return stored(depth, ahead) + toughness * (depth + ahead) * (LENGTH + 2 * ahead)
+
+
+def test_the_field_near_the_tip_stores_what_the_front_releases():
+    """Between two distances of the front, below the tip and beyond both ends, G acts on the area that is added."""
+    field, near, far = NearTip(2e-4, 500.0), 1e-5, 8e-4
+    depth = 5e-3
+    released, _ = quad(lambda a: field.release(a) * (LENGTH + 2 * depth + 4 * a), near, far)
+    assert field.energy(near, far, LENGTH + 2 * depth) == pytest.approx(released, rel=1e-6)
+    assert field.release(field.ahead(3.0)) == pytest.approx(3.0)
+    again = NearTip.through(field.strength, far, field.release(far))
+    assert again.bend == pytest.approx(field.bend)
+
+
+@pytest.mark.parametrize("toughness", [5.0, 0.5])
+def test_tissue_is_pierced_where_a_slit_takes_the_energy_of_the_intact_body(toughness):
+    """Tough tissue has its front nearer to the tip than any mesh; of soft tissue a farther front is solved."""
+    found = _path(_study(toughness=f"{toughness} J/m^2"))
+    exact = brentq(lambda d: STIFFNESS * d**2 / 2 - _cutting_energy(d, toughness), 1e-4, 6e-3)
+    assert float(found["puncture_depth"]) == pytest.approx(exact, abs=float(found["puncture_depth_error"]))
+    assert float(found["puncture_depth"]) == pytest.approx(exact, rel=1e-3)
+    assert float(found["puncture_force"]) == pytest.approx(STIFFNESS * exact, rel=1e-3)
+    depth = found["depth"].values
+    phases = [PHASES[number] for number in found["phase"].values]
+    assert phases == ["indentation"] * phases.index("puncture") + ["puncture"] + ["cutting"] * phases.count("cutting")
+    assert np.all(np.diff(depth) > 0)
+    assert depth[phases.index("cutting")] == pytest.approx(depth[phases.index("puncture")], abs=1e-8)
+
+
+def test_cutting_needs_the_change_of_the_stored_energy_the_toughness_and_friction():
+    found = _path(_study()).isel(depth=-1)
+    ahead = FIELD.ahead(5.0)
+    assert float(found["crack_depth"]) == pytest.approx(6e-3 + ahead)
+    assert float(found["force_elastic"]) == pytest.approx(elastic(6e-3, ahead), rel=1e-6)
+    assert float(found["force_cutting"]) == pytest.approx(5.0 * (LENGTH + 2 * ahead), rel=1e-6)
+    assert float(found["force_friction"]) == pytest.approx(2 * 0.25 * 2 * stored(6e-3, ahead) / 0.4e-3, rel=1e-6)
+
+
+def test_the_work_of_the_tool_is_stored_torn_and_rubbed():
+    found = _path(_study())
+    assert float(abs(found["balance"]).max()) < 1e-3
+    parts = sum(found[name] for name in ("energy_stored", "energy_fracture", "energy_friction"))
+    np.testing.assert_allclose(found["work"], parts, rtol=1e-3)
+    after = found.isel(depth=found["phase"].values == PHASES.index("cutting"))
+    np.testing.assert_allclose(
+        np.diff(after["work"]), np.diff(after["depth"]) * (after["force"].values[1:] + after["force"].values[:-1]) / 2,
+        rtol=1e-5,
+    )  # fmt: skip
+
+
+def test_tissue_that_is_tough_enough_stays_whole_and_without_toughness_is_cut_at_once():
+    whole, cut = _path(_study(toughness="1 kJ/m^2")), _path(_study(toughness="0.3 J/m^2"))
+    assert np.isnan(whole["puncture_depth"]) and np.all(whole["phase"] == PHASES.index("indentation"))
+    np.testing.assert_allclose(whole["force"], STIFFNESS * whole["depth"])
+    assert float(cut["puncture_depth"]) < 0.5e-3
+    assert np.all(cut["phase"].values[-12:] == PHASES.index("cutting"))
+
+
+def test_each_layer_is_cut_at_its_toughness():
+    layer = {"name": "skin", "thickness": "3.1 mm", "young": "20 kPa", "poisson": 0.3, "toughness": "8 J/m^2"}
+    body = SCENE["body"] | {"layer": [layer]}
+    study = read_mapping(SCENE | {"body": body}, "layers")
+    found = _path(study)
+    skin, below = (found["force_cutting"].sel(depth=at, method="nearest") for at in (2.9e-3, 3.3e-3))
+    assert float(skin / below) == pytest.approx(8 / 5, rel=0.01)
+    assert abs(found["depth"] - 3.1e-3).min() > 0.19e-3
+    assert float(abs(found["balance"]).max()) < 0.02
+
+
+def test_a_state_that_fails_ends_the_path_there_and_earlier_ones_are_kept():
+    found = _path(_study(), deepest=5e-3)
+    assert float(found["depth"][-1]) == pytest.approx(4.5e-3)
+    assert found.attrs["message"] == "5 mm: the mesh is too coarse"
+    assert float(found["puncture_depth"]) > 0
+
+
+@pytest.mark.parametrize(
+    ("probe", "key", "allowed"),
+    [
+        ({"toughness": "200"}, "probe.toughness", "the unit is missing"),
+        ({"toughness": None}, "probe.toughness", "is required for an insertion"),
+        ({"insertion": None, "depth": "1 mm"}, "probe.toughness", "add [probe.insertion]"),
+        ({"insertion": {"to": "19.5 mm"}}, "probe.insertion.to", "must be at most 19.2 mm"),
+        ({"depth": "1 mm"}, "probe.depth", "its last depth is `to`"),
+        ({"contact": "frictionless", "friction": 0}, "probe.contact", 'use contact = "unilateral"'),
+        ({"friction": "stick"}, "probe.friction", "give a coefficient"),
+        ({"incision": "4 mm"}, "probe.incision", "makes its own slit"),
+        ({"length": "39 mm"}, "probe.length", "use a shorter blade"),
+        ({"axis": [0.1, 0, -1]}, "probe.insertion", "a blade that goes straight down"),
+    ],
+)
+def test_what_cannot_be_inserted_is_refused(probe, key, allowed):
+    own = {name: value for name, value in (BLADE | probe).items() if value is not None}
+    with pytest.raises(StudyError) as wrong:
+        read_mapping(SCENE | {"probe": own}, "blade")
+    assert any(problem.key == key and allowed in str(problem) for problem in wrong.value.problems), wrong.value
+
+
+def test_layers_thinner_than_a_step_and_laws_of_large_displacements_are_refused():
+    layer = {"name": "skin", "thickness": "0.9 mm", "young": "20 kPa", "poisson": 0.3}
+    coarse = BLADE | {"insertion": {"to": "6 mm", "steps": 4}}
+    with pytest.raises(StudyError, match=r"skin is thinner than a step, 1.5 mm"):
+        read_mapping(SCENE | {"probe": coarse, "body": SCENE["body"] | {"layer": [layer]}}, "blade")
+    with pytest.raises(StudyError, match="large displacements"):
+        read_mapping(SCENE | {"material": SCENE["material"] | {"law": "neo-hookean"}}, "blade")
+
+
+def test_tissue_that_the_blade_would_split_ends_the_path():
+    with pytest.raises(SurrogateError, match=r"first step, 0.5 mm: the slit would run too far ahead"):
+        _path(_study(toughness="1 mJ/m^2"))
+
+
+def test_a_path_is_of_one_scene():
+    study = _study(friction=[0.1, 0.2])
+    with pytest.raises(StudyError, match="is a list of 2: one value is needed"):
+        follow(study, closed_form())
