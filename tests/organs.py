@@ -50,3 +50,25 @@ def write_stl(path: Path, points: np.ndarray, facets: np.ndarray) -> Path:
     """Write facets (m) as a binary STL file in mm."""
     path.write_bytes(stl.written(1e3 * points, facets))
     return path
+
+
+def write_labels(path: Path, voxel: float, ellipsoids: list[tuple[np.ndarray, np.ndarray]]) -> Path:
+    """Write a label map (NIfTI) of cubic voxels (m): of ellipsoids, each with its centre and semi-axes (m).
+
+    They have the labels 1, 2, …; where they overlap, the last one counts.
+    """
+    import nibabel
+
+    (centre, axes), *_ = ellipsoids
+    count = np.ceil(axes / voxel).astype(int) + 3
+    grid = np.stack(np.meshgrid(*[np.arange(-n, n + 1) for n in count], indexing="ij"), axis=-1)
+    shift = np.array([0.3, 0.1, 0.2])  # voxels: no symmetry
+    points, labels = centre + (grid + shift) * voxel, np.zeros(grid.shape[:3], dtype=np.uint8)
+    for number, (middle, semi_axes) in enumerate(ellipsoids, start=1):
+        labels[(((points - middle) / semi_axes) ** 2).sum(axis=-1) < 1] = number
+    affine = np.diag([1e3 * voxel] * 3 + [1.0])
+    affine[:3, 3] = 1e3 * (centre + (shift - count) * voxel)
+    image = nibabel.Nifti1Image(labels, affine)
+    image.header.set_xyzt_units("mm")
+    nibabel.save(image, path)
+    return path

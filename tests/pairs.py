@@ -103,14 +103,24 @@ def _inclusion(study: Study) -> None:
     study["body"]["inclusion"] = [inclusion | {"young": "50 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}]
 
 
+def _region(study: Study) -> None:
+    region = {"name": "cyst", "file": "ball.stl", "unit": "mm", "young": "2 kPa", "poisson": 0.3}
+    study["body"]["region"] = [region | {"density": "1000 kg/m^3"}]
+
+
 def _layers(study: Study) -> None:
     skin = {"name": "skin", "thickness": "4 mm", "young": "30 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}
     study["body"]["layer"] = [skin]
 
 
+def _pieces(study: Study) -> list[Study]:
+    """Return the tables of the body's regions."""
+    return [piece for key in ("layer", "inclusion", "region") for piece in study["body"].get(key, ())]
+
+
 def _poisson(value: float) -> Callable[[Study], None]:
     def change(study: Study) -> None:
-        for tissue in (study["material"], *study["body"].get("layer", ()), *study["body"].get("inclusion", ())):
+        for tissue in (study["material"], *_pieces(study)):
             tissue["poisson"] = value
 
     return change
@@ -135,12 +145,11 @@ def _relaxation(study: Study) -> None:
 
 
 def _relaxing_regions(study: Study) -> None:
-    """Tissue of which an inclusion, or each layer, relaxes in its own way."""
+    """Tissue of which each region relaxes in its own way."""
     _relaxation(study)
-    body = study["body"]
-    if not (body.get("layer") or body.get("inclusion")):
+    if not _pieces(study):
         _inclusion(study)
-    for piece in (*body.get("layer", ()), *body.get("inclusion", ())):
+    for piece in _pieces(study):
         piece["relaxation"] = [{"share": 0.3, "time": "1 s"}]
 
 
@@ -169,6 +178,7 @@ FEATURES = (
     Feature("image", "body", _body(shape="image", file="box.nrrd", label=1, fixed=_HELD)),
     Feature("layers", "layers", _layers),
     Feature("inclusion", "inclusion", _inclusion),
+    Feature("region", "region", _region),
     Feature("nu .49", "poisson", _poisson(0.49)),
     Feature("nu .5", "poisson", _poisson(0.5)),
     Feature("neo-hookean", "law", _update("material", law="neo-hookean")),
@@ -241,6 +251,8 @@ def write_bodies(folder: Path) -> None:
     from tests import organs
 
     organs.write_stl(folder / "box.stl", *organs.box(40e-3, 40e-3, 20e-3))
+    points, facets = organs.sphere(8)
+    organs.write_stl(folder / "ball.stl", 3e-3 * points + np.array([-6e-3, -5e-3, -9e-3]), facets)
     label = np.zeros((24, 24, 14), dtype=np.uint8)
     label[2:-2, 2:-2, 2:-2] = 1
     header = {

@@ -43,7 +43,7 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     straight = mesh.points[edges].mean(axis=1)
     of_cell = inverse.reshape(-1, len(EDGES))
     curved = straight if mesh.bent is None else _on_faces(mesh.bent, edges, straight)
-    curved = _on_inclusions(mesh, scene, edges, _on_sides(mesh, scene, edges, curved, keys))
+    curved = _on_embedded(mesh, scene, edges, _on_sides(mesh, scene, edges, curved, keys))
     curved = _on_rim(mesh, scene, edges, curved)
     middle = curved.copy()
     if scene.probe.has_singular_edge:
@@ -148,17 +148,19 @@ def _on_sides(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArra
     return middle
 
 
-def _on_inclusions(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
-    """Move the mid nodes of edges in the surface of an inclusion onto it, and onto a column that cuts it."""
-    if mesh.regions is None or not scene.body.inclusion:
+def _on_embedded(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid nodes of edges in the surface of an embedded region onto it, and onto a column that cuts it."""
+    if mesh.regions is None or not scene.body.embedded:
         return middle
     between = np.isin(_key(mesh, edges), _interface_edges(mesh, mesh.regions))
+    used = np.unique(edges[between])
     middle, close = middle.copy(), _CLOSE * scene.body.extent
-    for inclusion in scene.body.inclusion:
-        surfaces: list[Surface] = [inclusion.surface]
-        on_side = np.abs(inclusion.surface.distance(mesh.points)) < close
+    for surface_of_region in (piece.surface for piece in scene.body.embedded):
+        surfaces: list[Surface] = [surface_of_region]
+        on_side = np.zeros(len(mesh.points), dtype=bool)
+        on_side[used] = np.abs(surface_of_region.distance(mesh.points[used])) < close
         chosen = between & on_side[edges].all(axis=1)
-        middle[chosen] = inclusion.surface.project(middle[chosen])
+        middle[chosen] = surface_of_region.project(middle[chosen])
         if scene.is_cut:
             beyond = np.abs(scene.cut_face.distance(mesh.points)) < close
             both = chosen & beyond[edges].all(axis=1)

@@ -1,25 +1,32 @@
-"""Element sizes of layers and inclusions, in addition to those of the study."""
+"""Element sizes of the regions of a body, in addition to those of the study."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from math import inf
+from typing import Any
 
+import gmsh
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray
 from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.ovoid import Ovoid
-from pipeline.shapes.regions import Inclusion
+from pipeline.shapes.regions import Embedded
+from pipeline.shapes.shell import Shell
 
-# Element size on an inclusion in units of its smallest semi-axis, and in a layer below the probe in units of its
+# Element size on an embedded region in units of half of its thickness, and in a layer below the probe in units of its
 # thickness. With elements of degree 2, F is then within .1 and .4 % of its value for half these sizes
 # (docs/accuracy.md), and the error bar accounts for the rest.
-_ON_INCLUSION = 0.4
+_ON_EMBEDDED = 0.4
 _IN_LAYER = 0.5
-# Sampling points on an inclusion, for the point nearest to anything else.
+# Elements on a surface of triangles have sizes in steps of this factor, each with the points of its own part.
+_STEP = 1.3
+# Sampling points on an embedded region, for the point nearest to anything else.
 _POINTS = 2000
 
 
@@ -44,44 +51,110 @@ def region_sizes(scene: Scene, growth: float) -> Iterator[str]:
     heights = (high, *body.interfaces, low) if body.interfaces else ()
     for top, bottom in pairwise(heights):
         yield _in_layer(scene, (unit * bottom, unit * top), growth)
-    for inclusion in inclusion_sizes(body, growth):
+    for inclusion in embedded_sizes(body, growth):
         yield from inclusion.terms(unit)
 
 
-@dataclass(frozen=True)
-class InclusionSizes:
-    """Element sizes (m) of an inclusion: on its ``surface``, and at the point ``nearest`` to anything else.
+@dataclass(frozen=True, eq=False)
+class EmbeddedSizes:
+    """Element sizes (m) of an embedded region: on its surface, and at the point ``nearest`` to anything else.
 
     At that point they are at most the ``room`` (m) between the two. They grow by ``growth`` per unit of distance.
     """
 
-    surface: Ovoid
     nearest: Vector
     room: float
     growth: float
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the size (m) at points (n, 3)."""
-        on_it = min(self.surface.axes) * (_ON_INCLUSION + self.growth * np.abs(self.surface.level(points) - 1))
-        return np.minimum(on_it, self.room + self.growth * np.linalg.norm(points - np.array(self.nearest), axis=1))
+        return np.minimum(
+            self.on_surface(points), self.room + self.growth * np.linalg.norm(points - np.array(self.nearest), axis=1)
+        )
 
-    def terms(self, unit: float) -> tuple[str, str]:
-        """Return the two sizes, whose minimum counts, as text for gmsh, with ``unit`` units in a metre."""
+    def terms(self, unit: float, kernel: Any = None) -> Iterator[str]:
+        """Yield sizes, whose minimum counts, as text for gmsh, with ``unit`` units in a metre.
+
+        Points that they refer to are added to gmsh's current model with its ``kernel``.
+        """
+        yield from self.terms_on_surface(unit, kernel)
+        yield f"{unit * self.room:.12g}+{self.growth:.12g}*{_distance(self.nearest, unit)}"
+
+    def on_surface(self, points: FloatArray) -> FloatArray:
+        """Return the size (m) at points (n, 3) that the surface needs."""
+        raise NotImplementedError
+
+    def terms_on_surface(self, unit: float, kernel: Any) -> Iterator[str]:
+        """Yield the sizes that the surface needs as text for gmsh: see :meth:`terms`."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False)
+class OvoidSizes(EmbeddedSizes):
+    """Those of an ellipsoid."""
+
+    surface: Ovoid
+
+    def on_surface(self, points: FloatArray) -> FloatArray:
+        """Return the size (m) at points (n, 3) by the factor that scales the surface to them."""
+        return self.surface.least * (_ON_EMBEDDED + self.growth * np.abs(self.surface.level(points) - 1))
+
+    def terms_on_surface(self, unit: float, kernel: Any) -> Iterator[str]:
+        """Yield the same as text for gmsh."""
         surface = self.surface
-        least = unit * min(surface.axes)
         level = "+".join(
             f"((({name})-({unit * c:.12g}))/{unit * a:.12g})^2"
             for name, c, a in zip("xyz", surface.centre, surface.axes, strict=True)
         )
-        return (
-            f"{least:.12g}*({_ON_INCLUSION}+{self.growth:.12g}*Abs(Sqrt({level})-1))",
-            f"{unit * self.room:.12g}+{self.growth:.12g}*{_distance(self.nearest, unit)}",
-        )
+        yield f"{unit * surface.least:.12g}*({_ON_EMBEDDED}+{self.growth:.12g}*Abs(Sqrt({level})-1))"
 
 
-def inclusion_sizes(body: Body, growth: float) -> tuple[InclusionSizes, ...]:
-    """Return the element sizes of the inclusions of a body."""
-    return tuple(InclusionSizes(one.surface, *_nearest(body, one), growth) for one in body.inclusion)
+@dataclass(frozen=True, eq=False)
+class ShellSizes(EmbeddedSizes):
+    """Those of a surface of triangles: each part of it has elements by its own thickness."""
+
+    surface: Shell
+
+    @cached_property
+    def _parts(self) -> list[tuple[float, FloatArray, cKDTree]]:
+        """Sizes (m), the points (n, 3) of the parts with such elements, and their search trees."""
+        points, widths = self.surface.thin
+        step = np.floor(np.log(widths / widths.min()) / np.log(_STEP)).astype(int)
+        parts = {number: points[step == number] for number in np.unique(step).tolist()}
+        least = _ON_EMBEDDED * float(widths.min())
+        return [(least * _STEP**number, part, cKDTree(part)) for number, part in parts.items()]
+
+    def on_surface(self, points: FloatArray) -> FloatArray:
+        """Return the size (m) at points (n, 3) by their distance to parts of the surface."""
+        return np.min([size + self.growth * tree.query(points)[0] for size, _, tree in self._parts], axis=0)
+
+    def terms_on_surface(self, unit: float, kernel: Any) -> Iterator[str]:
+        """Yield the same as text for gmsh."""
+        for size, points, _ in self._parts:
+            yield f"{unit * size:.12g}+{self.growth:.12g}*F{distance_field(points * unit, kernel)}"
+
+
+def embedded_sizes(body: Body, growth: float) -> tuple[EmbeddedSizes, ...]:
+    """Return the element sizes of the embedded regions of a body."""
+
+    def sizes(piece: Embedded) -> EmbeddedSizes:
+        nearest, room = _nearest(body, piece)
+        if isinstance(surface := piece.surface, Shell):
+            return ShellSizes(nearest, room, growth, surface)
+        assert isinstance(surface, Ovoid)
+        return OvoidSizes(nearest, room, growth, surface)
+
+    return tuple(map(sizes, body.embedded))
+
+
+def distance_field(points: FloatArray, kernel: Any) -> int:
+    """Add points (n, 3), in units of gmsh's current model, with its ``kernel``; return the field of the distance."""
+    tags = [kernel.addPoint(*point) for point in points.tolist()]
+    kernel.synchronize()
+    field = gmsh.model.mesh.field
+    distance = int(field.add("Distance"))
+    field.setNumbers(distance, "NodesList", tags)
+    return distance
 
 
 def _in_layer(scene: Scene, heights: tuple[float, float], growth: float) -> str:
@@ -99,12 +172,12 @@ def _distance(point: Vector, unit: float) -> str:
     return f"Sqrt({squares})"
 
 
-def _nearest(body: Body, inclusion: Inclusion) -> tuple[Vector, float]:
-    """Return the point of an inclusion that is nearest to anything else, and its distance (m) from that."""
-    points = inclusion.surface.sample(_POINTS)
+def _nearest(body: Body, piece: Embedded) -> tuple[Vector, float]:
+    """Return the point of an embedded region that is nearest to anything else, and its distance (m) from that."""
+    points = piece.surface.sample(_POINTS)
     rooms: list[FloatArray] = [body.inside(points)]
     rooms += [np.abs(points[:, 2] - height) for height in body.interfaces]
-    rooms += [other.surface.distance(points) for other in body.inclusion if other is not inclusion]
+    rooms += [other.surface.distance(points) for other in body.embedded if other is not piece]
     room = np.min(rooms, axis=0)
     x, y, z = map(float, points[int(np.argmin(room))])
     return (x, y, z), float(room.min())

@@ -85,10 +85,10 @@ def _of_bend(case: Case) -> float:
 def _of_regions(case: Case) -> float:
     """Return the number of elements (as cubes of their size) for layers and inclusions."""
     body, growth = case.body, case.mesh.growth
-    # Both sides of an inclusion's surface: ∫ 1 / (0.4 least + growth s)³ ds.
-    total = sum(
-        _area(one.surface.axes) / (growth * (_ON_INCLUSION * min(one.surface.axes)) ** 2) for one in body.inclusion
-    )
+    # Both sides of an embedded region's surface: ∫ 1 / (0.4 least + growth s)³ ds.
+    total = 0.0
+    for areas, widths in (piece.surface.widths() for piece in body.embedded):
+        total += float((areas / (growth * (_ON_INCLUSION * widths) ** 2)).sum())
     top = body.heights[1]
     high = top
     for low in body.interfaces:
@@ -99,12 +99,6 @@ def _of_regions(case: Case) -> float:
             total += within + beside + below
         high = low
     return _MEETING * total
-
-
-def _area(axes: tuple[float, float, float]) -> float:
-    """Return the area (m²) of an ellipsoid, within 1 % (K. Thomsen's formula)."""
-    a, b, c = (axis**1.6 for axis in axes)
-    return float(4 * pi * ((a * b + a * c + b * c) / 3) ** (1 / 1.6))
 
 
 def dofs(count: float, degree: int) -> float:

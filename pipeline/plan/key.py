@@ -117,9 +117,8 @@ def _ratios(probe: Probe) -> dict[str, float]:
 def _in_units_of(stress: float, body: Body) -> Body:
     """Return the body with its regions' Young's moduli in units of ``stress`` (Pa)."""
     changes = {
-        key: tuple(piece.model_copy(update={"young": canonical(piece.young / stress)}) for piece in getattr(body, key))
-        for key in PIECES
-        if getattr(body, key, ())
+        key: tuple(piece.model_copy(update={"young": canonical(piece.young / stress)}) for piece in found)
+        for key, found in body.pieces.items()
     }
     return body.model_copy(update=changes) if changes else body
 
@@ -135,6 +134,8 @@ def _body_text(body: Body, stress: float | None = None) -> str:
         layer["thickness"] = ends[number]  # its lower end, so that equal layers have equal texts
     for inclusion, ball in zip(content["inclusion"], body.inclusion, strict=True):
         inclusion.update(axes=ball.surface.axes, radius=None)
+    for region, segment in zip(content.get("region", ()), body.embedded[len(body.inclusion) :], strict=True):
+        region.update(surface=segment.surface.identity)
     for key in (key for key in PIECES if key in content):
         content[key] = [
             {name: value for name, value in piece.items() if name not in (*Tissue.model_fields, "toughness")}

@@ -60,13 +60,13 @@ def _is_held_below_stiffer(case: Case) -> bool:
 
 
 def body_planes(body: Body) -> tuple[str, ...]:
-    """Return the planes of symmetry of a body with its support and inclusions."""
+    """Return the planes of symmetry of a body with its support and regions."""
     own = body.mirror_planes
-    # Every inclusion must be symmetric by itself: pairs of mirrored inclusions are not recognised.
+    # Every region must be symmetric by itself: pairs of mirrored ones are not recognised.
     return tuple(
         plane
         for number, plane in enumerate(PLANES)
-        if plane in own and all(inclusion.at[number] == 0.0 for inclusion in body.inclusion)
+        if plane in own and all(piece.surface.is_mirrored(number) for piece in body.embedded)
     )
 
 

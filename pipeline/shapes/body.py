@@ -7,22 +7,22 @@ from math import inf
 from typing import Annotated, Any, ClassVar, Self
 
 from pipeline.arrays import FloatArray
+from pipeline.shapes.closed import Closed
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.half_plane import HalfPlane
-from pipeline.shapes.ovoid import Ovoid
-from pipeline.shapes.regions import Inclusion, Layer, Region
+from pipeline.shapes.regions import Embedded, Inclusion, Layer, Region
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.support import Fixed, Support, support_of
 from pipeline.shapes.surface import Surface
 from pipeline.shapes.tissue import Tissue
 
 # Keys of a body's regions.
-PIECES = ("layer", "inclusion")
+PIECES = ("layer", "inclusion", "region")
 # Layers fill the body if their sum differs from its height by at most this share.
 _SAME = 1e-9
-# An inclusion is centred on the z axis within this share of the extent.
+# An embedded region is centred on the z axis within this share of the extent.
 _ON_AXIS = 1e-9
-# Sampling points on an inclusion, besides the ends of its axes.
+# Sampling points on an embedded region.
 _POINTS = 2000
 
 
@@ -48,9 +48,27 @@ class Body(Section, ABC):
     ] = ()
 
     @property
+    def pieces(self) -> dict[str, tuple[Region, ...]]:
+        """Its regions with a material of their own, by their key in a study."""
+        return {key: found for key in PIECES if (found := getattr(self, key, ()))}
+
+    @property
     def regions(self) -> tuple[Region, ...]:
-        """Regions with a material of their own, numbered from 1 in meshes; 0 is the rest of the body."""
-        return self.inclusion
+        """Regions with a material of their own, numbered from 1 in meshes; 0 is the rest of the body.
+
+        Layers come first, from the top down.
+        """
+        return tuple(piece for found in self.pieces.values() for piece in found)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Places of its regions in a study, such as inclusion[2], in their order."""
+        return tuple(f"{key}[{n}]" for key, found in self.pieces.items() for n in range(1, len(found) + 1))
+
+    @property
+    def embedded(self) -> tuple[Embedded, ...]:
+        """The last of its regions: those wholly inside it, each bounded by a closed surface."""
+        return tuple(piece for piece in self.regions if isinstance(piece, Embedded))
 
     @property
     def interfaces(self) -> tuple[float, ...]:
@@ -64,11 +82,10 @@ class Body(Section, ABC):
 
     def with_law_of(self, material: Tissue) -> Self:
         """Return the body; its regions that have no law of their own have that of ``material``."""
-        found = {key: getattr(self, key, ()) for key in PIECES}
-        if not material.is_large or not any(found.values()):
+        if not (material.is_large and self.pieces):
             return self
         return self.model_copy(
-            update={key: tuple(piece.completed(material) for piece in found[key]) for key in found if found[key]}
+            update={key: tuple(piece.completed(material) for piece in found) for key, found in self.pieces.items()}
         )
 
     @cached_property
@@ -136,7 +153,7 @@ class Body(Section, ABC):
     def inside(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of points (n, 3) to the surface, negative outside."""
 
-    def room(self, surface: Ovoid) -> float:
+    def room(self, surface: Closed) -> float:
         """Return the distance (m) between the body's surface and a ``surface`` inside, negative if that sticks out."""
         return float(self.inside(surface.sample(_POINTS)).min())
 
@@ -167,10 +184,7 @@ class Body(Section, ABC):
     @property
     def holds_round(self) -> bool:
         """Whether its regions are axisymmetric about z."""
-        return all(
-            max(map(abs, piece.at[:2])) <= _ON_AXIS * self.extent and piece.surface.axes[0] == piece.surface.axes[1]
-            for piece in self.inclusion
-        )
+        return all(piece.surface.has_axis(_ON_AXIS * self.extent) for piece in self.embedded)
 
     @property
     @abstractmethod
@@ -221,11 +235,6 @@ class Layered(Drawn):
     layer: Annotated[tuple[Layer, ...], Words("Layers of other materials, from the top down.", "[[body.layer]]")] = ()
 
     @property
-    def regions(self) -> tuple[Region, ...]:
-        """Its layers from the top down, then its inclusions."""
-        return (*self.layer, *self.inclusion)
-
-    @property
     def interfaces(self) -> tuple[float, ...]:
         """Heights z (m) of the interfaces between layers of different materials, from the top down."""
         low, high = self.heights
@@ -271,7 +280,7 @@ class Layered(Drawn):
     def depth_of_tissue(self) -> float:
         """Depth (m) below the top of the first interface between materials, or of the bottom."""
         low, top = self.heights
-        ends = [low, *self.interfaces, *(piece.at[2] + piece.surface.axes[2] for piece in self.inclusion)]
+        ends = [low, *self.interfaces, *(piece.surface.bounds[1][2] for piece in self.embedded)]
         return top - max(ends)
 
     @abstractmethod

@@ -9,8 +9,8 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
+from pipeline.shapes.closed import Closed
 from pipeline.shapes.frame import Frame, PlaceError
-from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.rays import nearest_point, pierce
 from pipeline.shapes.section import in_mm
 from pipeline.shapes.skin import Skin
@@ -81,9 +81,9 @@ class Facetted(Body):
         """Return the distance (m) of points (n, 3) to the surface, negative outside."""
         return skin_of(self.triangles).depth(points)
 
-    def room(self, surface: Ovoid) -> float:
+    def room(self, surface: Closed) -> float:
         """Return the distance (m) to a ``surface`` inside; it is negative if hollows or spikes of the body cut it."""
-        return _room(self.model_copy(update={"inclusion": ()}), surface)
+        return _room(self.model_copy(update=dict.fromkeys(self.pieces, ())), surface)
 
     @property
     def face(self) -> str:
@@ -101,10 +101,10 @@ class Facetted(Body):
 
 
 @lru_cache(_MANY)
-def _room(body: Facetted, surface: Ovoid) -> float:
-    points = body.triangles.points
-    held = points[surface.level(points) < 1]
-    return min(Body.room(body, surface), float(surface.distance(held).min(initial=inf)))
+def _room(body: Facetted, surface: Closed) -> float:
+    (low, high), points = np.array(surface.bounds), body.triangles.points
+    within = points[((points > low) & (points < high)).all(axis=1)]
+    return min(Body.room(body, surface), float(surface.distance(within).min()) if len(within) else inf)
 
 
 @lru_cache(_FEW)

@@ -10,12 +10,12 @@ from pydantic_core import PydanticCustomError
 from pipeline.shapes.facetted import Facetted
 from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.section import Words
+from pipeline.shapes.segment import Segment
 from pipeline.shapes.support import Below, Fixed
 from pipeline.shapes.triangles import SurfaceError, Triangles
 
 # Increase by hand when the same file gives another place, mesh or force: older records are then not used.
 _VERSION = 2
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 
 
 class FromFile(Facetted):
@@ -30,6 +30,10 @@ class FromFile(Facetted):
 
     if TYPE_CHECKING:
         file: str  # not declared here, or it would be validated before the fields that control reading
+    region: Annotated[
+        tuple[Segment, ...],
+        Words("Regions of any shape, of another material, inside the body.", "[[body.region]]"),
+    ] = ()
     fixed: Annotated[
         Fixed,
         Words(
@@ -93,5 +97,6 @@ class FromFile(Facetted):
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """Notices about changes to the surface that the author of the study should know."""
-        return self._loaded.notices
+        """Notices about changes to the surface, and to those of its regions, that the author should know."""
+        own = [f"{piece.name}: {notice}" for piece in self.region for notice in piece.notices]
+        return *self._loaded.notices, *own

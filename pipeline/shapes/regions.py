@@ -1,7 +1,8 @@
-"""Regions of a body with a material of their own: layers under a flat top, and inclusions."""
+"""Regions of a body with a material of their own: layers under a flat top, and regions wholly inside it."""
 
 from typing import Annotated
 
+from pipeline.shapes.closed import Closed
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.section import Name, Words
 from pipeline.shapes.tissue import Tissue
@@ -14,7 +15,7 @@ class Region(Tissue):
     name: Annotated[
         Name,
         Words(
-            "Name of the layer or inclusion: letters, digits, _ and -. The dimension of a sweep "
+            "Name of the layer, inclusion or region: letters, digits, _ and -. The dimension of a sweep "
             "begins with it: skin_young.",
             '"skin"',
         ),
@@ -36,7 +37,16 @@ class Layer(Region):
     ] = None
 
 
-class Inclusion(Region):
+class Embedded(Region):
+    """A region wholly inside the body, bounded by a closed surface."""
+
+    @property
+    def surface(self) -> Closed:
+        """Its surface."""
+        raise NotImplementedError
+
+
+class Inclusion(Embedded):
     """A ball, or an ellipsoid with axes along the coordinates, wholly inside the body."""
 
     at: Annotated[

@@ -6,8 +6,10 @@ import re
 _PAGES = {
     "body.layer": "howto/layers",
     "body.inclusion": "howto/layers",
+    "body.region": "howto/organs",
     "layer": "howto/layers",
     "inclusion": "howto/layers",
+    "region": "howto/organs",
     "body.fixed": "howto/own-body",
     "body.file": "howto/organs",
     "body.label": "howto/organs",

@@ -70,8 +70,7 @@ def _of_tissues(body: Body, material: Material) -> Iterator[Parameter]:
     tissues: list[tuple[str, Place, Tissue | Material]] = []
     if not body.is_filled:
         tissues.append(("", ("material",), material))
-    layers = body.layer if isinstance(body, Layered) else ()
-    for kind, pieces in (("layer", layers), ("inclusion", body.inclusion)):
+    for kind, pieces in body.pieces.items():
         tissues += [(f"{piece.name}_", ("body", kind, number), piece) for number, piece in enumerate(pieces)]
     for prefix, place, tissue in tissues:
         value, is_alone = tissue.young, len(tissues) == 1

@@ -196,8 +196,10 @@ def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
         return str(folder / value) if isinstance(value, str) and value and value not in CLASS_MAPS else value
 
     def table(body: Any) -> Any:
-        files = [key for key in ("file", "names") if isinstance(body, dict) and key in body]
-        return body | {key: found(body[key]) for key in files} if files else body
+        if not isinstance(body, dict):
+            return body
+        regions = {"region": [table(one) for one in body["region"]]} if isinstance(body.get("region"), list) else {}
+        return body | regions | {key: found(body[key]) for key in ("file", "names") if key in body}
 
     bodies = raw.get("body")
     return raw | {"body": [table(b) for b in bodies] if isinstance(bodies, list) else table(bodies)} if bodies else raw

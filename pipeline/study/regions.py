@@ -1,25 +1,28 @@
-"""Layers and inclusions of a study: whether they fit into the body, and whether [material] is needed."""
+"""Layers, inclusions and regions of a study: whether they fit into the body, and whether [material] is needed."""
 
 import itertools
 import re
 from collections.abc import Iterator, Sequence
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
 from pipeline.quantities import RESERVED
+from pipeline.shapes.bodies.image import FromImage
 from pipeline.shapes.body import Body, Layered
-from pipeline.shapes.regions import Inclusion
+from pipeline.shapes.from_file import FromFile
+from pipeline.shapes.regions import Embedded, Inclusion
 from pipeline.shapes.section import Section, in_mm
+from pipeline.shapes.segment import Segment
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.axis import Axis
 from pipeline.study.howto import page_of
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Material, material_of
 
-# Room around an inclusion, in units of its smallest semi-axis: elements there are no larger.
+# Room around an embedded region, in units of half of its smallest thickness: elements there are no larger.
 GAP = 0.1
-# Points on an inclusion, besides the ends of its axes, that are looked at.
+# Points on an embedded region that are looked at.
 _POINTS = 2000
 # Heights at which a message looks for tissue.
 _LEVELS = 401
@@ -49,11 +52,11 @@ _THINNEST = 1e-6
 
 
 def check_regions(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
-    """Check layers and inclusions of every body, and whether there is a material for the rest."""
+    """Check the regions of every body, and whether there is a material for the rest."""
     bodies, before = cast(Sequence[Body], sections["body"]), len(problems.errors)
     problems.each(_check_pieces, body=bodies)
     if len(problems.errors) == before:
-        problems.each(_check_inclusions, body=bodies)
+        problems.each(_check_room, body=bodies)
     _check_axes(axes, problems)
     _check_sweep(bodies, axes, problems)
     _check_material(bodies, cast(Sequence[Material], sections["material"]), axes, problems)
@@ -68,22 +71,41 @@ def tissues_of(body: Body, material: Material) -> Iterator[tuple[str, Tissue | M
     """Yield the key of every material in a body, with the material."""
     if not body.is_filled:
         yield "material", material
-    count = len(body.regions) - len(body.inclusion)
-    for number, region in enumerate(body.regions):
-        place = f"layer[{number + 1}]" if number < count else f"inclusion[{number - count + 1}]"
-        yield f"body.{place}", region
+    yield from zip((f"body.{place}" for place in body.places), body.regions, strict=True)
 
 
 def _check_pieces(body: Body, problems: Problems) -> None:
-    """Check each layer and inclusion by itself."""
+    """Check each region by itself."""
     names = [region.name for region in body.regions]
     for name in sorted({name for name in names if names.count(name) > 1}):
-        problems.error("body", name, "is the name of more than one layer or inclusion; names must differ")
+        problems.error("body", name, "is the name of more than one layer, inclusion or region; names must differ")
     if isinstance(body, Layered):
         _check_layers(body, problems)
     for number, inclusion in enumerate(body.inclusion, start=1):
         if (inclusion.radius is None) == (inclusion.axes is None):
             problems.error(f"body.inclusion[{number}]", None, "needs a radius (a ball) or axes (an ellipsoid)")
+    if isinstance(body, FromFile):
+        _check_segments(body, problems)
+
+
+def _check_segments(body: FromFile, problems: Problems) -> None:
+    """Check that each region has a file with its unit, or a label of its own of the body's image."""
+    taken: dict[int | str, str] = {body.label: "the body"} if isinstance(body, FromImage) else {}
+    for number, piece in enumerate(body.region, start=1):
+        key = f"body.region[{number}]"
+        if (piece.file is None) == (piece.label is None):
+            problems.error(key, None, "needs either `file` (a closed surface) or `label` (of the body's image)")
+        elif piece.label is None:
+            if piece.unit is None:
+                problems.error(f"{key}.unit", None, 'is required, since surface files have none: unit = "mm"')
+        elif not isinstance(body, FromImage):
+            problems.error(f"{key}.label", piece.label, "needs a body from an image: give `file`, a closed surface")
+        else:
+            for name in sorted(piece.model_fields_set & {"unit", "repair"}):
+                problems.error(f"{key}.{name}", getattr(piece, name), "is for `file`; a label has the body's image")
+            if piece.label in taken:
+                problems.error(f"{key}.label", piece.label, f"is the label of {taken[piece.label]}: labels must differ")
+            taken.setdefault(piece.label, piece.name)
 
 
 def _check_layers(body: Layered, problems: Problems) -> None:
@@ -115,43 +137,62 @@ def _check_layers(body: Layered, problems: Problems) -> None:
             return
 
 
-def _check_inclusions(body: Body, problems: Problems) -> None:
-    """Report inclusions without room for an element around them."""
-    for number, inclusion in enumerate(body.inclusion, start=1):
-        surface, key = inclusion.surface, f"body.inclusion[{number}].at"
-        gap, found = GAP * min(surface.axes), [in_mm(x) for x in inclusion.at]
+def _check_room(body: Body, problems: Problems) -> None:
+    """Report embedded regions without room for an element around them."""
+    first = len(body.regions) - len(body.embedded)
+    pieces = list(zip(body.embedded, body.places[first:], strict=True))
+    for piece, place in pieces:
+        surface, (key, found) = piece.surface, _place_of(piece, place)
+        gap, why = GAP * surface.least, f"a tenth of {surface.LEAST}"
         if (room := body.room(surface)) < gap:
             problems.error(
                 key,
                 found,
-                f"{inclusion.name} must be inside the body, at least {in_mm(gap)} (a tenth of its smallest "
-                f"semi-axis) below the surface; "
+                f"{piece.name} must be inside the body, at least {in_mm(gap)} ({why}) below the surface; "
                 + (f"it is {in_mm(room)} below it" if room > 0 else f"it reaches {in_mm(-room)} out of the body")
-                + f". {_tissue_at(body, inclusion.at)}",
+                + f". {_where(body, piece)}",
             )
-        low, high = surface.centre[2] - surface.axes[2], surface.centre[2] + surface.axes[2]
+        (*_, low), (*_, high) = surface.bounds
         for height in body.interfaces:
             if (room := max(low - height, height - high)) < gap:
                 problems.error(
                     key,
                     found,
-                    f"{inclusion.name} must be at least {in_mm(gap)} (a tenth of its smallest semi-axis) from "
-                    "the end of "
-                    f"a layer, at z = {in_mm(height)}; {_distance(room)}",
+                    f"{piece.name} must be at least {in_mm(gap)} ({why}) from the end of a layer, at z = "
+                    f"{in_mm(height)}; {_distance(room)}",
                 )
-    for (i, one), (j, other) in itertools.combinations(enumerate(body.inclusion, start=1), 2):
-        gap = GAP * min(*one.surface.axes, *other.surface.axes)
+    for (one, first_place), (other, place) in itertools.combinations(pieces, 2):
+        thinner = min(one.surface, other.surface, key=lambda surface: surface.least)
+        gap = GAP * thinner.least
         if (room := _apart(one, other)) < gap:
+            key, found = _place_of(other, place)
             problems.error(
-                f"body.inclusion[{j}].at",
-                [in_mm(x) for x in other.at],
-                f"{other.name} must be at least {in_mm(gap)} (a tenth of the smallest semi-axis) from {one.name}, "
-                f"inclusion[{i}]; {_distance(room)}",
+                key,
+                found,
+                f"{other.name} must be at least {in_mm(gap)} (a tenth of {thinner.LEAST}) from {one.name}, "
+                f"{first_place}; {_distance(room)}",
             )
 
 
-def _apart(one: Inclusion, other: Inclusion) -> float:
-    """Return the distance (m) between two inclusions, negative where one reaches into the other."""
+def _place_of(piece: Embedded, place: str) -> tuple[str, Any]:
+    """Return the key that places an embedded region, and its value as messages quote it."""
+    if isinstance(piece, Inclusion):
+        return f"body.{place}.at", [in_mm(x) for x in piece.at]
+    assert isinstance(piece, Segment)
+    return (f"body.{place}.label", piece.label) if piece.file is None else (f"body.{place}.file", piece.file)
+
+
+def _where(body: Body, piece: Embedded) -> str:
+    """Say where an embedded region is nearest to the surface, or for an inclusion where there is tissue."""
+    if isinstance(piece, Inclusion):
+        return _tissue_at(body, piece.at)
+    points = piece.surface.sample(_POINTS)
+    x, y, z = points[int(np.argmin(body.inside(points)))]
+    return f"This is at x = {in_mm(x)}, y = {in_mm(y)}, z = {in_mm(z)}"
+
+
+def _apart(one: Embedded, other: Embedded) -> float:
+    """Return the distance (m) between two embedded regions, negative where one reaches into the other."""
     return min(
         float(b.distance(a.sample(_POINTS)).min())
         for a, b in ((one.surface, other.surface), (other.surface, one.surface))

@@ -15,6 +15,7 @@ from pipeline.shapes.insertion import Insertion
 from pipeline.shapes.regions import Inclusion, Layer
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import Section, Words
+from pipeline.shapes.segment import Segment
 from pipeline.shapes.tissue import LAWS, Fibres, Relaxation, Term, Tissue
 from pipeline.study.loads import Load, Traction
 from pipeline.study.measurement import Columns, ColumnUnits, Identify, Measurement, Sensitivity, Sign
@@ -291,7 +292,7 @@ EXPERIMENT: dict[str, type[Section]] = {
 }
 # Arrays of tables within a section: pieces of it, each with keys that can be swept.
 NESTED: dict[str, dict[str, type[Section]]] = {
-    "body": {"layer": Layer, "inclusion": Inclusion},
+    "body": {"layer": Layer, "inclusion": Inclusion, "region": Segment},
     "material": {"relaxation": Relaxation, "terms": Term},
     "load": {"traction": Traction},
 }

@@ -188,10 +188,10 @@ def put_back(
     moved[stay] = sheet.points[stay]
     if known is not None:
         moved[known] = places
-    return _settled(sheet, moved)
+    return settled(sheet, moved)
 
 
-def _settled(sheet: Sheet, moved: FloatArray) -> Sheet:
+def settled(sheet: Sheet, moved: FloatArray) -> Sheet:
     """Move the points of a sheet, except those whose facets would turn over."""
     before, points = sheet.normals, moved.copy()
     for _ in range(_ROUNDS):

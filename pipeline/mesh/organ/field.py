@@ -4,19 +4,18 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import gmsh
 import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray
-from pipeline.mesh.regions import InclusionSizes
+from pipeline.mesh.regions import EmbeddedSizes, distance_field
 from pipeline.mesh.size import Sizes, set_background
 from pipeline.shapes.frame import Frame
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """``sizes`` around a ``frame``, and those of ``inclusions``.
+    """``sizes`` around a ``frame``, and those of ``embedded`` regions.
 
     ``edge`` (n, 3), in m, are dense points along the footprint's edge.
     """
@@ -24,7 +23,7 @@ class Field:
     sizes: Sizes
     frame: Frame
     edge: FloatArray
-    inclusions: tuple[InclusionSizes, ...] = ()
+    embedded: tuple[EmbeddedSizes, ...] = ()
 
     @cached_property
     def _tree(self) -> cKDTree:
@@ -34,8 +33,8 @@ class Field:
         """Return the size (m) at points (n, 3) of the surface."""
         distance, _ = self._tree.query(points)
         size = self.sizes.at(points, self.frame.point, distance)
-        for inclusion in self.inclusions:
-            size = np.minimum(size, inclusion.at(points))
+        for region in self.embedded:
+            size = np.minimum(size, region.at(points))
         return size
 
     def set(self, scale: float, kernel: Any) -> None:
@@ -43,10 +42,6 @@ class Field:
 
         Distances are those from points along the footprint's edge, which are added to the model with its ``kernel``.
         """
-        mesh = gmsh.model.mesh
-        points = [kernel.addPoint(*p) for p in (self.edge / scale).tolist()]
-        kernel.synchronize()
-        distance = mesh.field.add("Distance")
-        mesh.field.setNumbers(distance, "NodesList", points)
+        distance = distance_field(self.edge / scale, kernel)
         terms = self.sizes.terms(self.frame.point, f"F{distance}", 1 / scale)
-        set_background([*terms, *(term for inclusion in self.inclusions for term in inclusion.terms(1 / scale))])
+        set_background([*terms, *(term for region in self.embedded for term in region.terms(1 / scale, kernel))])

@@ -11,13 +11,13 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError, flat_cells, orient
 from pipeline.mesh.organ.base import DEVIATION, Base, Kept, Near, far_surface, put_back
 from pipeline.mesh.organ.contact import Contact, FoldedError, set_in
+from pipeline.mesh.organ.embedded import embedded_surfaces
 from pipeline.mesh.organ.field import Field
-from pipeline.mesh.organ.inclusions import inclusion_surfaces
 from pipeline.mesh.organ.remesh import remesh
 from pipeline.mesh.organ.sheet import PROBE, Sheet, edges_of, group_names
 from pipeline.mesh.organ.untangle import TangledError, untangled
 from pipeline.mesh.organ.volume import fill
-from pipeline.mesh.regions import inclusion_sizes
+from pipeline.mesh.regions import embedded_sizes
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body
@@ -92,12 +92,12 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
         return scene.body.lift(scene.frame, points)[0]
 
     contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift)
-    field = Field(sizes, scene.frame, contact.edge, inclusion_sizes(scene.body, sizes.growth))
+    field = Field(sizes, scene.frame, contact.edge, embedded_sizes(scene.body, sizes.growth))
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
     sheet = untangled(sheet, np.unique(sheet.facets[sheet.group == PROBE]))
     _check_whole(sheet, scene.body.volume)
     deviation = _deviation(sheet, scene.body, field)
-    inner = inclusion_surfaces(scene.body.inclusion, field)
+    inner = embedded_surfaces(scene.body.embedded, field)
     points, cells, regions = fill(Complex.nested([(sheet.points, sheet.facets), *inner]), field)
     if (flat := flat_cells(points, cells)).any():
         raise TangledError.at(points[cells[flat]], "gmsh left a flat tetrahedron")

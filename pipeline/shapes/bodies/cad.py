@@ -13,9 +13,9 @@ from pydantic_core import PydanticCustomError
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.cad_face import CadFace, plane_piece, raised
 from pipeline.shapes.facetted import skin_of
-from pipeline.shapes.files.loaded import Solid
+from pipeline.shapes.files.loaded import UNITS, Solid
 from pipeline.shapes.frame import Frame, Vector, unit
-from pipeline.shapes.from_file import UNITS, FromFile
+from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.rays import facing, pierce
 from pipeline.shapes.section import Words
 from pipeline.shapes.support import Below, NamedFace

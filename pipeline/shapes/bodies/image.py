@@ -6,17 +6,18 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from pipeline.shapes.files.loaded import Loaded
-from pipeline.shapes.from_file import UNITS, FromFile
+from pipeline.shapes.files.loaded import UNITS, Loaded
+from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
+from pipeline.shapes.triangles import SurfaceError
 from pipeline.units import Travel
 
 
 class FromImage(FromFile, Scanned):
     """The voxels of one label, in the patient's frame: x to the right, y to the front, z to the head."""
 
-    READ_BY: ClassVar[frozenset[str]] = frozenset({"label", "names", "unit", "smooth"})
+    READ_BY: ClassVar[frozenset[str]] = frozenset({"label", "names", "unit", "smooth", "region"})
 
     shape: Literal["image"]
     label: Annotated[
@@ -60,8 +61,17 @@ class FromImage(FromFile, Scanned):
 
     @classmethod
     def read(cls, file: str, given: Mapping[str, Any]) -> Loaded:
-        """Return the surface of the label."""
+        """Return the surface of the label, together with the labels of its regions."""
         from pipeline.shapes.files.image import read_image  # noqa: PLC0415 (only when a file is read)
 
-        unit = UNITS[given["unit"]] if given["unit"] else None
-        return read_image(Path(file), given["label"], unit, given["smooth"], given["names"])
+        def surface(label: int | str, smooth: float | None, inner: tuple[int | str, ...] = ()) -> Loaded:
+            unit = UNITS[given["unit"]] if given["unit"] else None
+            return read_image(Path(file), label, unit, smooth, given["names"], inner)
+
+        labelled = {piece.label: piece for piece in given["region"] if piece.label is not None}
+        for label, piece in labelled.items():
+            try:
+                piece.load(surface(label, given["smooth"] if piece.smooth is None else piece.smooth))
+            except SurfaceError as error:
+                raise SurfaceError(f"{piece.name}, label {label}: {error}") from error
+        return surface(given["label"], given["smooth"], tuple(labelled))

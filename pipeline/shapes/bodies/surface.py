@@ -6,8 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from pipeline.shapes.files.loaded import Loaded
-from pipeline.shapes.from_file import UNITS, FromFile
+from pipeline.shapes.files.loaded import UNITS, Loaded
+from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
 from pipeline.units import Travel

@@ -26,8 +26,12 @@ from pipeline.shapes.triangles import SurfaceError, Triangles, enclosed
 # Voxels outside the largest piece, or enclosed by it, are noise up to this share of it.
 MOST_APART = 0.05
 # Increase by hand when the same label gives another surface.
-_METHOD = 1
+_METHOD = 2
 _REACH = 4.0  # truncation of the filter, in standard deviations
+# The default filter is narrowed by a factor until its largest value shows that tissue is thick enough for it: 0.985 is
+# that in the middle of a ball of 3.2 standard deviations. It is not narrowed below this share of a voxel. On an
+# ellipsoid of 10 × 8 × 6 mm, voxels of 1, 2 and 4 mm then give distances of .09, .2 and .74 mm, close to the least.
+_THICK, _NARROWER, _NARROWEST = 0.985, 0.85, 0.75
 # Tolerance on the volume in the search for the level, and most steps.
 _SAME_VOLUME, _LEVELS = 5e-4, 6
 # Values are moved away from the level by this much, to avoid sliver facets.
@@ -36,13 +40,18 @@ _CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1
 
 
 def read_image(
-    path: Path, label: int | str, unit: float | None = None, smooth: float | None = None, names: str = ""
+    path: Path,
+    label: int | str,
+    unit: float | None = None,
+    smooth: float | None = None,
+    names: str = "",
+    inner: tuple[int | str, ...] = (),
 ) -> Loaded:
     """Return the surface of the voxels with a ``label``, a number or a name, and notices of what was changed.
 
-    ``unit`` (m) is needed only if the header names none; ``smooth`` (m) is the standard deviation of the filter;
-    ``names`` is that of :func:`read_labels`. Files are read again only when they have changed, and the surface is
-    cached on disk.
+    Voxels with one of the ``inner`` labels, those of regions of a body, belong to it, too. ``unit`` (m) is needed only
+    if the header names none; ``smooth`` (m) is the standard deviation of the filter; ``names`` is that of
+    :func:`read_labels`. Files are read again only when they have changed, and the surface is cached on disk.
 
     Raises:
         SurfaceError: if the label does not bound one piece of tissue; the message says what was found and how to repair
@@ -58,7 +67,7 @@ def read_image(
                 raise
             what = "`names`:" if str(file) == names else "the data file of its header,"
             raise SurfaceError(f"{what} `{file}`, {error}") from error
-    return _load(path, files, tuple(states), label, unit, smooth, names)
+    return _load(path, files, tuple(states), (label, *inner), unit, smooth, names)
 
 
 def _changed(path: Path) -> int:
@@ -71,12 +80,12 @@ def _files(path: Path, _time: int, names: str) -> tuple[Path, ...]:
     return files_of(path, names)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def _load(
     path: Path,
     files: tuple[Path, ...],
     states: tuple[tuple[int, int], ...],
-    label: int | str,
+    labels: tuple[int | str, ...],
     unit: float | None,
     smooth: float | None,
     names: str,
@@ -87,10 +96,10 @@ def _load(
         raise SurfaceError(f"has {largest / 1e9:.2g} GB, more than {LARGEST_IMAGE / 1e9:g}: crop or resample it")
 
     def make() -> tuple[Triangles, tuple[str, ...]]:
-        found = surface_of(read_labels(path, unit, names), label, smooth)
+        found = surface_of(read_labels(path, unit, names), labels[0], smooth, labels[1:])
         return found.triangles, found.notices
 
-    given = f"{_METHOD} {path.suffix.lower()} {label!r} {unit!r} {smooth!r} {names if names in CLASS_MAPS else ''}"
+    given = f"{_METHOD} {path.suffix.lower()} {labels!r} {unit!r} {smooth!r} {names if names in CLASS_MAPS else ''}"
     try:
         return Loaded(*kept_image(files, given, make))
     except OSError as error:
@@ -105,14 +114,15 @@ def default_smooth(spacing: FloatArray) -> float:
     return max(1.5 * float(np.prod(spacing)) ** (1 / 3), float(spacing.max()))
 
 
-def surface_of(labels: LabelMap, label: int | str, smooth: float | None = None) -> Loaded:
-    """Return the surface of the voxels with a ``label``."""
-    mask = of_label(labels, label)
+def surface_of(
+    labels: LabelMap, label: int | str, smooth: float | None = None, inner: tuple[int | str, ...] = ()
+) -> Loaded:
+    """Return the surface of the voxels with a ``label``, or one of the ``inner`` labels."""
+    mask = np.logical_or.reduce([of_label(labels, one) for one in (label, *inner)])
     mask, start, notices = one_piece(mask, float(np.prod(labels.spacing)))
-    deviation = default_smooth(labels.spacing) if smooth is None else smooth
-    sigma = deviation / labels.spacing
+    sigma = (default_smooth(labels.spacing) if smooth is None else smooth) / labels.spacing
     margin = np.ceil(_REACH * sigma).astype(int) + 2
-    indices, facets = _smoothed(np.pad(mask, [(m, m) for m in margin]), sigma)
+    indices, facets = _smoothed(np.pad(mask, [(m, m) for m in margin]), sigma, may_narrow=smooth is None)
     points = (indices + (start - margin)) @ labels.affine[:, :3].T + labels.affine[:, 3]
     if enclosed(points, facets) < 0:  # a mirrored frame
         facets = np.ascontiguousarray(facets[:, ::-1])
@@ -154,15 +164,18 @@ def one_piece(mask: Any, voxel: float) -> tuple[Any, IntArray, list[str]]:
     return filled, np.array([part.start for part in box]), notices
 
 
-def _smoothed(mask: Any, sigma: FloatArray) -> tuple[FloatArray, IntArray]:
+def _smoothed(mask: Any, sigma: FloatArray, *, may_narrow: bool) -> tuple[FloatArray, IntArray]:
     """Return the surface, in indices, of a mask after the filter, at the level that keeps its volume."""
     from scipy import ndimage  # noqa: PLC0415
 
-    values = mask.astype(np.float32)
+    steps = mask.astype(np.float32)
     if not sigma.any():
-        return march(values, 0.5)
+        return march(steps, 0.5)
     volume = float(mask.sum())
-    values = ndimage.gaussian_filter(values, sigma, truncate=_REACH)
+    values = ndimage.gaussian_filter(steps, sigma, truncate=_REACH)
+    while may_narrow and values.max() < _THICK and sigma.max() * _NARROWER > _NARROWEST:
+        sigma = sigma * _NARROWER
+        values = ndimage.gaussian_filter(steps, sigma, truncate=_REACH)
     # Secant method for the level at which the volume is that of the mask, from one half.
     level, before = 0.5, None
     for _ in range(_LEVELS):

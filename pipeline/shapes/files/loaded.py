@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.triangles import Triangles
 
+# Metres in the units of length of files.
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
+
 
 @dataclass(frozen=True)
 class Loaded:

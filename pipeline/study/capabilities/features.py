@@ -115,6 +115,7 @@ def needs_time_steps(scene: Scene) -> bool:
 FEATURES: dict[str, Feature] = {
     "layers": Feature("body.layer", lambda s: isinstance(s.body, Layered) and bool(s.body.layer)),
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
+    "region": Feature("body.region", lambda s: "region" in s.body.pieces),
     "curved body": Feature("body.shape", lambda s: not isinstance(s.body, Layered)),
     "large displacements": Feature("material.law", lambda s: s.material.is_large),
     "relaxation": Feature("material.relaxation", lambda s: any(_relaxations(s)), ("body",)),
@@ -160,6 +161,7 @@ FEATURES: dict[str, Feature] = {
     "curved or inclined surface": Feature("probe.axis", lambda s: not _is_flat(s), ("body",)),
     "no flat top": Feature("body.shape", lambda s: not (isinstance(s.body, Layered) and _is_level(s)), ("probe",)),
     "surface or image": Feature("body.shape", lambda s: isinstance(s.body, FromFile) and not s.body.HAS_NAMES),
+    "CAD solid": Feature("body.shape", lambda s: isinstance(s.body, FromFile) and s.body.HAS_NAMES),
     "fixed sides": Feature("body.fixed", lambda s: s.body.support.gap(0.0) == 0.0),
     "only sides fixed": Feature("body.fixed", lambda s: not s.body.support.holds_column()),
     "free column": Feature("mesh.outside", lambda s: s.mesh.outside == "free" and isfinite(s.mesh.epsilon)),

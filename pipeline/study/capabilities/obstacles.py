@@ -25,6 +25,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     "reduced basis": {
         "layers": "a body of several materials has more than one parameter",
         "inclusion": "a body of several materials has more than one parameter",
+        "region": "a body of several materials has more than one parameter",
         "unilateral contact": "the contact area changes with Poisson's ratio",
         "half ball": "the far field changes with Poisson's ratio",
         "large displacements": "the problem is nonlinear",
@@ -43,6 +44,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     "equivalent places": {
         "fibres": "the direction of the fibres is fixed in the body",
         "inclusion": "the distance to the inclusion differs",
+        "region": "the distance to the region differs",
         "loads": "loads act on the whole body",
         "Green's function": "the Green's function of the body depends on the place",
     },

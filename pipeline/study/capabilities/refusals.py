@@ -36,6 +36,7 @@ _OF_LAW = "with a law of large displacements"
 REFUSALS: tuple[Refusal, ...] = (
     # What the shapes have no keys for: the schema refuses it.
     Refusal("layers", "curved body", "layers need the flat top of a box or a cylinder"),
+    Refusal("region", "CAD solid", "a solid of a CAD file has inclusions only: write [[body.inclusion]]"),
     Refusal("tool that is not flat", "frictionless contact", "the area in contact is computed, not prescribed"),
     # A half ball that a far field closes.
     Refusal("half ball", "accuracy", "the far field adds an error that accuracy does not cover: omit accuracy"),

@@ -1,0 +1,54 @@
+"""Closed surfaces inside a body, which bound its inclusions and regions."""
+
+from abc import abstractmethod
+from typing import ClassVar
+
+from pipeline.arrays import FloatArray
+from pipeline.shapes.frame import Vector
+from pipeline.shapes.surface import Surface
+
+
+class Closed(Surface):
+    """A closed surface. Distances are positive outside.
+
+    ``LEAST`` is :attr:`least` in the words of messages.
+    """
+
+    is_curved = True
+    LEAST: ClassVar[str]
+
+    @property
+    @abstractmethod
+    def least(self) -> float:
+        """Half of its smallest thickness (m), to which elements and distances are compared."""
+
+    @property
+    @abstractmethod
+    def volume(self) -> float:
+        """Enclosed volume (m³)."""
+
+    @property
+    @abstractmethod
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Lowest and highest coordinates (m)."""
+
+    @property
+    @abstractmethod
+    def identity(self) -> str:
+        """Text that is equal for equal surfaces only."""
+
+    @abstractmethod
+    def sample(self, count: int) -> FloatArray:
+        """Return at least ``count`` points of the surface (n, 3), in m, which leave no part of it out."""
+
+    @abstractmethod
+    def widths(self) -> tuple[FloatArray, FloatArray]:
+        """Return areas (n), in m², of parts of the surface, and half of the thickness (n), in m, inside each part."""
+
+    @abstractmethod
+    def has_axis(self, within: float) -> bool:
+        """Return whether it is axisymmetric about the z axis; its centre is off it by at most ``within`` (m)."""
+
+    @abstractmethod
+    def is_mirrored(self, axis: int) -> bool:
+        """Return whether it is its own image in the plane where the coordinate ``axis`` is zero."""

@@ -1,0 +1,111 @@
+"""Regions of any shape inside a body: from a surface file, or a label of the body's own image."""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
+
+from pipeline.shapes.files.loaded import UNITS, Loaded
+from pipeline.shapes.regions import Embedded
+from pipeline.shapes.section import Words
+from pipeline.shapes.shell import Shell
+from pipeline.shapes.triangles import SurfaceError, Triangles
+from pipeline.units import Travel
+
+_FEW = 32  # cached surfaces with their search trees and thickness
+
+
+class Segment(Embedded):
+    """A region of any shape: the inside of a surface file, or a label of the body's own image."""
+
+    unit: Annotated[
+        Literal["m", "cm", "mm", "um", "µm"] | None,
+        Field(exclude=True),
+        Words("Unit of length of `file`; surface files have none.", '"mm"', default="none: a label is given"),
+    ] = None
+    repair: Annotated[
+        bool,
+        Field(exclude=True),
+        Words(
+            "Repair of a broken surface: holes are closed, and small loose parts are removed. A "
+            "warning lists the changes.",
+            "true",
+        ),
+    ] = False
+    smooth: Annotated[
+        Travel | None,
+        Field(exclude=True),
+        Words(
+            "Smoothing length of the surface, as that of a body.",
+            '"1 mm"',
+            default="of a label, that of the body; a file is not smoothed",
+        ),
+    ] = None
+    label: Annotated[
+        Annotated[int, Field(gt=0)] | Annotated[str, Field(min_length=1)] | None,
+        Field(exclude=True),
+        Words(
+            "Label of the region in the image of the body, by value or by name. The body is the union of its own label "
+            "and those of its regions.",
+            "2",
+            default="none: a file is given",
+        ),
+    ] = None
+    file: Annotated[
+        str | None,
+        Field(exclude=True),
+        Words(
+            "File of a closed surface, STL, PLY or OBJ, in the frame of the body: its path from the folder of the "
+            "study.",
+            '"tumour.stl"',
+            default="none: a label is given",
+        ),
+    ] = None
+
+    _loaded: Loaded | None = PrivateAttr(None)
+    _surface: Shell | None = PrivateAttr(None)
+
+    @field_validator("file")
+    @classmethod
+    def _readable(cls, file: str | None, info: ValidationInfo) -> str | None:
+        if file is not None and info.data.keys() >= {"unit", "repair", "smooth"} and info.data["unit"]:
+            try:
+                _read(file, info.data)
+            except SurfaceError as error:
+                raise PydanticCustomError("surface", "{what}", {"what": str(error)}) from None
+        return file
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Load the surface of a file; that of a label is given by the body, which has the image."""
+        if self.file is not None and self.unit is not None:
+            self.load(_read(self.file, dict(self)))
+
+    def load(self, found: Loaded) -> None:
+        """Set its surface."""
+        self._loaded, self._surface = found, shell_of(found.triangles)
+
+    @property
+    def surface(self) -> Shell:
+        """Its surface."""
+        assert self._surface is not None  # validated with the study
+        return self._surface
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Notices about changes to its surface that the author of the study should know."""
+        return self._loaded.notices if self._loaded else ()
+
+
+@lru_cache(_FEW)
+def shell_of(triangles: Triangles) -> Shell:
+    """Return the surface with its search tree."""
+    return Shell(triangles)
+
+
+def _read(file: str, given: Mapping[str, Any]) -> Loaded:
+    from pipeline.shapes.files.read import read_surface  # noqa: PLC0415 (only when a file is read)
+
+    return read_surface(Path(file), UNITS[given["unit"]], given["repair"], given["smooth"] or None)
