@@ -41,9 +41,10 @@ def insertion(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Follow the insertion of a study's blade: F over depth with indentation, puncture and cutting.
+    """Follow the insertion of a study's blade: F over depth with its phases.
 
-    The study's table [probe.insertion] has the last depth and the steps. The solved states are cases, which are kept in
+    Phases are indentation, puncture, cutting and withdrawal. The study's table [probe.insertion] has the last depth and
+    the steps. The solved states are cases, which are kept in
     the case store: run the same command to continue after an interruption.
 
     Example: epsmesh insertion studies/scalpel-path.toml

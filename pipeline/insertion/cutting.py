@@ -5,10 +5,10 @@ the blade at a fixed front, and 2b is the length of the front. Where G = Γ, the
 that is stored, and the work of fracture.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pipeline.insertion.near_tip import EXTENSION_ERROR, NearTip, strength
-from pipeline.insertion.states import SHORT, Cut, Scene
+from pipeline.insertion.states import SHORT, Cut, Scene, Tissue
 
 # A front is solved again if it is this much farther ahead than where it was solved.
 _FARTHER = 1.1
@@ -19,7 +19,7 @@ _SHALLOW = 3.5
 
 @dataclass(frozen=True)
 class Cutting:
-    """A blade that cuts, its tip at ``depth`` (m) and the front of the slit ``ahead`` (m).
+    """A blade that cuts, its tip at ``depth`` (m) and the front of the slit ``ahead`` (m), in the ``field`` between.
 
     ``stored`` and ``fracture`` are energies (J) since the first touch; ``elastic`` and ``cutting`` the parts of the
     force (N), ``squeeze`` (N) the normal force on each flank. Those with an error have its 95 % bar.
@@ -27,6 +27,7 @@ class Cutting:
 
     depth: float
     ahead: float
+    field: NearTip
     stored: float
     stored_error: float
     fracture: float
@@ -35,7 +36,6 @@ class Cutting:
     cutting: float
     squeeze: float
     squeeze_error: float
-    release: float
 
     @property
     def energy(self) -> float:
@@ -90,33 +90,38 @@ def _room(scene: Scene, depth: float) -> float:
 
 
 def _cutting(scene: Scene, cut: Cut) -> Cutting:
-    """Return the blade where G is the toughness, from one solved distance of the front."""
+    """Return the blade where G is the toughness, below its tip and beside its ends, from one solved slit."""
     tissue, length, width = scene.at(cut.depth), scene.blade.length, scene.blade.width
-    field = NearTip.through(strength(tissue.young, tissue.poisson, width / 2), cut.ahead, cut.release)
-    ahead = field.ahead(tissue.toughness)
-    front, solved_front = length + 2 * ahead, length + 2 * cut.ahead
-    # What lies between both distances, and how far the error of G there moves it.
-    near, far = sorted((ahead, cut.ahead))
-    sign = 1.0 if ahead < cut.ahead else -1.0
-    added = sign * field.energy(near, far, length + 2 * cut.depth)
-    widened = sign * 2 * field.per_length(near, far)
-    share = cut.release_error / cut.release
+    field = NearTip.through(_strength(scene, tissue), cut.ahead, cut.release)
+    ahead, share = field.ahead(tissue.toughness), cut.release_error / cut.release
+    # What is between the solved front and this one, and how far the error of G moves it.
+    added = length * field.per_length(ahead, cut.ahead) + field.corners(ahead, cut.ahead)
+    moved = length * field.strength
+    fracture = length * scene.tear(cut.depth + ahead) + 2 * ahead**2 * tissue.toughness
+    for layer, height in scene.above(cut.depth):
+        beside = replace(field, strength=_strength(scene, layer))
+        end = beside.ahead(layer.toughness)
+        added += 2 * height * beside.per_length(end, cut.ahead)
+        moved += 2 * height * beside.strength
+        fracture += 2 * height * end * layer.toughness
+    widened, solved_front = 2 * field.per_length(ahead, cut.ahead), length + 2 * cut.ahead
     stored = cut.energy + added
-    stored_error = cut.energy_error + EXTENSION_ERROR * abs(added) + share * field.strength * (length + 2 * cut.depth)
-    elastic = cut.drive - solved_front * cut.release + widened
-    elastic_error = (
-        cut.drive_error + solved_front * cut.release_error + EXTENSION_ERROR * abs(widened) + 2 * share * field.strength
-    )
+    stored_error = cut.energy_error + EXTENSION_ERROR * abs(added) + share * moved
+    force_error = cut.drive_error + solved_front * cut.release_error
     return Cutting(
         depth=cut.depth,
         ahead=ahead,
+        field=field,
         stored=stored,
         stored_error=stored_error,
-        fracture=front * scene.tear(cut.depth + ahead),
-        elastic=elastic,
-        elastic_error=elastic_error,
-        cutting=front * tissue.toughness,
+        fracture=fracture,
+        elastic=cut.drive - solved_front * cut.release + widened,
+        elastic_error=force_error + EXTENSION_ERROR * abs(widened) + 2 * share * field.strength,
+        cutting=(length + 2 * ahead) * tissue.toughness,
         squeeze=2 * stored / width,
         squeeze_error=2 * stored_error / width,
-        release=field.release(ahead),
     )
+
+
+def _strength(scene: Scene, tissue: Tissue) -> float:
+    return strength(tissue.young, tissue.poisson, scene.blade.width / 2)

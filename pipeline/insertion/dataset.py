@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.insertion.path import PHASES, Path
+from pipeline.insertion.path import Path
+from pipeline.insertion.steps import PHASES, Step
 from pipeline.study.sweep import Study
 
 # Name, unit and meaning of what has a value at each depth, in the order of ``_of``.
@@ -27,29 +28,16 @@ _ERRORS = "error bar (95 %) on"
 
 def dataset_of(study: Study, path: Path) -> xr.Dataset:
     """Return the dataset of a path: of each depth, the puncture, and why the path ended early."""
-    steps = path.steps
-    columns = [
-        (
-            step.force,
-            step.error,
-            step.elastic,
-            step.cutting,
-            step.friction,
-            step.crack_depth,
-            step.stored,
-            step.fracture,
-            step.rubbed,
-            step.work,
-            step.balance,
-        )
-        for step in steps
-    ]
+    sides = [path.steps, path.withdrawal] if path.withdrawal else [path.steps]
+    dims = ("direction", "depth") if path.withdrawal else ("depth",)
+    columns = np.array([[_of(step) for step in side] for side in sides])
     values: dict[str, Any] = {
-        name: ("depth", column, {"units": unit, "long_name": meaning})
-        for (name, unit, meaning), column in zip(_STEPS, np.array(columns).T, strict=True)
+        name: (dims, column if path.withdrawal else column[0], {"units": unit, "long_name": meaning})
+        for (name, unit, meaning), column in zip(_STEPS, np.moveaxis(columns, 2, 0), strict=True)
     }
     values["force"][2]["ancillary_variables"] = "force_error"
-    values["phase"] = ("depth", np.array([PHASES.index(step.phase) for step in steps], dtype=np.int8), _flags())
+    phases = np.array([[PHASES.index(step.phase) for step in side] for side in sides], dtype=np.int8)
+    values["phase"] = (dims, phases if path.withdrawal else phases[0], _flags())
     for name, unit, value, error in zip(
         ("puncture_depth", "puncture_force"), ("m", "N"), path.puncture, path.puncture_error, strict=True
     ):
@@ -57,9 +45,18 @@ def dataset_of(study: Study, path: Path) -> xr.Dataset:
         linked = {"ancillary_variables": f"{name}_error"}
         values[name] = ((), value, {"units": unit, "long_name": f"{what}; missing if it stays whole"} | linked)
         values[f"{name}_error"] = ((), error, {"units": unit, "long_name": f"{_ERRORS} {name}"})
-    depth = ("depth", [step.depth for step in steps], {"units": "m", "long_name": "depth of the tool's tip"})
+    depth = ("depth", [step.depth for step in path.steps], {"units": "m", "long_name": "depth of the tool's tip"})
+    coordinates: dict[str, Any] = {"depth": depth}
+    if path.withdrawal:
+        coordinates["direction"] = ("direction", ["insertion", "withdrawal"], {"long_name": "direction of the motion"})
     told = {"Conventions": "CF-1.8", "title": study.title, "study": study.text, "message": path.message}
-    return xr.Dataset(values, {"depth": depth}, told)
+    return xr.Dataset(values, coordinates, told)
+
+
+def _of(step: Step) -> tuple[float, ...]:
+    forces = step.force, step.error, step.elastic, step.cutting, step.friction
+    energies = step.stored, step.fracture, step.rubbed, step.work
+    return (*forces, step.crack_depth, *energies, step.balance)
 
 
 def _flags() -> dict[str, Any]:

@@ -43,17 +43,20 @@ class NearTip:
         share = 4 * self.bend * self.strength / toughness
         return 2 * self.strength / toughness / (1 + sqrt(max(1 + share, 0.0)))
 
-    def energy(self, near: float, far: float, edge: float) -> float:
-        """Return the energy (J) stored by a slit that ends ``near`` its blade, less that of one that ends ``far`` (m).
-
-        Both are in front of a tip of some length, and of two ends; together they have the length ``edge`` (m), to
-        which four distances are added where they meet.
-        """
-        return edge * self.per_length(near, far) + 4 * self.strength * self._rest(near, far)
+    def corners(self, near: float, far: float) -> float:
+        """Return the energy (J) of the area that both lower corners of a slit gain between two distances (m)."""
+        return 4 * self.strength * self._rest(near, far)
 
     def per_length(self, near: float, far: float) -> float:
-        """Return the integral of G (J/m) between two distances (m)."""
+        """Return what a slit that ends ``near`` (m) stores more, per length (J/m), than one that ends ``far`` (m).
+
+        It is negative if the first distance is larger.
+        """
         return self.strength * (log(far / near) - self.bend * self._rest(near, far))
+
+    def by_bend(self, near: float, far: float) -> float:
+        """Return the decrease (J) of ``per_length`` per unit of κ."""
+        return self.strength * (far / (1 + self.bend * far) - near / (1 + self.bend * near))
 
     def _rest(self, near: float, far: float) -> float:
         """Return the integral of 1 / (1 + κ a) (m)."""

@@ -5,7 +5,7 @@ Tissue is pierced at the depth where U − U_slit = Γ A, at the slit for which 
 G = Γ, as in cutting. No threshold is fitted. Friction μ N acts on both flanks, N from the field without friction.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import nan
 
@@ -16,11 +16,11 @@ from scipy.optimize import brentq
 from pipeline.arrays import FloatArray
 from pipeline.insertion.cutting import Cutting, cuttings
 from pipeline.insertion.states import Scene
+from pipeline.insertion.steps import CUTTING, INDENTATION, PUNCTURE, Step
+from pipeline.insertion.withdrawal import withdrawn
 from pipeline.study.sweep import Study
 from pipeline.surrogate.cases import Solve, SurrogateError
 
-INDENTATION, PUNCTURE, CUTTING = "indentation", "puncture", "cutting"
-PHASES = (INDENTATION, PUNCTURE, CUTTING)
 # The least depth at which a slit is solved, in widths of the blade.
 _LEAST = 0.25
 # The state after the puncture is so much deeper (m) than the one before: depths of a dataset rise.
@@ -29,36 +29,10 @@ _TINY = 1e-9
 
 
 @dataclass(frozen=True)
-class Step:
-    """One depth (m) of a path: forces (N) with the error bar of their sum, energies (J) since the first touch."""
-
-    phase: str
-    depth: float
-    elastic: float
-    cutting: float = 0.0
-    friction: float = 0.0
-    error: float = 0.0
-    stored: float = 0.0
-    fracture: float = 0.0
-    rubbed: float = 0.0
-    work: float = 0.0
-    crack_depth: float = 0.0
-
-    @property
-    def force(self) -> float:
-        """Force (N) of the tissue against the advance."""
-        return self.elastic + self.cutting + self.friction
-
-    @property
-    def balance(self) -> float:
-        """Work less stored energy, work of fracture and friction, relative to the work."""
-        return (self.work - self.stored - self.fracture - self.rubbed) / self.work
-
-
-@dataclass(frozen=True)
 class Path:
     """Steps of an insertion; depth (m) and force (N) of the puncture with error bars, NaN if the tissue stays whole.
 
+    The ``withdrawal``, if any, has a step for each depth, in the same order.
     ``message`` says at which depth the path ended early, and why.
     """
 
@@ -66,6 +40,7 @@ class Path:
     puncture: tuple[float, float] = (nan, nan)
     puncture_error: tuple[float, float] = (nan, nan)
     message: str = ""
+    withdrawal: tuple[Step, ...] = ()
 
 
 def follow(study: Study, solve: Solve) -> Path:
@@ -82,7 +57,8 @@ def follow(study: Study, solve: Solve) -> Path:
     whole = _Whole(stiffness, bar)
     # No slit is cheaper than its work of fracture alone: before, the tissue is whole.
     first = next((depth for depth in depths if whole.energy(depth) >= scene.blade.length * scene.tear(depth)), np.inf)
-    found, message = cuttings(scene, depths[depths >= first].tolist())
+    withdraws = scene.insertion.withdraw and np.isfinite(first)  # through all depths, after the tissue is cut
+    found, message = cuttings(scene, (depths if withdraws else depths[depths >= first]).tolist())
     intact = [one for one in found if whole.energy(one.depth) < one.energy]
     cut = found[len(intact) :]
     if not cut:
@@ -94,7 +70,14 @@ def follow(study: Study, solve: Solve) -> Path:
     puncture = _puncture(scene, whole, intact, cut[0], max(depths[depths < first], default=0.0))
     kept = [whole.step(depth) for depth in depths if depth < puncture.depth]
     steps = (*kept, *_steps(scene, whole, puncture, cut))
-    return Path(steps, (puncture.depth, stiffness * puncture.depth), puncture.errors(whole), message)
+    back: list[Step] = []
+    if withdraws:
+        above = [one for one in found if one.depth < puncture.depth]
+        below = [one for one in cut if one.depth > puncture.depth]
+        states = [*above, puncture.after, *below][::-1]
+        back = withdrawn(scene, states, steps[-1])[::-1]
+        back.insert(len(above), replace(back[len(above)], depth=puncture.depth))  # the puncture has two steps
+    return Path(steps, (puncture.depth, stiffness * puncture.depth), puncture.errors(whole), message, tuple(back))
 
 
 @dataclass(frozen=True)
@@ -164,10 +147,11 @@ def _crossing(scene: Scene, whole: _Whole, low: float, high: float) -> float:
 def _between(before: Cutting, after: Cutting, depth: float) -> Cutting:
     """Return the cutting blade at a depth (m) between two others."""
     share = (depth - before.depth) / (after.depth - before.depth)
-    mixed = {name: (1 - share) * getattr(before, name) + share * getattr(after, name) for name in vars(before)}
+    numbers = [name for name, value in vars(before).items() if isinstance(value, float)]
+    mixed = {name: (1 - share) * getattr(before, name) + share * getattr(after, name) for name in numbers}
     ends = [before.depth, after.depth]
     stored = CubicHermiteSpline(ends, [before.stored, after.stored], [before.elastic, after.elastic])
-    return Cutting(**(mixed | {"depth": depth, "stored": float(stored(depth))}))
+    return replace(after, **(mixed | {"depth": depth, "stored": float(stored(depth))}))
 
 
 def _steps(scene: Scene, whole: _Whole, puncture: _Puncture, cut: list[Cutting]) -> list[Step]:

@@ -100,13 +100,15 @@ class Scene:
         """Return the tissue at a depth (m)."""
         return [layer for layer in self.layers if layer.top <= depth][-1]
 
+    def above(self, depth: float) -> list[tuple[Tissue, float]]:
+        """Return the layers above a depth (m), each with its thickness there (m)."""
+        ends = (*self.interfaces, np.inf)
+        found = [(one, min(depth, end) - one.top) for one, end in zip(self.layers, ends, strict=True)]
+        return [(one, thickness) for one, thickness in found if thickness > 0]
+
     def tear(self, depth: float) -> float:
         """Return the integral of the toughness (J/m) from the surface to a depth (m)."""
-        ends = (*self.interfaces, np.inf)
-        return sum(
-            layer.toughness * max(min(depth, end) - layer.top, 0.0)
-            for layer, end in zip(self.layers, ends, strict=True)
-        )
+        return sum(one.toughness * thickness for one, thickness in self.above(depth))
 
     def clear(self, depth: float) -> float:
         """Return the depth (m) nearest to ``depth`` at which the tip is half a width or more away from interfaces."""

@@ -14,6 +14,8 @@ def answer(dataset: xr.Dataset) -> list[str]:
 
 
 def _lines(dataset: xr.Dataset) -> Iterator[str]:
+    back = dataset.isel(direction=-1, depth=-1) if "direction" in dataset.dims else None
+    whole, dataset = dataset, dataset.isel(direction=0) if back is not None else dataset
     last = dataset.isel(depth=-1)
     if np.isnan(float(dataset["puncture_depth"])):
         yield f"the tissue stays whole down to {write('depth', float(last['depth']))}: F is {_force(last)} there"
@@ -25,7 +27,13 @@ def _lines(dataset: xr.Dataset) -> Iterator[str]:
             f"{part} {1e3 * float(last[f'force_{part}']):.4g}" for part in ("elastic", "cutting", "friction")
         )
         yield f"cutting at {write('depth', float(last['depth']))}: F = {_force(last)} (in mN: {parts})"
-    worst = float(abs(dataset["balance"]).max())
+    if back is not None:
+        pulled = whole.isel(direction=-1)["force"]
+        yield (
+            f"withdrawal: F from {1e3 * float(pulled[-1]):.4g} to {1e3 * float(pulled[0]):.4g} mN, at least "
+            f"{1e3 * float(pulled.values.min()):.4g} mN"
+        )
+    worst = float(np.abs(whole["balance"].values).max())
     yield f"work is stored energy + fracture + friction within {100 * worst:.2g} %"
     if message := str(dataset.attrs["message"]):
         yield f"the path ends early, at {message}"

@@ -17,6 +17,9 @@ class Insertion(BaseModel):
     steps: Annotated[
         int, Field(ge=2, le=1000), Words("Number of depths, in equal steps, at which the force is computed.", "30")
     ] = 30
+    withdraw: Annotated[
+        bool, Words("Withdrawal of the tool after the last depth, through the same depths.", "true")
+    ] = False
 
 
 def last_depth(insertion: object) -> object:

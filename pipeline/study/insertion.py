@@ -28,6 +28,10 @@ def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
     if len(problems.errors) == before and isinstance(body, Layered):
         _check_end(body, probe, insertion, problems)
         _check_layers(body, probe, insertion, problems)
+        if insertion.withdraw and body.layer:
+            problems.error(
+                "probe.insertion.withdraw", True, "withdrawal is computed in a body of one material: omit it, or layers"
+            )
 
 
 def _check_keys(probe: Blade, problems: Problems) -> None:

@@ -27,7 +27,7 @@ FIELD = NearTip(strength(YOUNG, POISSON, WIDTH / 2), 700.0)
 
 def stored(depth, ahead):
     """Return the energy (J) of the body with a slit."""
-    return GROWTH * depth + FIELD.energy(ahead, FAR, LENGTH + 2 * depth)
+    return GROWTH * depth + (LENGTH + 2 * depth) * FIELD.per_length(ahead, FAR) + FIELD.corners(ahead, FAR)
 
 
 def elastic(depth, ahead):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.insertion.path import PHASES
+from pipeline.insertion.steps import PHASES
 from pipeline.study.toml import to_toml
 
 STUDY = {

@@ -7,7 +7,8 @@ from scipy.optimize import brentq
 
 from pipeline.insertion.dataset import dataset_of
 from pipeline.insertion.near_tip import NearTip
-from pipeline.insertion.path import PHASES, follow
+from pipeline.insertion.path import follow
+from pipeline.insertion.steps import PHASES
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_mapping
 from pipeline.surrogate.cases import SurrogateError
@@ -32,7 +33,8 @@ def test_the_field_near_the_tip_stores_what_the_front_releases():
     field, near, far = NearTip(2e-4, 500.0), 1e-5, 8e-4
     depth = 5e-3
     released, _ = quad(lambda a: field.release(a) * (LENGTH + 2 * depth + 4 * a), near, far)
-    assert field.energy(near, far, LENGTH + 2 * depth) == pytest.approx(released, rel=1e-6)
+    found = (LENGTH + 2 * depth) * field.per_length(near, far) + field.corners(near, far)
+    assert found == pytest.approx(released, rel=1e-6)
     assert field.release(field.ahead(3.0)) == pytest.approx(3.0)
     again = NearTip.through(field.strength, far, field.release(far))
     assert again.bend == pytest.approx(field.bend)
@@ -64,7 +66,7 @@ def test_cutting_needs_the_change_of_the_stored_energy_the_toughness_and_frictio
 
 def test_the_work_of_the_tool_is_stored_torn_and_rubbed():
     found = _path(_study())
-    assert float(abs(found["balance"]).max()) < 1e-3
+    assert np.abs(found["balance"].values).max() < 1e-3
     parts = sum(found[name] for name in ("energy_stored", "energy_fracture", "energy_friction"))
     np.testing.assert_allclose(found["work"], parts, rtol=1e-3)
     after = found.isel(depth=found["phase"].values == PHASES.index("cutting"))
@@ -90,7 +92,7 @@ def test_each_layer_is_cut_at_its_toughness():
     skin, below = (found["force_cutting"].sel(depth=at, method="nearest") for at in (2.9e-3, 3.3e-3))
     assert float(skin / below) == pytest.approx(8 / 5, rel=0.01)
     assert abs(found["depth"] - 3.1e-3).min() > 0.19e-3
-    assert float(abs(found["balance"]).max()) < 0.02
+    assert np.abs(found["balance"].values).max() < 0.02
 
 
 def test_a_state_that_fails_ends_the_path_there_and_earlier_ones_are_kept():
@@ -140,3 +142,15 @@ def test_a_path_is_of_one_scene():
     study = _study(friction=[0.1, 0.2])
     with pytest.raises(StudyError, match="is a list of 2: one value is needed"):
         follow(study, closed_form())
+
+
+def test_withdrawal_reverses_friction_and_tears_nothing():
+    found = _path(_study(insertion={"to": "6 mm", "steps": 12, "withdraw": True}))
+    into, out = found.sel(direction="insertion"), found.sel(direction="withdrawal")
+    assert np.all(out["force_cutting"] == 0) and np.all(out["force_friction"] < 0)
+    assert all(np.ptp(out[name].values) == 0 for name in ("energy_fracture", "crack_depth"))
+    assert np.all(np.diff(out["energy_friction"]) <= 0) and out["energy_friction"][-1] == into["energy_friction"][-1]
+    assert float(out["force_friction"][-1] / into["force_friction"][-1]) == pytest.approx(-1, rel=1e-9)
+    assert np.all(out["energy_stored"].values[:-1] < into["energy_stored"].values[-1])
+    assert np.abs(found["balance"].values).max() < 1e-3
+    assert np.all(out["phase"] == PHASES.index("withdrawal"))

@@ -17,6 +17,8 @@ _PARTS = ("force_cutting", "force_friction", "force_elastic")
 _ENERGIES = ("energy_fracture", "energy_friction", "energy_stored")
 # Share of the depths from which on there is room for a name.
 _WIDE = 0.2
+# Share of the largest force below zero that is drawn.
+_LOW = 0.1
 _LABELS = ("cutting", "friction", "elastic")
 _CAPTION = (
     "Parts of the force, and of the work, one on top of the other: what they do not fill is the error of the balance "
@@ -34,12 +36,19 @@ def draw(dataset: xr.Dataset, stem: Path, formats: Sequence[str] = FIGURE_FORMAT
 def insertion(dataset: xr.Dataset) -> Figure:
     """F over depth above, energies over depth below."""
     figure = new_figure(WIDTH, _HEIGHT)
+    back = dataset.isel(direction=-1) if "direction" in dataset.dims else None
+    dataset = dataset if back is None else dataset.isel(direction=0)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     depth, force = 1e3 * _from_zero(dataset["depth"]), 1e3 * _from_zero(dataset["force"])
     bar = 1e3 * _from_zero(dataset["force_error"])
     _stack(above, dataset, _PARTS, 1e3)
     above.fill_between(depth, force - bar, force + bar, color=GRID)
     above.plot(depth, force, color=LINE, label="F")
+    if back is not None:
+        away, pulled, own = (1e3 * back[name].values for name in ("depth", "force", "force_error"))
+        above.fill_between(away, pulled - own, pulled + own, color=GRID)
+        above.plot(away, pulled, color=COLOURS[4], label="F of the withdrawal")
+        above.axhline(0, color=LINE, linewidth=0.6)
     above.set_ylabel("force (mN)")
     _stack(below, dataset, _ENERGIES, 1e3)
     below.plot(depth, 1e3 * _from_zero(dataset["work"]), color=LINE, linestyle="--", label="work of the tool")
@@ -63,8 +72,8 @@ def _stack(ax: Axes, dataset: xr.Dataset, names: Sequence[str], factor: float) -
 def _name_phases(ax: Axes, dataset: xr.Dataset) -> None:
     """Mark the puncture, and name the phases beside it."""
     end, depth = 1e3 * float(dataset["depth"][-1]), 1e3 * float(dataset["puncture_depth"])
-    top = ax.get_ylim()[1]
-    ax.set_ylim(0, 1.12 * top)
+    low, top = ax.get_ylim()
+    ax.set_ylim(low if low < -_LOW * top else 0, 1.12 * top)
     if np.isnan(depth):
         ax.text(end / 2, 1.04 * top, "indentation", ha="center")
         return
