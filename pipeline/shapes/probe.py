@@ -12,6 +12,7 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.history import History
+from pipeline.shapes.revolved import Revolved
 from pipeline.shapes.section import Problems, Section, Words
 from pipeline.shapes.slit import Slit
 from pipeline.units import Coordinate, Length
@@ -223,6 +224,11 @@ class Probe(Section, ABC):
     @abstractmethod
     def is_round(self) -> bool:
         """Whether the footprint is axisymmetric about the probe's axis."""
+
+    @property
+    def revolved(self) -> Revolved | None:
+        """The section of a tool that is round about its axis; None for any other."""
+        return None
 
     @abstractmethod
     def is_mirrored(self, along: float, across: float) -> bool:

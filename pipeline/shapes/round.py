@@ -10,6 +10,7 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.frame import Frame, Units
 from pipeline.shapes.probe import ON_EDGE
 from pipeline.shapes.punch import Straight
+from pipeline.shapes.revolved import Revolved, flat_face
 
 
 class RoundPunch(Straight):
@@ -28,6 +29,11 @@ class RoundPunch(Straight):
     def is_round(self) -> bool:
         """Whether the semi-axes are equal."""
         return self.semi_axes[0] == self.semi_axes[1]
+
+    @property
+    def revolved(self) -> Revolved | None:
+        """A flat face if the semi-axes are equal."""
+        return flat_face(self.semi_axes[0]) if self.is_round else None
 
     @property
     def circumradius(self) -> float:

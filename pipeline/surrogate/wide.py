@@ -15,11 +15,9 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.layered.body import RIGID, LayeredBody
 from pipeline.layered.compliance import Layer
-from pipeline.layered.contact import Profile, flat
+from pipeline.layered.contact import Profile
 from pipeline.shapes.body import Layered
 from pipeline.shapes.probe import Probe
-from pipeline.shapes.probes._round import RoundIndenter
-from pipeline.shapes.probes.disc import Disc
 from pipeline.states import FAILED, OK
 from pipeline.study.case import Case
 from pipeline.study.sweep import Study
@@ -41,12 +39,8 @@ _SUPPORTS = ("bottom", "bottom+sides")
 
 def profile_of(probe: Probe) -> Profile | None:
     """Return the section of a round tool; None for any other."""
-    if isinstance(probe, Disc):
-        return flat(probe.radius)
-    if isinstance(probe, RoundIndenter):
-        section = probe.section
-        return Profile(section.slope, limit=probe.limit, flat=section.flat, kinks=probe.kinks)
-    return None
+    found = probe.revolved
+    return Profile(found.slope, found.limit, found.flat, found.kinks) if found else None
 
 
 def layered_body(case: Case) -> LayeredBody | None:
@@ -64,10 +58,10 @@ def layered_body(case: Case) -> LayeredBody | None:
 
 def _slides(probe: Probe) -> bool:
     """Return whether contact is that of a round tool without friction, and cannot lift off in its middle."""
-    if profile_of(probe) is None or probe.motion != "press" or probe.slit is not None:
+    section = probe.revolved
+    if section is None or probe.motion != "press" or probe.slit is not None:
         return False
-    contact = "frictionless" if isinstance(probe, Disc) else "unilateral"
-    return probe.contact == contact and probe.friction == 0
+    return probe.contact == ("frictionless" if section.is_flat else "unilateral") and probe.friction == 0
 
 
 def _layers(case: Case, body: Layered) -> list[Layer]:

@@ -435,6 +435,20 @@ def test_a_profile_is_finite_over_the_footprint_and_begins_at_the_lowest_point(a
     assert a_probe.has_singular_edge == (height.max() == 0) <= ends.all()
 
 
+def test_the_section_of_a_round_tool_has_its_profile_as_integral(a_probe):
+    """Its slope is the derivative of the heights, and zero where it is flat."""
+    section = a_probe.revolved
+    assert (section is not None) == a_probe.is_round
+    if section is None:
+        return
+    radii = np.linspace(0.05, 0.95, 7) * min(section.limit, 2 * a_probe.half_width)
+    step = 1e-6 * radii[-1]
+    ends = [a_probe.profile(np.column_stack([radii + by, 0 * radii])) for by in (-step, step)]
+    np.testing.assert_allclose((ends[1] - ends[0]) / (2 * step), section.slope(radii), rtol=1e-5, atol=1e-12)
+    assert section.is_flat == (a_probe.force_exponent == 1)
+    assert np.isinf(a_probe.profile(np.array([[1.01 * section.limit, 0.0]]))).all() or not section.is_flat
+
+
 def test_elements_are_small_where_contact_is_expected_to_end(a_probe):
     """Within the footprint, at its edge if that is singular; over a band if the edge of contact is not known."""
     names = {"Sqrt": np.sqrt, "Max": np.maximum, "Min": np.minimum, "Fabs": np.abs}

@@ -44,6 +44,33 @@ def test_a_case_has_the_layers_of_its_body():
     assert layered_body(case(probe=DISC)) == LayeredBody((skin, tissue))
 
 
+def test_an_ellipse_with_equal_axes_is_a_disc():
+    ellipse = DISC | {"shape": "ellipse", "axes": ["2 mm", "2 mm"], "radius": None}
+    found, disc = (
+        solve_wide(parse(changed(WIDE, probe={k: v for k, v in probe.items() if v}), file="wide.toml"))["force"]
+        for probe in (ellipse, DISC)
+    )
+    assert float(found) == pytest.approx(float(disc), rel=1e-12)
+
+
+LAYERS = {
+    "thin and stiff on soft": [SKIN | {"thickness": "0.25 mm", "young": "300 kPa"}],
+    "soft on stiff": [SKIN | {"thickness": "2 mm", "young": "1 kPa", "poisson": 0.49}],
+    "four": [
+        SKIN | {"name": name, "thickness": f"{thickness} mm", "young": f"{young} kPa"}
+        for name, thickness, young in (("skin", 0.5, 80), ("fat", 2, 8), ("fascia", 1, 200))
+    ],
+}
+
+
+@pytest.mark.parametrize("layers", LAYERS)
+def test_forces_on_layers_are_those_of_solves(layers, tmp_path):
+    """To 5e-6 on wider bodies and for balls, too (docs/accuracy.md)."""
+    study = parse(changed(WIDE, body={"layer": LAYERS[layers]}, probe=DISC), file="wide.toml")
+    solved = solve(study, MPI.COMM_SELF, tmp_path / "store.nc")
+    assert float(solve_wide(study)["force"]) == pytest.approx(float(solved["force"]), rel=3e-5)
+
+
 @pytest.mark.parametrize(
     "changes",
     [

@@ -11,6 +11,7 @@ from pipeline.shapes.distance import Distance, revolved
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes.disc import Disc
+from pipeline.shapes.revolved import Revolved
 
 
 class RoundIndenter(Indenter):
@@ -26,6 +27,11 @@ class RoundIndenter(Indenter):
         """Radii (m) at which its section is not smooth: a sharp tip, or where a rounding ends."""
         section = self.section
         return (*((section.flat,) if section.flat else ()), *((section.tangent,) if section.angle else ()))
+
+    @property
+    def revolved(self) -> Revolved:
+        """Its section."""
+        return Revolved(self.section.slope, self.limit, self.section.flat, self.kinks)
 
     @property
     def footprint(self) -> Probe:
