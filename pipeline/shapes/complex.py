@@ -1,12 +1,14 @@
 """Surfaces that divide a body into regions, and meet along curves where three or more regions do."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
 
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.shapes.triangles import enclosed
+from pipeline.shapes.triangles import Triangles, enclosed
 
 # Number of what is outside of the body, and of the body's own tissue; regions follow from 1.
 OUTSIDE, TISSUE = -1, 0
@@ -26,21 +28,45 @@ class Complex:
     sides: IntArray
 
     @staticmethod
-    def nested(surfaces: Sequence[tuple[FloatArray, IntArray]]) -> "Complex":
-        """Return a body's surface and closed surfaces within it, which do not touch: points and facets of each."""
-        starts = np.cumsum([0, *(len(points) for points, _ in surfaces)])
-        facets = [corners + start for (_, corners), start in zip(surfaces, starts[:-1], strict=True)]
-        behind = np.repeat(np.arange(len(surfaces)), [len(corners) for corners in facets])
-        before = np.where(behind == TISSUE, OUTSIDE, TISSUE)
+    def around(surface: Triangles) -> "Complex":
+        """Return a body of one region."""
+        return Complex(surface.points, surface.facets, np.tile([TISSUE, OUTSIDE], (len(surface.facets), 1)))
+
+    def holding(self, surfaces: Mapping[int, tuple[FloatArray, IntArray]]) -> "Complex":
+        """Return it with closed surfaces (m) within the body's own tissue: points and facets by number of region."""
+        start = np.cumsum([len(self.points), *(len(points) for points, _ in surfaces.values())])
+        facets = [corners + offset for (_, corners), offset in zip(surfaces.values(), start, strict=False)]
+        sides = [np.tile([n, TISSUE], (len(corners), 1)) for n, corners in zip(surfaces, facets, strict=True)]
         return Complex(
-            np.vstack([points for points, _ in surfaces]), np.vstack(facets), np.column_stack([behind, before])
+            np.vstack([self.points, *(points for points, _ in surfaces.values())]),
+            np.vstack([self.facets, *facets]),
+            np.vstack([self.sides, *sides]),
         )
+
+    def renumbered(self, numbers: Sequence[int]) -> "Complex":
+        """Return it with other numbers of its regions, in the order of theirs; the new order must be the same."""
+        new = np.array([*numbers, OUTSIDE])
+        return Complex(self.points, self.facets, new[self.sides])
 
     @property
     def regions(self) -> IntArray:
         """Numbers of its regions, in ascending order, without what is outside."""
         numbers = np.unique(self.sides)
         return np.asarray(numbers[numbers != OUTSIDE])
+
+    @cached_property
+    def hash(self) -> str:
+        """Hash of its points, facets and regions, by which meshes of it are identified; see :class:`Triangles`."""
+        own = Triangles(self.points, self.facets).hash
+        if len(self.regions) == 1:
+            return own
+        return sha256(f"{own} {self.sides.astype('<i8').tobytes().hex()}".encode()).hexdigest()
+
+    @cached_property
+    def skin(self) -> Triangles:
+        """The body's surface."""
+        used, corners = np.unique(self.boundary(OUTSIDE)[:, ::-1], return_inverse=True)
+        return Triangles(self.points[used], corners.reshape(-1, 3))
 
     def walls(self) -> tuple[IntArray, IntArray]:
         """Return the pairs of neighbours (k, 2), lower first, in order of appearance, and that of each facet (m)."""

@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.closed import Closed
+from pipeline.shapes.complex import Complex
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.rays import nearest_point, pierce
 from pipeline.shapes.section import in_mm
@@ -29,6 +30,11 @@ class Facetted(Body):
     @abstractmethod
     def triangles(self) -> Triangles:
         """Its surface, in m."""
+
+    @property
+    def partition(self) -> Complex | None:
+        """The surface with those between its regions (m), if regions meet it or each other."""
+        return None
 
     # ---- size -----------------------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import PrivateAttr, ValidationInfo, field_serializer, field_validator
 from pydantic_core import PydanticCustomError
 
+from pipeline.shapes.complex import Complex
 from pipeline.shapes.facetted import Facetted
 from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.section import Words
@@ -94,6 +95,11 @@ class FromFile(Facetted):
     def triangles(self) -> Triangles:
         """The surface in the file, in m."""
         return self._loaded.triangles
+
+    @property
+    def partition(self) -> Complex | None:
+        """The surface, and those between its regions, if they meet."""
+        return self._loaded.partition
 
     @property
     def notices(self) -> tuple[str, ...]:

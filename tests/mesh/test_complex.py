@@ -1,15 +1,23 @@
 """Tetrahedra of bodies whose regions touch: each region is filled, and neighbours have the same facets between them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pipeline.mesh.generate import MeshError
+from pipeline.mesh.organ.base import base
 from pipeline.mesh.organ.field import Field
+from pipeline.mesh.organ.sheet import FIXED
+from pipeline.mesh.organ.untangle import untangled
 from pipeline.mesh.organ.volume import fill
 from pipeline.mesh.size import Sizes
 from pipeline.shapes.complex import OUTSIDE, Complex
+from pipeline.shapes.files.crossings import crossings
+from pipeline.shapes.files.partition import partition_of
 from pipeline.shapes.frame import Frame
-from tests.complexes import blocks
+from pipeline.shapes.skin import Skin
+from tests.complexes import are_closed, blocks, scene
 
 LAYERS = np.array([[[0, 1, 2]]])
 QUARTERS = np.array([[[0], [1]], [[3], [2]]])
@@ -51,6 +59,50 @@ def test_the_volume_of_a_region_is_that_of_the_facets_around_it():
 
 def test_surfaces_that_cross_are_not_filled():
     one, other = blocks(np.zeros((2, 2, 2))), blocks(np.zeros((1, 1, 1)))
-    crossing = Complex.nested([(one.points, one.facets), (other.points + 13e-3, other.facets)])
+    crossing = one.holding({1: (other.points + 13e-3, other.facets)})
     with pytest.raises(MeshError, match=r"gmsh"):
         fill(crossing, even(4e-3))
+
+
+@pytest.fixture(scope="module")
+def organ():
+    """Return an organ with a part inside it and another one that ends at its surface, and its coarse surfaces."""
+    parts, _ = partition_of(scene((3, 3, 3)), (1, 7, 5))
+    made = base(parts, Skin(parts.skin), -8e-3, 10e-3)
+    return parts, replace(made, sheet=untangled(made.sheet, np.empty(0, np.int64)))
+
+
+def test_surfaces_between_regions_are_meshed_together_with_the_bodys(organ):
+    parts, made = organ
+    sheet = made.sheet
+    assert 800 < len(sheet.facets) < len(parts.facets) / 3
+    coarse = Complex(sheet.points, sheet.facets, sheet.sides)
+    assert are_closed(coarse.facets, coarse.sides, (OUTSIDE, 0, 1, 2))
+    assert not len(crossings(coarse.points, coarse.facets))
+    for region in parts.regions:
+        assert coarse.volume(region) == pytest.approx(parts.volume(region), rel=0.06)
+    assert {*map(tuple, coarse.walls()[0].tolist())} == {*map(tuple, parts.walls()[0].tolist())}
+    distance = made.faces.distance(sheet)
+    assert np.quantile(distance, 0.9) < 1e-9 and distance.max() < 0.5e-3
+    edges = sheet.points[sheet.junctions]
+    assert len(edges) > 8 and np.median(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)) > 1.5e-3
+    assert np.abs(edges[..., 0] - 19.5e-3).max() < 2e-3
+
+
+def test_the_support_ends_at_its_level_in_all_regions(organ):
+    _, made = organ
+    skin = made.sheet.skin
+    below = (skin.points[skin.facets][:, :, 2] < -8e-3 + 1e-6).all(axis=1)
+    np.testing.assert_array_equal(skin.kind == FIXED, below)
+    fixed = skin.sides[below]
+    assert {*fixed[:, 0].tolist()} == {0, 2}
+
+
+def test_coarse_surfaces_are_filled(organ):
+    _, made = organ
+    sheet = made.sheet
+    coarse = Complex(sheet.points, sheet.facets, sheet.sides)
+    points, cells, regions = fill(coarse, even(8e-3))
+    corners = points[cells]
+    filled = np.bincount(regions, np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6)
+    np.testing.assert_allclose(filled, [coarse.volume(region) for region in coarse.regions], rtol=1e-9)

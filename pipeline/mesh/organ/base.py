@@ -13,11 +13,14 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError
-from pipeline.mesh.organ.prepare import cut, level_line, merged, on_segments, sharp_edges
+from pipeline.mesh.organ.faces import Faces
+from pipeline.mesh.organ.junctions import coarsened
+from pipeline.mesh.organ.prepare import cut, level_line, merged, sharp_edges
 from pipeline.mesh.organ.remesh import release, remesh
-from pipeline.mesh.organ.sheet import FIXED, FREE, Sheet
+from pipeline.mesh.organ.sheet import Sheet
 from pipeline.mesh.organ.untangle import TangledError
 from pipeline.mesh.size import EDGES_PER_RADIUS
+from pipeline.shapes.complex import OUTSIDE, Complex
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.surface import Surface
@@ -40,13 +43,13 @@ _TURNED, _ROUNDS = 0.2, 10
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """The coarse ``sheet``, and the line at which the support ends on the true surface, ``level`` (n, 2, 3), in m.
+    """The coarse ``sheet``, and the true ``faces`` of the body.
 
     ``as_is`` (k, 3) are the centres of facets that are the file's own.
     """
 
     sheet: Sheet
-    level: FloatArray
+    faces: Faces
     as_is: FloatArray
 
     def is_own(self, sheet: Sheet) -> BoolArray:
@@ -101,34 +104,34 @@ def far_surface(
     """
     (below,), (skin,), triangles = body.support.edges(), body.surfaces()["skin"], body.triangles
     largest = body.bend / EDGES_PER_RADIUS / finer
+    parts = body.partition or Complex.around(triangles)
 
     def make() -> Arrays:
-        made = base(triangles.points, triangles.facets, skin, below, largest, tangles, contact)
+        made = base(parts, skin, below, largest, tangles, contact)
         sheet = made.sheet
         return {
             "points": sheet.points,
             "facets": sheet.facets,
             "group": sheet.group,
             "sharp": sheet.sharp,
-            "level": made.level,
+            "level": made.faces.level,
             "as_is": made.as_is,
         }
 
     if kept is None or tangles or contact:
         found = make()
     else:
-        found = kept.arrays(f"surface {_VERSION} {triangles.hash} {below!r} {largest!r} {release()}", make)
+        found = kept.arrays(f"surface {_VERSION} {parts.hash} {below!r} {largest!r} {release()}", make)
     return Base(
         sheet=Sheet(found["points"], found["facets"], found["group"], found["sharp"]),
-        level=found["level"],
+        faces=Faces(skin, found["level"], body.partition),
         as_is=found["as_is"],
     )
 
 
 @stage("far surface")
 def base(
-    points: FloatArray,
-    facets: IntArray,
+    parts: Complex,
     skin: Surface,
     below: float,
     largest: float,
@@ -137,28 +140,36 @@ def base(
 ) -> Base:
     """Return the surface in elements of at most ``largest`` (m), fixed below the height ``below`` (m).
 
+    ``parts`` are the body's surface, ``skin``, and those between its regions.
     Around ``tangles`` the facets stay unchanged. Near a ``contact`` elements are small.
 
     Raises:
         GeometryError: if nothing, or all, is fixed.
         MeshError: if the remesher fails.
     """
-    sheet = cut(*merged(points, facets), below)
-    if len(np.unique(sheet.group)) < 2:
+    points, facets = parts.points, parts.facets
+    is_divided = len(parts.regions) > 1
+    sheet = cut(points, facets, below, parts.sides) if is_divided else cut(*merged(points, facets), below)
+    if len(np.unique(sheet.skin.kind)) < 2:
         low, high = points[:, 2].min(), points[:, 2].max()
         raise GeometryError(f"a level of {below:g} m does not cut a surface between {low:g} and {high:g} m")
-    level = level_line(points, facets, below)
+    faces = Faces(skin, level_line(points, facets[parts.sides[:, 1] == OUTSIDE], below), parts if is_divided else None)
     sheet = Sheet(sheet.points, sheet.facets, sheet.group, sharp_edges(sheet, largest))
     as_is = _round(sheet, tangles)
-    made = Base(sheet, level, sheet.centres[as_is])
+    made = Base(sheet, faces, sheet.centres[as_is])
     # Twice with a contact: only in the second pass points are dense enough for sizes that change fast.
     for _ in range(1 if contact is None else 2):
-        size = np.full(len(sheet.points), largest)
-        if contact is not None:
-            size = np.minimum(size, contact.at(sheet.points))
-        sheet = remesh(sheet, size, DEVIATION * largest, as_is=made.is_own(sheet))
+
+        def size(points: FloatArray) -> FloatArray:
+            found = np.full(len(points), largest)
+            return found if contact is None else np.minimum(found, contact.at(points))
+
+        if is_divided:
+            sheet = coarsened(sheet, size, DEVIATION * largest, made.is_own)
+        else:
+            sheet = remesh(sheet, size(sheet.points), DEVIATION * largest, as_is=made.is_own(sheet))
         own = made.own_points(sheet)
-        sheet = put_back(sheet, skin, level, own, sheet.points[own])
+        sheet = put_back(sheet, faces, own, sheet.points[own])
     return replace(made, sheet=sheet)
 
 
@@ -174,17 +185,13 @@ def _round(sheet: Sheet, tangles: Tangles) -> BoolArray:
     return near
 
 
-def put_back(
-    sheet: Sheet, skin: Surface, level: FloatArray, known: IntArray | None = None, places: FloatArray | None = None
-) -> Sheet:
-    """Return the sheet with its points projected onto the ``skin``, those of the support's edge onto the ``level``.
+def put_back(sheet: Sheet, faces: Faces, known: IntArray | None = None, places: FloatArray | None = None) -> Sheet:
+    """Return the sheet with its points projected onto the true ``faces``.
 
     The ``known`` points (k) move to their ``places`` (k, 3). Points on sharp edges stay, and so do points whose facets
     would turn over.
     """
-    moved = skin.project(sheet.points)
-    line, stay = np.unique(sheet.border(FIXED, FREE)), np.unique(sheet.sharp)
-    moved[line] = on_segments(sheet.points[line], level)
+    moved, stay = faces.project(sheet), np.unique(sheet.sharp)
     moved[stay] = sheet.points[stay]
     if known is not None:
         moved[known] = places

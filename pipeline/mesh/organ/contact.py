@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import GeometryError, MeshError, model_options
-from pipeline.mesh.organ.sheet import FIXED, PROBE, Sheet, compact, edges_of
+from pipeline.mesh.organ.sheet import FIXED, PROBE, WALL, Sheet, compact, edges_of
 from pipeline.mesh.reason import reason
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.shapes.frame import Frame
@@ -90,18 +90,31 @@ def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -
     lifted, followed = lift(rim), lift(edge)
     if not (np.isfinite(lifted).all() and np.isfinite(followed).all()):
         raise GeometryError("a part of the footprint's edge has no connected tissue below it")
-    local = frame.local(sheet.points)
+    local, skin = frame.local(sheet.points), sheet.skin
     for collar in _COLLARS:
-        patch = _patch(sheet, local, collar * probe.circumradius + sizes.rim)
-        loops = _loops(sheet.facets[patch])
-        if not _lines_cross(local[:, :2], loops, rim):
+        patch = _patch(skin, local, collar * probe.circumradius + sizes.rim)
+        loops = _loops(skin.facets[patch])
+        if not _lines_cross(local[:, :2], loops, rim) and len(np.unique(skin.sides[patch], axis=0)) == 1:
             break
     else:
+        if len(np.unique(skin.sides[patch], axis=0)) > 1:
+            raise _over_two_regions(skin, patch, frame)
         raise FoldedError(f"{_FOLDED}; for a rough surface, set `smooth` to the length of its bumps")
-    if (sheet.group[patch] == FIXED).any():
+    if (skin.kind[patch] == FIXED).any():
         raise GeometryError("the footprint is on, or next to, the fixed part of the body")
     plane = _mesh_plane(local[:, :2], loops, rim, probe, sizes)
     return _joined(sheet, patch, plane, lift, lifted, followed)
+
+
+def _over_two_regions(skin: Sheet, patch: IntArray, frame: Frame) -> GeometryError:
+    """Return the error for a contact at a border between regions, with the nearest place of that."""
+    border = np.unique(skin.border_of_regions())
+    points = skin.points[np.intersect1d(border, skin.facets[patch])]
+    x, y, z = 1e3 * points[np.linalg.norm(points - np.array(frame.point), axis=1).argmin()]
+    return GeometryError(
+        f"two regions of the body meet at its surface at ({x:.4g}, {y:.4g}, {z:.4g}) mm, below the footprint or next "
+        "to it: move the probe, or make it smaller"
+    )
 
 
 def _patch(sheet: Sheet, local: FloatArray, radius: float) -> IntArray:
@@ -230,7 +243,9 @@ def _closed(tags: list[int]) -> int:
 def _joined(
     sheet: Sheet, patch: IntArray, plane: _Plane, lift: Lift, lifted: FloatArray, followed: FloatArray
 ) -> Contact:
-    """Replace a patch of the sheet by the lifted mesh of the plane."""
+    """Replace a patch of the sheet's surface by the lifted mesh of the plane."""
+    skin = sheet.skin
+    inner = sheet.kind == WALL
     number = np.full(len(plane.points), -1, dtype=np.int64)
     number[plane.outer] = plane.outer_of
     (new,) = np.nonzero(number < 0)
@@ -243,17 +258,18 @@ def _joined(
     points[~is_rim] = lift(plane.points[new[~is_rim]])
     if not np.isfinite(points).all():
         raise GeometryError("a part of the surface around the footprint is hidden along the probe's axis")
-    rest = np.ones(len(sheet.facets), dtype=bool)
-    group = np.where(plane.inside, PROBE, sheet.group[patch[0]])
+    rest = np.ones(len(skin.facets), dtype=bool)
+    before = skin.group[patch[0]]
+    group = np.where(plane.inside, before - skin.kind[patch[0]] + PROBE, before)
     rest[patch] = False
     whole = Sheet(
         np.vstack([sheet.points, points]),
-        np.vstack([sheet.facets[rest], number[plane.facets]]),
-        np.concatenate([sheet.group[rest], group]),
-        _outside(sheet, patch),
+        np.vstack([skin.facets[rest], number[plane.facets], sheet.facets[inner]]),
+        np.concatenate([skin.group[rest], group, sheet.group[inner]]),
+        _outside(skin, patch),
     )
     result, renumbered = compact(whole)
-    edges_of(result.facets)
+    edges_of(result.skin.facets)
     return Contact(result, renumbered[number[plane.rim]], followed)
 
 

@@ -12,6 +12,7 @@ from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError, flat_ce
 from pipeline.mesh.organ.base import DEVIATION, Base, Kept, Near, far_surface, put_back
 from pipeline.mesh.organ.contact import Contact, FoldedError, set_in
 from pipeline.mesh.organ.embedded import embedded_surfaces
+from pipeline.mesh.organ.faces import Faces
 from pipeline.mesh.organ.field import Field
 from pipeline.mesh.organ.remesh import remesh
 from pipeline.mesh.organ.sheet import PROBE, Sheet, edges_of, group_names
@@ -20,7 +21,6 @@ from pipeline.mesh.organ.volume import fill
 from pipeline.mesh.regions import embedded_sizes
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
-from pipeline.shapes.body import Body
 from pipeline.shapes.complex import Complex
 from pipeline.shapes.scanned import Scanned
 
@@ -40,6 +40,8 @@ _MOST_OFF = 0.25
 # Largest change of the body's volume. Chords of elements leave out half a per cent of an organ, which curved edges
 # restore; with folds as fine as elements it is more, and F is not that of the file.
 MOST_EXCESS = 0.03
+# The same of a region, which is smaller and rounder.
+MOST_OF_REGION = 0.1
 
 Lift = Callable[[FloatArray], FloatArray]
 
@@ -94,14 +96,16 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift)
     field = Field(sizes, scene.frame, contact.edge, embedded_sizes(scene.body, sizes.growth))
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
-    sheet = untangled(sheet, np.unique(sheet.facets[sheet.group == PROBE]))
-    _check_whole(sheet, scene.body.volume)
-    deviation = _deviation(sheet, scene.body, field)
-    inner = embedded_surfaces(scene.body.embedded, field)
-    points, cells, regions = fill(Complex.nested([(sheet.points, sheet.facets), *inner]), field)
+    sheet = untangled(sheet, np.unique(sheet.facets[sheet.kind == PROBE]))
+    _check_whole(sheet, far.faces, scene.body.volume)
+    deviation = _deviation(sheet, far.faces, field)
+    parts = Complex(sheet.points, sheet.facets, sheet.sides)
+    apart = {n: piece for n, piece in enumerate(scene.body.embedded, start=1) if n not in parts.regions}
+    inner = dict(zip(apart, embedded_surfaces(tuple(apart.values()), field), strict=True))
+    points, cells, regions = fill(parts.holding(inner), field)
     if (flat := flat_cells(points, cells)).any():
         raise TangledError.at(points[cells[flat]], "gmsh left a flat tetrahedron")
-    facets = {name: sheet.facets[sheet.group == number] for number, name in group_names().items()}
+    facets = {name: sheet.facets[sheet.kind == number] for number, name in group_names().items()}
     rim = np.unique(sheet.border(PROBE))
     seconds = perf_counter() - start
     return MeshArrays(points, orient(points, cells), facets, rim, seconds, regions, deviation=deviation)
@@ -115,29 +119,34 @@ def _check(scene: Scene) -> None:
         raise GeometryError(f"a {scene.body.shape} has no mirror symmetry")
 
 
-def _check_whole(sheet: Sheet, volume: float) -> None:
-    """Check that a surface is that of the file, whose ``volume`` is in m³.
+def _check_whole(sheet: Sheet, faces: Faces, volume: float) -> None:
+    """Check that a surface is that of the file, whose ``volume`` is in m³, and that all regions have theirs.
 
     Raises:
         MeshError: if it is open, or encloses much more or less.
     """
-    edges_of(sheet.facets)
+    edges_of(sheet.skin.facets)
     if abs(excess := sheet.volume / volume - 1) > MOST_EXCESS:
         amount = "much" if excess > 0 else "little"
         raise MeshError(
             f"the remeshed surface encloses {abs(excess):.2g} times the body's volume too {amount}: "
             "smooth it, or use a smaller `fine`"
         )
+    if (walls := faces.walls) is None:
+        return
+    made = Complex(sheet.points, sheet.facets, sheet.sides)
+    for region in walls.regions:
+        if region not in made.regions or abs(excess := made.volume(region) / walls.volume(region) - 1) > MOST_OF_REGION:
+            raise MeshError(f"the remeshed surface of region {region} has lost its shape: use a smaller `fine`")
 
 
-def _deviation(sheet: Sheet, body: Body, field: Field) -> float:
+def _deviation(sheet: Sheet, faces: Faces, field: Field) -> float:
     """Return the largest distance (m) of the sheet's points from the file's surface.
 
     Raises:
         TangledError: if that exceeds the limit given by elements there.
     """
-    (skin,) = body.surfaces()["skin"]
-    distance = skin.distance(sheet.points)
+    distance = faces.distance(sheet)
     far = distance > _MOST_OFF * field.at(sheet.points)
     if far.any():
         what = f"the remeshed surface deviates from the file's by {1e3 * distance[far].max():.2g} mm"
@@ -157,14 +166,13 @@ class _Truth:
         """Return the sheet on the true surface; its ``rim`` points (k) move to ``true_rim`` (k, 3)."""
         points = sheet.points.copy()
         points[rim] = true_rim
-        inner = np.setdiff1d(np.unique(sheet.facets[sheet.group == PROBE]), rim)
+        inner = np.setdiff1d(np.unique(sheet.facets[sheet.kind == PROBE]), rim)
         lifted = self.lift(self.scene.frame.local(points[inner])[:, :2])
         seen = np.isfinite(lifted).all(axis=1)
         own = np.setdiff1d(self.far.own_points(sheet), np.concatenate([rim, inner]))
         known = np.concatenate([rim, inner[seen], own])
         places = np.vstack([true_rim, lifted[seen], points[own]])
-        (skin,) = self.scene.body.surfaces()["skin"]
-        return put_back(Sheet(points, sheet.facets, sheet.group, sheet.sharp), skin, self.far.level, known, places)
+        return put_back(Sheet(points, sheet.facets, sheet.group, sheet.sharp), self.far.faces, known, places)
 
 
 def _to_sizes(contact: Contact, field: Field, truth: _Truth) -> Sheet:

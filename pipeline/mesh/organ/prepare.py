@@ -10,7 +10,9 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
-from pipeline.mesh.organ.sheet import FIXED, FREE, Sheet, compact, edges_of
+from pipeline.mesh.organ.sheet import FIXED, FREE, WALL, Sheet, compact, edges_of, groups_of
+from pipeline.shapes.complex import OUTSIDE, TISSUE
+from pipeline.shapes.triangles import half_edges
 
 # Points closer than this, in units of the surface's edges, are merged: remeshers drop such details.
 _SAME = 0.05
@@ -45,9 +47,16 @@ def merged(points: FloatArray, facets: IntArray) -> tuple[FloatArray, IntArray]:
     return middles[used], (np.cumsum(used) - 1)[corners]
 
 
-def cut(points: FloatArray, facets: IntArray, below: float) -> Sheet:
-    """Return the surface with edges along the level ``below`` (m); its facets are free above and fixed below it."""
-    edges, _ = edges_of(facets)
+def cut(points: FloatArray, facets: IntArray, below: float, sides: IntArray | None = None) -> Sheet:
+    """Return the surface with edges along the level ``below`` (m); its facets are free above and fixed below it.
+
+    ``sides`` (m, 2) are the regions behind and before each facet, if the body is divided.
+    """
+    if sides is None:
+        edges, _ = edges_of(facets)
+        sides = np.tile([TISSUE, OUTSIDE], (len(facets), 1))
+    else:
+        edges = np.unique(np.sort(half_edges(facets), axis=1), axis=0)
     points = _moved_onto(points, edges, below)
     side = np.sign(points[:, 2] - below).astype(np.int64)
     crossing = edges[side[edges[:, 0]] * side[edges[:, 1]] < 0]
@@ -71,14 +80,19 @@ def cut(points: FloatArray, facets: IntArray, below: float) -> Sheet:
         np.cross(points[facets[:, 1]] - points[facets[:, 0]], points[facets[:, 2]] - points[facets[:, 0]])[:, 2] < 0
     )
     groups[0] = np.where((flat & normal_down)[whole], FIXED, groups[0])
-    split = []
-    for facet in facets[~whole].tolist():
-        split += _split(facet, [int(side[i]) for i in facet], middle)
+    split, owners = [], [np.flatnonzero(whole)]
+    for owner in np.flatnonzero(~whole):
+        facet = facets[owner].tolist()
+        parts = _split(facet, [int(side[i]) for i in facet], middle)
+        split += parts
+        owners.append(np.full(len(parts), owner))
     if split:
         array = np.array(split, dtype=np.int64)
         pieces.append(array[:, :3])
         groups.append(array[:, 3])
-    sheet = Sheet(np.vstack([points, new]), np.vstack(pieces), np.concatenate(groups), np.empty((0, 2), np.int64))
+    sides = sides[np.concatenate(owners)]
+    group = groups_of(np.where(sides[:, 1] == OUTSIDE, np.concatenate(groups), WALL), sides)
+    sheet = Sheet(np.vstack([points, new]), np.vstack(pieces), group, np.empty((0, 2), np.int64))
     return compact(sheet)[0]
 
 
@@ -152,6 +166,9 @@ def on_segments(points: FloatArray, segments: FloatArray) -> FloatArray:
 
 def sharp_edges(sheet: Sheet, largest: float) -> IntArray:
     """Return the edges (k, 2) at which the surface is sharp, not only between two facets, as by noise and voxels."""
+    if sheet.is_divided:
+        edges, junctions, count = sharp_edges(sheet.skin, largest), sheet.junctions, np.array([len(sheet.points), 1])
+        return edges[~np.isin(edges @ count, junctions @ count)]
     edges, sides = edges_of(sheet.facets)
     normals = sheet.normals
     sharp = (normals[sides[:, 0]] * normals[sides[:, 1]]).sum(axis=1) < _SHARP

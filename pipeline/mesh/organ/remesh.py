@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
-from pipeline.mesh.organ.sheet import Sheet, compact, edges_of
+from pipeline.mesh.organ.sheet import Sheet, compact
 from pipeline.shapes.triangles import half_edges
 from pipeline.stages import stage
 
@@ -81,7 +81,7 @@ def remesh(
 
 
 def _mesh_text(sheet: Sheet, kept: IntArray, as_is: BoolArray | None) -> str:
-    edges, sides = edges_of(sheet.facets)
+    edges, sides, _ = sheet.neighbours()
     groups = sheet.group[sides]
     border = edges[groups[:, 0] != groups[:, 1]]
     base = len(sheet.points)
@@ -90,7 +90,8 @@ def _mesh_text(sheet: Sheet, kept: IntArray, as_is: BoolArray | None) -> str:
     lines = np.concatenate([border, np.sort(sheet.sharp, axis=1), np.sort(kept, axis=1)])[first]
     required = 1 + np.flatnonzero(np.isin(keys, _keys(kept, base)))
     ridges = 1 + np.flatnonzero(np.isin(keys, _keys(sheet.sharp, base)))
-    fixed = 1 + np.unique(np.concatenate([kept.ravel(), _corners(sheet.sharp, base)]))
+    corners = [_corners(lines, base) for lines in (sheet.sharp, sheet.junctions)]
+    fixed = 1 + np.unique(np.concatenate([kept.ravel(), *corners]))
     parts = [
         "MeshVersionFormatted 2\nDimension 3\n",
         _section("Vertices", np.column_stack([sheet.points, np.zeros(base)]), "%.17g %.17g %.17g %d"),
@@ -109,9 +110,9 @@ def _keys(edges: IntArray, base: int) -> IntArray:
     return edges.min(axis=1) * base + edges.max(axis=1)
 
 
-def _corners(sharp: IntArray, count: int) -> IntArray:
-    """Points where other than two sharp edges meet."""
-    meeting = np.bincount(sharp.ravel(), minlength=count)
+def _corners(lines: IntArray, count: int) -> IntArray:
+    """Points where other than two edges of ``lines`` (k, 2) meet."""
+    meeting = np.bincount(lines.ravel(), minlength=count)
     return np.flatnonzero((meeting > 0) & (meeting != 2))
 
 

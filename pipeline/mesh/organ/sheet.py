@@ -1,16 +1,23 @@
-"""Triangulated surfaces whose facets belong to named groups, and the borders between the groups."""
+"""Triangulated surfaces whose facets belong to named groups, and the borders between the groups.
 
-from dataclasses import dataclass
+They may divide a body into regions: facets inside it then meet each other, and the body's surface, along junctions.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
 from pipeline.scene import model
-from pipeline.shapes.triangles import closed_edges, doubled_normals, enclosed, half_edges
+from pipeline.shapes.complex import OUTSIDE
+from pipeline.shapes.triangles import closed_edges, doubled_normals, edge_keys, enclosed, half_edges
 
-# Group numbers; the remesher keeps the groups apart.
-FREE, FIXED, PROBE = 1, 2, 3
+# Kinds of facets, of the body's surface and inside the body. A group has one kind, and the same regions on both sides:
+# their numbers are added in multiples of these. The remesher keeps the groups apart.
+WALL, FREE, FIXED, PROBE = 0, 1, 2, 3
+_KINDS, _REGIONS = 4, 1024
 
 
 def group_names() -> dict[int, str]:
@@ -18,17 +25,83 @@ def group_names() -> dict[int, str]:
     return {FREE: model.FREE, FIXED: model.FIXED, PROBE: model.PROBE}
 
 
+def groups_of(kind: IntArray, sides: IntArray) -> IntArray:
+    """Return the groups (m) of facets by their kind (m) and the regions (m, 2) behind and before them."""
+    return np.asarray(kind + _KINDS * (sides[:, 1] - OUTSIDE + _REGIONS * sides[:, 0]))
+
+
 @dataclass(frozen=True)
 class Sheet:
     """A closed surface: ``points`` (n, 3) in m, ``facets`` (m, 3), and the group (m) of each facet.
 
-    ``sharp`` (k, 2) are edges to be kept, besides those between groups.
+    Facets inside it may divide the body. ``sharp`` (k, 2) are edges to be kept, besides those between groups.
     """
 
     points: FloatArray
     facets: IntArray
     group: IntArray
     sharp: IntArray
+
+    @cached_property
+    def kind(self) -> IntArray:
+        """Kinds (m) of the facets."""
+        return np.asarray(self.group % _KINDS)
+
+    @property
+    def sides(self) -> IntArray:
+        """Numbers of the regions (m, 2) behind and before the facets."""
+        behind, before = np.divmod(self.group // _KINDS, _REGIONS)
+        return np.column_stack([behind, before + OUTSIDE])
+
+    @property
+    def is_divided(self) -> bool:
+        """Whether there are facets inside the body."""
+        return bool((self.kind == WALL).any())
+
+    @property
+    def skin(self) -> "Sheet":
+        """The body's surface, with all points."""
+        outer = self.kind != WALL
+        return self if outer.all() else replace(self, facets=self.facets[outer], group=self.group[outer])
+
+    @cached_property
+    def junctions(self) -> IntArray:
+        """Edges (k, 2) in which more than two facets of a divided body meet, lower number first."""
+        if not self.is_divided:
+            return np.empty((0, 2), dtype=np.int64)
+        count = len(self.points)
+        keys, times = np.unique(edge_keys(self.facets, count), return_counts=True)
+        return np.column_stack(np.divmod(keys[times > 2], count))
+
+    def neighbours(self) -> tuple[IntArray, IntArray, IntArray]:
+        """Return edges (k, 2), lower number first, two facets (k, 2) at each, and their relative orientation (k).
+
+        That is -1 where one of them is counterclockwise seen from one side, and the other seen from the other side. At
+        junctions there are several pairs of facets.
+
+        Raises:
+            MeshError: if the body's surface, or that of a region, is not closed.
+        """
+        if not self.is_divided:
+            edges, facets = edges_of(self.facets)
+            return edges, facets, np.ones(len(edges), dtype=np.int64)
+        for region in np.unique(self.sides):
+            edges_of(self.facets[(self.sides == region).any(axis=1)])
+        pairs = half_edges(self.facets)
+        ordered = np.sort(pairs, axis=1)
+        order = np.lexsort((ordered[:, 1], ordered[:, 0]))
+        is_first = np.ones(len(order), dtype=bool)
+        is_first[1:] = (np.diff(ordered[order], axis=0) != 0).any(axis=1)
+        (first,) = np.nonzero(is_first)
+        count = np.diff([*first, len(order)])
+        # Each facet at an edge and the next one; of two facets that is one pair.
+        following = np.arange(1, len(order) + 1)
+        last = first + count - 1
+        following[last] = first
+        one = np.setdiff1d(np.arange(len(order)), last[count == 2])
+        here, there = order[one], order[following[one]]
+        turned = np.where(pairs[here, 0] == pairs[there, 0], -1, 1)
+        return ordered[here], np.column_stack([here // 3, there // 3]), turned
 
     @property
     def normals(self) -> FloatArray:
@@ -60,15 +133,26 @@ class Sheet:
     @property
     def volume(self) -> float:
         """Enclosed volume (m³)."""
-        return enclosed(self.points, self.facets)
+        return enclosed(self.points, self.skin.facets)
 
     def border(self, one: int, other: int | None = None) -> IntArray:
-        """Return edges (k, 2), lower number first, between facets of group ``one`` and the ``other`` (default: any)."""
-        edges, facets = edges_of(self.facets)
-        groups = self.group[facets]
-        mine = groups == one
-        theirs = ~mine if other is None else groups == other
+        """Return edges (k, 2) between facets of the surface of kind ``one`` and the ``other`` (default: any other).
+
+        The lower point number is first.
+        """
+        skin = self.skin
+        edges, facets = edges_of(skin.facets)
+        kinds = skin.kind[facets]
+        mine = kinds == one
+        theirs = ~mine if other is None else kinds == other
         return edges[mine.any(axis=1) & theirs.any(axis=1)]
+
+    def border_of_regions(self) -> IntArray:
+        """Return edges (k, 2), lower number first, of the body's surface at which regions meet."""
+        skin = self.skin
+        edges, facets = edges_of(skin.facets)
+        behind = skin.sides[:, 0][facets]
+        return edges[behind[:, 0] != behind[:, 1]]
 
 
 def edges_of(facets: IntArray) -> tuple[IntArray, IntArray]:

@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
-from pipeline.mesh.organ.sheet import Sheet, edges_of
+from pipeline.mesh.organ.sheet import WALL, Sheet
 from pipeline.shapes.files.crossings import crossings
 
 # Neighbouring facets with a smaller angle between them are folded: a tetrahedron between them would be flat. A fold of
@@ -48,26 +48,26 @@ def _crossing(sheet: Sheet) -> BoolArray:
 def _misshapen(sheet: Sheet, angle: float, height: float) -> BoolArray:
     """Return a mask of facets with an angle (rad) to a neighbour, or a height (share), below these limits."""
     found = sheet.heights < height
-    _, sides = edges_of(sheet.facets)
+    _, sides, turned = sheet.neighbours()
     normals = sheet.normals
-    found[sides[(normals[sides[:, 0]] * normals[sides[:, 1]]).sum(axis=1) < -cos(angle)]] = True
+    found[sides[turned * (normals[sides[:, 0]] * normals[sides[:, 1]]).sum(axis=1) < -cos(angle)]] = True
     return found
 
 
 def untangled(sheet: Sheet, stay: IntArray) -> Sheet:
     """Return the sheet with points of bad facets moved to the middle of their neighbours, until no facet is bad.
 
-    The points ``stay`` do not move. Points on sharp edges do not move at first, and those between other groups remain
-    in their level.
+    The points ``stay`` do not move. Points on sharp edges, and at junctions, do not move at first, and those between
+    other groups remain in their level.
 
     Raises:
         TangledError: if bad facets remain.
     """
-    edges, sides = edges_of(sheet.facets)
-    groups, count = sheet.group[sides], len(sheet.points)
-    level = np.unique(edges[groups[:, 0] != groups[:, 1]])
+    edges, sides, _ = sheet.neighbours()
+    groups, kinds, count = sheet.group[sides], sheet.kind[sides], len(sheet.points)
+    level = np.unique(edges[(kinds[:, 0] != kinds[:, 1]) & (kinds != WALL).all(axis=1)])
     fixed = np.zeros(count, dtype=bool)
-    fixed[stay] = fixed[level] = fixed[sheet.sharp] = True
+    fixed[stay] = fixed[edges[groups[:, 0] != groups[:, 1]]] = fixed[sheet.sharp] = True
     ends = np.vstack([edges, edges[:, ::-1]])
     beside = coo_array((np.ones(len(ends)), tuple(ends.T)), shape=(count, count)).tocsr()
     share = beside.sum(axis=1)

@@ -1,8 +1,9 @@
 """Results of reading a body's file."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
+from pipeline.shapes.complex import Complex
 from pipeline.shapes.triangles import Triangles
 
 # Metres in the units of length of files.
@@ -11,10 +12,14 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 
 @dataclass(frozen=True)
 class Loaded:
-    """A surface, and notices about changes that the author of the study should know."""
+    """A surface, and notices about changes that the author of the study should know.
+
+    ``partition``, if any, has the same surface, and those between the body's regions.
+    """
 
     triangles: Triangles
     notices: tuple[str, ...]
+    partition: Complex | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -73,19 +73,22 @@ def _filtered(mask: Any, sigma: FloatArray, *, may_narrow: bool) -> tuple[Any, F
 
 
 def _weights(number: IntArray, count: int, sigma: FloatArray, *, may_narrow: bool) -> FloatArray:
-    """Return the filtered indicators (count, nx, ny, nz) of the labels.
+    """Return the filtered indicators (count, nx, ny, nz) of the labels; their sum is 1.
 
-    A thin label, with its narrower filter, comes first; the others share what it leaves.
+    Labels are continued outside of the body, so that its surface does not bend those between them. A thin label, with
+    its narrower filter, comes first; the others share what it leaves.
     """
+    if count > 1:
+        from scipy.ndimage import distance_transform_edt  # noqa: PLC0415
+
+        nearest = distance_transform_edt(number == OUTSIDE, 1 / sigma, return_distances=False, return_indices=True)
+        number = number[tuple(nearest)]
     filtered = [_filtered(number == label, sigma, may_narrow=may_narrow and label > 0) for label in range(count)]
     weights = np.stack([values for values, _ in filtered])
-    wide = [label for label, (_, width) in enumerate(filtered) if width is sigma]
-    if len(wide) < count:
-        thin = [label for label in range(count) if label not in wide]
-        # The share of the other labels among themselves, without what is outside.
-        among = np.stack([_filtered(number == label, sigma, may_narrow=False)[0] for label in thin]).sum(axis=0)
-        rest, inside = weights[wide].sum(axis=0), weights[wide].sum(axis=0) + among
-        weights[wide] *= np.maximum(inside - weights[thin].sum(axis=0), 0.0) / np.maximum(rest, _TINY)
+    wide = [width is sigma for _, width in filtered]
+    if not all(wide):
+        left = np.maximum(1 - weights[np.logical_not(wide)].sum(axis=0), 0.0)
+        weights[wide] *= left / np.maximum(weights[wide].sum(axis=0), _TINY)
     return np.asarray(weights)
 
 

@@ -1,7 +1,5 @@
 """Surfaces between several labels: closed around each of them, common to neighbours, accurate, and of their volume."""
 
-from collections import Counter
-
 import numpy as np
 import pytest
 
@@ -10,34 +8,8 @@ from pipeline.shapes.files.crossings import crossings
 from pipeline.shapes.files.labels import LabelMap
 from pipeline.shapes.files.marching import march
 from pipeline.shapes.files.partition import partition_of
-from pipeline.shapes.triangles import SurfaceError, half_edges
-
-AXES = np.array([36.0, 27.0, 20.0])  # mm
-CENTRE, INNER = np.array([-12.0, 3.0, 0.0]), np.array([13.0, 9.0, 8.0])
-
-
-def scene(spacing: tuple[float, float, float]) -> LabelMap:
-    """Return an ellipsoid with another inside it, and a third part that ends at the surface, by voxels in mm."""
-    steps = np.array(spacing)
-    count = np.ceil(2 * (AXES + 4) / steps).astype(int)
-    origin = (0.5 - count / 2) * steps
-    x = np.moveaxis(np.indices(count), 0, -1) * steps + origin
-    labels = (((x / AXES) ** 2).sum(axis=-1) < 1).astype(int)
-    labels[(labels == 1) & (((x - CENTRE) / INNER) ** 2 < 1 / 3).all(axis=-1)] = 1
-    labels[(((x - CENTRE) / INNER) ** 2).sum(axis=-1) < 1] = 7
-    labels[(labels == 1) & (x[..., 0] > 18)] = 5
-    return LabelMap(labels, 1e-3 * np.column_stack([np.diag(steps), origin]))
-
-
-def are_closed(facets, sides, regions) -> bool:
-    """Return whether each region's boundary has every edge once in either direction."""
-    for region in regions:
-        behind, before = (np.asarray(sides) == region).T
-        around = np.vstack([facets[behind], facets[before][:, ::-1]])
-        times = Counter(map(tuple, half_edges(around).tolist()))
-        if any(count != 1 or times[b, a] != 1 for (a, b), count in times.items()):
-            return False
-    return True
+from pipeline.shapes.triangles import SurfaceError
+from tests.complexes import AXES, CENTRE, INNER, are_closed, scene
 
 
 @pytest.mark.parametrize("spacing", [(2, 2, 2), (3, 3, 3), (1.5, 1.5, 3)])
