@@ -1,4 +1,4 @@
-"""The command that shows one case: pictures of mesh and deformation, and files for ParaView."""
+"""The command that shows one case: pictures of mesh and deformation, and files for ParaView; or a label map."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -8,7 +8,18 @@ import typer
 from pipeline.cli.cases import find_case
 from pipeline.cli.console import error, say
 from pipeline.cli.faults import SOME_FAILED, Fault, fail
-from pipeline.cli.words import DEFAULT_MESHES, DEFAULT_OUTPUT, File, Json, Output, check_machine, check_output, read_all
+from pipeline.cli.view_image import Given, view_image
+from pipeline.cli.words import (
+    DEFAULT_MESHES,
+    DEFAULT_OUTPUT,
+    Json,
+    Output,
+    by_name,
+    check_machine,
+    check_output,
+    read_all,
+)
+from pipeline.shapes.files.labels import is_image
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -19,8 +30,22 @@ if TYPE_CHECKING:
 
 
 def view(
-    file: File,
-    case: Annotated[str, typer.Argument(help='A case: "poisson=0.3, epsilon=10 mm", or its number.')] = "0",
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="A study file (TOML), or a name in studies/; or a label map (NIfTI, NRRD, DICOM).",
+            show_default=False,
+            callback=by_name,
+        ),
+    ],
+    case: Annotated[
+        str,
+        typer.Argument(
+            help='A case: "poisson=0.3, epsilon=10 mm", or its number [default: 0]; of a label map, a label.',
+            show_default=False,
+        ),
+    ] = "",
     output: Output = DEFAULT_OUTPUT,
     mesh_only: Annotated[bool, typer.Option("--mesh-only", help="Mesh, but do not solve.")] = False,
     export: Annotated[
@@ -29,6 +54,10 @@ def view(
     ] = None,
     vtk: Annotated[bool, typer.Option("--vtk", help="Short for --export vtu.")] = False,
     meshes: Annotated[Path, typer.Option(help="Folder of the mesh cache.")] = DEFAULT_MESHES,
+    unit: Annotated[str, typer.Option(help="Unit of a label map whose header has none.", show_default=False)] = "",
+    names: Annotated[
+        str, typer.Option(help="Names of a label map's labels: a file, or totalsegmentator.", show_default=False)
+    ] = "",
     as_json: Json = False,
 ) -> None:
     """Draw the mesh of one case, cut open, and the deformed body.
@@ -41,10 +70,23 @@ def view(
     Example: epsmesh view studies/figure3.toml 12 --mesh-only
 
     Example: epsmesh view studies/figure3.toml 12 --export html
+
+    A label map, before a study exists: a table of its labels, the section [body] of one, and a page with surfaces,
+    slices and places to choose.
+
+    Example: epsmesh view meshes/liver.nii.gz
     """
     export = export or ("vtu" if vtk else None)
+    if is_image(file):
+        if mesh_only or export not in (None, "html"):
+            option = "--mesh-only" if mesh_only else f"--export {export}"
+            fail(Fault(f"{option}: is for a case of a study; of a label map, only the page is written", key=option))
+        return view_image(Given(file, unit, names, case), output)
+    if unit or names:
+        option = "--unit" if unit else "--names"
+        fail(Fault(f"{option}: is for a label map; a study has it in [body]", key=option))
     (study,) = read_all([file])
-    chosen = find_case(study, case)
+    chosen = find_case(study, case or "0")
     number = next(n for n, other in enumerate(study.cases()) if other.index == chosen.index)
     stem = output / f"{study.name}_{number}"
     missing = "" if export else _missing()

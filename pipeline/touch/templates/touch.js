@@ -96,7 +96,7 @@ class Page {
   // ---- places ----------------------------------------------------------------------------------------------------
   // Where the eye's ray meets the face (x and y, mm), if it does.
   onFace(event) {
-    const hit = this.stage.under(event, this.stage.body);
+    const hit = this.stage.under(event, this.stage.body)?.point;
     if (!hit || Math.abs(hit.z - this.heightAt(hit.x, hit.y)) > BESIDE * this.size) return null;
     return this.model.isFlat || this.model.table.holds(hit.x / MM, hit.y / MM) ? [hit.x, hit.y] : null;
   }

@@ -225,12 +225,12 @@ class Stage {
   scale() {
     return (2 * this.radius) / this.camera.zoom / this.canvas.clientHeight;
   }
-  // The nearest point of a part that is seen at the pointer, where it was before it moved.
+  // What of a part is seen at the pointer, where it was before it moved: its nearest point, and the triangle.
   under({ clientX, clientY }, part) {
     const { clientWidth, clientHeight } = this.canvas;
     const ray = new THREE.Raycaster();
     ray.setFromCamera(new THREE.Vector2((2 * clientX) / clientWidth - 1, 1 - (2 * clientY) / clientHeight), this.camera);
-    return ray.intersectObject(part)[0]?.point;
+    return ray.intersectObject(part)[0];
   }
   press(event) {
     const { controls } = this;
