@@ -142,6 +142,8 @@ def _found(table: Table, kind: str, reading: Reading, told: list[str]) -> int:
     units = [_unit(table, number, reading, kind) for number in range(len(table.headers))]
     of_kind = [n for n, unit in enumerate(units) if unit and is_unit_of(unit, UNITS[kind]) and _has_values(table, n)]
     without = [n for n, unit in enumerate(units) if not unit and _has_values(table, n)]
+    if kind == "depth":
+        of_kind = [n for n in of_kind if not is_called(table.headers[n].name, "deflection")]
     called = [n for n in (*of_kind, *without) if is_called(table.headers[n].name, kind)]
     candidates = called or of_kind
     if len(candidates) > 1 and _are_equal(table, candidates, but_for_a_constant=kind == "force"):
@@ -155,8 +157,14 @@ def _found(table: Table, kind: str, reading: Reading, told: list[str]) -> int:
     raise ExperimentError(
         table.file,
         f"{kind} {why} among {_listed(table)}: name it by header or number in columns of {_SECTION}, and its unit in "
-        "units if the header has none",
+        f"units if the header has none{_if_bent(table)}",
     )
+
+
+def _if_bent(table: Table) -> str:
+    """Return what to do if a spring's deflection is the only force."""
+    is_bent = any(is_called(header.name, "deflection") and is_unit_of(header.unit, "m") for header in table.headers)
+    return "; if the force is the deflection of a spring, name piezo, deflection and spring" if is_bent else ""
 
 
 def _time(table: Table, taken: set[int], reading: Reading, told: list[str]) -> int | None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.experiment.columns import Recorded
+from pipeline.experiment.header import is_unit_of
 from pipeline.experiment.read import read_curve, whole_curve
 from pipeline.experiment.reading import UNITS, ExperimentError, Reading
 from pipeline.experiment.segments import cycles_of
@@ -40,7 +41,7 @@ def describe(path: Path, reading: Reading | None = None) -> str:
     except ExperimentError as error:
         return "\n".join([*lines, "", f"not read yet: {error}", "", *_to_choose(table, path.name)])
     lines += ["", *_of_segments(signed(whole, reading)), *(f"- {told}" for told in curve.told)]
-    return "\n".join([*lines, "", *_block(whole, path.name, signs_of(whole, reading))])
+    return "\n".join([*lines, "", *_block(whole, path.name, signs_of(whole, reading)), *_to_add(table)])
 
 
 def _of_table(table: Table, name: str) -> str:
@@ -99,33 +100,54 @@ def _block(found: Recorded, name: str, signs: tuple[int, int]) -> list[str]:
         *_heading(name),
         f"columns = {{{columns}}}",
         *([f"sign = {{depth = {signs[0]}, force = {signs[1]}}}"] if min(signs) < 0 else []),
-        *_TO_ADD,
     ]
 
 
 def _to_choose(table: Table, name: str) -> list[str]:
     """Return the table of a study in which columns are to be chosen: the likely ones are written."""
+    if spring := _of_spring(table):
+        return [*_heading(name), f"columns = {{{', '.join(spring)}}} # check"]
     columns, units = [], []
     for kind in ("depth", "force", "time"):
         likely = [n for n, header in enumerate(table.headers) if is_called(header.name, kind)]
         number = likely[0] if likely else ("time", "depth", "force").index(kind)
         if number >= len(table.headers) or (kind == "time" and not likely):
             continue
-        header = table.headers[number]
-        columns.append(f"{kind} = {_text(header.text) if header.text else number + 1}")
-        if not header.unit:
+        columns.append(f"{kind} = {_of_column(table, number)}")
+        if not table.headers[number].unit:
             units.append(f'{kind} = "{ {"m": "mm", "N": "N", "s": "s"}[UNITS[kind]] }"')
     return [
         *_heading(name),
         f"columns = {{{', '.join(columns)}}} # check: header or number of each column",
         *([f"units = {{{', '.join(units)}}} # check"] if units else []),
-        *_TO_ADD,
+        *_to_add(table),
     ]
 
 
-_TO_ADD = [
-    '# machine_stiffness = "60 N/mm" # of machine and load cell; or a range, or "unknown"; rigid without it',
-]
+def _of_spring(table: Table) -> list[str]:
+    """Return the keys of the way of a piezo, and the deflection of a spring; none if the table has no deflection."""
+    lengths = [n for n, header in enumerate(table.headers) if is_unit_of(header.unit, "m")]
+    bent = [n for n in lengths if is_called(table.headers[n].name, "deflection")]
+    ways = [n for n in lengths if n not in bent]
+    if not (bent and ways):
+        return []
+    chosen = {"piezo": ways[0], "deflection": bent[0]}
+    return [
+        *(f"{kind} = {_of_column(table, number)}" for kind, number in chosen.items()),
+        f"spring = {_text(table.spring or '0.05 N/m')}",
+    ]
+
+
+def _of_column(table: Table, number: int) -> str:
+    text = table.headers[number].text
+    return _text(text) if text else f"{number + 1}"
+
+
+def _to_add(table: Table) -> list[str]:
+    """Return the lines that a machine which yields needs."""
+    if table.spring:
+        return [f"machine_stiffness = {_text(table.spring)} # of the spring, if the depth is the way of the piezo"]
+    return ['# machine_stiffness = "60 N/mm" # of machine and load cell; or a range, or "unknown"; rigid without it']
 
 
 def _heading(name: str) -> list[str]:

@@ -1,6 +1,7 @@
 """The table of numbers in a text: its headers with their units, its values, and the lines they are from."""
 
 import csv
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from io import StringIO
@@ -15,11 +16,18 @@ from pipeline.experiment.header import Header, is_comment
 from pipeline.experiment.headings import headers_of
 from pipeline.experiment.layout import MISSING, Layout, find_layout
 from pipeline.experiment.reading import ExperimentError
+from pipeline.units import unit_factor
 
 # Lines of other widths among the rows, beyond which a file is more than one table.
 _MOST_ODD = 0.05
 # Letters of a text among numbers that a message repeats.
 _QUOTED = 40
+# A spring constant among the header lines of force microscopes, in N/m where no unit is given.
+_SPRING = re.compile(
+    r"spring[ _-]?(const(ant)?)?\W{0,6}(?P<value>\d[\d.]*(e[+-]?\d+)?)\W{0,3}(?P<unit>[pnµum]?N/[nµum]?m)?",
+    re.IGNORECASE,
+)
+_OF_SPRING = "it is `machine_stiffness` if the depth is the way of the piezo, not of the tip"
 # Rows one after the other that are a table.
 _ROWS = 4
 # The separator of fields that ASCII has: no text has it.
@@ -31,6 +39,7 @@ class Table:
     """Values (rows × columns; NaN where missing) and the numbers of their lines, from 1.
 
     ``strange`` has, by column, the first line and text of a value that is no number. ``told`` says what was found.
+    ``spring`` is the spring constant in the lines above.
     """
 
     file: str
@@ -40,6 +49,7 @@ class Table:
     strange: dict[int, tuple[int, str]] = field(default_factory=dict)
     told: tuple[str, ...] = ()
     layout: Layout = field(default_factory=lambda: Layout(",", ".", 0))
+    spring: str = ""
 
 
 def table_of(lines: Sequence[str], file: str) -> Table:
@@ -62,10 +72,24 @@ def table_of(lines: Sequence[str], file: str) -> Table:
         width = len(layout.fields(lines[wrong[0]]))
         raise ExperimentError(file, f"has {width} columns, others have {layout.width}", line=wrong[0] + 1)
     told = [f"{_of_lines(odd)} no row of {layout.width} columns: left out"] if odd else []
+    if spring := spring_of(lines[:begin]):
+        told.append(f"the header has a spring constant of {spring}: {_OF_SPRING}")
     numbers = np.array(kept) + 1
     values, strange, clocks = _values([lines[n] for n in kept], layout, numbers)
     headers = tuple(replace(one, unit="s") if n in clocks else one for n, one in enumerate(headers))
-    return Table(file, headers, values, numbers, strange, tuple(told), layout)
+    return Table(file, headers, values, numbers, strange, tuple(told), layout, spring)
+
+
+def spring_of(before: Sequence[str]) -> str:
+    """Return the spring constant that the lines above a table have, as a study writes it; "" for none."""
+    for line in before:
+        if found := _SPRING.search(line):
+            unit = found["unit"] or "N/m"
+            try:
+                return f"{found['value']} {unit}" if unit_factor(unit, "N/m") > 0 < float(found["value"]) else ""
+            except ValueError:
+                return ""
+    return ""
 
 
 def _begin(lines: Sequence[str], layout: Layout) -> int | None:

@@ -9,6 +9,7 @@ _WORDS = {
         "stroke", "travel", "compression", "crosshead", "deformation", "height", "separation", "z", "weg", "h", "d",
     }),
     "force": frozenset({"force", "load", "kraft", "f", "fn", "fz", "p"}),
+    "deflection": frozenset({"deflection", "defl", "bending"}),
     "time": frozenset({"time", "timestamp", "elapsed", "zeit", "t"}),
 }  # fmt: skip
 # Words of columns that are derived from those of interest.

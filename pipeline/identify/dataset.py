@@ -46,6 +46,7 @@ WORDS: dict[str, tuple[str, str]] = {
     "noise_deviation": ("N", "standard deviation of the noise at no force"),
     "window_depth": ("m", "largest depth of a fit to a part of the curves"),
     "window_young": ("Pa", "Young's modulus of that fit"),
+    "hertz_young": ("Pa", "Young's modulus of Hertz's formula, a paraboloid on a half-space, by least squares"),
     "evidence": ("1", "logarithm of the evidence for a deviation from the law, relative to that for none"),
 }
 # Words of each of many files.
@@ -90,10 +91,19 @@ def dataset_of(
     }
     dataset = xr.Dataset(values, coordinates)
     for name in dataset.variables:
-        unit, meaning = WORDS[str(name)]
-        dataset[name].attrs = {"long_name": meaning} | ({"units": unit} if unit else {})
+        dataset[name].attrs = _meaning(str(name))
     told = {"told": "\n".join(found.told)} if found.told else {}
     return dataset.assign_attrs({"Conventions": "CF-1.8", "verdict": found.verdict, **told, **attributes})
+
+
+def described(name: str, value: float) -> xr.DataArray:
+    """Return a number as a variable of a dataset with its meaning."""
+    return xr.DataArray(value, attrs=_meaning(name))
+
+
+def _meaning(name: str) -> dict[str, str]:
+    unit, meaning = WORDS[name]
+    return {"long_name": meaning} | ({"units": unit} if unit else {})
 
 
 def joined(found: Sequence[xr.Dataset | ExperimentError], files: Sequence[str]) -> xr.Dataset:

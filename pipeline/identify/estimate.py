@@ -1,6 +1,6 @@
 """From measured curves to estimates: the fit, its verdict, both bars, their parts, and profiles."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.special import stdtrit
 from pipeline.arrays import FloatArray
 from pipeline.experiment.curve import Curve
 from pipeline.experiment.reading import ExperimentError
+from pipeline.identify.attraction import attractions
 from pipeline.identify.bars import TAIL, interval
 from pipeline.identify.fit import Fit, fit
 from pipeline.identify.hidden import hidden_bars
@@ -26,6 +27,8 @@ from pipeline.study.identified import FITS
 # A law does not fit if a smooth deviation from it is so much more likely, as logarithm of the ratio of the evidence:
 # on synthetic curves of the right law this happens to less than 2 % (docs/identification.md).
 MISFIT = 1.2
+# No measured force is exact to this share of the largest one: ISO 7500-1 allows five times as much in its finest class.
+_FINEST = 1e-3
 # An unknown is not seen if its bar covers this share of its range, or of what was known before.
 _BLIND = 0.75
 # Unknowns that are far from normal whatever the fit says.
@@ -80,7 +83,7 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
         profiles=profiles,
         windows=() if does_fit or beyond else _windows(measured, found),
         evidence=found.misfit,
-        told=(*combinations(found, seen), *(cut(found) if does_fit else ())),
+        told=(*combinations(found, seen), *(_told(found) if does_fit else ())),
     )
 
 
@@ -171,7 +174,9 @@ def _curve(found: Fit, number: int) -> CurveFit:
 
 def _verdict(found: Fit) -> str:
     """Return whether the law fits; if not, by how much it does not."""
-    if found.misfit <= MISFIT:
+    if sticking := list(attractions([one.curve for one in found.model.measured], is_much=True)):
+        return f"does not fit: {'; '.join(sticking)}"
+    if found.misfit <= MISFIT or _is_small(found):
         return FITS
     number = int(np.argmax([belief.misfit for belief in found.beliefs]))
     force, measured = found.force[number], found.model.measured[number]
@@ -182,6 +187,27 @@ def _verdict(found: Fit) -> str:
         f"does not fit: the force{name} differs from the law's by a smooth curve, up to {100 * largest:.2g} % of the "
         "largest force; the modulus of small depths is the one to use"
     )
+
+
+def _told(found: Fit) -> Iterator[str]:
+    """Yield what may make the bars of a law that fits too small."""
+    yield from cut(found)
+    for sentence in attractions([one.curve for one in found.model.measured], is_much=False):
+        yield f"{sentence[0].upper()}{sentence[1:]}: E may be off by more than its error bar."
+
+
+def _is_small(found: Fit) -> bool:
+    """Return whether what the law leaves of every curve is too small to say anything about the law.
+
+    It is within the error of the law's forces, of mesh and interpolation, or within that of any measured force.
+    """
+    values = found.model.space.values(found.x)
+    for number, (one, force) in enumerate(zip(found.model.measured, found.force, strict=True)):
+        error = one.forward.error(found.model.depth(number, values, force), values)
+        ours = float(np.max(error * np.abs(force - found.model.offset(number, values))))
+        if np.abs(one.curve.force - force).max() > max(ours, _FINEST * np.ptp(one.curve.force)):
+            return False
+    return True
 
 
 def _windows(measured: Sequence[Measured], found: Fit) -> tuple[Window, ...]:

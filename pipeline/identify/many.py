@@ -11,10 +11,11 @@ import xarray as xr
 
 from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.advice import advice
-from pipeline.identify.dataset import dataset_of
+from pipeline.identify.dataset import dataset_of, described
 from pipeline.identify.doubts import doubts_of_depth, doubts_of_force, doubts_of_moduli, doubts_of_scale
 from pipeline.identify.estimate import identify
 from pipeline.identify.experiment import Near, Scenes, Specimen
+from pipeline.identify.hertz import hertz_young
 from pipeline.identify.kept import Kept
 from pipeline.identify.parts import Estimate, TooDeepError
 from pipeline.identify.unknowns import unknowns
@@ -64,7 +65,7 @@ class Work:
             found[number] = outcome
             if count > 1 and isinstance(outcome, xr.Dataset):
                 kept.write(mine[number], outcome)
-            if time.monotonic() - printed > SILENCE:
+            if count > 1 and time.monotonic() - printed > SILENCE:
                 printed = time.monotonic()
                 say(f"{min(len(found) * comm.size, count)} of {count} files are fitted")
         every = {number: one for part in comm.allgather(found) for number, one in part.items()}
@@ -120,6 +121,8 @@ class Work:
         told += advice(self.study, found) if len(self.specimens) == 1 else ()
         dataset = dataset_of(found, _attributes(self.study), [curve.time for curve in specimen.curves])
         told += doubts_of_moduli(dataset)
+        if len(measured) == 1 and (young := hertz_young(scenes.cases[0], measured[0], found)) is not None:
+            dataset = dataset.assign(hertz_young=described("hertz_young", young))
         return dataset.assign_attrs({"told": "\n".join(told)} if told else {})
 
 

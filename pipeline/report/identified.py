@@ -55,11 +55,20 @@ def wanted(dataset: xr.Dataset) -> list[str]:
 def answer(dataset: xr.Dataset) -> list[str]:
     """Return what was found, in sentences."""
     if "file" in dataset.dims:
-        return [*_of_files(dataset), *told(dataset)]
-    if dataset.attrs["verdict"] != FITS:
-        return [*_without_bars(dataset), *told(dataset)]
-    lines = [of_unknown(dataset, name, is_short=number > 0) for number, name in enumerate(wanted(dataset))]
-    return [*lines, *told(dataset)]
+        lines = list(_of_files(dataset))
+    elif dataset.attrs["verdict"] != FITS:
+        lines = list(_without_bars(dataset))
+    else:
+        lines = [of_unknown(dataset, name, is_short=number > 0) for number, name in enumerate(wanted(dataset))]
+    return [*lines, *_hertz(dataset), *told(dataset)]
+
+
+def _hertz(dataset: xr.Dataset) -> Iterator[str]:
+    """Yield what Hertz's formula gives for a ball."""
+    if "hertz_young" in dataset:
+        what = "median E" if "file" in dataset.dims else "E"
+        value = engineering(float(dataset["hertz_young"].median()), "Pa", 4)
+        yield f"Hertz's formula, a paraboloid on a half-space, by least squares: {what} = {value}."
 
 
 def told(dataset: xr.Dataset) -> list[str]:
@@ -131,7 +140,10 @@ def bar(dataset: xr.Dataset, name: str, *, hidden: bool = False) -> str:
 
 def span(dataset: xr.Dataset, name: str, low: float, high: float) -> str:
     """Write a range of an unknown, with one unit if both ends have it: ``43.6 to 45.6 kPa``."""
-    first, last = (written(dataset, name, end) for end in (low, high))
+    for digits in (3, 4, 5, 6):
+        first, last = (written(dataset, name, end, digits) for end in (low, high))
+        if first != last:
+            break
     number, _, unit = first.partition(" ")
     return f"{number if last.endswith(f' {unit}') else first} to {last}"
 

@@ -58,3 +58,24 @@ def test_what_is_no_table_is_refused(tmp_path):
     (tmp_path / "a.csv").write_text("Dear all,\nno curves today.\n")
     with pytest.raises(ExperimentError):
         describe(tmp_path / "a.csv")
+
+
+def test_a_spring_constant_in_the_header_is_told_and_pasted(tmp_path):
+    columns = {"height (m)": -DEPTH, "force (N)": FORCE}
+    path = write(tmp_path / "tip.txt", columns, separator="\t", before="# springConstant: 0.05\n# fast: true\n")
+    said = describe(path)
+    assert "the header has a spring constant of 0.05 N/m: it is `machine_stiffness` if the depth is the way" in said
+    (found,) = block(said)["measurement"]
+    assert found["machine_stiffness"] == "0.05 N/m"
+
+
+def test_a_deflection_is_no_depth_but_that_of_a_spring(tmp_path):
+    columns = {"ZSnsr (nm)": 1e9 * (DEPTH + FORCE / 50), "Defl (nm)": 1e9 * FORCE / 50}
+    path = write(tmp_path / "tip.csv", columns, before="Spring constant: 50 N/m\n")
+    said = describe(path)
+    assert "if the force is the deflection of a spring, name piezo, deflection and spring" in said
+    content = raw() | block(said)
+    study = parse(content, file=str(tmp_path / "study.toml"))
+    (curve,) = curves_of(study, study.measurements[0])
+    assert np.ptp(curve.depth) == pytest.approx(np.ptp(DEPTH), rel=1e-3)
+    assert np.ptp(curve.force) == pytest.approx(np.ptp(FORCE[: FORCE.argmax() + 1]), rel=1e-3)
