@@ -4,7 +4,7 @@ import numpy as np
 from scipy.special import stdtr
 
 from pipeline.arrays import FloatArray
-from pipeline.identify.fit import Mixture
+from pipeline.identify.mixture import Mixture
 
 # Probability of each side beyond a bar of 95 %: less than 2.5 %, since the mixture is of models made linear, with the
 # noise on a grid. Calibrated on 640 synthetic curves; docs/identification.md reports on others.
@@ -14,7 +14,7 @@ _BISECTIONS = 60
 
 def interval(mixture: Mixture, place: int) -> tuple[float, float]:
     """Return the coordinates between which an unknown is with 95 %, not cut at the ends of its range."""
-    mean, deviation = mixture.mean[:, place], mixture.wider * np.sqrt(mixture.covariance[:, place, place])
+    mean, deviation = mixture.mean[:, place], np.sqrt(mixture.covariance[:, place, place])
     return _quantile(mixture, mean, deviation, TAIL), _quantile(mixture, mean, deviation, 1 - TAIL)
 
 

@@ -16,7 +16,6 @@ from pipeline.identify.fit import Fit, fit
 from pipeline.identify.hidden import hidden_bars
 from pipeline.identify.limits import begins_later, cut, out_of_range
 from pipeline.identify.model import REACH, Model
-from pipeline.identify.noise import GRID
 from pipeline.identify.parts import SOURCES, CurveFit, Estimate, Measured, NoiseFound, Profile, Unknown, Window
 from pipeline.identify.profiles import Likelihood, ends, profile
 from pipeline.identify.seen import combinations
@@ -122,7 +121,7 @@ def _bars(found: Fit) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, Pro
     if not is_cut and not any(model.names[k].startswith(_CURVED) for k in shared):
         return x, low, high, {}
     # The profile has the most probable noise: its threshold is raised as bars of all noises are wider than that one's.
-    top = mixture.covariance[int(np.argmax(mixture.weight))]
+    top = mixture.covariance[mixture.top]
     student = float(stdtrit(mixture.freedom, 1 - TAIL))
     wider = float(np.median((high - low) / 2 / np.sqrt(np.diag(top)) / student))
     squared = (student * max(wider, 1.0)) ** 2
@@ -154,10 +153,9 @@ def _seen(model: Model, low: FloatArray, high: FloatArray) -> npt.NDArray[np.boo
 
 
 def _curve(found: Fit, number: int) -> CurveFit:
-    model, belief = found.model, found.beliefs[number]
+    model, force = found.model, found.force[number]
     values = model.space.values(found.x)
-    best = int(np.argmax(belief.weight))
-    noise, force = GRID[belief.noise[best]], found.force[number]
+    noise, scale = found.noise(number)
     # The fit has means over blocks of points.
     block = len(force) / len(model.thinned(force))
     jacobian = found.jacobian[number]
@@ -168,7 +166,7 @@ def _curve(found: Fit, number: int) -> CurveFit:
         force=model.measured[number].curve.force,
         fit=force,
         band=1.96 * np.sqrt(np.maximum(variance, 0.0)),
-        noise=NoiseFound(noise.correlation ** (1 / block), noise.white, noise.growth, float(belief.scale[best])),
+        noise=NoiseFound(noise.correlation ** (1 / block), noise.white, noise.growth, scale),
     )
 
 

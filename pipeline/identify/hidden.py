@@ -12,7 +12,8 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.identify.bars import interval
-from pipeline.identify.fit import Fit, Mixture, fit, prior
+from pipeline.identify.fit import Fit, fit, prior
+from pipeline.identify.mixture import Mixture
 from pipeline.identify.model import Model, Space
 from pipeline.identify.profiles import Likelihood
 from pipeline.identify.tabulated import Proportional, Scaled, tabulated
@@ -64,14 +65,16 @@ def _of_kind(found: Fit, kind: str) -> list[Mixture]:
     weight = np.exp(np.array(logs) - max(logs))
     weight /= weight.sum()
     # The most probable noise is not the only one: its bars are widened to those of the mixture.
-    top = found.mixture.covariance[int(np.argmax(found.mixture.weight))]
+    top = found.mixture.covariance[found.mixture.top]
     wider = np.sqrt(np.diag(found.mixture.spread) / np.diag(top))
     covariance = np.array([one * np.outer(wider, wider) for one in covariances])
-    mixture = Mixture(weight, np.array(places), covariance, found.mixture.freedom, np.full(len(weight), True))
+    best = int(np.argmax(weight))
+    mixture = Mixture(
+        weight, np.array(places), covariance, found.mixture.freedom, np.zeros((len(weight), 0), dtype=int), best
+    )
     if 1 / np.sum(weight**2) >= _FEW:
         return [mixture]
     # The curves see the hidden part: between the points of the grid, too.
-    best = int(np.argmax(weight))
     model = base.with_unknowns(space.unknowns)
     return [mixture, fit(model, np.concatenate([places[best], points[best]])).mixture]
 

@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.identify.beliefs import size_of
 from pipeline.identify.fit import Fit, prior
 from pipeline.identify.model import Model
-from pipeline.identify.noise import DEVIATIONS, GRID, TERMS, Noise, deviation, whiten
+from pipeline.identify.noise import TERMS, Noise, deviation, whiten
 from pipeline.identify.parts import Profile
 
 # Steps of a profile: at most so many to each side, as shares of the range and of the standard deviation.
@@ -109,12 +110,10 @@ def _bounded(matrix: FloatArray, slope: FloatArray, x: FloatArray, held: Sequenc
 
 
 def _most_probable(found: Fit, number: int) -> _Curve:
-    belief, model = found.beliefs[number], found.model
-    top = int(np.argmax(belief.weight))
+    model, (noise, scale), size = found.model, found.noise(number), size_of(found.top(number))
     values = model.space.values(found.x)
     contact = found.force[number] - model.offset(number, values)
     share = model.thinned(contact) / np.maximum(np.abs(contact).max(), np.finfo(float).tiny)
-    noise, scale, size = GRID[belief.noise[top]], float(belief.scale[top]), DEVIATIONS[belief.size[top]]
     if size == 0:
         return _Curve(noise, scale, share, np.empty((0, 0)))
     bent, _ = whiten(model.thinned(deviation(contact, model.depth(number, values, found.force[number]))), share, noise)

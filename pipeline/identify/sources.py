@@ -4,9 +4,10 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.identify.bars import interval
-from pipeline.identify.fit import Fit, Mixture
+from pipeline.identify.fit import Fit
+from pipeline.identify.mixture import Mixture
 from pipeline.identify.model import is_of_curve
-from pipeline.identify.noise import GRID, whiten
+from pipeline.identify.noise import whiten
 from pipeline.identify.parts import SOURCES, TooDeepError
 
 
@@ -25,7 +26,7 @@ def shares(found: Fit) -> FloatArray:
     ]
     groups = {"thickness": of_geometry, "machine": of_machine, "contact": of_curve}
     mixture = found.mixture
-    information = np.linalg.inv(mixture.covariance[int(np.argmax(mixture.weight))])
+    information = np.linalg.inv(mixture.covariance[mixture.top])
     result = np.zeros((len(unknowns), len(SOURCES)))
     without = mixture.of_law()
     for place in range(len(unknowns)):
@@ -48,11 +49,11 @@ def mesh(found: Fit) -> FloatArray:
     Raises:
         TooDeepError: if a curve is fitted at depths for which its force is not known.
     """
-    top = found.mixture.covariance[int(np.argmax(found.mixture.weight))]
+    top = found.mixture.covariance[found.mixture.top]
     model, values = found.model, found.model.space.values(found.x)
     square = np.zeros(len(found.x))
-    for number, (measured, belief) in enumerate(zip(model.measured, found.beliefs, strict=True)):
-        best = int(np.argmax(belief.weight))
+    for number, measured in enumerate(model.measured):
+        noise, scale = found.noise(number)
         contact = found.force[number] - model.offset(number, values)
         depth = model.depth(number, values, found.force[number])
         error = measured.forward.error(depth, values)
@@ -62,8 +63,8 @@ def mesh(found: Fit) -> FloatArray:
         wrong = contact * error
         share = contact / np.maximum(np.abs(contact).max(), np.finfo(float).tiny)
         columns = model.thinned(np.column_stack([found.jacobian[number], wrong]))
-        whitened, _ = whiten(columns, model.thinned(share), GRID[belief.noise[best]])
-        pull = whitened[:, :-1].T @ whitened[:, -1] / belief.scale[best] ** 2
+        whitened, _ = whiten(columns, model.thinned(share), noise)
+        pull = whitened[:, :-1].T @ whitened[:, -1] / scale**2
         square += (top @ pull) ** 2
     return np.sqrt(square)
 
