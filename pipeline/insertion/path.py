@@ -59,8 +59,9 @@ def follow(study: Study, solve: Solve) -> Path:
     first = next((depth for depth in depths if whole.energy(depth) >= scene.blade.length * scene.tear(depth)), np.inf)
     withdraws = scene.insertion.withdraw and np.isfinite(first)  # through all depths, after the tissue is cut
     found, message = cuttings(scene, (depths if withdraws else depths[depths >= first]).tolist())
-    intact = [one for one in found if whole.energy(one.depth) < one.energy]
-    cut = found[len(intact) :]
+    pierced = (number for number, one in enumerate(found) if whole.energy(one.depth) >= one.energy)
+    count = next(pierced, len(found))
+    intact, cut = found[:count], found[count:]
     if not cut:
         deepest = intact[-1].depth if intact else max(depths[depths < first], default=0.0)
         steps = tuple(whole.step(depth) for depth in depths if depth <= deepest)
@@ -110,7 +111,7 @@ class _Puncture:
         energy = CubicHermiteSpline(ends, [before.energy, after.energy], [before.slope, after.slope])
         depth = float(brentq(lambda d: whole.energy(d) - float(energy(d)), *ends, xtol=1e-9))
         one = _between(before, after, depth)
-        error = one.stored_error + whole.bar * depth**2 / 2
+        error = one.stored_error + whole.bar * depth**2 / 2 + _defect(before, after) * (after.depth - before.depth)
         return cls(depth, one, error / (whole.stiffness * depth - one.slope))
 
     @classmethod
@@ -161,11 +162,12 @@ def _steps(scene: Scene, whole: _Whole, puncture: _Puncture, cut: list[Cutting])
     depths = np.array([one.depth for one in states])
     rubs = np.array([friction * one.squeeze for one in states])
     rubbed = _sums(depths, rubs)
-    elastic = _elastic_work(scene, states)
+    worked = _work(scene, states)
     found = [whole.step(puncture.depth, PUNCTURE)]
     start = puncture.after.energy
+    missed = [0.0 if _crosses(scene, *pair) else _defect(*pair) for pair in pairwise(states)]
+    missed = [max(pair) for pair in pairwise([0.0, *missed, 0.0])]
     for number, one in enumerate(states):
-        torn = one.fracture - puncture.after.fracture
         found.append(
             Step(
                 phase=CUTTING,
@@ -173,26 +175,35 @@ def _steps(scene: Scene, whole: _Whole, puncture: _Puncture, cut: list[Cutting])
                 elastic=one.elastic,
                 cutting=one.cutting,
                 friction=float(rubs[number]),
-                error=one.elastic_error + friction * one.squeeze_error,
+                error=one.elastic_error + friction * one.squeeze_error + missed[number],
                 stored=one.stored,
                 fracture=one.fracture,
                 rubbed=float(rubbed[number]),
-                work=start + torn + float(elastic[number] + rubbed[number]),
+                work=start + float(worked[number] + rubbed[number]),
                 crack_depth=one.crack_depth,
             )
         )
     return found
 
 
-def _elastic_work(scene: Scene, states: list[Cutting]) -> FloatArray:
-    """Return the work (J) of the elastic force since the first state; across an interface it is the stored energy."""
+def _work(scene: Scene, states: list[Cutting]) -> FloatArray:
+    """Return the work (J), but that of friction, since the first state; across an interface, the change of energies."""
     found = [0.0]
     for before, after in pairwise(states):
-        if any(before.depth < end < after.depth for end in scene.interfaces):
-            found.append(after.stored - before.stored)
+        if _crosses(scene, before, after):
+            found.append(after.energy - before.energy)
         else:
-            found.append((before.elastic + after.elastic) / 2 * (after.depth - before.depth))
+            found.append((before.slope + after.slope) / 2 * (after.depth - before.depth))
     return np.cumsum(found)
+
+
+def _crosses(scene: Scene, before: Cutting, after: Cutting) -> bool:
+    return any(before.depth < end < after.depth for end in scene.interfaces)
+
+
+def _defect(before: Cutting, after: Cutting) -> float:
+    """Return by how much the mean force (N) between two depths differs from the change of the energies."""
+    return abs((after.energy - before.energy) / (after.depth - before.depth) - (after.slope + before.slope) / 2)
 
 
 def _sums(depths: FloatArray, forces: FloatArray) -> FloatArray:

@@ -20,6 +20,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
     from pipeline.verify.friction import friction_rows  # noqa: PLC0415
     from pipeline.verify.hyperelastic import hyperelastic_rows  # noqa: PLC0415
+    from pipeline.verify.insertions import insertion_rows  # noqa: PLC0415
     from pipeline.verify.laws import law_rows  # noqa: PLC0415
     from pipeline.verify.loads import load_rows  # noqa: PLC0415
     from pipeline.verify.paths import path_rows  # noqa: PLC0415
@@ -41,6 +42,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from friction_rows(comm, quick=quick)
     yield from wedge_rows(comm, quick=quick)
     yield from slit_rows(comm, quick=quick)
+    yield from insertion_rows(comm, quick=quick)
     yield from far_field_rows(comm, quick=quick)
     yield from path_rows(comm, quick=quick)
     yield from load_rows(comm, quick=quick)

@@ -95,6 +95,17 @@ def test_each_layer_is_cut_at_its_toughness():
     assert np.abs(found["balance"].values).max() < 0.02
 
 
+def test_what_is_cut_stays_cut_in_a_layer_that_the_intact_body_would_not_tear():
+    layer = {"name": "fat", "thickness": "3 mm", "young": "20 kPa", "poisson": 0.3}
+    probe = BLADE | {"toughness": "60 J/m^2"}
+    body = SCENE["body"] | {"layer": [layer | {"toughness": "2 J/m^2"}]}
+    found = _path(read_mapping(SCENE | {"body": body, "probe": probe}, "layers"))
+    assert float(found["puncture_depth"]) < 1.5e-3
+    assert np.all(np.diff(found["phase"]) >= 0) and found.attrs["message"] == ""
+    deep = found.isel(depth=-1)
+    assert float(deep["energy_fracture"]) > STIFFNESS * float(deep["depth"]) ** 2 / 2
+
+
 def test_a_state_that_fails_ends_the_path_there_and_earlier_ones_are_kept():
     found = _path(_study(), deepest=5e-3)
     assert float(found["depth"][-1]) == pytest.approx(4.5e-3)

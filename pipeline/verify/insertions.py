@@ -1,0 +1,73 @@
+"""Insertion of a blade: the force of cutting against energies, and the field near the tip against a nearer front."""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import xarray as xr
+from mpi4py import MPI
+
+from pipeline.insertion.near_tip import EXTENSION_ERROR, NearTip, strength
+from pipeline.insertion.path import follow
+from pipeline.insertion.states import Cut, Scene
+from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
+from pipeline.run.execute import compute
+from pipeline.study.read import parse
+from pipeline.study.sweep import Study
+from pipeline.verify.row import Row
+
+_STUDY: dict[str, dict[str, Any]] = {
+    "body": {"shape": "box", "size": ["30 mm", "30 mm", "16 mm"], "fixed": "bottom"},
+    "material": {"young": "20 kPa", "poisson": 0.3},
+    "probe": {
+        "shape": "blade",
+        "length": "6 mm",
+        "width": "0.8 mm",
+        "contact": "unilateral",
+        "toughness": "2 J/m^2",
+        "insertion": {"to": "6 mm", "steps": 6},
+    },
+    "mesh": {"accuracy": "3 %"},
+}
+# Depths and distances (m) of the front that are compared.
+_DEPTH, _NEAR, _FAR = 4e-3, 0.2e-3, 0.8e-3
+
+
+def insertion_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
+    """Yield the rows of insertions, none if ``quick``; collective."""
+    if quick:
+        return
+    solve, study = partial(_solved, comm), parse(_STUDY)
+    path = follow(study, solve)
+    before, after = path.steps[-2:]
+    gained = after.stored + after.fracture - before.stored - before.fracture
+    force = (before.force + after.force) / 2
+    yield Row(
+        "blade that cuts, ν = 0.3: force",
+        "3D",
+        gained / (after.depth - before.depth),
+        "change of stored energy and work of fracture",
+        force,
+        max(before.error, after.error) / force,
+        message=path.message,
+    )
+    cuts = Scene(study, solve).cuts([(_DEPTH, _NEAR), (_DEPTH, _FAR)])
+    near, far = cuts[_DEPTH, _NEAR], cuts[_DEPTH, _FAR]
+    assert isinstance(near, Cut)
+    assert isinstance(far, Cut)
+    field = NearTip.through(strength(20e3, 0.3, 0.4e-3), _FAR, far.release)
+    yield Row(
+        "front near a blade's tip, ν = 0.3: energy release",
+        "3D",
+        field.release(_NEAR),
+        "rigid plate, G. I. Barenblatt 1962; κ from a front four times as far",
+        near.release,
+        near.release_error / near.release,
+        far.release_error / far.release + EXTENSION_ERROR,
+    )
+
+
+def _solved(comm: MPI.Comm, study: Study) -> xr.Dataset:
+    plan = make_plan(study)
+    return build(plan, compute(plan, comm))
