@@ -16,6 +16,9 @@ _DEPTHS, _FORCES = (1e-9, 0.2), (1e-12, 1e5)
 _NOISE = 3.0
 # Contact begins, roughly, where this share of the force's rise is exceeded.
 _BEGUN = 0.02
+# Contact, from this share of the force's rise on: its last part, and one before it, as shares of its length from the
+# deepest row. A slope of the one below this share of that of the other is none, if it would be above the noise.
+_FLAT_BEGUN, _FLAT_LAST, _FLAT_BEFORE, _FLAT, _FLAT_NOISE = 0.1, (0.1, -1.0), (0.6, 0.3), 0.15, 8.0
 # Air, in lengths of the contact, that is too long, and what is left of it. Less than this share of a curve is no air:
 # a ball without any exceeds the share above at this depth.
 _LONG, _LEFT, _NONE = 3.0, 2.0, 0.1
@@ -59,7 +62,7 @@ def check_contact(found: Recorded, *, is_rising: bool, is_cut: bool) -> Recorded
     the study gives the window: ``is_cut`` is false.
     """
     depth, force = found.depth, found.force
-    told = gaps(found, depth, "depth", "m") if is_rising else []
+    told = [*gaps(found, depth, "depth", "m"), *_flat_end(found)] if is_rising else []
     air = np.median(force[: max(3, len(force) // 20)])
     end = np.median(force[-max(3, len(force) // 20) :])
     noise = float(np.median(np.abs(np.diff(force)))) * 1.4826 / np.sqrt(2)
@@ -78,6 +81,23 @@ def check_contact(found: Recorded, *, is_rising: bool, is_cut: bool) -> Recorded
         told.append(f"{int((~kept).sum())} rows of air, far longer than the contact, are left out")
         return found.part(kept).tell(*told)
     return found.tell(*told)
+
+
+def _flat_end(found: Recorded) -> list[str]:
+    """Tell a force that hardly rises any more at the deepest rows, as of a load cell at its end with noise."""
+    depth, force = found.depth, found.force
+    air, noise = np.median(force[: max(3, len(force) // 20)]), float(np.median(np.abs(np.diff(force))))
+    pressed = depth >= depth[np.argmax(force > air + _FLAT_BEGUN * (force.max() - air))]
+    length = float(depth.max() - depth[pressed].min())
+    last, before = (pressed & (depth >= depth.max() - a * length) & (depth < depth.max() - b * length)
+                    for a, b in (_FLAT_LAST, _FLAT_BEFORE))  # fmt: skip
+    if min(last.sum(), before.sum()) < _PLATEAU:
+        return []
+    slopes = [float(np.polyfit(depth[rows] - depth.max(), force[rows], 1)[0]) for rows in (last, before)]
+    if slopes[0] > _FLAT * slopes[1] or slopes[1] * _FLAT_LAST[0] * length < _FLAT_NOISE * noise:
+        return []
+    width = f"{_FLAT_LAST[0] * length:.3g} m"
+    return [f"force hardly rises over the last {width}: is the load cell saturated, or the tissue cut? Give a window"]
 
 
 def check_count(found: Recorded, what: str) -> Recorded:

@@ -13,6 +13,7 @@ from pipeline.experiment.words import is_called
 # Two columns of one kind are the same but for a constant within this share of their range.
 _SAME = 1e-3
 _SECTION = "[[measurement]]"
+_KINDS = {"m": "a length", "N": "a force", "s": "a time"}
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class Recorded:
     """Depth (m), force (N) and time (s from the first row, or None) as recorded, and the lines they are from.
 
     ``names`` has the headers of the columns, by what they are. ``told`` says what was found without being asked for.
+    ``began`` is the time of the first row as recorded.
     """
 
     file: str
@@ -30,6 +32,7 @@ class Recorded:
     names: dict[str, str]
     told: tuple[str, ...] = ()
     deflection: FloatArray | None = None
+    began: float = 0.0
 
     @property
     def depth_name(self) -> str:
@@ -157,8 +160,23 @@ def _found(table: Table, kind: str, reading: Reading, told: list[str]) -> int:
     raise ExperimentError(
         table.file,
         f"{kind} {why} among {_listed(table)}: name it by header or number in columns of {_SECTION}, and its unit in "
-        f"units if the header has none{_if_bent(table)}",
+        f"units if the header has none{_if_bent(table)}{_why_not(table, kind, units)}",
     )
+
+
+def _why_not(table: Table, kind: str, units: list[str]) -> str:
+    """Return why columns that are called so are none: they have text or nothing, or a unit of another kind."""
+    reasons = []
+    for number, header in enumerate(table.headers):
+        title = _title(table, number)
+        if number in table.strange:
+            line, text = table.strange[number]
+            reasons.append(f'`{title}` has text, "{text}" in line {line}')
+        elif is_called(header.name, kind) and not _has_values(table, number):
+            reasons.append(f"`{title}` has no values")
+        elif is_called(header.name, kind) and units[number] and not is_unit_of(units[number], UNITS[kind]):
+            reasons.append(f"`{title}` has the unit {units[number]}, no unit of {_KINDS[UNITS[kind]]}")
+    return "".join(f"; {reason}" for reason in reasons)
 
 
 def _if_bent(table: Table) -> str:
@@ -250,8 +268,10 @@ def _without_missing(found: Recorded) -> Recorded:
     if not rows.size:
         raise ExperimentError(found.file, "has no row with depth and force")
     kept = found.part(rows)
+    if kept.time is not None and np.ptp(kept.time) == 0:
+        kept = replace(kept, time=None).tell(f"time never changes (column `{kept.names['time']}`): not read")
     if kept.time is not None:
-        kept = replace(kept, time=kept.time - kept.time[0])
+        kept = replace(kept, time=kept.time - kept.time[0], began=float(kept.time[0]))
     count = int(missing.sum())
     if count:
         first = int(found.lines[np.flatnonzero(missing)[0]])

@@ -17,6 +17,12 @@ _FALL = 0.2
 _SPIKE, _SPIKE_NOISE, _INNER = 0.25, 20.0, (0.02, 0.98)
 
 
+# Shares of the rows in which a force goes one way, and a depth that is none does; and in which a depth may rest.
+_EVEN, _UNEVEN, _STILL, _FEWEST = 0.98, 0.8, 0.1, 20
+# Steps that differ by this share of them are even. Times (s) from here on are dates.
+_EXACT, _DATE = 1e-3, 1e6
+
+
 def check_order(found: Recorded) -> Recorded:
     """Return the curve; report rows that are in no order, and tell gaps in time."""
     if np.ptp(found.depth) == 0:
@@ -30,9 +36,11 @@ def check_order(found: Recorded) -> Recorded:
         line = int(found.lines[turns[1]])
         why = "the depth jumps to and fro: rows are not in the order of time, or this column is not the depth"
         raise ExperimentError(found.file, why, column=found.depth_name, line=line)
+    _check_swapped(found)
     _check_spikes(found, found.depth, found.depth_name)
     _check_spikes(found, found.force, found.force_name)
-    return found.tell(*_jumps(found), *(gaps(found, found.time, "time", "s") if found.time is not None else ()))
+    _check_last(found)
+    return found.tell(*_jumps(found), *(_of_time(found, found.time) if found.time is not None else ()))
 
 
 def _check_time(found: Recorded, time: FloatArray) -> None:
@@ -45,6 +53,37 @@ def _check_time(found: Recorded, time: FloatArray) -> None:
         why += "a second test begins here: write each to its own file" if falls == 1 else (
             f"it falls in {falls} rows, so these are in no order, or depth and time are swapped")  # fmt: skip
         raise ExperimentError(found.file, why, column=found.names["time"], line=int(found.lines[row]))
+
+
+def _check_swapped(found: Recorded) -> None:
+    """Report a force that only rises or falls beside a depth that goes to and fro: the one is the other."""
+    top = int(np.argmax(np.abs(found.force - found.force[0])))
+    if top < _FEWEST:
+        return
+    steps = [np.diff(values[: top + 1]) for values in (found.force, found.depth)]
+    force, depth = (max(float((step > 0).mean()), float((step < 0).mean())) for step in steps)
+    if force >= _EVEN and depth <= _UNEVEN and float((steps[1] == 0).mean()) < _STILL:
+        why = "the depth goes to and fro from row to row, and the force does not: are these columns swapped?"
+        raise ExperimentError(found.file, why, column=found.depth_name)
+
+
+def _check_last(found: Recorded) -> None:
+    """Report a force of the last row that is far off those before, while the depth goes on as before."""
+    force, depth = np.abs(np.diff(found.force)), np.abs(np.diff(found.depth))
+    least = max(_SPIKE * float(np.ptp(found.force[:-1])), _SPIKE_NOISE * float(np.median(force)))
+    if force[-1] > least and force[-1] > _GAP * force[-4:-1].max() and depth[-1] <= _GAP * float(np.median(depth)):
+        why = f"{found.force[-1]:.4g} (SI) is far off the rows before, and it is the last: remove or correct it"
+        raise ExperimentError(found.file, why, column=found.force_name, line=int(found.lines[-1]))
+
+
+def _of_time(found: Recorded, time: FloatArray) -> list[str]:
+    """Tell gaps in time, and a depth that looks like a time while the time looks like a depth."""
+    told = gaps(found, time, "time", "s")
+    steps = np.abs(np.diff(found.depth))
+    is_clock = found.depth[0] == 0 and np.ptp(steps) <= _EXACT * steps.max()
+    if is_clock and 0 < abs(found.began) < _DATE and np.ptp(np.diff(time)) > 10 * _EXACT * np.abs(np.diff(time)).max():
+        told.append("the depth rises in even steps from 0, and the time does not: are these columns swapped?")
+    return told
 
 
 def _check_spikes(found: Recorded, values: FloatArray, name: str) -> None:
@@ -79,7 +118,8 @@ def _jumps(found: Recorded) -> list[str]:
 def gaps(found: Recorded, values: FloatArray, what: str, unit: str) -> list[str]:
     """Say where the largest step of a column is much larger than the usual one."""
     steps = np.abs(np.diff(values))
-    row = int(np.argmax(steps))
-    if steps[row] <= max(_GAP * float(np.median(steps)), _SHARE * float(np.ptp(values))):
+    row, moving = int(np.argmax(steps)), steps[steps > 0]
+    usual = float(np.median(moving)) if moving.size else 0.0
+    if steps[row] <= max(_GAP * usual, _SHARE * float(np.ptp(values))):
         return []
     return [f"gap of {steps[row]:.3g} {unit} in {what} before line {found.lines[row + 1]}"]

@@ -11,8 +11,8 @@ from pipeline.arrays import FloatArray
 _TURN = 0.1
 # A hold moves slower than this share of the approach, near the deepest place, for this many rows.
 _SLOW, _NEAR, _FEWEST = 0.15, 0.85, 5
-# Rows over which a rate is taken, as a share of all.
-_WINDOW = 0.01
+# Rows over which a rate is taken, as a share of all, and in rests of a depth that is recorded in coarse steps.
+_WINDOW, _RESTS = 0.01, 3
 
 
 @dataclass(frozen=True)
@@ -68,10 +68,16 @@ def turning_points(depth: FloatArray, least: float) -> list[int]:
     return turns
 
 
+def _rest(depth: FloatArray) -> int:
+    """Return the usual number of rows of one depth, one after the other: many if it is recorded in coarse steps."""
+    changes = np.flatnonzero(np.diff(depth))
+    return int(np.median(np.diff(changes))) if len(changes) > 2 else 1
+
+
 def _hold(depth: FloatArray, time: FloatArray | None, top: int) -> tuple[int, int]:
     """Return where the hold begins and ends: at the deepest row if there is none."""
     clock = np.arange(len(depth), dtype=float) if time is None else time
-    width = max(2, int(_WINDOW * len(depth)))
+    width = max(2, int(_WINDOW * len(depth)), _RESTS * _rest(depth[: top + 1]))
     if len(depth) < 3 * width or top < width:
         return top + 1, top + 1
     base, highest = depth[: top + 1].min(), depth[top]

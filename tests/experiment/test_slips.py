@@ -136,6 +136,25 @@ ERRORS = {
     "no cycle": (GOOD, {}, {"cycle": 2}, ["cycle = 2", "has 1"]),
     "no hold": (GOOD, {}, {"segment": "hold"}, ["no hold"]),
     "no retract": (GOOD, {}, {"segment": "retract"}, ["no retract"]),
+    "depth and force swapped": (
+        GOOD, {}, {"columns": {"depth": 3, "force": 2, "time": 1}, "units": {}}, ["cannot be depth", "`force (mN)`"],
+    ),
+    "depth and force swapped, without units": (
+        PLAIN, {}, {"columns": {"depth": "F", "force": "z"}, "units": {"depth": "mm", "force": "mN"}},
+        ["`F`", "goes to and fro", "swapped"],
+    ),
+    "a last row of zero": (GOOD, {"change": cell(200, 2, "0")}, {}, ["line 201", "`force (mN)`", "it is the last"]),
+    "grams for a force": (
+        {"z (mm)": 1e3 * DEPTH, "load (g)": 1e2 * FORCE}, {}, {}, ["force is not found", "unit g, no unit of a force"],
+    ),
+    "a comma for thousands": (
+        {"way (µm)": 1e6 * DEPTH, "load (mN)": 1e3 * FORCE}, {"separator": ";", "change":
+        lambda lines: [lines[0], *(f"{float(a):,.1f};{b}" for a, b in (line.split(";") for line in lines[1:]))]}, {},
+        ["line 102", "`way (µm)`", '"1,005.0" is no number'],
+    ),
+    "the only force is empty": (
+        GOOD | {"force (mN)": np.nan * TIME}, {}, {}, ["force is not found", "`force (mN)` has no values"],
+    ),
     "two tables": (
         GOOD, {"change": lambda lines: [*lines, *("1,2" for _ in range(50))]}, {},
         ["line 202", "2 columns", "others have 3"],
@@ -145,6 +164,14 @@ ERRORS = {
 # What is in the file, how it is written, and what must be told of it.
 TOLD = {
     "saturated load cell": (GOOD | {"force (mN)": saturated()}, {}, ["largest value", "saturated", "left out"]),
+    "saturated load cell with noise": (
+        GOOD | {"force (mN)": saturated() + 0.03 * np.cos(7.3 * np.arange(200))}, {}, ["hardly rises", "saturated"],
+    ),
+    "time that stands still": (GOOD | {"time (s)": 0 * TIME + 5}, {}, ["time never changes", "`time (s)`", "not read"]),
+    "depth and time swapped, of one ramp": (
+        {"depth (mm)": np.arange(200) / 10, "time (s)": 12 + 1e3 * DEPTH + 3e-3 * np.cos(np.arange(200)),
+         "force (mN)": 1e3 * FORCE}, {}, ["even steps from 0", "swapped"],
+    ),
     "gap in time": (GOOD | {"time (s)": TIME + 30 * (TIME > 10)}, {}, ["gap of 30", "time", "line 102"]),
     "gap in depth": (
         GOOD, {"change": lambda lines: lines[:140] + lines[165:]}, ["gap of 0.00026", "depth", "line 141"],
@@ -221,6 +248,13 @@ def test_a_saturated_part_is_not_used(tmp_path):
     curve = read_curve(write(tmp_path / "a.csv", GOOD | {"force (mN)": saturated()}), Reading())
     assert curve.force.max() < 30e-3
     assert np.ptp(curve.depth) < 0.9 * np.ptp(DEPTH)
+
+
+def test_coarse_steps_of_the_depth_are_no_holds(tmp_path):
+    columns = GOOD | {"depth (mm)": np.round(1e3 * DEPTH, 1)}
+    curve = read_curve(write(tmp_path / "a.csv", columns), Reading())
+    assert np.ptp(curve.depth) == pytest.approx(np.ptp(DEPTH))
+    assert not any("gap" in told for told in curve.told)
 
 
 def test_coarse_steps_of_the_force_are_not_saturation(tmp_path):
