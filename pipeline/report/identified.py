@@ -30,7 +30,7 @@ _NAMES = {
     "baseline": "baseline",
     "drift": "drift",
 }
-_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Unknowns whose error is told as a number, not as a share of their value: it may be 0, or is a share itself.
 _ABSOLUTE = ("poisson", "friction", "baseline", "drift", "contact_point", "share")
 _SHARES = "relaxation_share_"
@@ -76,8 +76,12 @@ def told(dataset: xr.Dataset) -> list[str]:
     if "file" in dataset.dims:
         files, lines = dataset["file"].values.astype(str), dataset["told"].values.astype(str)
         said = [(file, line) for file, own in zip(files, lines, strict=True) for line in own.splitlines()]
-        return list(once(said, len(files)))
-    return [line for line in str(dataset.attrs.get("told", "")).splitlines() if line]
+        return [_ended(line) for line in once(said, len(files))]
+    return [_ended(line) for line in str(dataset.attrs.get("told", "")).splitlines() if line]
+
+
+def _ended(sentence: str) -> str:
+    return sentence if sentence.endswith((".", "?")) else f"{sentence}."
 
 
 def once(said: Iterable[tuple[str, str]], count: int) -> Iterator[str]:

@@ -63,7 +63,7 @@ def test_the_squares_of_parts_add_up_to_the_bar():
 @pytest.mark.parametrize(
     ("value", "unit", "text"),
     [(12345.0, "Pa", "12.3 kPa"), (999.9e3, "Pa", "1.00 MPa"), (-2e-5, "m", "-20.0 µm"), (0.45, "1", "0.45"),
-     (0.0, "N", "0.00 N"), (6.4e4, "N/m", "64.0 kN/m"), (5e-12, "m", "0.00500 nm"), (1.1e-4, "m", "110 µm")],
+     (0.0, "N", "0.00 N"), (6.4e4, "N/m", "64.0 kN/m"), (5e-12, "m", "5.00 pm"), (1.1e-4, "m", "110 µm")],
 )  # fmt: skip
 def test_values_have_a_prefix_that_suits_them(value, unit, text):
     assert engineering(value, unit) == text

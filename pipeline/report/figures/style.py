@@ -122,14 +122,15 @@ def stack(figure: Figure) -> Figure:
     """Put the panels of a figure below one another, each with its own title, ticks and axis titles: for a phone."""
     # A bar of colours is no panel: it follows those that it belongs to.
     specs = {ax: ax.get_subplotspec() for ax in figure.axes if hasattr(ax, "get_subplotspec")}
-    at = {ax: (spec.rowspan.start, spec.colspan.start) for ax, spec in specs.items() if spec is not None}
+    # By where they are, since grids may be within one another.
+    at = {ax: _corner(ax) for ax, spec in specs.items() if spec is not None}
     panels = sorted(at, key=at.__getitem__)
     words = {}
     for ax in panels:
         row, column = ([p for p in panels if at[p][i] == at[ax][i]] for i in (0, 1))
         words[ax] = (
             next(filter(None, (p.get_title() for p in (ax, *column, *row))), ""),
-            next(filter(None, (p.get_xlabel() for p in (ax, *reversed(column)))), ""),
+            next(filter(None, (p.get_xlabel() for p in (*column[column.index(ax) :], *reversed(column)))), ""),
             next(filter(None, (p.get_ylabel() for p in (ax, *row))), ""),
         )
     legends = [legend for ax in panels if (legend := ax.get_legend()) is not None]
@@ -148,6 +149,7 @@ def stack(figure: Figure) -> Figure:
         ax.set_ylabel(textwrap.fill(y, 26))
         if own := None if is_beside else ax.get_legend():
             write_above(ax, own.get_title().get_text(), _PHONE_LETTERS - 12, 1)
+            _lift_title(ax)
         for label in ax.get_xticklabels() if turned else ():
             if label.get_rotation():
                 label.set(rotation=90, ha="center", rotation_mode="default")
@@ -157,6 +159,22 @@ def stack(figure: Figure) -> Figure:
         above.axis("off")
         write_legend(figure, above)
     return figure
+
+
+def _corner(ax: Axes) -> tuple[float, float]:
+    """Return where the upper left corner of a panel is: from the top, and from the left."""
+    box = ax.get_position()
+    return round(-box.y1, 3), round(box.x0, 3)
+
+
+def _lift_title(ax: Axes) -> None:
+    """Put the title of a panel above the legend that is above the panel."""
+    legend = ax.get_legend()
+    if legend is None or not ax.get_title():
+        return
+    texts = [text for text in (legend.get_title(), *legend.get_texts()) if text.get_text()]
+    lines = sum(text.get_text().count("\n") + 1 for text in texts)
+    ax.set_title(ax.get_title(), pad=6 + 1.5 * lines * texts[-1].get_fontsize())
 
 
 def log_scale(ax: Axes, which: str = "y") -> None:

@@ -78,10 +78,10 @@ def _of_files(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
     for number, file in enumerate(dataset["file"].values):
         one = dataset.isel(file=number)
         verdict = str(one["verdict"].values) or f"failed: {one['message'].values}"
-        cells = [str(file), verdict]
+        cells = [str(file)]
         for name in names:
             value = written(one, name, float(one["estimate"].sel(unknown=name))) if str(one["verdict"].values) else ""
             cells += [value, bar(one, name), bar(one, name, hidden=True)] if verdict == FITS else [value, "", ""]
-        rows.append(cells)
+        rows.append([*cells, verdict])
     heads = [head for name in names for head in (title(name), "as declared", "may hide")]
-    return ["file", "law", *heads], rows
+    return ["file", *heads, "law"], rows
