@@ -130,6 +130,10 @@ def _traction(study: Study) -> None:
     study.setdefault("load", {})["traction"] = [{"on": "free", "pressure": "0.2 kPa"}]
 
 
+def _output(study: Study) -> None:
+    study["output"] = [{"name": "mises", "region": "body", "of": "von_mises", "reduce": "mean"}]
+
+
 def _path(study: Study) -> None:
     study["probe"]["path"] = {"line": {"from": ["1 mm", "0 mm"], "to": ["4 mm", "0 mm"], "steps": 2}}
 
@@ -221,6 +225,7 @@ FEATURES = (
     Feature("model 3d", "model", _update("mesh", model="3d")),
     Feature("F_exact", "exact", _update("solve", exact=True)),
     Feature("swept E", "young", _update("material", young=["10 kPa", "20 kPa"])),
+    Feature("output", "output", _output),
 )  # fmt: skip
 
 

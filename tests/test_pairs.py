@@ -33,6 +33,7 @@ _OF_SCHEMA = (
     'must be "unilateral"',
     "elements of degree 1 lock",
     "must be 0.2 to 0.45",
+    "is not computed over time",
 )
 
 

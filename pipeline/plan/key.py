@@ -15,6 +15,7 @@ from pipeline.shapes.tissue import Tissue
 from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.case import Case
 from pipeline.study.loads import Load
+from pipeline.study.output import Output
 from pipeline.study.schema import Material, Mesh
 from pipeline.units import canonical
 
@@ -48,9 +49,19 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
         parts.append(_load_text(case.load, case.densities))
     if case.is_stepped:
         parts.append(_time_text(case))
+    parts += [_output_text(output) for output in case.outputs]
     if case.solve.timing:
         parts += [str(case.labels), str(case.solve.repeats)]
     return digest("\n".join(parts))
+
+
+def _output_text(output: Output) -> str:
+    """Return an output in canonical form, with the content of the file of its function."""
+    content = output.model_dump(exclude={"unit"}) | {"name": output.name}
+    if output.function is not None:
+        file, name = output.path
+        content["function"] = [digest(file.read_text(encoding="utf-8")), name]
+    return _text(content)
 
 
 def reference_key(case: Case, accuracy: float) -> str:

@@ -132,7 +132,7 @@ def ask_for_ends(plan: Plan, without: Collection[str] = ()) -> Plan:
 
 def _reference(key: str, case: Case, accuracy: float) -> Solve:
     mesh = Mesh.model_construct({"accuracy"}, accuracy=accuracy)
-    whole = replace(normalised(case), mesh=mesh, solve=Solving())
+    whole = replace(normalised(case), mesh=mesh, solve=Solving(), outputs=())
     solve = Solve(key, whole, goal=accuracy, later=rungs_for(whole, accuracy), is_reference=True).again()
     if is_round(whole):
         return replace(solve, axisymmetric=True)

@@ -102,6 +102,10 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
                 ]
                 variables[name] = _variable(study, name, values, *part.dims)
                 of_scene += [name] if part.is_exact else []
+    for output in study.outputs:
+        for name in output.variables:
+            values = [record.largest.get(name, nan) if record and record.is_ok else nan for record in flat]
+            variables[name] = _variable(study, name, values)
     variables |= _of_places(study, cases) | _texts(plan, cases, flat, exact)
     component = ("component", ["x", "y", "z"], attributes("component"))
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": component}
@@ -161,8 +165,9 @@ def _variable(study: Study, name: str, values: Sequence[Any], *more: str) -> tup
     """Return a variable of ``values``, one a case, of which each has ``more`` dimensions."""
     array = np.array(values, dtype=object if isinstance(values[0], str) else None)
     dims = tuple(axis.name for axis in study.axes)
+    known = next((texts for output in study.outputs for own, texts in output.variables.items() if own == name), None)
     missing = {"missing_value": _MISSING} if name in _COUNTS else {}
-    return (*dims, *more), array.reshape((*study.shape, *array.shape[1:])), attributes(name) | missing
+    return (*dims, *more), array.reshape((*study.shape, *array.shape[1:])), (known or attributes(name)) | missing
 
 
 def _motions() -> dict[str, Any]:

@@ -73,9 +73,15 @@ class CaseSolution:
         return compat.cell_tags(self.mesh, np.zeros(count, np.int32) if regions is None else regions)
 
     @property
+    def images(self) -> int:
+        """Number of mirror images of the modelled part: 4 for a quarter of the body, 1 for all of it."""
+        return int(2 ** len(self.solved.state.body.mirrored))
+
+    @property
     def region_names(self) -> tuple[str, ...]:
         """Names of the regions, by their numbers in ``regions``."""
-        return "tissue", *(region.name for region in self.case.body.regions)
+        names = "tissue", *(region.name for region in self.case.body.regions)
+        return (*names, *(f"{name} beyond ε" for name in names)) if self.case.is_linear_beyond else names
 
     @property
     def force(self) -> float:

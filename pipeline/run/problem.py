@@ -226,6 +226,7 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case 
     """
     law, movement = law_of(case), movement_of(case, meshed)
     asked = Request(law, movement, case.solve.method, case.solve.energy_tolerance, estimate, course_of(case))
+    asked = replace(asked, keep=bool(case.outputs))
     try:
         solution = problem.answer(asked)
     except (ContactError, LargeError):

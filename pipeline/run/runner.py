@@ -25,6 +25,7 @@ from pipeline.run.measure import BARS, TIMES, record_of
 from pipeline.run.memory import FreeMemory, PeakMemory, give_back
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import mesh_case, on_first_rank
+from pipeline.run.outputs import outputs_of
 from pipeline.run.problem import (
     check_memory,
     lacks_memory,
@@ -216,6 +217,10 @@ class StepRunner:
         has_bar = has_bar and not missing
         solution = solve_problem(solve.case, problem, estimate=has_bar, meshed=solve.meshed_case)
         record = record_of(solve, solution, meshed.times.mesh)
+        if solve.case.outputs:
+            found, told = outputs_of(solve, problem, meshed.spaces, record, has_bar=has_bar)
+            record = replace(record, largest=record.largest | found)
+            missing = "; ".join(filter(None, (missing, told)))
         stamped = self._stamp(record, meshed.memory)
         return replace(stamped, message=missing, surface_deviation=meshed.spaces.body.deviation)
 

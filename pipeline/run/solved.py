@@ -1,6 +1,6 @@
 """One case solved as a run solves it, with its fields in hand: meshes are tried and judged as in a run."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -128,11 +128,11 @@ def _attempt(solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, n
         room = bar and not lacks_memory(FreeMemory(comm), with_bar, "")
         note(f"solving for {problem.dofs} unknowns")
         # Of a history, fields are those of the elastic body.
-        still = replace(case, probe=case.probe.model_copy(update={"history": None}))
+        still = replace(case, probe=case.probe.model_copy(update={"history": None}), outputs=())
         solution = solve_problem(still, problem, estimate=room or solve.goal is not None, meshed=meshed)
         state = problem.state()
-    _compile_stress(comm, state)
-    _put_back(case, meshed, mesh, state)
+    compile_law(comm, state)
+    put_back(case, meshed, mesh, [state])
     state = replace(state, law=law_of(still, in_body=True))
     return Solved(solve, record_of(solve, solution), state, arrays, solution.dofs)
 
@@ -145,7 +145,7 @@ def modelled_arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note:
     return on_first_rank(comm, lambda: cached_arrays(case, solve.mirrors, cache))
 
 
-def _compile_stress(comm: MPI.Comm, state: State) -> None:
+def compile_law(comm: MPI.Comm, state: State) -> None:
     """Compile what the stress of large displacements needs, under the lock of the cache; collective."""
     if comm.rank == 0 and not state.law.is_linear:
         with compiling():
@@ -153,12 +153,22 @@ def _compile_stress(comm: MPI.Comm, state: State) -> None:
     comm.barrier()
 
 
-def _put_back(case: Case, meshed: Case, mesh: BodyMesh, state: State) -> None:
-    """Bring mesh and displacement from the solver's frame to the body's coordinates, and to the place of ``case``."""
+def put_back(case: Case, meshed: Case, mesh: BodyMesh, states: Sequence[State]) -> Callable[[], None]:
+    """Bring mesh and displacements from the solver's frame to the body's coordinates, and to the place of ``case``.
+
+    Return a function that undoes it for the mesh.
+    """
     x: Any = mesh.mesh.geometry.x
+    before = x.copy()
     if (turn := case.frame.turn) is not None:
         x[:] = x @ turn
-        values = state.displacement.x.array
-        values[:] = (values.reshape(-1, 3) @ turn).reshape(-1)
+        for state in states:
+            values = state.displacement.x.array
+            values[:] = (values.reshape(-1, 3) @ turn).reshape(-1)
     if (shift := np.subtract(case.frame.point, meshed.frame.point)).any():
         x[:] += shift
+
+    def undo() -> None:
+        x[:] = before
+
+    return undo

@@ -155,12 +155,12 @@ def plain_share(body: BodyMesh) -> float:
     return plain / total if total else 0.0
 
 
-def clear_cells(body: BodyMesh, front: Front | None = None) -> BoolArray:
+def clear_cells(body: BodyMesh, front: Front | None = None, *, wholly: bool = False) -> BoolArray:
     """Return a mask of the owned cells that are clear of edges with singular strain; collective.
 
     Singular edges are the rim of the footprint, the edge of the support, and the ``front`` of a slit. A cell is clear
     if its centre is farther from them than a tenth of the footprint's half width (the largest distance within the
-    footprint to its rim).
+    footprint to its rim). It is ``wholly`` clear if all its corners are, too.
     """
     x = np.asarray(body.mesh.geometry.x)
     rim = _points_of(body, _on_edge(body, PROBE))
@@ -169,11 +169,13 @@ def clear_cells(body: BodyMesh, front: Front | None = None) -> BoolArray:
     least = CLEAR * body.comm.allreduce(float(inside.max()), op=MPI.MAX)
     centres = x[compat.geometry_dofs(body.mesh)[: body.owned_cells, :_CORNERS]].mean(axis=1)
     edges = np.vstack([rim, _points_of(body, _on_edge(body, FIXED))])
-    clear = np.isinf(cKDTree(edges).query(centres, distance_upper_bound=least)[0])
+    corners = x[compat.geometry_dofs(body.mesh)[: body.owned_cells, :_CORNERS]]
+    places = np.concatenate([centres[:, None], corners], axis=1) if wholly else centres[:, None]
+    clear = np.isinf(cKDTree(edges).query(places, distance_upper_bound=least)[0])
     if front is not None:
-        offset = centres - np.array(front.point)
-        clear &= np.hypot(offset @ np.array(front.normal), offset[:, 2] + front.depth) >= least
-    return np.asarray(clear)
+        offset = places - np.array(front.point)
+        clear &= np.hypot(offset @ np.array(front.normal), offset[..., 2] + front.depth) >= least
+    return np.asarray(clear.all(axis=1))
 
 
 def _points_of(body: BodyMesh, chosen: BoolArray) -> FloatArray:

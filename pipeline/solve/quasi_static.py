@@ -86,6 +86,8 @@ class QuasiStaticProblem(Problem):
         displacement = self.elements.displacements.forms.displacement
         self._values = CellValues(self._body, displacement, is_mixed=element == "mixed")
         self._law: MaterialLaw | None = None  # of the last solution
+        # The fields of the last solution in elements of one degree more, if they were requested and are known.
+        self.finer_state: State | None = None
 
     def close(self) -> None:
         """Free what is kept between solves."""
@@ -112,7 +114,8 @@ class QuasiStaticProblem(Problem):
             SolveError: if the elements do not support the law, the solver does not converge, or the solution fails a
                 check; a ContactError, if contact is not found.
         """
-        self._law = law = asked.law
+        self._law, self.finer_state = asked.law, None
+        law = asked.law
         with recorded() as times, ExitStack() as stack:
             found = self.constraint.solve(asked, stack)
             front, tip = self._released(self.elements, found.columns, law, found.movement)
@@ -132,7 +135,7 @@ class QuasiStaticProblem(Problem):
                 stored=None if stored is None else 2.0 ** len(self._body.mirrored) * stored,
             )
             if asked.estimate:
-                solution = self._estimated(solution, found, law)
+                solution = self._estimated(solution, found, asked)
             if asked.course is not None:
                 solution = self._followed(solution, found, asked, stack)
             self.elements.show(found.columns)
@@ -151,14 +154,17 @@ class QuasiStaticProblem(Problem):
         return replace(solution, history=history, iterations=solution.iterations + steps.iterations)
 
     @stage("error bar")
-    def _estimated(self, solution: Solution, found: Equilibrium, law: MaterialLaw) -> Solution:
+    def _estimated(self, solution: Solution, found: Equilibrium, asked: Request) -> Solution:
         """Return the last ``solution`` with its error bars; collective."""
-        elements, columns, movement = self.elements, found.columns, found.movement
+        elements, columns, movement, law = self.elements, found.columns, found.movement, asked.law
         whole = 2.0 ** len(self._body.mirrored)
         with ExitStack() as stack:
             finer = found.solver.hierarchical_estimate(
-                columns, movement, stack, keep=self._conditions.front is not None
+                columns, movement, stack, keep=asked.keep or self._conditions.front is not None
             )
+            if asked.keep and finer.columns:
+                finer.elements.show(finer.columns, [column.amount for column in columns])
+                self.finer_state = finer.elements.state(law)
             form = _form(solution.response, solution.load_response)
             if finer.decrements is None:
                 products = finer.elements.products(law, finer.columns, checked=False)

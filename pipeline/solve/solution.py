@@ -214,7 +214,8 @@ class Request:
     """Request to a problem: material ``law``, and ``movement`` of the probe with its loads.
 
     ``method`` is "auto", "direct" or "iterative"; ``tolerance`` is the relative energy norm of the solver's error.
-    ``estimate`` requests error bars. With a ``course`` the movement is also followed over time.
+    ``estimate`` requests error bars, ``keep`` the fields of one degree more that give them, where there are such. With
+    a ``course`` the movement is also followed over time.
     """
 
     law: MaterialLaw
@@ -223,6 +224,7 @@ class Request:
     tolerance: float = TOLERANCE
     estimate: bool = False
     course: Course | None = None
+    keep: bool = False
 
 
 class Problem(ABC):

@@ -13,6 +13,7 @@ from pipeline.study.capabilities.features import features_of, needs_time_steps
 from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.closure import FarRegion
 from pipeline.study.loads import Load
+from pipeline.study.output import Output
 from pipeline.study.place import CLEAR, is_clear, place_error
 from pipeline.study.schema import Material, Mesh, Solving
 from pipeline.viscoelastic import Terms
@@ -45,6 +46,7 @@ class Case:
     solve: Solving
     load: Load = field(default_factory=Load)
     far_region: FarRegion | None = None
+    outputs: tuple[Output, ...] = ()
 
     @property
     def labels(self) -> tuple[tuple[str, float | int | str], ...]:

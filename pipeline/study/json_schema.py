@@ -139,7 +139,7 @@ def _section(name: str, models: tuple[type[Section], ...], definitions: Schema) 
         table = {"$ref": f"#/$defs/{name.capitalize()}"}
     for model in models:  # of what is no table, a section says it
         definitions[model.__name__].pop("type", None)
-    if name == "measurement":
+    if name in ("measurement", "output"):
         return {"type": "array", "minItems": 1, "items": {"type": "object", "allOf": [table]}}
     if name in (*SINGLE, *EXPERIMENT):
         return {"type": "object", "allOf": [table]}

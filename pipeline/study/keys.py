@@ -77,6 +77,8 @@ SECTION_TEXTS = {
     "sensitivity": "Parameters whose effect on the force `epsmesh sensitivity` compares. Besides the key below, the "
     "name of a parameter is a key, as in [identify], and `depth`: it has a range, or a value with its error "
     "(95 %). Forces do not depend on this section. Optional; its lists are no sweeps.",
+    "output": "Further numbers of each case, one table each: variables of the dataset with error bars, at a point, "
+    "over a region, or of a function of your own. Forces do not depend on them. Optional; their lists are no sweeps.",
 }
 
 
@@ -121,8 +123,8 @@ def _inner(section: str) -> dict[str, type[BaseModel]]:
 
 
 def _labelled() -> set[str]:
-    """Return the arrays of tables whose tables have names: those within sections, and measurements."""
-    return {"measurement", *(f"{section}.{key}" for section, pieces in NESTED.items() for key in pieces)}
+    """Return the arrays of tables whose tables have names: those within sections, measurements, and outputs."""
+    return {"measurement", "output", *(f"{section}.{key}" for section, pieces in NESTED.items() for key in pieces)}
 
 
 def shapes_of(section: str) -> dict[str, type[BaseModel]]:

@@ -1,7 +1,7 @@
 """Read a study file: TOML to checked sections and axes, or all problems at once."""
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from pipeline.study.identified import with_identified
 from pipeline.study.loads import Load
 from pipeline.study.measured import MESH, completed
 from pipeline.study.measurement import Measurement
+from pipeline.study.output import Output, check_outputs, read_outputs
 from pipeline.study.parameters import DEPTH, Parameter, parameters_of
 from pipeline.study.problems import Problem, Problems, StudyError, nearest
 from pipeline.study.regions import check_regions, material_without_section
@@ -93,13 +94,14 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene:
         _check_together(sections, tuple(axes), problems)
     measurements, identification = _read_experiment(given, sections, file, problems)
     spread = _read_spread(given, sections, problems)
+    outputs = _read_outputs(given, sections, axes, Path(file).parent, problems)
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))
     sections, every_axis = with_stages(sections, tuple(axes))
     warnings = tuple(f"{file}: {warning}" for warning in problems.told_once())
     title = str(raw.get("title", Path(file).stem))
     experiment = (given, measurements, identification, identified, spread)
-    return Study(file, Path(file).stem, title, text, every_axis, sections, warnings, *experiment, lacking)
+    return Study(file, Path(file).stem, title, text, every_axis, sections, warnings, *experiment, outputs, lacking)
 
 
 def scene_of(study: Study, measurement: Measurement) -> Study:
@@ -155,6 +157,22 @@ def _read_spread(raw: dict[str, Any], sections: dict[str, tuple[Section, ...]], 
         return Spread()
     known = {name: one for name, one in _parameters(sections).items() if one.place}
     return read_sensitivity(raw["sensitivity"], known | {DEPTH.name: DEPTH}, problems)
+
+
+def _read_outputs(
+    raw: dict[str, Any],
+    sections: dict[str, tuple[Section, ...]],
+    axes: Sequence[Axis],
+    folder: Path,
+    problems: Problems,
+) -> tuple[Output, ...]:
+    """Return the further numbers of each case, for which the sections are checked, too."""
+    if "output" not in raw:
+        return ()
+    outputs = read_outputs(raw["output"], folder, problems)
+    if not problems.errors:
+        check_outputs(outputs, sections, axes, problems)
+    return outputs
 
 
 def _parameters(sections: dict[str, tuple[Section, ...]]) -> dict[str, Parameter]:

@@ -19,6 +19,7 @@ from pipeline.shapes.segment import Segment
 from pipeline.shapes.tissue import LAWS, Fibres, Relaxation, Term, Tissue
 from pipeline.study.loads import Load, Traction
 from pipeline.study.measurement import Columns, ColumnUnits, Identify, Measurement, Sensitivity, Sign
+from pipeline.study.output import Output
 from pipeline.study.path import Path
 from pipeline.study.vocabulary import FIGURES, REDUCTIONS
 from pipeline.units import Length, Pressure, Share, parse_quantity
@@ -284,11 +285,12 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "load": Load,
     "figure": Drawing,
 }
-# Sections about experiments and their parameters, on which no case depends: see pipeline/study/identification.py.
+# Sections on which no force depends: experiments and their parameters, and further numbers of a solution.
 EXPERIMENT: dict[str, type[Section]] = {
     "measurement": Measurement,
     "identify": Identify,
     "sensitivity": Sensitivity,
+    "output": Output,
 }
 # Arrays of tables within a section: pieces of it, each with keys that can be swept.
 NESTED: dict[str, dict[str, type[Section]]] = {

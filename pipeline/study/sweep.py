@@ -15,6 +15,7 @@ from pipeline.study.case import Case
 from pipeline.study.identification import Identification
 from pipeline.study.identified import NOTHING, Identified
 from pipeline.study.measurement import Measurement
+from pipeline.study.output import Output
 from pipeline.study.problems import Problem
 from pipeline.study.schema import Drawing, Material, Planning, Solving, material_of
 from pipeline.study.sensitivity import Spread
@@ -39,6 +40,7 @@ class Study:
     identification: Identification = field(default_factory=Identification)
     identified: Identified = NOTHING
     spread: Spread = field(default_factory=Spread)
+    outputs: tuple[Output, ...] = ()
     lacking: tuple[Problem, ...] = ()  # what its cases need, and the study of measured curves does not say
 
     @property
@@ -104,7 +106,7 @@ class Study:
             for position, length in own:
                 flat = flat * length + index[position]
             chosen.append(variants[flat])
-        return Case(index, self.axes, *_with_material_in_use(*chosen))
+        return Case(index, self.axes, *_with_material_in_use(*chosen), outputs=self.outputs)  # type: ignore[misc]
 
     @cached_property
     def _layout(self) -> tuple[tuple[tuple[Section, ...], tuple[tuple[int, int], ...]], ...]:

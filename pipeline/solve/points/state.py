@@ -23,6 +23,7 @@ from pipeline.solve.points.locate import INSIDE, Located, Locator, table_of
 # The reference cell on which a law at a point was compiled: four corners, and the mid nodes of curved cells.
 _CORNERS = np.vstack([np.zeros(3), np.eye(3)])
 _CELL = np.vstack([_CORNERS, _CORNERS[EDGES].mean(axis=1)])
+_SAME = np.ones(3)
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 
@@ -86,11 +87,31 @@ class State:
         found[owner < 0] = np.nan
         return self._values(found, owner >= 0, signs)
 
-    def at_centres(self) -> Values:
-        """Return the values at the centres of the cells that this rank owns, local; collective."""
-        count = self.body.owned_cells
-        located = Located(np.arange(count), np.full((count, 3), 0.25), np.full(count, 0.25))
-        return self._values(self._of_rank(located), np.ones(count, bool), np.ones((count, 3)))
+    def of_cells(self, cells: IntArray, at: FloatArray, signs: FloatArray = _SAME) -> Values:
+        """Return the values at reference points ``at`` (q, 3) of each of local ``cells`` (n), local, (n q); collective.
+
+        With ``signs`` (3), those of the mirror image.
+        """
+        of = np.repeat(cells, len(at))
+        located = Located(of, np.tile(at, (len(cells), 1)), np.zeros(len(of)))
+        return self._values(self._of_rank(located), np.ones(len(of), bool), np.tile(signs, (len(of), 1)))
+
+    def volumes(self, cells: IntArray, at: FloatArray) -> FloatArray:
+        """Return |dx/dX| at reference points ``at`` (q, 3) of local ``cells`` (n), (n, q)."""
+        of = np.repeat(cells, len(at))
+        jacobian, _ = self.locator.map(Located(of, np.tile(at, (len(cells), 1)), np.zeros(len(of))))
+        return np.abs(np.linalg.det(jacobian)).reshape(len(cells), len(at))
+
+    def of_cells_at(self, points: FloatArray, values: FloatArray) -> FloatArray:
+        """Return the value of the cell of each of ``points``, from those of owned cells; NaN outside; collective."""
+        located = self.locator.find(points * self._signs(points))
+        owner = self._owner(located)
+        mine = owner == self.body.comm.rank
+        found = np.zeros(len(points))
+        found[mine] = values[located.cells[mine]]
+        found = self.body.comm.allreduce(found, op=MPI.SUM)
+        found[owner < 0] = np.nan
+        return np.asarray(found)
 
     def _values(self, found: FloatArray, inside: BoolArray, signs: FloatArray) -> Values:
         """Return what is ``found`` (n, 24) at points, reflected to the part of the body with these ``signs``."""
@@ -180,7 +201,8 @@ class State:
             components = evaluate(each, float(p))
             for value, (i, j) in zip(components, SYMMETRIC, strict=True):
                 found[n, i, j] = found[n, j, i] = value
-        volume = np.linalg.det(deformation)[:, None, None]
+        with np.errstate(invalid="ignore"):  # at a quarter-point node
+            volume = np.linalg.det(deformation)[:, None, None]
         return np.asarray(deformation @ found @ deformation.swapaxes(1, 2) / volume)
 
     def _evaluator(self, number: int, law: MaterialLaw) -> Callable[[FloatArray, float], FloatArray]:

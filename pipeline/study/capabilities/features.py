@@ -175,6 +175,8 @@ FEATURES: dict[str, Feature] = {
     "mixed elements": Feature("mesh.element", lambda s: s.mesh.element == "mixed"),
     "accuracy": Feature("mesh.accuracy", lambda s: s.mesh.accuracy is not None),
     "loads": Feature("load", lambda s: s.load.acts),
+    # Of a case: the sections of a scene have none.
+    "outputs": Feature("output", lambda s: bool(getattr(s, "outputs", ()))),
 }
 
 

@@ -15,6 +15,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "six motions": "most of the six motions are not axisymmetric",
         "half ball": "a half ball is coupled to its far field in three dimensions",
         "loads": "loads are computed in three dimensions",
+        "outputs": "outputs are numbers of a solution in three dimensions",
     },
     # Taken if no case of the study is in the way: what is compared is computed alike.
     "meridian, in a comparison": {
@@ -32,14 +33,17 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "slit": "a slit has results besides F",
         "loads": "loads have results besides F",
         "time steps": "a history in time steps is no static solution",
+        "outputs": "outputs need the solution of each case",
     },
     "scaling": {
         "loads": "their force is not proportional to modulus and depth",
+        "outputs": "outputs of a function need the solution of each case",
     },
     "images": {
         "fibres": "the direction of the fibres differs in a mirror image",
         "six motions": "the 6 × 6 stiffness differs in a mirror image",
         "loads": "loads break the symmetry",
+        "outputs": "outputs are at the same place of the body, not of its image",
     },
     "equivalent places": {
         "fibres": "the direction of the fibres is fixed in the body",
@@ -47,10 +51,12 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "region": "the distance to the region differs",
         "loads": "loads act on the whole body",
         "Green's function": "the Green's function of the body depends on the place",
+        "outputs": "outputs are at the same place of the body",
     },
     "proportional depths": {
         "loads": "their force is not proportional to the depth",
         "large displacements": "F is not proportional to the depth",
+        "outputs": "outputs of a function need the solution of each depth",
     },
     "F_exact": {
         "time steps": "F_exact is static, and these forces are no multiples of static ones",
