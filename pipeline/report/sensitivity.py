@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import xarray as xr
 
-from pipeline.quantities import symbol, write
+from pipeline.quantities import QUANTITIES, symbol, write
 
 _ROW = "  {:<24} {:<24} {:>16} {:>16}"
 
@@ -20,8 +20,8 @@ def share(value: float, error: float) -> str:
 
 
 def ordered(one: xr.Dataset) -> xr.Dataset:
-    """Return the indices of one output in the order of the total index, the largest first."""
-    return one.sortby("total", ascending=False)
+    """Return the indices of one output in the order of the first index, the largest on top."""
+    return one.sortby("first", ascending=False)
 
 
 def range_of(one: xr.Dataset) -> str:
@@ -43,9 +43,23 @@ def _of_output(one: xr.Dataset) -> Iterator[str]:
         row = found.isel(parameter=number)
         alone, total = (share(float(row[kind]), float(row[f"{kind}_error"])) for kind in ("first", "total"))
         yield _ROW.format(str(row["parameter"].values), range_of(row), alone, total)
-    first = found.isel(parameter=0)
-    yield (
-        f"  {first['parameter'].values} matters most: if it were known, {100 * float(first['total']):.0f} % of the "
-        f"variance of {letter} would vanish. Surrogate: {int(one['cases'])} cases, error "
-        f"{100 * float(one['surrogate_error']):.2g} %."
+    yield f"  {_what_matters(found, letter)} Surrogate: {int(one['cases'])} cases, error {percent(one)}."
+
+
+def _what_matters(found: xr.Dataset, letter: str) -> str:
+    """Tell which parameter matters most, if the surrogate is exact enough to tell any."""
+    error, first = float(found["surrogate_error"]), found.isel(parameter=0)
+    if error >= float(found["deviation"]):
+        return f"{letter} varies by less than the error of the surrogate: its indices are not known."
+    name, alone = first["parameter"].values, 100 * float(first["first"])
+    return f"{name} matters most: if it were known, {alone:.0f} % of the variance of {letter} would vanish."
+
+
+def percent(one: xr.Dataset) -> str:
+    """Write the error of the surrogate of one output; without error bars of its cases, it is the interpolation's."""
+    text = f"{100 * float(one['surrogate_error']):.2g} %"
+    return (
+        text
+        if f"{one['output'].values}_error" in QUANTITIES
+        else f"{text} by interpolation, and that of meshes unknown"
     )

@@ -9,16 +9,15 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from pipeline.quantities import QUANTITIES, RUN
+from pipeline.quantities import LARGEST
 from pipeline.study.identification import Sought, given_one, known_one
 from pipeline.study.measurement import Sensitivity
 from pipeline.study.parameters import Parameter
 from pipeline.study.problems import Problems, nearest, tuples
 
-# Variables of a dataset that are one number for each case, and may be positive.
-OUTPUTS = tuple(
-    name for name, one in QUANTITIES.items() if name not in RUN and one.unit and not name.endswith(("_error", "_exact"))
-)
+# Results of one scene that are one positive number for each case.
+_RESULTS = ("force", "contact_area", "contact_radius", "slip_area", "friction_force", "torque", "energy_release")
+OUTPUTS = (*_RESULTS, *LARGEST)
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ def read_sensitivity(raw: Any, known: Mapping[str, Parameter], problems: Problem
         return Spread()
     for name in section.outputs:
         if name not in OUTPUTS:
-            allowed = f"is no variable of a dataset with one number for each case; {nearest(name, OUTPUTS)}"
+            allowed = f"is no result of a case that is one number; {nearest(name, OUTPUTS)}"
             problems.error("sensitivity.outputs", name, allowed)
     varied = []
     for key in (key for key in raw if key not in own):

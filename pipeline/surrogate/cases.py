@@ -121,7 +121,10 @@ def stored_in(store: Path, comm: "MPI.Comm | None" = None) -> Solve:
 
 @dataclass
 class Cases:
-    """Solved cases of a domain, by a function that returns datasets; it keeps the relative error bar of each."""
+    """Solved cases of a domain, by a function that returns datasets; it keeps the relative error bar of each.
+
+    An output without error bars has a bar of 0.
+    """
 
     domain: Domain
     solve: Solve
@@ -144,6 +147,8 @@ class Cases:
             if np.isnan(bar).any():
                 raise SurrogateError(f"{study.file}: a case has no {error}, so that the surrogate would have none")
             self.bars += (bar / value).ravel().tolist()
+        else:
+            self.bars += [0.0] * value.size
         unit = domain.reference.young if domain.output.is_proportional else 1.0
         return np.asarray(np.log(value / (unit * depths.power(depth))) - trend_of(domain.ranges, points_of(block)))
 
@@ -185,5 +190,5 @@ def _check(dataset: "xr.Dataset", study: Study, output: Output) -> None:
     status, value = np.ravel(dataset["status"]), np.ravel(dataset[output.name])
     if (wrong := np.flatnonzero((status != OK) | ~(value > 0))).size:
         case = list(study.cases())[int(wrong[0])]
-        why = str(np.ravel(dataset["message"])[wrong[0]]) or str(status[wrong[0]])
+        why = str(np.ravel(dataset["message"])[wrong[0]]) or f"it is {value[wrong[0]]:.3g}, and must be positive"
         raise SurrogateError(f"{study.file}: {case}: no {output.name}: {why}; a smaller range may avoid this case")

@@ -24,13 +24,16 @@ from pipeline.surrogate.table import Table
 _WORDS = {
     "output": "variable of the study's dataset",
     "parameter": "parameter of the study",
-    "first": "share of the output's variance that the parameter makes alone (Sobol's index of first order)",
+    "first": "share of the output's variance that vanishes, on average, if the parameter is known (Sobol's index of "
+    "first order)",
     "first_error": "error bar (95 %) on first: of the sample, and of the surrogate",
-    "total": "share of the output's variance that vanishes if the parameter is known (Sobol's total index)",
+    "total": "share of the output's variance that is left, on average, if all other parameters are known (Sobol's "
+    "total index)",
     "total_error": "error bar (95 %) on total: of the sample, and of the surrogate",
     "mean": "mean of the output over all parameters, in its unit",
     "deviation": "standard deviation of the output, relative to its mean",
-    "surrogate_error": "error bar (95 %) on the surrogate, relative to the output: meshes and interpolation",
+    "surrogate_error": "error bar (95 %) on the surrogate, relative to the output: interpolation, and meshes if the "
+    "output has error bars",
     "cases": "number of the surrogate's cases",
     "low": "least value of the parameter, in its unit",
     "high": "largest value of the parameter, in its unit",
@@ -94,7 +97,8 @@ def _explained(study: Study, output: Output, solve: Solve) -> Explained:
     if np.ptp(ends) <= _ALIKE * abs(ends[0]):
         names = ", ".join(one.parameter.name for one in varied)
         raise SurrogateError(f"{study.file}: {output.name} depends on none of {names}")
-    return Explained(output.name, sobol(function, len(varied), table.interpolation + table.mesh), table)
+    acting = [number for number, one in enumerate(varied) if one.parameter.name in {*table.acting, DEPTH.name}]
+    return Explained(output.name, sobol(function, len(varied), table.interpolation + table.mesh, acting=acting), table)
 
 
 def _depths(study: Study) -> tuple[float, float]:

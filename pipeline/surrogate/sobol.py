@@ -4,7 +4,7 @@ I. M. Sobol, Math. Comput. Simul. 55, 271 (2001); estimators of A. Saltelli et a
 (2010), by SALib.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,11 +34,17 @@ class Indices:
 
 
 def sobol(
-    function: Callable[[FloatArray], FloatArray], parameters: int, error: float, samples: int = SAMPLES
+    function: Callable[[FloatArray], FloatArray],
+    parameters: int,
+    error: float,
+    samples: int = SAMPLES,
+    acting: Collection[int] | None = None,
 ) -> Indices:
     """Return the indices of a function of points (n, parameters), uniform in [0, 1], with a relative ``error``.
 
-    Error bars are those of the sample, by bootstrap, and of the function, by :func:`_passed_on`.
+    Error bars are those of the sample, by bootstrap, and of the function, by :func:`_passed_on`. The function and what
+    it is an approximation of depend on ``acting`` parameters only, by default on all: the others' indices are 0, and
+    that of a single one is 1, without error.
     """
     from SALib.analyze.sobol import analyze  # noqa: PLC0415 (slow to import)
     from SALib.sample.sobol import sample  # noqa: PLC0415
@@ -50,25 +56,25 @@ def sobol(
     mean, deviation = float(values.mean()), float(values.std())
     found = analyze(problem, values - mean, num_resamples=_RESAMPLES, **options)
     share = error * float(np.sqrt(np.mean(values**2))) / deviation
-    first, total = (np.asarray(found[name], dtype=float) for name in ("S1", "ST"))
-    return Indices(
-        first=first,
-        first_error=np.asarray(found["S1_conf"]) + _passed_on(first, share),
-        total=total,
-        total_error=np.asarray(found["ST_conf"]) + _passed_on(total, share),
-        mean=mean,
-        deviation=deviation / mean,
-    )
+    acts = np.isin(np.arange(parameters), list(range(parameters) if acting is None else acting))
+    known = ~acts if acts.sum() > 1 else np.full(parameters, True)
+
+    def index(kind: str) -> tuple[FloatArray, FloatArray]:
+        value = np.asarray(found[kind], dtype=float)
+        bar = np.minimum(np.asarray(found[f"{kind}_conf"]) + _passed_on(value, share), 1.0)
+        return np.where(known, acts.astype(float), value), np.where(known, 0.0, bar)
+
+    return Indices(*index("S1"), *index("ST"), mean=mean, deviation=deviation / mean)
 
 
 def _passed_on(index: FloatArray, share: float) -> FloatArray:
     """Return how much indices (p,) may be off by an error of the function, in units of its standard deviation.
 
-    The root of a part of the variance is the norm of a projection of the function, so that it moves by at most the
-    norm of the error; and so does the root of the whole variance.
+    The roots of an index and of the rest of the variance are the sides of a right triangle with hypotenuse 1: norms of
+    two orthogonal parts of the function. An error of the norm ``share`` turns the hypotenuse by at most its arc sine.
     """
-    root = np.sqrt(np.clip(index, 0, 1))
     if share >= 1:
         return np.ones_like(index)
-    most, least = ((root + share) / (1 - share)) ** 2, (np.maximum(root - share, 0) / (1 + share)) ** 2
-    return np.asarray(np.minimum(np.maximum(most - root**2, root**2 - least), 1.0))
+    angle, turn = np.arccos(np.sqrt(np.clip(index, 0, 1))), np.arcsin(share)
+    most, least = (np.cos(np.clip(angle + by, 0, np.pi / 2)) ** 2 for by in (-turn, turn))
+    return np.asarray(np.maximum(most - np.cos(angle) ** 2, np.cos(angle) ** 2 - least))

@@ -41,6 +41,16 @@ class Table:
         factor = () if self.reference.is_known else (self.reference.name,)
         return (*factor, *(one.name for one in self.ranges))
 
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """What the output depends on: not on the modulus that all others are divided by, unless proportional to it."""
+        return tuple(name for name in self.names if name != self.reference.name or self._scales)
+
+    @property
+    def _scales(self) -> bool:
+        """Whether the modulus of reference matters: as a factor, or by what moduli are divided by."""
+        return self.output.is_proportional or any(one.is_ratio for one in self.ranges)
+
     def force(self, depth: FloatArray, values: Mapping[str, float]) -> FloatArray:
         """Return the force (N) at depths (m); 0 above the surface.
 

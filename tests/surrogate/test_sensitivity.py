@@ -10,7 +10,7 @@ from pipeline.study.problems import StudyError
 from pipeline.study.read import read_mapping
 from pipeline.surrogate.cases import SurrogateError
 from pipeline.surrogate.sensitivity import dataset_of, explain
-from pipeline.surrogate.sobol import sobol
+from pipeline.surrogate.sobol import _passed_on, sobol
 from tests.surrogate.scenes import BALL, PUNCH, hertz, solved_by
 
 VARIED = {
@@ -65,6 +65,38 @@ def test_the_error_of_the_surrogate_is_in_the_bars():
     assert abs(found.first - [0.8, 0.2]).max() > exact.first_error.max()
 
 
+def test_indices_of_a_function_without_order_are_those_of_ishigami_and_homma():
+    """sin x₁ + 7 sin² x₂ + 0.1 x₃⁴ sin x₁ over (-π, π)³: x₃ acts with x₁ only (T. Ishigami, T. Homma, 1990)."""
+
+    def ishigami(points):
+        x = np.pi * (2 * points - 1)
+        return np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+
+    found = sobol(ishigami, 3, 0.0)
+    for name, exact in (("first", [0.3139, 0.4424, 0.0]), ("total", [0.5576, 0.4424, 0.2437])):
+        wrong, bar = abs(getattr(found, name) - exact), getattr(found, f"{name}_error")
+        assert np.all(wrong <= bar + 1e-4) and np.all(bar < 0.06)
+    assert found.mean == pytest.approx(3.5, rel=1e-3)
+
+
+@pytest.mark.parametrize("error", [0.01, 0.1, 0.5])
+def test_no_error_of_its_size_moves_an_index_beyond_its_bar(error):
+    """Of a sum of two orthogonal parts: any error of the norm of the surrogate's, in the plane of both."""
+    first = np.array([0.0, 0.02, 0.5, 0.98, 1.0])
+    bars, sides = _passed_on(first, error), np.sqrt([first, 1 - first])
+    for turn in np.linspace(0, 2 * np.pi, 60):
+        moved = sides + error * np.array([[np.cos(turn)], [np.sin(turn)]])
+        wrong = abs(moved[0] ** 2 / np.sum(moved**2, axis=0) - first)
+        assert np.all(wrong <= bars + 1e-9)
+    assert np.all(bars <= 1)
+
+
+def test_a_parameter_that_cannot_act_has_no_index_and_no_bar():
+    found = sobol(lambda x: 1 + x[:, 0], 2, 0.5, acting=[0])
+    assert found.first.tolist() == found.total.tolist() == [1.0, 0.0]
+    assert found.first_error.tolist() == found.total_error.tolist() == [0.0, 0.0]
+
+
 def test_the_dataset_names_what_was_varied():
     study = read_mapping(PUNCH | {"sensitivity": VARIED}, "punch")
     dataset = dataset_of(study, explain(study, solved_by(_punch)))
@@ -81,7 +113,8 @@ def test_outputs_that_are_no_force_do_not_depend_on_the_modulus():
 
     varied = {"young": ["5 kPa", "20 kPa"], "depth": ["0.01 mm", "0.02 mm"], "outputs": ["contact_area"]}
     (found,) = explain(read_mapping(BALL | {"sensitivity": varied}, "ball"), solve)
-    np.testing.assert_allclose(found.indices.first, [0, 1], atol=0.02)
+    assert found.indices.first.tolist() == [0, 1] and found.indices.total_error.tolist() == [0, 0]
+    assert found.table.cases > 1  # though areas have no bars here
     assert found.indices.mean == pytest.approx(np.pi * 2e-3 * 1e-5 / np.log(2), rel=1e-3)
 
 
@@ -93,6 +126,8 @@ def test_outputs_that_are_no_force_do_not_depend_on_the_modulus():
         ({"sensitivity": {"young": ["20 kPa", "5 kPa"]}}, r"sensitivity\.young.*must rise"),
         ({"sensitivity": {"baseline": ["0 N", "1 N"]}}, r"sensitivity\.baseline.*is no parameter"),
         ({"sensitivity": {"poisson": [0, 0.5], "outputs": ["forse"]}}, r"sensitivity\.outputs = \"forse\".*`force`"),
+        ({"sensitivity": {"poisson": [0, 0.5], "outputs": ["young"]}}, r"\"young\".*is no result of a case"),
+        ({"sensitivity": {"poisson": [0, 0.5], "outputs": ["force_vector"]}}, r"\"force_vector\".*use one of|force"),
         ({"sensitivity": {"outputs": ["force"]}}, r"sensitivity: must have a parameter"),
         (
             {"sensitivity": {"poisson": [0, 0.5]}, "probe": PUNCH["probe"] | {"depth": ["1 mm", "2 mm"]}},
@@ -103,7 +138,7 @@ def test_outputs_that_are_no_force_do_not_depend_on_the_modulus():
             r"material\.young: is a list of 2: one value is needed, or a range of `young`",
         ),
     ],
-    ids=["none", "name", "order", "experiment", "output", "empty", "depths", "young"],
+    ids=["none", "name", "order", "experiment", "output", "input", "vector", "empty", "depths", "young"],
 )
 def test_mistakes_are_told_by_their_key(section, message):
     with pytest.raises(StudyError, match=message):

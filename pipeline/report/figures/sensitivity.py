@@ -18,8 +18,8 @@ from pipeline.report.sensitivity import ordered, range_of
 _PANEL, _ROW = 1.1, 0.42
 _BAR = 0.36
 _CAPTION = (
-    "Share of the variance over the ranges given: alone, if only this parameter varied; in all, what would vanish if "
-    "it were known. Black: 95 % error bars of sample and surrogate."
+    "Share of the variance over the ranges given: alone, what would vanish if only this parameter were known; in all, "
+    "what would be left if all others were known. Black: 95 % error bars of sample and surrogate."
 )
 
 
@@ -45,10 +45,10 @@ def _panel(ax: Axes, one: xr.Dataset) -> None:
     found = ordered(one)
     rows = np.arange(found.sizes["parameter"])
     for kind, label, side, colour in (("first", "alone", -1, COLOURS[1]), ("total", "in all", 1, COLOURS[0])):
-        bar = 100 * found[f"{kind}_error"].values
-        ax.barh(
-            rows + side * _BAR / 2, 100 * found[kind].values, _BAR, label=label, color=colour, xerr=bar, ecolor=LINE
-        )
+        share, bar = 100 * found[kind].values, 100 * found[f"{kind}_error"].values
+        ends = share - np.maximum(share - bar, 0), np.minimum(share + bar, 100) - share
+        xerr = np.maximum(ends, 0)
+        ax.barh(rows + side * _BAR / 2, share, _BAR, label=label, color=colour, xerr=xerr, ecolor=LINE)
     names = [found.isel(parameter=row) for row in rows]
     ax.set_yticks(rows, [f"{name['parameter'].values}\n{range_of(name)}" for name in names])
     ax.invert_yaxis()
