@@ -1,4 +1,4 @@
-"""Make the surfaces and the label map in meshes/: shapes like organs', copied from nobody's.
+"""Make the surfaces and the label maps in meshes/: shapes like organs', copied from nobody's.
 
 Ellipsoids that run into each other, with smooth noise, sampled as the voxels of a segmented image; the surface round
 them, as a body `image` has it, with fewer facets. The same files every time: python scripts/make_organs.py
@@ -91,6 +91,45 @@ def tumour(places: FloatArray) -> FloatArray:
     return ellipsoid((-28.3, 4.4, 6.7), (9, 9, 9))(places)
 
 
+Branch = tuple[tuple[float, float, float, float], tuple[float, float, float, float]]
+
+
+def vessel(places: FloatArray, *branches: Branch) -> FloatArray:
+    """A tree of straight branches, each from one ball to another: x, y, z and radius (mm) of both."""
+    found: FloatArray | None = None
+    for start, end in (np.array(branch) for branch in branches):
+        along = end[:3] - start[:3]
+        share = np.clip((places - start[:3]) @ along / (along @ along), 0, 1)
+        away = np.linalg.norm(places - start[:3] - share[..., None] * along, axis=-1)
+        distance = away - (start[3] + share * (end[3] - start[3]))
+        found = distance if found is None else blend(found, distance, 3)
+    assert found is not None
+    return found
+
+
+def lump(places: FloatArray) -> FloatArray:
+    """A tumour of no simple shape."""
+    return blend(ellipsoid((-32, 4, 12), (10, 8, 7))(places), ellipsoid((-24, 7, 13), (7, 8, 6))(places), 4)
+
+
+def portal_vein(places: FloatArray) -> FloatArray:
+    """Like a portal vein: a trunk with a branch to each side."""
+    fork = (-6.0, 2.0, -9.0, 5.0)
+    right, left = (-30.0, 0.0, -9.0, 5.0), (42.0, -8.0, 4.0, 4.0)
+    return vessel(
+        places, (fork, right), (right, (-56.0, 10.0, -6.0, 4.0)), (right, (-52.0, -18.0, -8.0, 4.0)), (fork, left)
+    )
+
+
+def hepatic_vein(places: FloatArray) -> FloatArray:
+    """Like a hepatic vein: an arch above the portal vein."""
+    knee = (-14.0, -14.0, 8.0, 5.0)
+    return vessel(places, ((10.0, 14.0, 9.0, 5.0), knee), (knee, (-48.0, -22.0, 8.0, 4.0)))
+
+
+# Regions of the patient's liver, with labels from 2.
+PATIENT: dict[str, Field] = {"tumour": lump, "portal vein": portal_vein, "hepatic vein": hepatic_vein}
+
 ORGANS = {
     "liver.stl": Organ(liver, (100, 60, 50), 2.0, 5000),
     "kidney.obj": Organ(kidney, (62, 38, 32), 1.25, 3000),
@@ -98,14 +137,14 @@ ORGANS = {
 }
 
 
-def label_map(organ: Organ, inside: Field | None = None) -> LabelMap:
-    """The organ as an image: label 1, and 2 where another body lies ``inside``."""
+def label_map(organ: Organ, *inside: Field) -> LabelMap:
+    """The organ as an image: label 1, and 2, 3, … where other bodies lie ``inside``."""
     counts = [int(2 * half / organ.voxel) + 1 for half in organ.half]
     affine = np.column_stack([np.eye(3) * organ.voxel, -np.array(organ.half)])
     places = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1) @ affine[:, :3].T + affine[:, 3]
     values = (organ.field(places) < 0).astype(np.uint8)
-    if inside is not None:
-        values[inside(places) < 0] = 2
+    for label, field in enumerate(inside, start=2):
+        values[field(places) < 0] = label
     return LabelMap(values, affine * 1e-3)
 
 
@@ -145,22 +184,36 @@ def ply(points: FloatArray, facets: IntArray) -> bytes:
 WRITERS = {".stl": stl, ".obj": obj, ".ply": ply}
 
 
-def image() -> bytes:
-    """The liver, with a tumour, as a NIfTI label map."""
-    labels = label_map(ORGANS["liver.stl"], tumour)
+def image(*inside: Field) -> bytes:
+    """The liver, with other bodies in it, as a NIfTI label map."""
+    labels = label_map(ORGANS["liver.stl"], *inside)
     found = nibabel.Nifti1Image(labels.values, np.vstack([labels.affine * 1e3, [0, 0, 0, 1]]))
     found.header.set_xyzt_units("mm")
     return gzip.compress(found.to_bytes(), mtime=0)
 
 
+def names() -> bytes:
+    """The names of the patient's labels, as ITK-SNAP writes them."""
+    lines = [f'{label} 0 0 0 1 1 1 "{name}"' for label, name in enumerate(("liver", *PATIENT), start=1)]
+    return "\n".join(["# Labels of patient.nii.gz; made by scripts/make_organs.py", *lines, ""]).encode()
+
+
+FILES: dict[str, Callable[[], bytes]] = {
+    **{name: lambda name=name: WRITERS[Path(name).suffix](*surface(ORGANS[name])) for name in ORGANS},
+    "liver.nii.gz": lambda: image(tumour),
+    "patient.nii.gz": lambda: image(*PATIENT.values()),
+    "patient.txt": names,
+}
+
+
 def make(name: str) -> bytes:
     """The content of one of the files."""
-    return image() if name == "liver.nii.gz" else WRITERS[Path(name).suffix](*surface(ORGANS[name]))
+    return FILES[name]()
 
 
 def main(folder: Path = MESHES) -> None:
     """Write the files."""
-    for name in (*ORGANS, "liver.nii.gz"):
+    for name in FILES:
         content = make(name)
         with atomic(folder / name) as temporary:
             temporary.write_bytes(content)

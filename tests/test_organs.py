@@ -12,6 +12,7 @@ import pytest
 
 from pipeline.shapes.files.image import read_image
 from pipeline.shapes.files.read import read_surface
+from pipeline.study.read import read_study
 
 ROOT = Path(__file__).resolve().parents[1]
 MESHES = ROOT / "meshes"
@@ -62,3 +63,17 @@ def test_the_image_holds_the_liver_of_the_surface():
     )
     assert image.volume == pytest.approx(surface.volume, rel=2e-3)
     assert np.allclose(image.bounds, surface.bounds, atol=5e-4)
+
+
+def test_the_patients_labels_have_their_names_and_do_not_touch(script: ModuleType):
+    assert script.make("patient.txt") == (MESHES / "patient.txt").read_bytes()
+    again, kept = (
+        nibabel.Nifti1Image.from_bytes(gzip.decompress(data))
+        for data in (script.make("patient.nii.gz"), (MESHES / "patient.nii.gz").read_bytes())
+    )
+    assert (np.asanyarray(again.dataobj) != np.asanyarray(kept.dataobj)).mean() < 1e-5
+    case = read_study(ROOT / "studies" / "patient.toml").case((1, 0))
+    volumes = {piece.name: 1e6 * piece.surface.volume for piece in case.body.embedded}
+    counts = np.bincount(np.asanyarray(kept.dataobj).ravel())[2:] * 8e-3
+    assert list(volumes) == ["tumour", "portal_vein", "hepatic_vein"]
+    assert [*volumes.values()] == pytest.approx(counts, rel=0.01)

@@ -14,15 +14,14 @@ from scipy.spatial import cKDTree
 from pipeline.arrays import FloatArray
 from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body
+from pipeline.shapes.closed import ON_SURFACE
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.regions import Embedded
 from pipeline.shapes.shell import Shell
 
-# Element size on an embedded region in units of half of its thickness, and in a layer below the probe in units of its
-# thickness. With elements of degree 2, F is then within .1 and .4 % of its value for half these sizes
-# (docs/accuracy.md), and the error bar accounts for the rest.
-_ON_EMBEDDED = 0.4
+# Element size in a layer below the probe in units of its thickness. With elements of degree 2, F is then within .4 % of
+# its value for half this size (docs/accuracy.md), and the error bar accounts for the rest.
 _IN_LAYER = 0.5
 # Elements on a surface of triangles have sizes in steps of this factor, each with the points of its own part.
 _STEP = 1.3
@@ -51,7 +50,7 @@ def region_sizes(scene: Scene, growth: float) -> Iterator[str]:
     heights = (high, *body.interfaces, low) if body.interfaces else ()
     for top, bottom in pairwise(heights):
         yield _in_layer(scene, (unit * bottom, unit * top), growth)
-    for inclusion in embedded_sizes(body, growth):
+    for inclusion in embedded_sizes(body, growth, scene.frame.point):
         yield from inclusion.terms(unit)
 
 
@@ -97,7 +96,7 @@ class OvoidSizes(EmbeddedSizes):
 
     def on_surface(self, points: FloatArray) -> FloatArray:
         """Return the size (m) at points (n, 3) by the factor that scales the surface to them."""
-        return self.surface.least * (_ON_EMBEDDED + self.growth * np.abs(self.surface.level(points) - 1))
+        return self.surface.least * (ON_SURFACE + self.growth * np.abs(self.surface.level(points) - 1))
 
     def terms_on_surface(self, unit: float, kernel: Any) -> Iterator[str]:
         """Yield the same as text for gmsh."""
@@ -106,22 +105,23 @@ class OvoidSizes(EmbeddedSizes):
             f"((({name})-({unit * c:.12g}))/{unit * a:.12g})^2"
             for name, c, a in zip("xyz", surface.centre, surface.axes, strict=True)
         )
-        yield f"{unit * surface.least:.12g}*({_ON_EMBEDDED}+{self.growth:.12g}*Abs(Sqrt({level})-1))"
+        yield f"{unit * surface.least:.12g}*({ON_SURFACE}+{self.growth:.12g}*Abs(Sqrt({level})-1))"
 
 
 @dataclass(frozen=True, eq=False)
 class ShellSizes(EmbeddedSizes):
-    """Those of a surface of triangles: each part of it has elements by its own thickness."""
+    """Those of a surface of triangles: each part of it has elements by its own thickness, for a tool at ``contact``."""
 
     surface: Shell
+    contact: Vector
 
     @cached_property
     def _parts(self) -> list[tuple[float, FloatArray, cKDTree]]:
         """Sizes (m), the points (n, 3) of the parts with such elements, and their search trees."""
-        points, widths = self.surface.thin
-        step = np.floor(np.log(widths / widths.min()) / np.log(_STEP)).astype(int)
+        points, sizes, _ = self.surface.sizes(self.contact)
+        least = float(sizes.min())
+        step = np.floor(np.log(sizes / least) / np.log(_STEP)).astype(int)
         parts = {number: points[step == number] for number in np.unique(step).tolist()}
-        least = _ON_EMBEDDED * float(widths.min())
         return [(least * _STEP**number, part, cKDTree(part)) for number, part in parts.items()]
 
     def on_surface(self, points: FloatArray) -> FloatArray:
@@ -134,13 +134,13 @@ class ShellSizes(EmbeddedSizes):
             yield f"{unit * size:.12g}+{self.growth:.12g}*F{distance_field(points * unit, kernel)}"
 
 
-def embedded_sizes(body: Body, growth: float) -> tuple[EmbeddedSizes, ...]:
-    """Return the element sizes of the embedded regions of a body."""
+def embedded_sizes(body: Body, growth: float, contact: Vector) -> tuple[EmbeddedSizes, ...]:
+    """Return the element sizes of the embedded regions of a body that a tool touches at ``contact`` (m)."""
 
     def sizes(piece: Embedded) -> EmbeddedSizes:
         nearest, room = _nearest(body, piece)
         if isinstance(surface := piece.surface, Shell):
-            return ShellSizes(nearest, room, growth, surface)
+            return ShellSizes(nearest, room, growth, surface, contact)
         assert isinstance(surface, Ovoid)
         return OvoidSizes(nearest, room, growth, surface)
 

@@ -13,8 +13,10 @@ from pipeline.plan.proportional_depths import depth_key
 from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.printable import counted
+from pipeline.shapes.regions import Embedded
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import in_mm
+from pipeline.shapes.segment import Segment
 from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.case import Case
 
@@ -78,7 +80,25 @@ def _of_place(case: Case) -> list[str]:
     extent = ", ".join(f"{name} from {in_mm(low)} to {in_mm(high)}" for name, low, high in ends)
     point, axis = np.multiply(1e3, case.frame.point).round(2), np.round(case.frame.axis, 3)
     place, way = (f"({', '.join(f'{c:g}' for c in vector)})" for vector in (point, axis))
-    return [f"Body: {extent}. The first case touches it at {place} mm and advances along {way}."]
+    notes = [f"Body: {extent}. The first case touches it at {place} mm and advances along {way}."]
+    if pieces := case.body.embedded:
+        volumes = [piece.surface.volume for piece in pieces]
+        listed = [_of_region(piece, volume) for piece, volume in zip(pieces, volumes, strict=True)]
+        notes.append(f"Regions: {', '.join(listed)}; {_in_cm3(case.body.volume - sum(volumes))} around them.")
+    return notes
+
+
+def _of_region(piece: Embedded, volume: float) -> str:
+    """Return the volume of an embedded region and, of one from a file, its least and its median thickness."""
+    found = f"{piece.name} {_in_cm3(volume)}"
+    if not isinstance(piece, Segment):
+        return found
+    _, half = piece.surface.thin
+    return f"{found} (thickness from {in_mm(2 * half.min())}, median {in_mm(2 * float(np.median(half)))})"
+
+
+def _in_cm3(volume: float) -> str:
+    return f"{1e6 * volume:.3g} cm³"
 
 
 def _of_large_displacements(plan: Plan) -> list[str]:

@@ -36,9 +36,9 @@ _BYTES_PER_CELL = 1000
 # tetrahedra per unit of a surface's curvature, for elements of unit size.
 _OF_BEND, _ON_BOUNDARY, _FOLLOW = 0.5, 1.4, 30.0
 _TRIANGLE = 0.43
-# Element sizes on an inclusion, in its smallest semi-axis, and in a layer, in its thickness (mesh/regions.py); factor
-# on their number, because element faces follow the interfaces.
-_ON_INCLUSION, _IN_LAYER, _MEETING = 0.4, 0.5, 1.75
+# Element size in a layer, in its thickness (mesh/regions.py); factor on the number of elements of regions, because
+# element faces follow the interfaces.
+_IN_LAYER, _MEETING = 0.5, 1.75
 
 
 def cells(case: Case) -> float:
@@ -85,10 +85,11 @@ def _of_bend(case: Case) -> float:
 def _of_regions(case: Case) -> float:
     """Return the number of elements (as cubes of their size) for layers and inclusions."""
     body, growth = case.body, case.mesh.growth
-    # Both sides of an embedded region's surface: ∫ 1 / (0.4 least + growth s)³ ds.
+    # Both sides of an embedded region's surface: ∫ 1 / (size + growth s)³ ds.
     total = 0.0
-    for areas, widths in (piece.surface.widths() for piece in body.embedded):
-        total += float((areas / (growth * (_ON_INCLUSION * widths) ** 2)).sum())
+    for piece in body.embedded:
+        _, sizes, areas = piece.surface.sizes(case.frame.point)
+        total += float((areas / (growth * sizes**2)).sum())
     top = body.heights[1]
     high = top
     for low in body.interfaces:

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.shapes.closed import Closed
+from pipeline.shapes.closed import ON_SURFACE, Closed
 from pipeline.shapes.frame import Vector
 
 # Newton's method from the left converges monotonically; points near the centre of flat ellipsoids need most steps.
@@ -52,9 +52,9 @@ class Ovoid(Closed):
         """Its centre and semi-axes."""
         return repr((self.centre, self.axes))
 
-    def widths(self) -> tuple[FloatArray, FloatArray]:
-        """Return its area (m²) and its smallest semi-axis (m)."""
-        return np.array([self.area]), np.array([self.least])
+    def sizes(self, contact: Vector) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return its centre (m), the size (m) of elements by its smallest semi-axis, and its area (m²)."""
+        return np.array([self.centre]), np.array([ON_SURFACE * self.least]), np.array([self.area])
 
     def has_axis(self, within: float) -> bool:
         """Return whether it is centred on the z axis, within ``within`` (m), and round about it."""

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.shapes.closed import Closed
+from pipeline.shapes.closed import ON_SURFACE, Closed
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.skin import Skin
 from pipeline.shapes.triangles import Triangles, doubled_normals
@@ -18,6 +18,9 @@ _POINTS, _THIN = 4000, 0.1
 _ROUNDS = 30
 # A ball ends at points of which its centre sees the first one under a larger angle (cosine); nearer ones are noise.
 _APART, _SAME = 0.5, 1e-6
+# Far from the contact, element sizes are this share of the distance from it, up to the second in units of half of the
+# thickness.
+_OF_DISTANCE, _LARGEST = 0.15, 0.8
 # Fractions of a low-discrepancy sequence in two dimensions (M. Roberts, 2018).
 _PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])
 
@@ -120,10 +123,15 @@ class Shell(Closed):
         """Half of its thickness (m) where it is thin."""
         return float(self.thin[1].min())
 
-    def widths(self) -> tuple[FloatArray, FloatArray]:
-        """Return equal areas (n), in m², and half of the thickness (n), in m, at a point of each."""
-        _, radius = self.thin
-        return np.full(len(radius), self.triangles.area / len(radius)), radius
+    def sizes(self, contact: Vector) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return points (n, 3), element sizes (n) by the thickness there, and equal areas (n) of parts around them.
+
+        Far from the contact elements are larger: they need only follow the surface.
+        """
+        points, half = self.thin
+        away = np.linalg.norm(points - np.array(contact), axis=1)
+        sizes = np.clip(_OF_DISTANCE * away, ON_SURFACE * half, _LARGEST * half)
+        return points, sizes, np.full(len(half), self.triangles.area / len(half))
 
     # ---- symmetry -------------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 import itertools
 import re
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from pipeline.quantities import RESERVED
 from pipeline.shapes.bodies.image import FromImage
 from pipeline.shapes.body import Body, Layered
+from pipeline.shapes.closed import Closed
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.regions import Embedded, Inclusion
 from pipeline.shapes.section import Section, in_mm
@@ -24,6 +26,7 @@ from pipeline.study.schema import Material, material_of
 GAP = 0.1
 # Points on an embedded region that are looked at.
 _POINTS = 2000
+_MANY = 10_000  # cached distances
 # Heights at which a message looks for tissue.
 _LEVELS = 401
 # Names of tissues in layers: two of them in a sweep of materials were probably meant as layers.
@@ -164,7 +167,7 @@ def _check_room(body: Body, problems: Problems) -> None:
     for (one, first_place), (other, place) in itertools.combinations(pieces, 2):
         thinner = min(one.surface, other.surface, key=lambda surface: surface.least)
         gap = GAP * thinner.least
-        if (room := _apart(one, other)) < gap:
+        if (room := _apart(one.surface, other.surface)) < gap:
             key, found = _place_of(other, place)
             problems.error(
                 key,
@@ -191,12 +194,10 @@ def _where(body: Body, piece: Embedded) -> str:
     return f"This is at x = {in_mm(x)}, y = {in_mm(y)}, z = {in_mm(z)}"
 
 
-def _apart(one: Embedded, other: Embedded) -> float:
-    """Return the distance (m) between two embedded regions, negative where one reaches into the other."""
-    return min(
-        float(b.distance(a.sample(_POINTS)).min())
-        for a, b in ((one.surface, other.surface), (other.surface, one.surface))
-    )
+@lru_cache(_MANY)
+def _apart(one: Closed, other: Closed) -> float:
+    """Return the distance (m) between two closed surfaces, negative where one reaches into the other."""
+    return min(float(b.distance(a.sample(_POINTS)).min()) for a, b in ((one, other), (other, one)))
 
 
 def _distance(room: float) -> str:

@@ -21,7 +21,7 @@ from pipeline.shapes.shell import Shell
 # enough for sizes that change fast.
 _POINTS, _PASSES = 1000, 2
 # Largest deviation of chords from the surface, in units of half of its smallest thickness: the field rules the sizes.
-_DEVIATION = 0.05
+_DEVIATION = 0.12
 # Largest change of the volume by chords, which curved edges restore.
 _EXCESS = 0.1
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)

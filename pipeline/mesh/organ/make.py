@@ -94,7 +94,7 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
         return scene.body.lift(scene.frame, points)[0]
 
     contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift)
-    field = Field(sizes, scene.frame, contact.edge, embedded_sizes(scene.body, sizes.growth))
+    field = Field(sizes, scene.frame, contact.edge, embedded_sizes(scene.body, sizes.growth, scene.frame.point))
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
     sheet = untangled(sheet, np.unique(sheet.facets[sheet.kind == PROBE]))
     _check_whole(sheet, far.faces, scene.body.volume)
