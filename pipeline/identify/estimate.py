@@ -39,6 +39,8 @@ _FEWEST = 10
 # Contact before the first row, in recorded depths: half the depth at contact of 0.5, four fifths of it at 4.
 _REACHES = (REACH, 1.5, 4.0)
 _WINDOWS = (0.25, 0.5, 1.0)
+# A force above that of air by so many of its usual steps from row to row is one of contact.
+_NOISE = 5.0
 
 
 def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estimate:
@@ -213,7 +215,9 @@ def _windows(measured: Sequence[Measured], found: Fit) -> tuple[Window, ...]:
     if "young" not in found.model.names:
         return ()
     place, values = found.model.names.index("young"), found.model.space.values(found.x)
-    depths = [found.model.depth(number, values, force) for number, force in enumerate(found.force)]
+    # From where the force begins to rise: a law that does not fit has a contact point anywhere.
+    touch = {found.model.own("contact_point", number): _touch(one.curve) for number, one in enumerate(measured)}
+    depths = [found.model.depth(number, values | touch, force) for number, force in enumerate(found.force)]
     most = max(float(depth.max()) for depth in depths)
     windows = []
     for share in _WINDOWS:
@@ -224,6 +228,14 @@ def _windows(measured: Sequence[Measured], found: Fit) -> tuple[Window, ...]:
         model = Model(cut, found.model.space)
         windows.append(Window(share * most, float(model.space.value(place, start(model)[place]))))
     return tuple(windows)
+
+
+def _touch(curve: Curve) -> float:
+    """Return the recorded depth (m) from which the force is above that of air, or of the first rows, and its noise."""
+    first = max(3, len(curve.force) // 20)
+    noise = _NOISE * float(np.median(np.abs(np.diff(curve.force))))
+    below = np.flatnonzero(curve.force[: int(np.argmax(curve.depth)) + 1] <= np.median(curve.force[:first]) + noise)
+    return float(curve.depth[below[-1]]) if below.size else float(curve.depth[0])
 
 
 def _cut(measured: Measured, keep: npt.NDArray[np.bool_]) -> Measured:
