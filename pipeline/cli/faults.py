@@ -95,12 +95,17 @@ def of_results(wrong: "ResultsError", file: str) -> tuple[Fault, int]:
 
 
 @contextmanager
-def refusing(*errors: type[Exception], file: str | Path, howto: str | None = None) -> Iterator[None]:
-    """Exit with the status of wrong input if one of ``errors`` is raised; its message is about ``file``."""
+def refusing(
+    *errors: type[Exception], file: str | Path, howto: str | None = None, on_all_ranks: bool = False
+) -> Iterator[None]:
+    """Exit with the status of wrong input if one of ``errors`` is raised, on all ranks or on one: see :func:`fail`.
+
+    Its message is about ``file``.
+    """
     try:
         yield
     except errors as wrong:
-        fail(Fault(str(wrong), file=str(file), howto=howto))
+        fail(Fault(str(wrong), file=str(file), howto=howto), on_all_ranks=on_all_ranks)
 
 
 @contextmanager

@@ -120,7 +120,8 @@ def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict
     from pipeline.report.identified import answer, failures
 
     start = time.monotonic()
-    with refusing_cases(study, store), refusing(ExperimentError, file=study.file, howto=_OF_CURVES):
+    no_curve = refusing(ExperimentError, file=study.file, howto=_OF_CURVES, on_all_ranks=True)
+    with refusing_cases(study, store), no_curve:
         dataset = identification(study, output, store, (lambda _: None) if quiet else _tell)
     failed = failures(dataset)
     if not is_first_rank():

@@ -128,6 +128,17 @@ def test_a_bad_file_is_a_row_and_what_is_told_of_files_is_told_once(folder, epsm
     assert data["status"] == 1 and list(data["studies"][0]["failed"]) == ["gel_11"]
 
 
+def test_ranks_share_the_files_and_find_the_same(folder, spawn, found):
+    """The files of this study are fitted afresh: its title differs from that of another one."""
+    text = STUDY.format(file="curves/*.csv", may_hide="[]").replace("Punch", "On two ranks")
+    (folder / "shared.toml").write_text(text)
+    done = spawn("identify", folder / "shared.toml", "--output", folder / "results", ranks=2)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("3 files: the declared law fits 3.") == 1
+    dataset = xr.load_dataset(folder / "results" / "shared.nc")
+    assert dataset["estimate"].sel(unknown="young").values == pytest.approx([20e3, 25e3, 30e3], rel=0.03)
+
+
 def test_the_report_is_a_page_with_the_answer(folder, epsmesh, found):
     result = epsmesh("report", folder / "results" / "punch.nc")
     assert result.exit_code == 0, result.output
