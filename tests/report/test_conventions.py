@@ -47,7 +47,10 @@ def test_datasets_of_all_studies_follow_the_conventions(tmp_path):
     pytest.importorskip("cfchecker")
     files = []
     for study in STUDIES:
-        found = build(make_plan(read_study(study)), {})
+        read = read_study(study)
+        if read.lacking:  # it has no cases
+            continue
+        found = build(make_plan(read), {})
         files.append(tmp_path / f"{study.stem}.nc")
         write(found, files[-1])
         files.append(tmp_path / f"{study.stem}_run.nc")
