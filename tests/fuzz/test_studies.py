@@ -83,7 +83,7 @@ def judge(file) -> Study | None:
     for axis in study.axes:
         assert len(set(axis.labels)) == len(axis) > 0
         count *= len(axis)
-    if count <= _PLANNED:
+    if count <= _PLANNED and not study.lacking:
         assert summary(make_plan(study))["cases"] == count
     return study
 
