@@ -131,7 +131,8 @@ def _check(files: list[Path]) -> NoReturn:
         report.append({"file": str(file), "errors": [], "warnings": list(study.warnings), "cases": cases})
         if not is_json_wanted():
             warn(study)
-            print(f"{file}: fine; {counted(cases, 'case')}{axes_of(study)}")
+            what = "for `epsmesh identify`" if study.lacking else f"{counted(cases, 'case')}{axes_of(study)}"
+            print(f"{file}: fine; {what}")
     say(report)
     raise typer.Exit(BAD_INPUT if any(one["errors"] for one in report) else DONE)
 
