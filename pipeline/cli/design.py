@@ -36,6 +36,8 @@ def _ranked(study: "Study", store: Path, *, quiet: bool) -> dict[str, Any]:
         if not quiet and is_first_rank():
             print(f"  {line}", file=sys.stderr, flush=True)
 
+    if any(measurement.errors for measurement in study.measurements):
+        tell("errors of lengths of single measurements (`errors`) are not in these bars")
     with refusing_cases(study, store):
         found = rank(study, telling(stored_in(store), tell), tell)
     if not is_json_wanted():

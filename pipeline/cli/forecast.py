@@ -42,7 +42,7 @@ def told(found: dict[str, Any]) -> str:
 
 
 def _domains(study: "Study") -> "Iterator[tuple[str, str, Domain]]":
-    from pipeline.identify.experiment import deepest_of
+    from pipeline.identify.experiment import deepest_of, of_scene, own_names
     from pipeline.identify.forward import unknown_domain
     from pipeline.identify.unknowns import unknowns
     from pipeline.study.curves import curves_of, sound
@@ -55,6 +55,7 @@ def _domains(study: "Study") -> "Iterator[tuple[str, str, Domain]]":
             deepest = deepest_of(sound(curves_of(study, measurement)))
         else:
             deepest = max(probe.depth for probe in scene.probes)
-        yield "identify", measurement.name, unknown_domain(scene, unknowns(study), deepest)
+        sought = of_scene(unknowns(study), own_names(measurement, unknowns(study)))
+        yield "identify", measurement.name, unknown_domain(scene, sought, deepest)
     if study.spread.varied:
         yield "sensitivity", "the scene", spread_domain(study)

@@ -1,6 +1,6 @@
 """The experiment of a study: its specimens with their curves, and the forces of the scenes they were measured on."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, log10
 from pathlib import Path
@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.experiment.curve import Curve
 from pipeline.experiment.reading import ExperimentError
-from pipeline.identify.forward import SceneForce, forward_of
+from pipeline.identify.forward import OwnForce, SceneForce, forward_of
 from pipeline.identify.may_hide import hidden_parts
 from pipeline.identify.parts import Estimate, Hidden, Measured, Unknown
 from pipeline.identify.tools import tip_of_probe
@@ -18,6 +18,7 @@ from pipeline.shapes.probe import Probe
 from pipeline.study.case import Case
 from pipeline.study.curves import curves_of, sound
 from pipeline.study.measurement import Measurement
+from pipeline.study.own_lengths import own_length
 from pipeline.study.read import scene_of
 from pipeline.study.schema import Material
 from pipeline.study.sweep import Study
@@ -48,7 +49,7 @@ class Scenes:
 
     measurements: tuple[Measurement, ...]
     cases: tuple[Case, ...]
-    forwards: tuple[SceneForce, ...]
+    forwards: tuple[SceneForce | OwnForce, ...]
     hidden: tuple[tuple[Hidden, ...], ...]
 
     def measured(self, specimen: Specimen) -> tuple[Measured, ...]:
@@ -118,15 +119,31 @@ def scenes_of(
     """
     scenes = [scene_of(study, measurement) for measurement in study.measurements]
     deepest = [deepest_of([one.curves[number] for one in found if one.curves], times) for number in range(len(scenes))]
-    made: dict[str, SceneForce] = {}
-    for scene in scenes:
-        most = max(depth for other, depth in zip(scenes, deepest, strict=True) if other.text == scene.text)
-        if scene.text not in made:
-            made[scene.text] = forward_of(scene, unknowns, most, solve)
+    owns = [own_names(measurement, unknowns) for measurement in study.measurements]
+    keys = [(scene.text, tuple(own.values())) for scene, own in zip(scenes, owns, strict=True)]
+    made: dict[Hashable, SceneForce | OwnForce] = {}
+    for scene, own, key in zip(scenes, owns, keys, strict=True):
+        if key not in made:
+            most = max(depth for other, depth in zip(keys, deepest, strict=True) if other == key)
+            force = forward_of(scene, of_scene(unknowns, own), most, solve)
+            made[key] = OwnForce(force, own) if own else force
     probes = [cast(Probe, scene.sections["probe"][0]) for scene in scenes]
     tips = [tip_of_probe(probe, depth) for probe, depth in zip(probes, deepest, strict=True)]
     hidden = hidden_parts(study.identification.may_hide, tips, deepest, _poisson(study, unknowns))
-    return Scenes(study.measurements, cases_of(study), tuple(made[scene.text] for scene in scenes), tuple(hidden))
+    return Scenes(study.measurements, cases_of(study), tuple(made[key] for key in keys), tuple(hidden))
+
+
+def own_names(measurement: Measurement, unknowns: Sequence[Unknown]) -> dict[str, str]:
+    """Return the names of the unknowns that are lengths of one measurement alone, by those of their keys."""
+    known = {unknown.name for unknown in unknowns}
+    names = {name: own_length(name, measurement.name) for name in measurement.errors or {}}
+    return {name: own for name, own in names.items() if own in known}
+
+
+def of_scene(unknowns: Sequence[Unknown], own: Mapping[str, str]) -> list[Unknown]:
+    """Return unknowns by the names of their keys in the scene of a measurement: see :func:`own_names`."""
+    keys = {full: name for name, full in own.items()}
+    return [replace(one, name=keys.get(one.name, one.name)) for one in unknowns]
 
 
 def deepest_of(curves: Sequence[Curve], times: float = 1.0) -> float:

@@ -1,6 +1,6 @@
 """The force of a measurement's scene as a function of depth and unknowns: which model it is computed with."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -65,6 +65,38 @@ class SceneForce:
             except SurrogateError:
                 self._made[ranges] = None
         return replace(self, near=self._made[ranges])
+
+
+@dataclass(frozen=True)
+class OwnForce:
+    """The force of a scene some of whose unknowns are of this scene alone: ``own`` has their names by those of keys."""
+
+    scene: SceneForce
+    own: Mapping[str, str]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the force depends on."""
+        return tuple(self.own.get(name, name) for name in self.scene.names)
+
+    def force(self, depth: FloatArray, values: Values) -> FloatArray:
+        """Return the force (N) at depths (m)."""
+        return self.scene.force(depth, self._named(values))
+
+    def error(self, depth: FloatArray, values: Values) -> FloatArray:
+        """Return the relative error of the force."""
+        return self.scene.error(depth, self._named(values))
+
+    def ranges(self, low: Values, high: Values) -> tuple[Range, ...]:
+        """Return the ranges over which the force is to be corrected: see :meth:`SceneForce.ranges`."""
+        return self.scene.ranges(self._named(low), self._named(high))
+
+    def corrected(self, ranges: tuple[Range, ...]) -> "OwnForce":
+        """Return the force with a correction over such ranges: see :meth:`SceneForce.corrected`."""
+        return replace(self, scene=self.scene.corrected(ranges))
+
+    def _named(self, values: Values) -> Values:
+        return {**values, **{name: values[own] for name, own in self.own.items()}}
 
 
 def forward_of(scene: Study, unknowns: Sequence[Unknown], deepest: float, solve: Solve) -> SceneForce:

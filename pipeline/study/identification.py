@@ -130,11 +130,11 @@ def given_one(
     allowed = f'must be a range, such as {ends}, or a value with an error, such as {{value = {example}, error = "5 %"}}'
     try:
         if isinstance(raw, list) and len(raw) == 2:
-            low, high = (_number(end, unit) for end in raw)
+            low, high = (number_in(end, unit) for end in raw)
             return _ranged(key, parameter, raw, low, high, problems)
         if isinstance(raw, dict) and raw.keys() == {"value", "error"}:
-            value, error = _number(raw["value"], unit), _error(raw["error"], raw["value"], unit)
-            return _with_error(key, parameter, raw, value, error, is_asked, problems)
+            value, error = number_in(raw["value"], unit), _error(raw["error"], raw["value"], unit)
+            return with_error(key, parameter, raw, value, error, is_asked, problems)
         problems.error(key, raw, allowed)
     except PydanticCustomError as wrong:
         problems.error(key, raw, f"{allowed}: {wrong.message()}")
@@ -151,9 +151,10 @@ def _ranged(key: str, parameter: Parameter, raw: Any, low: float, high: float, p
     return None
 
 
-def _with_error(
+def with_error(
     key: str, parameter: Parameter, raw: Any, value: float, error: float, is_asked: bool, problems: Problems
 ) -> Sought | None:
+    """Return a parameter that is known with an ``error`` (95 %); None, with a report, if it cannot be."""
     if error <= 0:
         problems.error(key, raw, "must have an error above 0; a parameter without an error is known: omit it here")
     elif not parameter.least <= value <= parameter.most:
@@ -174,7 +175,7 @@ def _bounds(parameter: Parameter) -> str:
     return f"values above {parameter.least:g}{unit}"
 
 
-def _number(value: Any, unit: str) -> float:
+def number_in(value: Any, unit: str) -> float:
     """Return a number in the SI ``unit``."""
     if unit != "1":
         return parse_quantity(value, unit)
@@ -186,8 +187,8 @@ def _number(value: Any, unit: str) -> float:
 def _error(error: Any, value: Any, unit: str) -> float:
     """Return the error (95 %) of a value in the SI ``unit``; per cent are those of the value."""
     if isinstance(error, str) and error.rstrip().endswith("%"):
-        return parse_quantity(error, "") * abs(_number(value, unit))
-    return _number(error, unit)
+        return parse_quantity(error, "") * abs(number_in(value, unit))
+    return number_in(error, unit)
 
 
 def _add_implied(
@@ -242,7 +243,8 @@ def check_shared(
                 f"identify.{one.parameter.name}",
                 None,
                 f"is one unknown, {one.parameter.value:g} in [{one.parameter.place[0]}], but the measurement "
-                f'"{measurement.name}" has its own, {own.value:g} (SI): leave it known',
+                f'"{measurement.name}" has its own, {own.value:g} (SI): give each an error in its [[measurement]], '
+                f'such as errors = {{{one.parameter.name} = "5 %"}}',
             )
 
 

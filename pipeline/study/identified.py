@@ -257,7 +257,8 @@ def _correlation(own: "xr.Dataset", wider: "Mapping[str, xr.DataArray]") -> Floa
 
 def is_of_test(name: str) -> bool:
     """Return whether an unknown belongs to the experiment or its specimen, not to the tissue."""
-    return name in ("friction", "radius", "thickness") or name.startswith(_OF_TEST)
+    is_own = " of " in name  # of one measurement
+    return is_own or name in ("friction", "radius", "thickness") or name.startswith(_OF_TEST)
 
 
 # Several curves have one each, with the name of the curve behind.

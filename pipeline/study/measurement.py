@@ -246,6 +246,17 @@ class Measurement(Section):
         ),
     ] = None
 
+    errors: Annotated[
+        dict[str, str] | None,
+        _TABLE,
+        Words(
+            "Errors (95 %) of lengths of this measurement's own tool and body, such as radius, thickness or "
+            "skin_thickness: they widen all bars. A length that all measurements have alike is a key of [identify].",
+            '{radius = "2 %", thickness = "0.2 mm"}',
+            default="none: lengths are exact",
+        ),
+    ] = None
+
     @model_validator(mode="after")
     def _of_one_way(self) -> "Measurement":
         if self.depth_is == "tool" and self.machine_stiffness != inf:

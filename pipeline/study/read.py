@@ -19,6 +19,7 @@ from pipeline.study.loads import Load
 from pipeline.study.measured import MESH, completed
 from pipeline.study.measurement import Measurement
 from pipeline.study.output import Output, check_outputs, read_outputs
+from pipeline.study.own_lengths import own_errors
 from pipeline.study.parameters import DEPTH, Parameter, parameters_of
 from pipeline.study.problems import Problem, Problems, StudyError, nearest
 from pipeline.study.regions import check_regions, material_without_section
@@ -144,10 +145,14 @@ def _read_experiment(
         return measurements, Identification()
     found = read_identify(raw.get("identify", {}), measurements, _parameters(sections), problems)
     for number, measurement in enumerate(measurements, start=1):
+        where, known = f"measurement[{number}]", _parameters(sections)
         if measurement.probe or measurement.body:
-            scene = _scene(raw, measurement, f"measurement[{number}]", file, problems)
-            if scene is not None:
-                check_shared(found, measurement, _parameters(scene.sections), problems)
+            scene = _scene(raw, measurement, where, file, problems)
+            if scene is None:
+                continue
+            known = _parameters(scene.sections)
+            check_shared(found, measurement, known, problems)
+        found = own_errors(found, measurement, where, known, problems)
     return measurements, found
 
 

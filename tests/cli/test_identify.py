@@ -155,6 +155,19 @@ def test_what_curves_and_ranges_give_is_needed_for_cases(folder, epsmesh, comman
         pipeline.read(folder / "punch.toml").plan()
 
 
+def test_the_error_of_a_radius_widens_the_bar(folder, epsmesh, found):
+    """F of a flat punch is proportional to its radius, but for the thickness of the layer."""
+    text = STUDY.format(file="curves/gel_8.csv", may_hide="[]")
+    (folder / "vague.toml").write_text(text.replace("[identify]", 'errors = {radius = "6 %"}\n[identify]'))
+    result = epsmesh("identify", folder / "vague.toml", "--output", folder / "results")
+    assert result.exit_code == 0, result.output
+    vague = xr.load_dataset(folder / "results" / "vague.nc").sel(unknown="young")
+    half = float(vague["high"] - vague["low"]) / 2
+    assert vague["low"] < YOUNG < vague["high"]
+    assert 0.05 * YOUNG < half < 0.12 * YOUNG
+    assert float(vague["part"].sel(source="thickness")) > 0.8 * half
+
+
 def test_a_plan_has_the_cost_of_the_forces_alone(folder, epsmesh):
     result = epsmesh("plan", folder / "punch.toml", "--output", folder / "results")
     assert result.exit_code == 0, result.output

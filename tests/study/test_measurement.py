@@ -222,6 +222,23 @@ def test_a_study_with_measurements_is_written_and_read_again():
     assert measurement.machine_compliance == 0
 
 
+def test_lengths_of_single_measurements_have_errors_of_their_own():
+    wide = {"name": "wide", "probe": {"radius": "6 mm"}, "errors": {"radius": "2 %"}}
+    study = parse(raw() | {"measurement": [CURVE | {"errors": {"radius": "0.3 mm"}}, CURVE | wide]})
+    own = {one.name: one for one in unknowns(study) if " of " in one.name}
+    assert own["radius of punch"].prior == pytest.approx((3e-3, 0.15e-3))
+    assert own["radius of wide"].prior == pytest.approx((6e-3, 0.06e-3))
+    assert not any(one.is_wanted for one in own.values())
+    for errors, identify, words in (
+        ({"young": "5 %"}, {}, "errors.young"),
+        ({"radius": "2"}, {}, "must be an error"),
+        ({"radius": "2 %"}, {"radius": ["2 mm", "4 mm"]}, "also a key of"),
+        ({"radius": "60 %"}, {}, "error below"),
+    ):
+        with pytest.raises(StudyError, match=words):
+            parse(raw() | {"measurement": [CURVE | {"errors": errors}], "identify": identify})
+
+
 def test_what_is_to_be_found_need_not_have_a_value():
     """Values of ranges, or with errors, stand in: the scene of a measurement is whole, and the study has no cases."""
     layers = [{"name": "skin", "poisson": 0.48}, {"name": "fat", "poisson": 0.48}]
