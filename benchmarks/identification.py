@@ -162,15 +162,17 @@ def experiment(tool: Tool, rng: np.random.Generator, correlation: float, hides: 
     return Measured(curve, tool.forward, None, hidden), young, unknown
 
 
-def least_squares(measured: Measured, unknowns: Sequence[Unknown]) -> tuple[float, float]:
-    """Return the 95 % interval of the modulus (Pa) by least squares with the usual covariance."""
+def least_squares(measured: Measured, unknowns: Sequence[Unknown]) -> tuple[FloatArray, FloatArray]:
+    """Return the ends (u,) of the 95 % intervals by least squares with the usual covariance."""
     model = Model.of([measured], unknowns)
     x = start(model)
     force = model.predict(0, model.space.values(x))
     jacobian, residual = model.jacobian(0, x, force), measured.curve.force - force
     variance = residual @ residual / (len(force) - len(x))
-    spread = np.sqrt(np.linalg.inv(jacobian.T @ jacobian / variance + prior(model)[1])[0, 0])
-    low, high = (float(model.space.value(0, x[0] + side * 1.96 * spread)) for side in (-1, 1))
+    spread = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian / variance + prior(model)[1])))
+    low, high = (
+        np.array([float(model.space.value(k, at)) for k, at in enumerate(x + side * 1.96 * spread)]) for side in (-1, 1)
+    )
     return low, high
 
 
@@ -183,7 +185,8 @@ def trial(tool: Tool, seed: tuple[int, int], correlation: float, hides: str) -> 
     before = process_time()
     found = identify([measured], unknowns)
     seconds = process_time() - before
-    return Trial(young, correlation, hides, tool.name, found, least_squares(measured, unknowns), seconds)
+    low, high = least_squares(measured, unknowns)
+    return Trial(young, correlation, hides, tool.name, found, (float(low[0]), float(high[0])), seconds)
 
 
 def trials(both: Sequence[Tool], count: int, seed: int) -> Iterator[Trial]:

@@ -17,7 +17,9 @@ from pipeline.identify.parts import Profile
 _MOST, _OF_RANGE, _OF_SPREAD, _GROWTH = 24, 0.08, 0.6, 1.3
 # Gauss-Newton steps at each point, which begins where its neighbour ended; halvings of a step that is too long.
 _NEWTON, _HALVINGS = 6, 5
-_CLOSE = 1e-2
+# Steps that gain less, in twice the logarithm of the likelihood, are not made. A good one gains this share of what its
+# derivatives foretell.
+_CLOSE, _GOOD = 1e-2, 0.7
 
 
 @dataclass(frozen=True)
@@ -41,10 +43,13 @@ class _Curve:
 class Likelihood:
     """The likelihood of a model's coordinates for the most probable noise, without linearising the model."""
 
-    def __init__(self, found: Fit, model: Model | None = None):
-        """``model`` may have other forces with the same unknowns."""
+    def __init__(self, found: Fit, model: Model | None = None, deviation: float = 0.0):
+        """``model`` may have other forces with the same unknowns, with a ``deviation`` from the law at least as large.
+
+        The deviation is relative to the force, as in ``DEVIATIONS``.
+        """
         self.model = model or found.model
-        self._curves = tuple(_most_probable(found, number) for number in range(len(found.force)))
+        self._curves = tuple(_most_probable(found, number, deviation) for number in range(len(found.force)))
         self._mean, precision = prior(self.model)
         # Uniform unknowns have no prior but their range.
         self._root = np.sqrt(np.where(self.model.space.prior[1] > 0, np.diag(precision), 0.0))
@@ -68,25 +73,32 @@ class Likelihood:
         return np.vstack([*rows, np.diag(self._root)])
 
     def best(self, x: FloatArray, held: Sequence[int]) -> tuple[FloatArray, float, FloatArray]:
-        """Return the best coordinates with those in ``held`` unchanged, the sum of squares, and the normal matrix."""
-        residual = self.residual(x)
-        square = float(residual @ residual)
+        """Return the best coordinates with those in ``held`` unchanged, the sum of squares, and the normal matrix.
+
+        Derivatives are computed anew only where a step gains much less than they foretell.
+        """
+        residual, jacobian = self.residual(x), self.jacobian(x)
+        square, is_new = float(residual @ residual), True
         for _ in range(_NEWTON):
-            jacobian = self.jacobian(x)
-            matrix = jacobian.T @ jacobian
-            step = _bounded(matrix, jacobian.T @ residual, x, held)
-            for halving in range(_HALVINGS):
+            matrix, slope = jacobian.T @ jacobian, jacobian.T @ residual
+            step = _bounded(matrix, slope, x, held)
+            foretold = -float(step @ (2 * slope + matrix @ step))
+            if foretold < _CLOSE:
+                break
+            for halving in range(_HALVINGS if is_new else 1):
                 trial = np.clip(x + step / 2**halving, 0.0, 1.0)
                 after = self.residual(trial)
                 if after @ after < square:
                     break
             gain = square - float(after @ after)
-            if gain <= 0:
+            if gain > 0:
+                x, residual, square = trial, after, square - gain
+            elif is_new:
                 break
-            x, residual, square = trial, after, square - gain
-            if gain < _CLOSE:
-                break
-        return x, square, matrix
+            is_new = gain < _GOOD * foretold
+            if is_new:
+                jacobian = self.jacobian(x)
+        return x, square, jacobian.T @ jacobian
 
 
 def _bounded(matrix: FloatArray, slope: FloatArray, x: FloatArray, held: Sequence[int]) -> FloatArray:
@@ -109,8 +121,8 @@ def _bounded(matrix: FloatArray, slope: FloatArray, x: FloatArray, held: Sequenc
     return step
 
 
-def _most_probable(found: Fit, number: int) -> _Curve:
-    model, (noise, scale), size = found.model, found.noise(number), size_of(found.top(number))
+def _most_probable(found: Fit, number: int, least: float) -> _Curve:
+    model, (noise, scale), size = found.model, found.noise(number), max(size_of(found.top(number)), least)
     values = model.space.values(found.x)
     contact = found.force[number] - model.offset(number, values)
     share = model.thinned(contact) / np.maximum(np.abs(contact).max(), np.finfo(float).tiny)

@@ -5,6 +5,7 @@ a cone, the logarithm of F/d².
 """
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
@@ -53,5 +54,6 @@ class Depths:
         return replace(self, count=count)
 
 
+@cache
 def _inverse(count: int) -> FloatArray:
     return np.asarray(np.linalg.inv(chebvander(nodes()[:count], count - 1)))
