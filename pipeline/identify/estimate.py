@@ -125,11 +125,12 @@ def _bars(found: Fit) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, Pro
     # The profile has the most probable noise: its threshold is raised as bars of all noises are wider than that one's.
     top = mixture.covariance[mixture.top]
     student = float(stdtrit(mixture.freedom, 1 - TAIL))
+    wider = float(np.median((high - low) / 2 / np.sqrt(np.diag(top)) / student))
+    squared = (student * max(wider, 1.0)) ** 2
+    threshold = mixture.freedom * np.log1p(squared / mixture.freedom)
     likelihood, profiles = Likelihood(found), {}
     for place in shared:
         spread = float(np.sqrt(top[place, place]))
-        squared = max((high[place] - low[place]) / 2 / spread, student) ** 2
-        threshold = float(mixture.freedom * np.log1p(squared / mixture.freedom))
         curve, best = profile(likelihood, np.clip(found.x, 0.0, 1.0), place, spread, threshold)
         low[place], high[place] = ends(curve, threshold)
         x[place] = best
