@@ -48,8 +48,8 @@ def _of_output(one: xr.Dataset) -> Iterator[str]:
 
 def _what_matters(found: xr.Dataset, letter: str) -> str:
     """Tell which parameter matters most, if the surrogate is exact enough to tell any."""
-    error, first = float(found["surrogate_error"]), found.isel(parameter=0)
-    if error >= float(found["deviation"]):
+    first, is_exact = found.isel(parameter=0), not found["total_error"].any()  # only one parameter acts
+    if found["surrogate_error"] >= found["deviation"] and not is_exact:
         return f"{letter} varies by less than the error of the surrogate: its indices are not known."
     name, alone = first["parameter"].values, 100 * float(first["first"])
     return f"{name} matters most: if it were known, {alone:.0f} % of the variance of {letter} would vanish."
