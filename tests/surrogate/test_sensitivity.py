@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from pipeline.report.sensitivity import answer
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_mapping
 from pipeline.surrogate.cases import SurrogateError
@@ -103,6 +104,15 @@ def test_the_dataset_names_what_was_varied():
     assert list(dataset["parameter"].values) == list(VARIED)
     assert float(dataset["high"].sel(parameter="radius")) == pytest.approx(3e-3)
     assert str(dataset["output_unit"].sel(output="force").values) == "N"
+
+
+def test_an_output_that_varies_by_less_than_its_error_has_no_known_indices():
+    varied = {"young": ["9 kPa", "11 kPa"], "poisson": [0.3, 0.4]}
+    study = read_mapping(PUNCH | {"sensitivity": varied}, "punch")
+    for bar, is_known in ((1e-4, True), (0.2, False)):
+        lines = answer(dataset_of(study, explain(study, solved_by(_punch, bar=bar))))
+        assert ("young matters most" in lines[-1]) == is_known
+        assert ("its indices are not known" in lines[-1]) != is_known
 
 
 def test_outputs_that_are_no_force_do_not_depend_on_the_modulus():
