@@ -57,9 +57,6 @@ def _what_matters(found: xr.Dataset, letter: str) -> str:
 
 def percent(one: xr.Dataset) -> str:
     """Write the error of the surrogate of one output; without error bars of its cases, it is the interpolation's."""
-    text = f"{100 * float(one['surrogate_error']):.2g} %"
-    return (
-        text
-        if f"{one['output'].values}_error" in QUANTITIES
-        else f"{text} by interpolation, and that of meshes unknown"
-    )
+    name, text = str(one["output"].values), f"{100 * float(one['surrogate_error']):.2g} %"
+    has_bar = name not in QUANTITIES or f"{name}_error" in QUANTITIES
+    return text if has_bar else f"{text} by interpolation, and that of meshes unknown"

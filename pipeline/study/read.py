@@ -94,8 +94,8 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene:
     if all(problem.key != "study" for problem in problems.errors):
         _check_together(sections, tuple(axes), problems)
     measurements, identification = _read_experiment(given, sections, file, problems)
-    spread = _read_spread(given, sections, problems)
     outputs = _read_outputs(given, sections, axes, Path(file).parent, problems)
+    spread = _read_spread(given, sections, outputs, problems)
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))
     sections, every_axis = with_stages(sections, tuple(axes))
@@ -156,12 +156,14 @@ def _read_experiment(
     return measurements, found
 
 
-def _read_spread(raw: dict[str, Any], sections: dict[str, tuple[Section, ...]], problems: Problems) -> Spread:
+def _read_spread(
+    raw: dict[str, Any], sections: dict[str, tuple[Section, ...]], outputs: Sequence[Output], problems: Problems
+) -> Spread:
     """Return the parameters that are varied, and the outputs to explain."""
     if problems.errors or "sensitivity" not in raw:
         return Spread()
     known = {name: one for name, one in _parameters(sections).items() if one.place}
-    return read_sensitivity(raw["sensitivity"], known | {DEPTH.name: DEPTH}, problems)
+    return read_sensitivity(raw["sensitivity"], known | {DEPTH.name: DEPTH}, outputs, problems)
 
 
 def _read_outputs(

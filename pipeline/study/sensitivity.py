@@ -3,7 +3,7 @@
 Forces do not depend on this section: it neither sweeps nor changes cases.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from pipeline.quantities import LARGEST
 from pipeline.study.identification import Sought, given_one, known_one
 from pipeline.study.measurement import Sensitivity
+from pipeline.study.output import Output
 from pipeline.study.parameters import Parameter
 from pipeline.study.problems import Problems, nearest, tuples
 
@@ -28,23 +29,28 @@ class Spread:
     outputs: tuple[str, ...] = ()
 
 
-def read_sensitivity(raw: Any, known: Mapping[str, Parameter], problems: Problems) -> Spread:
-    """Return the parameters of ``[sensitivity]``, of those that are ``known`` by name, and its outputs."""
+def read_sensitivity(raw: Any, known: Mapping[str, Parameter], own: Sequence[Output], problems: Problems) -> Spread:
+    """Return the parameters of ``[sensitivity]``, of those that are ``known`` by name, and its outputs.
+
+    ``own`` are the study's: how one of a function depends on the moduli, of which one is a factor, is not known.
+    """
     if not isinstance(raw, dict):
         problems.error("sensitivity", raw, "must be a table: write [sensitivity]")
         return Spread()
-    own = {key: value for key, value in raw.items() if key in Sensitivity.model_fields and key != "name"}
+    keys = {key: value for key, value in raw.items() if key in Sensitivity.model_fields and key != "name"}
     try:
-        section = Sensitivity.model_validate({key: tuples(value) for key, value in own.items()})
+        section = Sensitivity.model_validate({key: tuples(value) for key, value in keys.items()})
     except ValidationError as error:
-        problems.from_pydantic("sensitivity", error, Sensitivity, own)
+        problems.from_pydantic("sensitivity", error, Sensitivity, keys)
         return Spread()
     for name in section.outputs:
-        if name not in OUTPUTS:
-            allowed = f"is no result of a case that is one number; {nearest(name, OUTPUTS)}"
+        if any(one.function for one in own if one.name == name):
+            problems.error("sensitivity.outputs", name, "is a function: use an output at a point, or of a region")
+        elif name not in (outputs := (*OUTPUTS, *(one.name for one in own if one.of))):
+            allowed = f"is no result of a case that is one number; {nearest(name, outputs)}"
             problems.error("sensitivity.outputs", name, allowed)
     varied = []
-    for key in (key for key in raw if key not in own):
+    for key in (key for key in raw if key not in keys):
         parameter = known_one(f"sensitivity.{key}", raw[key], key, known, problems)
         if parameter and (one := given_one("sensitivity", parameter, raw[key], problems)):
             varied.append(one)

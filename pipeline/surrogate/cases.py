@@ -62,7 +62,7 @@ class Domain:
         lists: dict[Parameter, Sequence[float]] = {self.reference.parameter: [self.reference.young]}
         for one, own in zip(self.ranges, values, strict=True):
             lists[one.parameter] = (own * (self.reference.young if one.is_ratio else 1.0)).tolist()
-        return derive(self.scene, lists | {DEPTH: depths.tolist()}, self.accuracy)
+        return derive(self.scene, lists | {DEPTH: depths.tolist()}, self.accuracy, self.output)
 
     @property
     def middle(self) -> Block:
@@ -91,7 +91,7 @@ def domain_of(
     found = found if has_mesh(scene) else replace(found, accuracy=ON_MERIDIAN)
     study = found.study([one.value(np.zeros(1)) for one in found.ranges], np.array([deepest]))
     case = study.case((0,) * len(study.axes))
-    if reason := obstacle("scaling", case):
+    if reason := obstacle("scaling", replace(case, outputs=())):  # they are of fields, which are proportional, too
         raise StudyError(scene.file, [Problem("load", None, f"forces must be proportional to young: {reason}")])
     if all(solve.axisymmetric for solve in make_plan(study).solves):
         found = replace(found, is_on_meridian=True)

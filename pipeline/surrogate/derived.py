@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.quantities import quantity_of
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.study.parameters import Parameter, parameters_of
@@ -24,18 +23,18 @@ ON_MERIDIAN, IN_SPACE = 1e-3, 1e-2
 
 @dataclass(frozen=True)
 class Output:
-    """A variable of a dataset, one positive number for each case."""
+    """A variable of a dataset, one positive number for each case, with its unit."""
 
     name: str
+    unit: str
 
     @property
     def is_proportional(self) -> bool:
         """Whether it is proportional to all moduli together: forces, stresses and energies are, lengths are not."""
-        quantity = quantity_of(self.name)
-        return quantity is not None and any(unit in quantity.unit for unit in ("N", "Pa", "J"))
+        return any(unit in self.unit for unit in ("N", "Pa", "J"))
 
 
-FORCE = Output("force")
+FORCE = Output("force", "N")
 
 
 def parameters(scene: Study) -> dict[str, Parameter]:
@@ -51,8 +50,12 @@ def has_mesh(scene: Study) -> bool:
     return isinstance(mesh, Mapping) and not any(isinstance(value, list) for value in mesh.values())
 
 
-def derive(scene: Study, values: Mapping[Parameter, Sequence[float]], accuracy: float | None) -> Study:
+def derive(
+    scene: Study, values: Mapping[Parameter, Sequence[float]], accuracy: float | None, output: Output = FORCE
+) -> Study:
     """Return the study whose cases are the product of ``values`` (SI units), with meshes for an ``accuracy`` if given.
+
+    Of the scene's own outputs it has the one that is asked for.
 
     The elastic force is computed: relaxation is a factor of its own, that of the time.
 
@@ -60,6 +63,8 @@ def derive(scene: Study, values: Mapping[Parameter, Sequence[float]], accuracy: 
         StudyError: with every problem of it, such as sweeps of the scene.
     """
     raw = _elastic(scene.raw)
+    if asked := [one for one in scene.raw.get("output", ()) if one["name"] == output.name]:
+        raw["output"] = asked
     if accuracy is not None:
         raw["mesh"] = {"accuracy": f"{accuracy:g}"}
     if arrays := [name for name in ("body", "material", "probe") if isinstance(raw.get(name), list)]:

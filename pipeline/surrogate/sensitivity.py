@@ -51,7 +51,7 @@ _SHARES = ("first", "first_error", "total", "total_error", "deviation", "surroga
 class Explained:
     """Indices of one output, and the surrogate that they are of."""
 
-    output: str
+    output: Output
     indices: Indices
     table: Table
 
@@ -71,7 +71,13 @@ def explain(study: Study, solve: Solve) -> list[Explained]:
     if not study.spread.varied:
         why = 'is required for `epsmesh sensitivity`: parameters with ranges, such as young = ["5 kPa", "20 kPa"]'
         raise StudyError(study.file, [Problem("[sensitivity]", None, why)])
-    return [_explained(study, Output(name), solve) for name in study.spread.outputs]
+    return [_explained(study, _output(study, name), solve) for name in study.spread.outputs]
+
+
+def _output(study: Study, name: str) -> Output:
+    """Return the output of a name: the study's own, or a result of every study."""
+    units = {one.name: one.attributes["units"] for one in study.outputs}
+    return Output(name, units.get(name) or QUANTITIES[name].unit)
 
 
 def spread_domain(study: Study, output: Output = FORCE) -> Domain:
@@ -98,7 +104,7 @@ def _explained(study: Study, output: Output, solve: Solve) -> Explained:
         names = ", ".join(one.parameter.name for one in varied)
         raise SurrogateError(f"{study.file}: {output.name} depends on none of {names}")
     acting = [number for number, one in enumerate(varied) if one.parameter.name in {*table.acting, DEPTH.name}]
-    return Explained(output.name, sobol(function, len(varied), table.interpolation + table.mesh, acting=acting), table)
+    return Explained(output, sobol(function, len(varied), table.interpolation + table.mesh, acting=acting), table)
 
 
 def _depths(study: Study) -> tuple[float, float]:
@@ -138,8 +144,8 @@ def dataset_of(study: Study, found: Sequence[Explained]) -> xr.Dataset:
     values["expected"] = ("parameter",), [one.prior[0] if one.prior else nan for one in varied]
     values["expected_error"] = ("parameter",), [2 * one.prior[1] if one.prior else nan for one in varied]
     values["unit"] = ("parameter",), np.array([one.parameter.unit for one in varied], dtype=object)
-    values["output_unit"] = of_output, np.array([QUANTITIES[one.output].unit for one in found], dtype=object)
-    names = {"output": [one.output for one in found], "parameter": [one.parameter.name for one in varied]}
+    values["output_unit"] = of_output, np.array([one.output.unit for one in found], dtype=object)
+    names = {"output": [one.output.name for one in found], "parameter": [one.parameter.name for one in varied]}
     dataset = xr.Dataset(values, names)
     for name in dataset.variables:
         units = {"units": "1"} if name in _SHARES else {}

@@ -128,6 +128,35 @@ def test_outputs_that_are_no_force_do_not_depend_on_the_modulus():
     assert found.indices.mean == pytest.approx(np.pi * 2e-3 * 1e-5 / np.log(2), rel=1e-3)
 
 
+STRESS = {"name": "stress", "at": ["0 mm", "0 mm", "-5 mm"], "of": "von_mises"}
+
+
+def test_an_output_of_the_study_is_one_of_them():
+    """A stress is proportional to the moduli, and only its cases have the output."""
+
+    def solve(study):
+        assert [one.name for one in study.outputs] == ([] if study.outputs == () else ["stress"])
+        dataset = solved_by(_punch)(study)
+        stress = np.reshape([_punch(case) / case.probe.radius**2 for case in study.cases()], study.shape)
+        own = {"stress": stress, "stress_error": 1e-3 * stress} if study.outputs else {}
+        return dataset.assign({name: (dataset["force"].dims, values) for name, values in own.items()})
+
+    varied = {"young": ["5 kPa", "20 kPa"], "poisson": [0.2, 0.5], "outputs": ["force", "stress"]}
+    study = read_mapping(PUNCH | {"output": [STRESS], "sensitivity": varied}, "punch")
+    force, stress = explain(study, solve)
+    assert stress.indices.first == pytest.approx(force.indices.first, rel=1e-6)
+    assert stress.table.mesh == pytest.approx(1e-3)
+    assert dataset_of(study, [force, stress])["output_unit"].values.tolist() == ["N", "Pa"]
+
+
+def test_an_output_of_a_function_is_refused(tmp_path):
+    (tmp_path / "own.py").write_text("def work(solution):\n    return 1.0\n", encoding="utf-8")
+    own = {"name": "work", "function": "own.py:work"}
+    varied = {"poisson": [0.2, 0.5], "outputs": ["work"]}
+    with pytest.raises(StudyError, match="is a function: use an output at a point"):
+        read_mapping(PUNCH | {"output": [own], "sensitivity": varied}, "punch", tmp_path)
+
+
 @pytest.mark.parametrize(
     ("section", "message"),
     [
