@@ -80,8 +80,7 @@ class CaseSolution:
     @property
     def region_names(self) -> tuple[str, ...]:
         """Names of the regions, by their numbers in ``regions``."""
-        names = "tissue", *(region.name for region in self.case.body.regions)
-        return (*names, *(f"{name} beyond ε" for name in names)) if self.case.is_linear_beyond else names
+        return self.case.region_names
 
     @property
     def force(self) -> float:

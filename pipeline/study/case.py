@@ -98,6 +98,12 @@ class Case:
         return self.material, *self.body.regions
 
     @property
+    def region_names(self) -> tuple[str, ...]:
+        """Names of the regions of the mesh, in the order of their numbers: those of tissues, then of linear parts."""
+        names = "tissue", *(region.name for region in self.body.regions)
+        return (*names, *(f"{name}, linear" for name in names)) if self.is_linear_beyond else names
+
+    @property
     def relaxations(self) -> tuple[Terms, ...]:
         """Terms of the relaxation of the regions of the body; where a region has none, the material's."""
         return tuple(tissue.prony or self.material.prony for tissue in self.tissues)

@@ -120,5 +120,4 @@ def _whole(
         return fields
     # Where layers fill the body nothing is left of the tissue that has number 0.
     present, regions = np.unique(whole.regions, return_inverse=True)
-    names = "tissue", *(region.name for region in case.body.regions)
-    return replace(fields, regions=regions, region_names=tuple(names[number] for number in present))
+    return replace(fields, regions=regions, region_names=tuple(case.region_names[number] for number in present))

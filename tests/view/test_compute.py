@@ -165,3 +165,11 @@ def test_force_of_a_place_on_a_path_is_the_run_s():
 def test_what_does_not_fit_into_memory_is_refused():
     with pytest.raises(CaseFailure, match="GB are available"):
         fields(WORLD, mesh_only=True, mesh={"fine": "0.01 mm", "rim": "0.01 mm"})
+
+
+def test_linear_parts_of_regions_have_names():
+    changes = {"material": {"law": "neo-hookean", "poisson": 0.4}, "mesh": {"epsilon": "6 mm", "outside": "linear"}}
+    found = fields(**changes, mesh_only=True)
+    assert found.region_names == ("tissue", "tissue, linear")
+    middle = np.linalg.norm(found.centres - found.contact, axis=1)
+    np.testing.assert_array_equal(found.regions, middle > 6e-3)
