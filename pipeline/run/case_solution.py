@@ -12,6 +12,8 @@ from pipeline.arrays import FloatArray
 from pipeline.run.samples import dataset_of, in_plane, plane_axes
 from pipeline.run.solved import Solved
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.points.reduce import CHANGES, change_of
+from pipeline.solve.points.state import Values
 from pipeline.study.case import Case
 from pipeline.units import parse_quantity
 
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 # A length: metres, or text with a unit.
 Length = float | str
 Point = Sequence[Length]
+# Points of a plane: a gigabyte of values.
+_MOST_POINTS = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +102,9 @@ class CaseSolution:
         """Return the fields at points (n, 3), in m or as text with units, with the dimension ``point``.
 
         ``displacement``, ``strain``, ``stress``, ``principal_stress``, ``von_mises``, ``contact_pressure`` and
-        ``region`` have units and long names. Points outside the body have NaN, and region -1.
+        ``region`` have units and long names. Points outside the body have NaN, and region -1. Where elements of one
+        degree more are known, ``displacement_error``, ``principal_stress_error`` and ``von_mises_error`` are 95 % error
+        bars: of each component or principal value.
 
         Raises:
             ValueError: if these are not points.
@@ -127,7 +133,7 @@ class CaseSolution:
         The vectors of u and v are attributes of these coordinates; both are zero at the origin.
 
         Raises:
-            ValueError: if there is no plane, or the spacing is not positive.
+            ValueError: if there is no plane, or the spacing is not positive or gives more than 2 million points.
         """
         (centre,), step = _points([origin]), _metres(spacing)
         across = np.asarray(normal, dtype=float)
@@ -135,6 +141,8 @@ class CaseSolution:
             raise ValueError("a plane needs a normal (three numbers, not all zero) and a positive spacing")
         axes = plane_axes(across)
         grid = in_plane(self._corners(), centre, axes, step)
+        if (count := len(grid[0]) * len(grid[1])) > _MOST_POINTS:
+            raise ValueError(f"spacing = {spacing!r} gives {count} points: at most {_MOST_POINTS}")
         coordinates = {
             name: ((name,), values, {"units": "m", "long_name": f"coordinate along {name}", "direction": axis})
             for name, values, axis in zip(("v", "u"), grid[::-1], axes[::-1], strict=True)
@@ -144,7 +152,21 @@ class CaseSolution:
         return self._dataset(places, coordinates, v.shape)
 
     def _dataset(self, points: FloatArray, coordinates: dict[str, Any], shape: tuple[int, ...]) -> "xr.Dataset":
-        return dataset_of(self.solved.state.at(points), points, coordinates, shape, self.region_names)
+        values = self.solved.state.at(points)
+        return dataset_of(values, self._bars(points, values), points, coordinates, shape, self.region_names)
+
+    def _bars(self, points: FloatArray, values: Values) -> dict[str, FloatArray]:
+        """Return the error bars at points, by variable; none without the fields of one degree more. Collective."""
+        finer, clear = self.solved.finer, self.solved.clear
+        if finer is None or clear is None:
+            return {}
+        above = finer.at(points)
+        known = np.where(self.solved.state.of_cells_at(points, clear.astype(float)) == 1.0, CHANGES, np.nan)
+        return {
+            "displacement": CHANGES * change_of("displacement", values, above),
+            "principal_stress": known * change_of("max_principal", values, above),
+            "von_mises": known * change_of("von_mises", values, above),
+        }
 
     def _corners(self) -> FloatArray:
         """Return the corners (8, 3) of the box of the whole mesh; collective."""

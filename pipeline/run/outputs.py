@@ -21,15 +21,14 @@ from pipeline.run.record import Record
 from pipeline.run.solved import Solved, compile_law, put_back
 from pipeline.solve import SolveError
 from pipeline.solve.cell_values import clear_cells
-from pipeline.solve.points.reduce import Number, at_point, over_region
+from pipeline.solve.points.reduce import CHANGES, Number, at_point, over_region
 from pipeline.solve.points.state import State
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.case import Case
 from pipeline.study.output import OWN, WHOLE, Output
 
-# 95 % bar, in units of the change by one degree more, and of the mean pointwise change over a region: docs/python.md.
-CHANGES = 2.0
+# Least change, in units of the mean pointwise change over the region.
 POINTWISE = {"at": 1.0, "max": 0.5, "mean": 0.1, "quantile": 0.1}
 # The highest degree for which the whole case is solved again in one degree more.
 _HIGHEST = 2

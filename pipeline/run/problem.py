@@ -216,17 +216,19 @@ def _parameters(tissue: Tissue, turn: FloatArray | None) -> Parameters:
     return Parameters.of_moduli(tissue.young, tissue.poisson, tissue.law or "linear", further)
 
 
-def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case | None = None) -> Solution:
+def solve_problem(
+    case: Case, problem: Problem, *, estimate: bool, meshed: Case | None = None, keep: bool = False
+) -> Solution:
     """Solve a case; a small system is solved directly if iterations do not converge. Collective.
 
-    ``meshed`` is the case of the mesh, if it differs: see ``movement_of``.
+    ``meshed`` is the case of the mesh, if it differs: see ``movement_of``. ``keep``: see :class:`Request`.
 
     Raises:
         SolveError: if this fails, too, or if the solution is impossible.
     """
     law, movement = law_of(case), movement_of(case, meshed)
     asked = Request(law, movement, case.solve.method, case.solve.energy_tolerance, estimate, course_of(case))
-    asked = replace(asked, keep=bool(case.outputs))
+    asked = replace(asked, keep=keep or bool(case.outputs))
     try:
         solution = problem.answer(asked)
     except (ContactError, LargeError):

@@ -19,6 +19,7 @@ _AXES = ("x", "y", "z")
 
 def dataset_of(
     values: Values,
+    bars: dict[str, FloatArray],
     points: FloatArray,
     coordinates: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]],
     shape: tuple[int, ...],
@@ -26,7 +27,8 @@ def dataset_of(
 ) -> "xr.Dataset":
     """Return a dataset of ``values`` at ``points`` (n, 3), n the product of a ``shape`` of dimensions.
 
-    ``coordinates`` are those of the dimensions, in their order: dimensions, values and attributes.
+    ``bars`` are 95 % error bars by variable, in its unit. ``coordinates`` are those of the dimensions, in their order:
+    dimensions, values and attributes.
     """
     import xarray as xr  # noqa: PLC0415 (slow to import)
 
@@ -41,6 +43,8 @@ def dataset_of(
         "von_mises": (von_mises(values.stress), (), "Pa", f"von Mises stress of the {stress}"),
         "contact_pressure": (values.contact, (), "Pa", "pressure normal to the tool's footprint, NaN elsewhere"),
     }
+    for name, found in bars.items():
+        variables[f"{name}_error"] = (found, (), variables[name][2], f"error bar (95 %) on {name}, by the mesh")
     data: dict[str, Any] = {
         name: ((*dims, *own), found.reshape(*shape, *found.shape[1:]), {"units": unit, "long_name": meaning})
         for name, (found, own, unit, meaning) in variables.items()

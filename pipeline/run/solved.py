@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
+from pipeline.arrays import BoolArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.generate import MeshArrays, MeshError
 from pipeline.mesh.of_case import upright
@@ -24,6 +25,7 @@ from pipeline.run.meshing import cached_arrays, on_first_rank
 from pipeline.run.problem import (
     CaseFailure,
     check_memory,
+    conditions_of,
     lacks_memory,
     law_of,
     memory_of,
@@ -33,6 +35,7 @@ from pipeline.run.problem import (
 )
 from pipeline.run.record import Record
 from pipeline.solve import SolveError
+from pipeline.solve.cell_values import clear_cells
 from pipeline.solve.compiled import compiling
 from pipeline.solve.points.state import State, compile_stress
 from pipeline.solve.spaces import Spaces
@@ -48,7 +51,8 @@ class Solved:
 
     ``arrays`` is the mesh of the modelled part as it was made, on rank 0 only. The ``state`` is in the body's
     coordinates. ``dofs`` counts the unknowns of the whole body. The force of the record ``on_meridian`` is that of the
-    axisymmetric scene in the half plane.
+    axisymmetric scene in the half plane. ``finer`` are the fields in elements of one degree more, where the error bar
+    of the force has them, and ``clear`` the owned cells away from singular edges.
     """
 
     solve: Solve
@@ -57,6 +61,8 @@ class Solved:
     arrays: MeshArrays | None
     dofs: int
     on_meridian: bool = False
+    finer: State | None = None
+    clear: BoolArray | None = None
 
 
 def solve_alone(study: Study, case: Case) -> Solve:
@@ -129,12 +135,15 @@ def _attempt(solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, n
         note(f"solving for {problem.dofs} unknowns")
         # Of a history, fields are those of the elastic body.
         still = replace(case, probe=case.probe.model_copy(update={"history": None}), outputs=())
-        solution = solve_problem(still, problem, estimate=room or solve.goal is not None, meshed=meshed)
-        state = problem.state()
+        has_bar = room or solve.goal is not None
+        solution = solve_problem(still, problem, estimate=has_bar, meshed=meshed, keep=True)
+        state, finer = problem.state(), problem.finer_state
     compile_law(comm, state)
-    put_back(case, meshed, mesh, [state])
-    state = replace(state, law=law_of(still, in_body=True))
-    return Solved(solve, record_of(solve, solution), state, arrays, solution.dofs)
+    clear = clear_cells(mesh, conditions_of(case).front, wholly=True)
+    put_back(case, meshed, mesh, [state] if finer is None else [state, finer])
+    law = law_of(still, in_body=True)
+    state, finer = replace(state, law=law), finer and replace(finer, law=law)
+    return Solved(solve, record_of(solve, solution), state, arrays, solution.dofs, finer=finer, clear=clear)
 
 
 def modelled_arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -> MeshArrays | None:

@@ -39,11 +39,13 @@ _NUMBERS: dict[str, Callable[[Values], FloatArray]] = {
     "pressure": lambda v: np.asarray(-np.trace(v.stress, axis1=1, axis2=2) / 3),
     "max_strain": lambda v: _principal_norm(v.strain),
 }
+# 95 % bar, in units of the change by one degree more.
+CHANGES = 2.0
 # Those that do not grow without bound at a singular edge.
 _BOUNDED = ("displacement", "displacement_x", "displacement_y", "displacement_z")
 
 
-def _change(of: str, one: Values, other: Values) -> FloatArray:
+def change_of(of: str, one: Values, other: Values) -> FloatArray:
     """Return a bound of the difference of a quantity at points."""
     if of in _BOUNDED:
         return np.asarray(np.linalg.norm(one.displacement - other.displacement, axis=1))
@@ -81,7 +83,7 @@ def at_point(of: str, point: FloatArray, state: State, finer: State | None, clea
         return Number(value, is_singular=singular)
     above = finer.at(points)
     change = abs(value - float(_NUMBERS[of](above)[0]))
-    return Number(value, change, float(_change(of, found, above)[0]), is_singular=singular)
+    return Number(value, change, float(change_of(of, found, above)[0]), is_singular=singular)
 
 
 def over_region(
@@ -107,7 +109,7 @@ def over_region(
         return Number(value, is_singular=singular)
     of_finer = list(_images(finer, cells, at))
     above = _reduced(of, how, state, of_finer, volumes, is_clear)
-    changes = [_change(of, one, other) for one, other in zip(of_state, of_finer, strict=True)]
+    changes = [change_of(of, one, other) for one, other in zip(of_state, of_finer, strict=True)]
     sums = global_sum(comm, np.array([sum(float(each @ volumes) for each in changes), len(changes) * volumes.sum()]))
     return Number(value, abs(value - above), float(sums[0] / sums[1]), is_singular=singular)
 
