@@ -22,6 +22,7 @@ from pipeline.cli.words import (
     warn,
 )
 from pipeline.files import STORE_NAME, result_files
+from pipeline.insertion import ENDING
 from pipeline.launcher import is_first_rank
 
 if TYPE_CHECKING:
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
     from pipeline.study.sweep import Study
 
 _HOWTO = "docs/howto/insertion.md"
-# What the names of the files add to the study's: its own dataset stays.
-_ENDING = "_insertion"
 
 
 def insertion(
@@ -52,9 +51,8 @@ def insertion(
     (study,) = read_all([file])
     if store:
         check_store(store)
-    path, name = store or output / STORE_NAME, study.name + _ENDING
-    files = result_files(output, name)
-    check_output(path, *files)
+    path = store or output / STORE_NAME
+    check_output(path, *result_files(output, study.name + ENDING))
     check_machine()
     if is_first_rank():
         warn(study)
@@ -62,12 +60,10 @@ def insertion(
     dataset = _dataset(study, path)
     if not is_first_rank():
         return
-    from pipeline.netcdf import write_netcdf
-    from pipeline.report.figures.insertion import draw
+    from pipeline.insertion.publish import publish
     from pipeline.report.insertion import answer
 
-    write_netcdf(dataset, files[0], "NETCDF4")
-    written = [files[0], *draw(dataset, output / name)]
+    written = publish(dataset, output, study.name)
     seconds = time.perf_counter() - start
     lines = [] if quiet else answer(dataset)
     wrote = f"{study.file}: wrote {', '.join(map(str, written))}; {seconds:.3g} s"

@@ -144,17 +144,22 @@ class Scene:
         found: dict[tuple[float, float], Cut | str] = {}
         for ahead, group in groupby(sorted(places, key=lambda place: place[::-1]), key=lambda place: place[1]):
             depths = [depth for depth, _ in group]
-            fronts = [f"{depth + ahead:.12g} m" for depth in depths]
-            slit = {
-                "incision": fronts if len(fronts) > 1 else fronts[0],
-                "ahead": f"{ahead:.12g} m",
-                "depth": f"{_ANY * self.blade.width:.12g} m",
-            }
-            dataset = self._solve(self._study(slit))
+            dataset = self._solve(self.slit_study(depths, ahead))
             for number, depth in enumerate(depths):
                 one = dataset.isel(incision=number) if "incision" in dataset.dims else dataset
                 found[depth, ahead] = _cut(one, depth, ahead)
         return found
+
+    def slit_study(self, depths: Sequence[float], ahead: float) -> Study:
+        """Return the study of slits with the tip of the blade at ``depths`` (m), and the front ``ahead`` (m) of it."""
+        fronts = [f"{depth + ahead:.12g} m" for depth in depths]
+        return self._study(
+            {
+                "incision": fronts if len(fronts) > 1 else fronts[0],
+                "ahead": f"{ahead:.12g} m",
+                "depth": f"{_ANY * self.blade.width:.12g} m",
+            }
+        )
 
     def _study(self, probe: Mapping[str, Any]) -> Study:
         """Return the study of states with the blade's keys and those of ``probe``, which slides without friction."""

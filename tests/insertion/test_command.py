@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import pipeline
 from pipeline.insertion.steps import PHASES
 from pipeline.study.toml import to_toml
 
@@ -57,6 +58,8 @@ def test_a_second_run_reads_what_was_solved(ran, epsmesh):
     depth = round(1e3 * first["insertion"]["puncture_depth"], 5)
     assert f"puncture at {depth:g} mm" in again.stdout
     assert "work is stored energy" in again.stdout
+    read = pipeline.read(folder / "pad.toml").insertion(output=folder)
+    assert float(read["puncture_depth"]) == first["insertion"]["puncture_depth"]
 
 
 def test_a_study_without_an_insertion_is_refused(epsmesh, tmp_path):
@@ -66,3 +69,11 @@ def test_a_study_without_an_insertion_is_refused(epsmesh, tmp_path):
     done = epsmesh("insertion", file, "--output", tmp_path)
     assert done.exit_code == 2
     assert "probe.insertion: is required for `epsmesh insertion`" in done.stderr
+
+
+def test_plan_tells_what_the_path_costs(epsmesh, tmp_path):
+    file = tmp_path / "pad.toml"
+    file.write_text(to_toml(STUDY, str(file)))
+    found = json.loads(epsmesh("plan", file, "--output", tmp_path, "--json").stdout)
+    (told,) = found["forecasts"]
+    assert (told["command"], told["most"]) == ("insertion", 5) and told["most_seconds"] > 0
