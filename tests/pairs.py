@@ -108,6 +108,12 @@ def _region(study: Study) -> None:
     study["body"]["region"] = [region | {"density": "1000 kg/m^3"}]
 
 
+def _hollow(study: Study) -> None:
+    study["body"]["region"] = [
+        {"name": "cyst", "file": "ball.stl", "unit": "mm", "hollow": True, "pressure": "0.5 kPa"}
+    ]
+
+
 def _layers(study: Study) -> None:
     skin = {"name": "skin", "thickness": "4 mm", "young": "30 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}
     study["body"]["layer"] = [skin]
@@ -115,7 +121,12 @@ def _layers(study: Study) -> None:
 
 def _pieces(study: Study) -> list[Study]:
     """Return the tables of the body's regions."""
-    return [piece for key in ("layer", "inclusion", "region") for piece in study["body"].get(key, ())]
+    return [
+        piece
+        for key in ("layer", "inclusion", "region")
+        for piece in study["body"].get(key, ())
+        if not piece.get("hollow")
+    ]
 
 
 def _poisson(value: float) -> Callable[[Study], None]:
@@ -183,6 +194,7 @@ FEATURES = (
     Feature("layers", "layers", _layers),
     Feature("inclusion", "inclusion", _inclusion),
     Feature("region", "region", _region),
+    Feature("hollow region", "region", _hollow),
     Feature("nu .49", "poisson", _poisson(0.49)),
     Feature("nu .5", "poisson", _poisson(0.5)),
     Feature("neo-hookean", "law", _update("material", law="neo-hookean")),

@@ -72,7 +72,7 @@ def test_the_patients_labels_have_their_names_and_do_not_touch(script: ModuleTyp
         for data in (script.make("patient.nii.gz"), (MESHES / "patient.nii.gz").read_bytes())
     )
     assert (np.asanyarray(again.dataobj) != np.asanyarray(kept.dataobj)).mean() < 1e-5
-    case = read_study(ROOT / "studies" / "patient.toml").case((1, 0))
+    case = read_study(ROOT / "studies" / "patient.toml").case((1, 0, 0))
     volumes = {piece.name: 1e6 * piece.surface.volume for piece in case.body.embedded}
     counts = np.bincount(np.asanyarray(kept.dataobj).ravel())[2:] * 8e-3
     assert list(volumes) == ["tumour", "portal_vein", "hepatic_vein"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import MeshArrays, MeshError
-from pipeline.scene.model import FIXED, MIRROR, PROBE, Scene
+from pipeline.scene.model import FIXED, FREE, MIRROR, PROBE, Scene
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.surface import Surface
@@ -150,9 +150,11 @@ def _on_sides(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArra
 
 def _on_embedded(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
     """Move the mid nodes of edges in the surface of an embedded region onto it, and onto a column that cuts it."""
-    if mesh.regions is None or not scene.body.embedded:
+    if not scene.body.embedded:
         return middle
-    between = np.isin(_key(mesh, edges), _interface_edges(mesh, mesh.regions))
+    inner = [] if mesh.regions is None else [_interface_edges(mesh, mesh.regions)]
+    inner += [_facet_edges(mesh, [FREE])] if scene.body.cavities else []
+    between = np.isin(_key(mesh, edges), np.concatenate([*inner, np.empty(0, dtype=np.int64)]))
     used = np.unique(edges[between])
     middle, close = middle.copy(), _CLOSE * scene.body.extent
     for surface_of_region in (piece.surface for piece in scene.body.embedded):

@@ -90,7 +90,7 @@ def _of_place(case: Case) -> list[str]:
 
 def _of_region(piece: Embedded, volume: float) -> str:
     """Return the volume of an embedded region and, of one from a file, its least and its median thickness."""
-    found = f"{piece.name} {_in_cm3(volume)}"
+    found = f"{piece.name} {_in_cm3(volume)}{', hollow' if piece.is_hollow else ''}"
     if not isinstance(piece, Segment):
         return found
     _, half = piece.surface.thin

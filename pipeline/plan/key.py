@@ -137,7 +137,7 @@ def _in_units_of(stress: float, body: Body) -> Body:
 @lru_cache(_MANY)
 def _body_text(body: Body, stress: float | None = None) -> str:
     """Return a body in canonical form, moduli in units of ``stress`` (Pa); without it, only the geometry."""
-    if not body.regions:
+    if not body.pieces:
         return text_of(body)
     content = body.model_dump()
     ends = (*body.interfaces, body.heights[0])

@@ -1,6 +1,6 @@
 """The loads of a case for the solver: in newtons, on the mesh turned so that the probe presses along -z."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -32,18 +32,28 @@ def loads_of(case: Case) -> Loads | None:
 def _surface_load(case: Case, traction: Traction) -> SurfaceLoad:
     turn, on = case.frame.turn, traction.on
     vector, pressure = _turned(turn, traction.traction or (0.0, 0.0, 0.0)), traction.pressure or 0.0
+    outer, cavities = case.body.surfaces(), {name: (wall,) for name, wall in case.body.cavities.items()}
+    is_outside = _on_face(outer | cavities, (*outer,), case.frame) if cavities else _everywhere
     if isinstance(on, Cap):
         place = case.body.frame(on.around)
         outward = np.array(_turned(turn, place.outward))
         within = _turned(turn, place.point), on.radius
-        return SurfaceLoad(lambda _, normals: np.asarray(normals @ outward > _SAME_WAY), vector, pressure, within)
+
+        def in_cap(corners: FloatArray, normals: FloatArray) -> BoolArray:
+            return np.asarray(normals @ outward > _SAME_WAY) & is_outside(corners, normals)
+
+        return SurfaceLoad(in_cap, vector, pressure, within)
     if on == FREE:
-        return SurfaceLoad(lambda corners, _: np.ones(len(corners), dtype=bool), vector, pressure)
-    return SurfaceLoad(_on_face(case.body.surfaces(), on, case.frame), vector, pressure)
+        return SurfaceLoad(is_outside, vector, pressure)
+    return SurfaceLoad(_on_face(outer | cavities, (on,), case.frame), vector, pressure)
 
 
-def _on_face(surfaces: dict[str, tuple[Surface, ...]], name: str, frame: Frame) -> _Test:
-    """Return a test of facets: whether the face ``name`` is the nearest of all ``surfaces``.
+def _everywhere(corners: FloatArray, _: FloatArray) -> BoolArray:
+    return np.ones(len(corners), dtype=bool)
+
+
+def _on_face(surfaces: Mapping[str, tuple[Surface, ...]], names: tuple[str, ...], frame: Frame) -> _Test:
+    """Return a test of facets: whether one of the faces ``names`` is the nearest of all ``surfaces``.
 
     All corners of a facet beside an edge may be on another face; its middle is then not.
     """
@@ -54,7 +64,7 @@ def _on_face(surfaces: dict[str, tuple[Surface, ...]], name: str, frame: Frame) 
         away = {
             key: np.min([_farthest(surface, points) for surface in parts], axis=0) for key, parts in surfaces.items()
         }
-        return np.asarray(away[name] <= np.min(list(away.values()), axis=0))
+        return np.asarray(np.min([away[name] for name in names], axis=0) <= np.min(list(away.values()), axis=0))
 
     return on_face
 

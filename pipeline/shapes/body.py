@@ -82,11 +82,21 @@ class Body(Section, ABC):
 
     def with_law_of(self, material: Tissue) -> Self:
         """Return the body; its regions that have no law of their own have that of ``material``."""
-        if not (material.is_large and self.pieces):
+        if not self.pieces:
             return self
         return self.model_copy(
             update={key: tuple(piece.completed(material) for piece in found) for key, found in self.pieces.items()}
         )
+
+    @property
+    def cavities(self) -> dict[str, Closed]:
+        """Surfaces of its hollow regions, by name."""
+        return {piece.name: piece.surface for piece in self.embedded if piece.is_hollow}
+
+    @property
+    def pressures(self) -> dict[str, float]:
+        """Pressures (Pa) in its hollow regions, by name, where there is one."""
+        return {}
 
     @cached_property
     def support(self) -> Support:

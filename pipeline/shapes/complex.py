@@ -1,7 +1,7 @@
 """Surfaces that divide a body into regions, and meet along curves where three or more regions do."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 
@@ -48,11 +48,15 @@ class Complex:
         new = np.array([*numbers, OUTSIDE])
         return Complex(self.points, self.facets, new[self.sides])
 
+    def without(self, hollow: Iterable[int]) -> "Complex":
+        """Return it without the ``hollow`` regions, which do not meet the outside; -1 - k is the cavity number k."""
+        return replace(self, sides=np.where(np.isin(self.sides, list(hollow)), OUTSIDE - self.sides, self.sides))
+
     @property
     def regions(self) -> IntArray:
         """Numbers of its regions, in ascending order, without what is outside."""
         numbers = np.unique(self.sides)
-        return np.asarray(numbers[numbers != OUTSIDE])
+        return np.asarray(numbers[numbers > OUTSIDE])
 
     @cached_property
     def hash(self) -> str:

@@ -92,6 +92,11 @@ class FromFile(Facetted):
         return f"{_VERSION} {self.triangles.hash}"
 
     @property
+    def pressures(self) -> dict[str, float]:
+        """Pressures (Pa) in its hollow regions, by name, where there is one."""
+        return {piece.name: piece.pressure for piece in self.region if piece.hollow and piece.pressure}
+
+    @property
     def triangles(self) -> Triangles:
         """The surface in the file, in m."""
         return self._loaded.triangles

@@ -45,6 +45,11 @@ class Embedded(Region):
         """Its surface."""
         raise NotImplementedError
 
+    @property
+    def is_hollow(self) -> bool:
+        """Whether it is empty, so that the tissue ends at its surface."""
+        return False
+
 
 class Inclusion(Embedded):
     """A ball, or an ellipsoid with axes along the coordinates, wholly inside the body."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from functools import lru_cache
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,8 +13,9 @@ from pipeline.shapes.files.loaded import UNITS, Loaded
 from pipeline.shapes.regions import Embedded
 from pipeline.shapes.section import Words
 from pipeline.shapes.shell import Shell
+from pipeline.shapes.tissue import Tissue
 from pipeline.shapes.triangles import SurfaceError, Triangles
-from pipeline.units import Travel
+from pipeline.units import Pressure, Stress, Travel
 
 _FEW = 32  # cached surfaces with their search trees and thickness
 
@@ -21,6 +23,23 @@ _FEW = 32  # cached surfaces with their search trees and thickness
 class Segment(Embedded):
     """A region of any shape: the inside of a surface file, or a label of the body's own image."""
 
+    # A hollow region has no material; within a case it has that of the tissue around it, and no cell.
+    young: Annotated[
+        Pressure, Words("Young's modulus at small strain.", '"10 kPa"', default="required, unless it is hollow")
+    ] = inf
+    poisson: Annotated[
+        float,
+        Field(ge=0, le=0.5),
+        Words(
+            "Poisson's ratio at small strain. 0.5 is incompressible.", "0.45", default="required, unless it is hollow"
+        ),
+    ] = inf
+    hollow: Annotated[bool, Words("Whether the region is empty, such as a vessel.", "true")] = False
+    pressure: Annotated[
+        Stress | None,
+        Field(exclude=True, json_schema_extra={"unit": "Pa"}),
+        Words("Pressure in a hollow region, on its wall: a load.", '"10 mmHg"', default="none"),
+    ] = None
     unit: Annotated[
         Literal["m", "cm", "mm", "um", "µm"] | None,
         Field(exclude=True),
@@ -92,6 +111,17 @@ class Segment(Embedded):
         """Its surface."""
         assert self._surface is not None  # validated with the study
         return self._surface
+
+    @property
+    def is_hollow(self) -> bool:
+        """Whether it is empty, so that the tissue ends at its surface."""
+        return self.hollow
+
+    def completed(self, material: Tissue) -> "Segment":
+        """Return the region with the law of ``material`` if it has none; with all of the material if it is hollow."""
+        if self.hollow:
+            return self.model_copy(update={key: getattr(material, key) for key in Tissue.model_fields if key != "name"})
+        return super().completed(material)
 
     @property
     def notices(self) -> tuple[str, ...]:

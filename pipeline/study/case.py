@@ -156,7 +156,7 @@ class Case:
     @property
     def is_even(self) -> bool:
         """Whether a body of one material is pressed straight down on a plane face."""
-        return not self.body.regions and self.probe.slit is None and is_level(self.body, self.frame)
+        return not self.body.pieces and self.probe.slit is None and is_level(self.body, self.frame)
 
     @property
     def is_plate(self) -> bool:

@@ -68,7 +68,7 @@ def _check_densities(body: Body, material: Material, problems: Problems) -> None
 
 def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -> bool:
     """Report a part of the boundary that does not exist, and return whether it does."""
-    on, names = traction.on, sorted(body.surfaces())
+    on, names = traction.on, sorted([*body.surfaces(), *body.cavities])
     if isinstance(on, Cap):
         found = [in_mm(c) for c in on.around]
         try:
@@ -85,7 +85,7 @@ def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -
             )
             return False
         return True
-    if on != FREE and isinstance(body, FromFile) and body.HAS_NAMES:
+    if on != FREE and on not in body.cavities and isinstance(body, FromFile) and body.HAS_NAMES:
         problems.error(key, on, 'faces of a CAD file have no tractions by name: use a cap around a point, or "free"')
         return False
     if on != FREE and on not in names:

@@ -1,5 +1,6 @@
 """Loads on the body: gravity, and tractions on parts of its boundary."""
 
+from collections.abc import Mapping
 from math import hypot
 from typing import Annotated, Any
 
@@ -57,7 +58,8 @@ class Traction(Section):
         str | Cap,
         BeforeValidator(_on),
         Words(
-            'Part of the boundary: a face of the body ("top", "sides", "bottom"; not of a CAD file), '
+            'Part of the boundary: a face of the body ("top", "sides", "bottom"; not of a CAD file), a hollow '
+            "region by its name, "
             'a cap around a point of the surface, or "free", all of the boundary without support and '
             "tool.",
             '"sides"',
@@ -97,6 +99,13 @@ class Load(Section):
     traction: Annotated[
         tuple[Traction, ...], Words("Tractions on parts of the boundary.", "[[load.traction]]", default="none")
     ] = ()
+
+    def with_pressures(self, pressures: Mapping[str, float]) -> "Load":
+        """Return the load with ``pressures`` (Pa) in hollow regions, by name, as tractions on their walls."""
+        if not pressures:
+            return self
+        inner = (Traction.model_construct(on=name, pressure=pressure) for name, pressure in pressures.items())
+        return self.model_copy(update={"traction": (*self.traction, *inner)})
 
     @property
     def acts(self) -> bool:

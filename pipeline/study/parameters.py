@@ -6,6 +6,7 @@ from math import inf, nan
 
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.probe import MOST_FRICTION, Probe
+from pipeline.shapes.regions import Embedded
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.schema import Material
 from pipeline.study.swept import Place
@@ -71,7 +72,11 @@ def _of_tissues(body: Body, material: Material) -> Iterator[Parameter]:
     if not body.is_filled:
         tissues.append(("", ("material",), material))
     for kind, pieces in body.pieces.items():
-        tissues += [(f"{piece.name}_", ("body", kind, number), piece) for number, piece in enumerate(pieces)]
+        tissues += [
+            (f"{piece.name}_", ("body", kind, number), piece)
+            for number, piece in enumerate(pieces)
+            if not (isinstance(piece, Embedded) and piece.is_hollow)
+        ]
     for prefix, place, tissue in tissues:
         value, is_alone = tissue.young, len(tissues) == 1
         low, high = _WIDEST if is_alone else (value / _OF_MODULUS, value * _OF_MODULUS)

@@ -19,6 +19,7 @@ from pipeline.shapes.segment import Segment
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.axis import Axis
 from pipeline.study.howto import page_of
+from pipeline.study.loads import FREE
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Material, material_of
 
@@ -74,7 +75,9 @@ def tissues_of(body: Body, material: Material) -> Iterator[tuple[str, Tissue | M
     """Yield the key of every material in a body, with the material."""
     if not body.is_filled:
         yield "material", material
-    yield from zip((f"body.{place}" for place in body.places), body.regions, strict=True)
+    for place, region in zip(body.places, body.regions, strict=True):
+        if not (isinstance(region, Embedded) and region.is_hollow):
+            yield f"body.{place}", region
 
 
 def _check_pieces(body: Body, problems: Problems) -> None:
@@ -96,6 +99,9 @@ def _check_segments(body: FromFile, problems: Problems) -> None:
     taken: dict[int | str, str] = {body.label: "the body"} if isinstance(body, FromImage) else {}
     for number, piece in enumerate(body.region, start=1):
         key = f"body.region[{number}]"
+        _check_hollow(piece, key, problems)
+        if piece.hollow and piece.name in (FREE, *body.surfaces()):
+            problems.error(f"{key}.name", piece.name, "is the name of a part of the body's boundary: give another one")
         if (piece.file is None) == (piece.label is None):
             problems.error(key, None, "needs either `file` (a closed surface) or `label` (of the body's image)")
         elif piece.label is None:
@@ -109,6 +115,19 @@ def _check_segments(body: FromFile, problems: Problems) -> None:
             if piece.label in taken:
                 problems.error(f"{key}.label", piece.label, f"is the label of {taken[piece.label]}: labels must differ")
             taken.setdefault(piece.label, piece.name)
+
+
+def _check_hollow(piece: Segment, key: str, problems: Problems) -> None:
+    """Check that a hollow region has no material, and that the others have one, and no pressure."""
+    given = piece.model_fields_set - {"name"}
+    if piece.hollow:
+        for name in sorted(given & set(Tissue.model_fields)):
+            problems.error(f"{key}.{name}", None, "is of a material, which a hollow region has not: omit it")
+        return
+    for name in sorted({"young", "poisson"} - given):
+        problems.error(f"{key}.{name}", None, "is required, unless the region is hollow")
+    if piece.pressure is not None:
+        problems.error(f"{key}.pressure", None, "needs `hollow = true`: a region of tissue has no pressure of its own")
 
 
 def _check_layers(body: Layered, problems: Problems) -> None:

@@ -14,6 +14,7 @@ from pipeline.study.axis import Axis
 from pipeline.study.case import Case
 from pipeline.study.identification import Identification
 from pipeline.study.identified import NOTHING, Identified
+from pipeline.study.loads import Load
 from pipeline.study.measurement import Measurement
 from pipeline.study.output import Output
 from pipeline.study.problems import Problem
@@ -120,7 +121,8 @@ class Study:
 def _with_material_in_use(body: Body, material: Material, *others: Any) -> tuple[Any, ...]:
     """Return the parts of a case: a body that layers fill has the first one's material, not the section's.
 
-    Regions without a law have that of the material.
+    Regions without a law have that of the material. Pressures in hollow regions are tractions of the load.
     """
     material = material_of(body.regions[0]) if body.is_filled else material
+    others = tuple(part.with_pressures(body.pressures) if isinstance(part, Load) else part for part in others)
     return body.with_law_of(material), material, *others

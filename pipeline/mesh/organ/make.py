@@ -20,7 +20,7 @@ from pipeline.mesh.organ.untangle import TangledError, untangled
 from pipeline.mesh.organ.volume import fill
 from pipeline.mesh.regions import embedded_sizes
 from pipeline.mesh.size import Sizes
-from pipeline.scene.model import Scene
+from pipeline.scene.model import FREE, Scene
 from pipeline.shapes.complex import Complex
 from pipeline.shapes.scanned import Scanned
 
@@ -102,10 +102,14 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     parts = Complex(sheet.points, sheet.facets, sheet.sides)
     apart = {n: piece for n, piece in enumerate(scene.body.embedded, start=1) if n not in parts.regions}
     inner = dict(zip(apart, embedded_surfaces(tuple(apart.values()), field), strict=True))
-    points, cells, regions = fill(parts.holding(inner), field)
+    parts = parts.holding(inner)
+    empty = [number for number, piece in enumerate(scene.body.embedded, start=1) if piece.is_hollow]
+    points, cells, regions = fill(parts.without(empty), field)
     if (flat := flat_cells(points, cells)).any():
         raise TangledError.at(points[cells[flat]], "gmsh left a flat tetrahedron")
     facets = {name: sheet.facets[sheet.kind == number] for number, name in group_names().items()}
+    walls = parts.facets[np.isin(parts.sides, empty).any(axis=1)]
+    facets[FREE] = np.vstack([facets[FREE], walls])
     rim = np.unique(sheet.border(PROBE))
     seconds = perf_counter() - start
     return MeshArrays(points, orient(points, cells), facets, rim, seconds, regions, deviation=deviation)

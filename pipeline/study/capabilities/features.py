@@ -107,6 +107,10 @@ def _coefficient(friction: float) -> float | str:
     return STICK if friction == inf else friction
 
 
+def _is_loaded(scene: Scene) -> bool:
+    return scene.load.acts or bool(scene.body.pressures)
+
+
 def needs_time_steps(scene: Scene) -> bool:
     """Return whether the force over time is no elastic force times a function of time."""
     return scene.probe.history is not None and (scene.material.is_large or len(_relaxations(scene)) > 1)
@@ -142,9 +146,11 @@ FEATURES: dict[str, Feature] = {
     ),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
     "bent surface of a linear law": Feature(
-        "load", lambda s: s.load.acts and s.probe.is_unilateral and not s.material.is_large, ("probe", "material")
+        "load",
+        lambda s: _is_loaded(s) and s.probe.is_unilateral and not s.material.is_large,
+        ("body", "probe", "material"),
     ),
-    "bent surface": Feature("load", lambda s: s.load.acts and s.probe.is_unilateral, ("probe",)),
+    "bent surface": Feature("load", lambda s: _is_loaded(s) and s.probe.is_unilateral, ("body", "probe")),
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),
     "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),
     "open slit": Feature("probe.ends", lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
@@ -174,7 +180,7 @@ FEATURES: dict[str, Feature] = {
     "degree 1": Feature("mesh.degree", lambda s: s.mesh.degree == 1, write=int),
     "mixed elements": Feature("mesh.element", lambda s: s.mesh.element == "mixed"),
     "accuracy": Feature("mesh.accuracy", lambda s: s.mesh.accuracy is not None),
-    "loads": Feature("load", lambda s: s.load.acts),
+    "loads": Feature("load", _is_loaded, ("body",)),
     # Of a case: the sections of a scene have none.
     "outputs": Feature("output", lambda s: bool(getattr(s, "outputs", ()))),
 }
