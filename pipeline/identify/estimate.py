@@ -62,6 +62,9 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
     beyond = out_of_range(found)
     verdict = beyond or _verdict(found)
     does_fit = verdict == FITS
+    if not (does_fit or beyond):
+        found = _by_least_squares(found)
+        x = found.x
     hidden_low, hidden_high = hidden_bars(found, wanted) if does_fit else (low, high)
     sides = [low, high, np.fmin(low, hidden_low), np.fmax(high, hidden_high)]
     estimate, low, high, low_hidden, high_hidden = (_values(model, np.clip(side, 0.0, 1.0)) for side in [x, *sides])
@@ -179,14 +182,21 @@ def _verdict(found: Fit) -> str:
     if found.misfit <= MISFIT or _is_small(found):
         return FITS
     number = int(np.argmax([belief.misfit for belief in found.beliefs]))
-    force, measured = found.force[number], found.model.measured[number]
+    force, measured = _by_least_squares(found).force[number], found.model.measured[number]
     residual = measured.curve.force - force
     largest = float(np.abs(residual).max() / np.ptp(measured.curve.force))
     name = f' of "{measured.curve.name}"' if len(found.force) > 1 else ""
     return (
         f"does not fit: the force{name} differs from the law's by a smooth curve, up to {100 * largest:.2g} % of the "
-        "largest force; the modulus of small depths is the one to use"
+        "largest force; no single modulus describes it"
     )
+
+
+def _by_least_squares(found: Fit) -> Fit:
+    """Return the fit of the law alone, by least squares: that of a law that does not fit may be right nowhere else."""
+    model, x = found.model, start(found.model)
+    values = model.space.values(x)
+    return replace(found, x=x, force=tuple(model.predict(number, values) for number in range(len(model.measured))))
 
 
 def _told(found: Fit) -> Iterator[str]:

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import inf, isfinite
+from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import ValidationError
@@ -72,6 +73,8 @@ def read_measurements(raw: Any, problems: Problems) -> tuple[Measurement, ...]:
             allowed = "unknown key; give the part of the curve as `segment`, a range of depth or time as `window`"
             problems.error(f"{where}.approach", table["approach"], allowed)
             table = {key: value for key, value in table.items() if key != "approach"}  # noqa: PLW2901
+        if "name" not in table and isinstance(file := table.get("file"), str):
+            table = {**table, "name": _name_of(file)}  # noqa: PLW2901
         try:
             one = Measurement.model_validate({key: tuples(value) for key, value in table.items()})
         except ValidationError as error:
@@ -84,6 +87,12 @@ def read_measurements(raw: Any, problems: Problems) -> tuple[Measurement, ...]:
         if count > 1:
             problems.error("measurement.name", name, "is the name of several measurements: names must differ")
     return tuple(found)
+
+
+def _name_of(file: str) -> str:
+    """Return the name of a measurement of a file without its ending; of a pattern, the folder's."""
+    path = Path(file)
+    return (path.parent.name if "*" in path.name else path.stem) or "curve"
 
 
 def read_identify(

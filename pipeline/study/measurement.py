@@ -168,8 +168,12 @@ class Measurement(Section):
     name: Annotated[
         str,
         Field(exclude=True, min_length=1),
-        Words("Name of the measurement, in messages, figures and the dataset.", '"punch 2 mm"'),
-    ]
+        Words(
+            "Name of the measurement, in messages, figures and the dataset.",
+            '"punch 2 mm"',
+            default="that of the file, without its ending",
+        ),
+    ] = ""
     file: Annotated[
         str,
         Field(min_length=1),

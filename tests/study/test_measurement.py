@@ -119,6 +119,12 @@ def test_experiments_neither_sweep_nor_change_a_case():
     assert case_key(study.case(())) == case_key(plain.case(()))
 
 
+@pytest.mark.parametrize(("file", "name"), [("a/ball 3.csv", "ball 3"), ("a/gels/*.csv", "gels"), ("*.csv", "curve")])
+def test_a_measurement_without_a_name_has_that_of_its_file(file, name):
+    (found,) = parse(raw() | {"measurement": [{"file": file}]}).measurements
+    assert found.name == name
+
+
 def test_without_names_the_moduli_contact_and_baseline_are_unknown():
     found = {one.name: one for one in unknowns(parse(layered({})))}
     assert list(found) == ["young", "skin_young", "contact_point", "baseline"]
