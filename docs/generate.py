@@ -117,7 +117,7 @@ def features_page() -> str:
 
 def dataset_page() -> str:
     """Return the page of every variable of a dataset."""
-    of_files = ("surface_deviation", "body_message", "force_uncertainty")
+    of_files = ("surface_deviation", "body_message", "force_uncertainty", "force_image_uncertainty")
     found: dict[str, dict[str, Any]] = {name: attributes(name) for name in of_files}
     for changes in _VARIANTS:
         study = tomllib.loads(starter("study"))

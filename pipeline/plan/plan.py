@@ -13,7 +13,7 @@ from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import NO_RECORD, EndPlans, Plan, Struck
 from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.case import Case
-from pipeline.study.ends import ends_of_bars
+from pipeline.study.ends import ends_of
 from pipeline.study.problems import StudyError
 from pipeline.study.schema import Mesh, Solving
 from pipeline.study.sweep import Study
@@ -118,12 +118,12 @@ def ask_for_exact(plan: Plan) -> Plan:
 
 
 def ask_for_ends(plan: Plan, without: Collection[str] = ()) -> Plan:
-    """Add the cases with each identified parameter at the ends of its bar, on the meshes of the study."""
+    """Add the cases with each identified parameter, and what an image leaves open, at the ends of its bar."""
     ends = []
     solves = {solve.key: solve for solve in plan.solves}
-    for end in ends_of_bars(plan.study):
+    for end in ends_of(plan.study):
         low, high = (make_plan(study, without=without) if study else None for study in (end.low, end.high))
-        ends.append(EndPlans(end.unknown, low, high))
+        ends.append(EndPlans(end.unknown, low, high, end.of_image))
         for found in (low, high):
             for solve in found.solves if found else ():
                 solves.setdefault(solve.key, replace(solve, serves=(), end_of=end.unknown))

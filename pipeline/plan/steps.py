@@ -23,7 +23,7 @@ class Solve:
     ``mirrors`` are the planes of symmetry ("x": x = 0), so that half or a quarter of the body is solved;
     ``axisymmetric`` solves the meridian; ``reduced`` allows a reduced basis. With a ``goal``, a relative error, the
     case is solved on the meshes of ``later``, in turn, until its error bar is below the goal; ``expected`` is the
-    expected error bar of its present mesh. ``end_of`` is the identified parameter that is at an end of its bar.
+    expected error bar of its present mesh. ``end_of`` is the parameter that is at an end of its bar.
     """
 
     key: str

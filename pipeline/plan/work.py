@@ -43,7 +43,7 @@ class Plan:
         unasked: the solves for F_exact that are left out because `solve.exact` is off by default.
         equivalent: by index of a case, the equivalent place that is solved instead.
         proportional: by index of a case, the proportional depth that is solved instead.
-        ends: the plans of the study at the ends of the bars of an identified material; their solves are among these.
+        ends: the plans of the study at the ends of the bars of its material and image; their solves are among these.
     """
 
     study: Study
@@ -91,11 +91,15 @@ class Plan:
 
 @dataclass(frozen=True)
 class EndPlans:
-    """The plans of a study with one identified parameter at either end of its bar; None where that makes no study."""
+    """The plans of a study with one parameter at either end of its bar; None where that makes no study.
+
+    The parameter was identified, or is what an image leaves open (``of_image``).
+    """
 
     unknown: str
     low: Plan | None
     high: Plan | None
+    of_image: bool = False
 
 
 def reason_of(reduction: Callable[..., Plan]) -> str:

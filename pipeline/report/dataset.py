@@ -17,7 +17,7 @@ from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST, MESH_DIMENSIONS, RUN, attributes, quantity_of
 from pipeline.report.history import over_time
-from pipeline.report.uncertainty import NAME, force_uncertainty
+from pipeline.report.uncertainty import uncertainties
 from pipeline.report.values import at_full_order, with_flags
 from pipeline.run.outcome import without_contact
 from pipeline.run.record import Record
@@ -120,8 +120,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     path = {axis.name for axis in study.axes if axis.off}
     for name in {*_PLACE, "axis", "body_message", "tool_depth"} & {*dataset.variables}:
         dataset[name] = _along(dataset[name], {*path, "component", "time"})
-    if plan.ends:
-        dataset[NAME] = force_uncertainty(plan, dataset["force"], lambda end: build(end, records)["force"])
+    for name, bar in uncertainties(plan, dataset["force"], lambda end: build(end, records)["force"]).items():
+        dataset[name] = bar
     return _linked(_add_ratios(dataset.set_coords(_PLACE if path else ()), plan))
 
 

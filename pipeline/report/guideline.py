@@ -16,7 +16,7 @@ from pipeline.report.laws import Laws
 from pipeline.report.sinking import tools
 from pipeline.report.table import Table
 from pipeline.report.times import doubts
-from pipeline.report.uncertainty import tissue
+from pipeline.report.uncertainty import unknowns
 from pipeline.report.verdict import Verdict, choose, judge, keeps, most_accurate
 
 # Settings that are chosen from the verdicts.
@@ -41,7 +41,7 @@ class Guideline:
     def __init__(self, dataset: xr.Dataset, table: Table, accuracy: float, budget: float):
         self.title, self.coordinates = str(dataset.attrs.get("title", "")), dataset.coords
         self.accuracy, self.budget, self.reference = accuracy, budget, table.reference
-        self.timing, self.doubts, self.tissue = _timing(dataset), doubts(dataset), tissue(dataset)
+        self.timing, self.doubts, self.tissue = _timing(dataset), doubts(dataset), unknowns(dataset)
         self.axes = {name: len(np.unique(labels)) for name, labels in table.axes.items()}
         self.scenes = int((~table.lost).sum())
         self.lost = [scene for scene, lost in zip(table.scenes, table.lost, strict=True) if lost]

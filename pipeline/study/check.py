@@ -13,6 +13,8 @@ from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
+from pipeline.shapes.segmented import Segmented
+from pipeline.shapes.triangles import SurfaceError
 from pipeline.study.axis import Axis
 from pipeline.study.capabilities.refusals import check_features
 from pipeline.study.check_law import check_laws
@@ -50,6 +52,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     bodies, probes = cast(Sequence[Body], sections["body"]), cast(Sequence[Probe], sections["probe"])
     materials, meshes = cast(Sequence[Material], sections["material"]), cast(Sequence[Mesh], sections["mesh"])
     problems.each(_tell_notices, body=bodies)
+    problems.each(_check_boundary, body=bodies)
     linear = [material for material in materials if not material.is_large]
     if linear:
         problems.each(warn_of_depth, probe=probes)
@@ -145,6 +148,16 @@ def _tell_notices(body: Body, problems: Problems) -> None:
     if isinstance(body, FromFile):
         for notice in body.notices:
             problems.warn("body.file", body.file, notice)
+
+
+def _check_boundary(body: Body, problems: Problems) -> None:
+    """Check that the surface can be shifted to the ends of its boundary's range."""
+    if isinstance(body, Segmented) and body.boundary_range:
+        try:
+            for sign in (-1, 1):
+                body.varied(offset=sign * body.boundary_range)
+        except SurfaceError as error:
+            problems.error("body.boundary_uncertainty", body.boundary_uncertainty, f"is too large: {error}")
 
 
 def _check_softness(body: Body, material: Material, problems: Problems) -> None:

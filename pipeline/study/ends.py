@@ -1,8 +1,12 @@
-"""The studies at the ends of the error bars of an identified material: what the bars make of every force."""
+"""The studies at the ends of what is not known of the tissue and of the image: what that makes of every force."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
+from pipeline.shapes.segmented import Segmented
+from pipeline.shapes.triangles import SurfaceError
 from pipeline.study.identified import NOTHING
 from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
@@ -15,17 +19,61 @@ from pipeline.study.text import toml_of
 class Ends:
     """A study with one identified parameter at the lower and at the upper end of its bar, all else as it is.
 
-    An end that makes no study, such as a Poisson's ratio that the elements do not allow, is None.
+    An end that makes no study, such as a Poisson's ratio that the elements do not allow, is None. The parameter may
+    also be the boundary of an image or its smoothing (``of_image``).
     """
 
     unknown: str
     low: Study | None
     high: Study | None
+    of_image: bool = False
 
     @property
     def studies(self) -> tuple[Study, ...]:
         """The ends that there are."""
         return tuple(study for study in (self.low, self.high) if study is not None)
+
+
+def ends_of(study: Study) -> tuple[Ends, ...]:
+    """Return the ends of all bars: those of the material, if it was identified, and those that the image leaves."""
+    return ends_of_bars(study) + ends_of_image(study)
+
+
+def ends_of_image(study: Study) -> tuple[Ends, ...]:
+    """Return the ends of the boundary's position and of the smoothing; none without ``boundary_uncertainty``."""
+    bodies = [body for body in study.sections["body"] if isinstance(body, Segmented) and body.boundary_range]
+    if not bodies:
+        return ()
+    inward, outward = (_with_bodies(study, partial(_moved_boundary, sign=sign)) for sign in (-1, 1))
+    boundary = Ends("boundary", inward, outward, of_image=True)
+    if not any(body.smoothing_range for body in bodies):
+        return (boundary,)
+    less, more = (_with_bodies(study, partial(_smoothed, end=end)) for end in (0, 1))
+    return boundary, Ends("smoothing", less, more, of_image=True)
+
+
+def _moved_boundary(body: Segmented, sign: int) -> Segmented:
+    return body.varied(offset=sign * body.boundary_range)
+
+
+def _smoothed(body: Segmented, end: int) -> Segmented:
+    found = body.smoothing_range
+    return body.varied(smooth=found[end] if found else None)
+
+
+def _with_bodies(study: Study, change: Callable[[Segmented], Segmented]) -> Study | None:
+    """Return the study with other segmented bodies, without F_exact and bars; None if one cannot be made."""
+    try:
+        bodies = tuple(
+            change(body) if isinstance(body, Segmented) and body.boundary_range else body
+            for body in study.sections["body"]
+        )
+    except SurfaceError:
+        return None
+    solve = study.solve.model_copy(update={"exact": False, "timing": False})
+    planning = study.planning.model_copy(update={"stop_near_exact": None})
+    sections = {"body": bodies, "solve": (solve,), "plan": (planning,)}
+    return replace(study, sections=study.sections | sections, identified=NOTHING)
 
 
 def ends_of_bars(study: Study) -> tuple[Ends, ...]:
@@ -44,6 +92,6 @@ def _moved(study: Study, number: int, value: float) -> Study | None:
     raw["solve"] = raw.get("solve", {}) | {"exact": False, "timing": False}
     raw["plan"] = {key: kept for key, kept in raw.get("plan", {}).items() if key != "stop_near_exact"}
     try:
-        return replace(parse(raw, file=study.file), identified=NOTHING)
+        return _with_bodies(parse(raw, file=study.file), Segmented.varied)
     except StudyError:
         return None

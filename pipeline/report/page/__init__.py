@@ -29,7 +29,7 @@ from pipeline.report.page.facts import (
 )
 from pipeline.report.page.inline import inline_svg
 from pipeline.report.table import warnings_of
-from pipeline.report.uncertainty import tissue
+from pipeline.report.uncertainty import unknowns
 from pipeline.report.values import at_peak
 from pipeline.states import FAILURES, SKIPPED
 
@@ -79,7 +79,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         figures=_figures(over_time),
         guide=guide,
         answer=guide.sentence if guide else summary(dataset),
-        tissue=tissue(dataset),
+        tissue=unknowns(dataset),
         table=table,
         many_cases=counted(len(table.order), "case"),
         main=next((name for name in _MAIN if name in varying), "force"),

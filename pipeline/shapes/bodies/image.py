@@ -4,20 +4,25 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
+from pipeline.arrays import FloatArray
 from pipeline.shapes.files.loaded import UNITS, Loaded
-from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
+from pipeline.shapes.segmented import Segmented
 from pipeline.shapes.triangles import SurfaceError
 from pipeline.units import Travel
 
+# Range of the smoothing length, in its units.
+_NARROWEST, _WIDEST = 2 / 3, 4 / 3
 
-class FromImage(FromFile, Scanned):
+
+class FromImage(Segmented, Scanned):
     """The voxels of one label, in the patient's frame: x to the right, y to the front, z to the head."""
 
-    READ_BY: ClassVar[frozenset[str]] = frozenset({"label", "names", "unit", "smooth", "region"})
+    READ_BY: ClassVar[frozenset[str]] = frozenset({"label", "names", "unit", "smooth", "region", "offset"})
 
     shape: Literal["image"]
     label: Annotated[
@@ -64,9 +69,11 @@ class FromImage(FromFile, Scanned):
         """Return the surface of the label, together with the labels of its regions."""
         from pipeline.shapes.files.image import read_image  # noqa: PLC0415 (only when a file is read)
 
-        def surface(label: int | str, smooth: float | None, inner: tuple[int | str, ...] = ()) -> Loaded:
+        def surface(
+            label: int | str, smooth: float | None, inner: tuple[int | str, ...] = (), offset: float = 0.0
+        ) -> Loaded:
             unit = UNITS[given["unit"]] if given["unit"] else None
-            return read_image(Path(file), label, unit, smooth, given["names"], inner)
+            return read_image(Path(file), label, unit, smooth, given["names"], inner, offset)
 
         labelled = {piece.label: piece for piece in given["region"] if piece.label is not None}
         for label, piece in labelled.items():
@@ -74,4 +81,24 @@ class FromImage(FromFile, Scanned):
                 piece.load(surface(label, given["smooth"] if piece.smooth is None else piece.smooth))
             except SurfaceError as error:
                 raise SurfaceError(f"{piece.name}, label {label}: {error}") from error
-        return surface(given["label"], given["smooth"], tuple(labelled))
+        return surface(given["label"], given["smooth"], tuple(labelled), given["offset"])
+
+    @property
+    def _spacing(self) -> FloatArray:
+        from pipeline.shapes.files.image import spacing_of  # noqa: PLC0415
+
+        path = Path(self.file)
+        return np.array(spacing_of(path, UNITS[self.unit] if self.unit else None, path.stat().st_mtime_ns))
+
+    @property
+    def voxel(self) -> float | None:
+        """Size of a voxel (m), the cube root of its volume."""
+        return float(np.prod(self._spacing)) ** (1 / 3)
+
+    @property
+    def smoothing_range(self) -> tuple[float, float] | None:
+        """Two thirds and four thirds of the smoothing length: 1 and 2 voxels of the default; None without smoothing."""
+        from pipeline.shapes.files.image import default_smooth  # noqa: PLC0415
+
+        length = default_smooth(self._spacing) if self.smooth is None else self.smooth
+        return (length * _NARROWEST, length * _WIDEST) if length else None

@@ -4,19 +4,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
+from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.files.loaded import UNITS, Loaded
-from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
+from pipeline.shapes.segmented import Segmented
 from pipeline.units import Travel
 
 
-class FromSurface(FromFile, Scanned):
+class FromSurface(Segmented, Scanned):
     """A body bounded by the triangles of a file, in the file's own frame."""
 
-    READ_BY: ClassVar[frozenset[str]] = frozenset({"unit", "repair", "smooth"})
+    READ_BY: ClassVar[frozenset[str]] = frozenset({"unit", "repair", "smooth", "offset"})
 
     shape: Literal["surface"]
     unit: Annotated[
@@ -51,4 +52,16 @@ class FromSurface(FromFile, Scanned):
         """Return the surface in a file."""
         from pipeline.shapes.files.read import read_surface  # noqa: PLC0415 (only when a file is read)
 
-        return read_surface(Path(file), UNITS[given["unit"]], given["repair"], given["smooth"] or None)
+        return read_surface(Path(file), UNITS[given["unit"]], given["repair"], given["smooth"] or None, given["offset"])
+
+    @field_validator("boundary_uncertainty")
+    @classmethod
+    def _has_no_voxels(cls, given: str | None) -> str | None:
+        if given is not None and "voxel" in given:
+            raise PydanticCustomError("not_supported", "must be a length: a surface has no voxels")
+        return given
+
+    @property
+    def voxel(self) -> float | None:
+        """None: a surface has no voxels."""
+        return None

@@ -34,6 +34,8 @@ _REACH = 4.0  # truncation of the filter, in standard deviations
 _THICK, _NARROWER, _NARROWEST = 0.985, 0.85, 0.75
 # Tolerance on the volume in the search for the level, and most steps.
 _SAME_VOLUME, _LEVELS = 5e-4, 6
+# Largest shift, in standard deviations of the filter: beyond, levels are too near to 0 and 1.
+_MOST_OFFSET = 1.5
 # Values are moved away from the level by this much, to avoid sliver facets.
 _AWAY = 0.005
 _CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
@@ -46,12 +48,14 @@ def read_image(
     smooth: float | None = None,
     names: str = "",
     inner: tuple[int | str, ...] = (),
+    offset: float = 0.0,
 ) -> Loaded:
     """Return the surface of the voxels with a ``label``, a number or a name, and notices of what was changed.
 
     Voxels with one of the ``inner`` labels, those of regions of a body, belong to it, too. ``unit`` (m) is needed only
     if the header names none; ``smooth`` (m) is the standard deviation of the filter; ``names`` is that of
-    :func:`read_labels`. Files are read again only when they have changed, and the surface is cached on disk.
+    :func:`read_labels`, ``offset`` (m) that of :func:`surface_of`. Files are read again only when they have changed,
+    and the surface is cached on disk.
 
     Raises:
         SurfaceError: if the label does not bound one piece of tissue; the message says what was found and how to repair
@@ -67,7 +71,7 @@ def read_image(
                 raise
             what = "`names`:" if str(file) == names else "the data file of its header,"
             raise SurfaceError(f"{what} `{file}`, {error}") from error
-    return _load(path, files, tuple(states), (label, *inner), unit, smooth, names)
+    return _load(path, files, tuple(states), (label, *inner), unit, smooth, names, offset)
 
 
 def _changed(path: Path) -> int:
@@ -89,6 +93,7 @@ def _load(
     unit: float | None,
     smooth: float | None,
     names: str,
+    offset: float,
 ) -> Loaded:
     if not all(size for _, size in states):
         raise SurfaceError("is empty: copy or export it again")
@@ -96,14 +101,23 @@ def _load(
         raise SurfaceError(f"has {largest / 1e9:.2g} GB, more than {LARGEST_IMAGE / 1e9:g}: crop or resample it")
 
     def make() -> tuple[Triangles, tuple[str, ...]]:
-        found = surface_of(read_labels(path, unit, names), labels[0], smooth, labels[1:])
+        found = surface_of(read_labels(path, unit, names), labels[0], smooth, labels[1:], offset)
         return found.triangles, found.notices
 
-    given = f"{_METHOD} {path.suffix.lower()} {labels!r} {unit!r} {smooth!r} {names if names in CLASS_MAPS else ''}"
+    given = f" {offset!r}" if offset else ""
+    given = (
+        f"{_METHOD} {path.suffix.lower()} {labels!r} {unit!r} {smooth!r} {names if names in CLASS_MAPS else ''}{given}"
+    )
     try:
         return Loaded(*kept_image(files, given, make))
     except OSError as error:
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
+
+
+@lru_cache(maxsize=32)
+def spacing_of(path: Path, unit: float | None, _time: int) -> tuple[float, ...]:
+    """Return the sizes (3,) of the voxels (m) of an image that was last changed at a time (ns)."""
+    return tuple(read_labels(path, unit).spacing.tolist())
 
 
 def default_smooth(spacing: FloatArray) -> float:
@@ -115,14 +129,25 @@ def default_smooth(spacing: FloatArray) -> float:
 
 
 def surface_of(
-    labels: LabelMap, label: int | str, smooth: float | None = None, inner: tuple[int | str, ...] = ()
+    labels: LabelMap,
+    label: int | str,
+    smooth: float | None = None,
+    inner: tuple[int | str, ...] = (),
+    offset: float = 0.0,
 ) -> Loaded:
-    """Return the surface of the voxels with a ``label``, or one of the ``inner`` labels."""
+    """Return the surface of the voxels with a ``label``, or one of the ``inner`` labels, shifted out by ``offset`` (m).
+
+    The shift is one of the level: at a distance x outside a plane, the filtered mask is Φ(−x/σ), and nearly so at
+    surfaces whose radius of curvature is some σ.
+
+    Raises:
+        SurfaceError: if the labels are not one piece, or the filter is too narrow for the offset.
+    """
     mask = np.logical_or.reduce([of_label(labels, one) for one in (label, *inner)])
     mask, start, notices = one_piece(mask, float(np.prod(labels.spacing)))
     sigma = (default_smooth(labels.spacing) if smooth is None else smooth) / labels.spacing
     margin = np.ceil(_REACH * sigma).astype(int) + 2
-    indices, facets = _smoothed(np.pad(mask, [(m, m) for m in margin]), sigma, may_narrow=smooth is None)
+    indices, facets = _smoothed(np.pad(mask, [(m, m) for m in margin]), sigma, smooth is None, offset / labels.spacing)
     points = (indices + (start - margin)) @ labels.affine[:, :3].T + labels.affine[:, 3]
     if enclosed(points, facets) < 0:  # a mirrored frame
         facets = np.ascontiguousarray(facets[:, ::-1])
@@ -164,11 +189,19 @@ def one_piece(mask: Any, voxel: float) -> tuple[Any, IntArray, list[str]]:
     return filled, np.array([part.start for part in box]), notices
 
 
-def _smoothed(mask: Any, sigma: FloatArray, *, may_narrow: bool) -> tuple[FloatArray, IntArray]:
-    """Return the surface, in indices, of a mask after the filter, at the level that keeps its volume."""
+def _smoothed(mask: Any, sigma: FloatArray, may_narrow: bool, offset: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return the surface, in indices, of a mask after the filter, at the level that keeps its volume.
+
+    It is then shifted outward by ``offset`` (3,), in voxels.
+    """
     from scipy import ndimage  # noqa: PLC0415
+    from scipy.special import ndtr, ndtri  # noqa: PLC0415
 
     steps = mask.astype(np.float32)
+    if abs(offset[0]) > _MOST_OFFSET * sigma[0]:
+        raise SurfaceError(
+            f"`offset` is more than {_MOST_OFFSET:g} times the smoothing length: use a smaller one or more `smooth`"
+        )
     if not sigma.any():
         return march(steps, 0.5)
     volume = float(mask.sum())
@@ -186,6 +219,10 @@ def _smoothed(mask: Any, sigma: FloatArray, *, may_narrow: bool) -> tuple[FloatA
         slope = -1.0 if before is None else (excess - before[1]) / (level - before[0])
         before = level, excess
         level = float(np.clip(level - np.clip(excess / slope, -0.1, 0.1), 0.2, 0.8))
+    if offset.any():
+        # Voxels add the variance of their rounding, 1/12, to that of the filter.
+        width = np.sqrt(sigma**2 + 1 / 12)
+        return march(values, float(ndtr(ndtri(level) - float((offset / width).mean()))))
     return points, facets
 
 

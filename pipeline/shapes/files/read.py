@@ -9,6 +9,7 @@ from pipeline.shapes.files import obj, ply, stl
 from pipeline.shapes.files.checked import kept_whole
 from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.files.raw import Raw
+from pipeline.shapes.files.shifted import shifted
 from pipeline.shapes.files.whole import made_whole
 from pipeline.shapes.triangles import SurfaceError
 
@@ -17,16 +18,18 @@ _PARSERS: dict[str, Callable[[bytes], Raw]] = {".stl": stl.parse, ".ply": ply.pa
 LARGEST_FILE = 600_000_000  # bytes
 
 
-def read_surface(path: Path, unit: float, repair: bool = False, smooth: float | None = None) -> Loaded:
+def read_surface(
+    path: Path, unit: float, repair: bool = False, smooth: float | None = None, offset: float = 0.0
+) -> Loaded:
     """Return the surface in an STL, PLY or OBJ file whose numbers are in a ``unit`` (m).
 
-    ``repair`` allows repairs of a broken surface; ``smooth`` (m) is the length of the smoothing filter. The file is
-    read again only when it has changed.
+    ``repair`` allows repairs of a broken surface; ``smooth`` (m) is the length of the smoothing filter, and ``offset``
+    (m) shifts the surface outward. The file is read again only when it has changed.
 
     Raises:
         SurfaceError: if it does not bound one piece of tissue; the message says what was found and how to repair it.
     """
-    return _load(path, *state_of(path), unit, repair, smooth)
+    return _load(path, *state_of(path), unit, repair, smooth, offset)
 
 
 def state_of(path: Path) -> tuple[int, int]:
@@ -45,7 +48,9 @@ def state_of(path: Path) -> tuple[int, int]:
 
 
 @lru_cache(maxsize=8)
-def _load(path: Path, _changed: int, size: int, unit: float, repair: bool, smooth: float | None) -> Loaded:
+def _load(
+    path: Path, _changed: int, size: int, unit: float, repair: bool, smooth: float | None, offset: float
+) -> Loaded:
     if path.suffix.lower() not in _PARSERS:
         raise SurfaceError(f"its name ends in `{path.suffix}`; allowed are {', '.join(_PARSERS)}")
     if size == 0:
@@ -60,7 +65,8 @@ def _load(path: Path, _changed: int, size: int, unit: float, repair: bool, smoot
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
     ending = path.suffix.lower()
     given = f"{ending} {unit!r} {repair} {smooth!r}"
-    return Loaded(*kept_whole(data, given, lambda: made_whole(_parsed(data, ending), unit, repair, smooth)))
+    whole = Loaded(*kept_whole(data, given, lambda: made_whole(_parsed(data, ending), unit, repair, smooth)))
+    return Loaded(shifted(whole.triangles, offset), whole.notices) if offset else whole
 
 
 def _parsed(data: bytes, ending: str) -> Raw:
