@@ -144,7 +144,7 @@ def surface_of(
         SurfaceError: if the labels are not one piece, or the filter is too narrow for the offset.
     """
     mask = np.logical_or.reduce([of_label(labels, one) for one in (label, *inner)])
-    mask, start, notices = one_piece(mask, float(np.prod(labels.spacing)))
+    mask, start, notices = one_piece(mask, labels)
     sigma = (default_smooth(labels.spacing) if smooth is None else smooth) / labels.spacing
     margin = np.ceil(_REACH * sigma).astype(int) + 2
     indices, facets = _smoothed(np.pad(mask, [(m, m) for m in margin]), sigma, smooth is None, offset / labels.spacing)
@@ -157,7 +157,7 @@ def surface_of(
     return Loaded(triangles, (*labels.notices, *notices, *apart, *more))
 
 
-def one_piece(mask: Any, voxel: float) -> tuple[Any, IntArray, list[str]]:
+def one_piece(mask: Any, labels: LabelMap) -> tuple[Any, IntArray, list[str]]:
     """Return the largest piece of a mask, cropped and without hollows, the index of its corner, and notices."""
     from scipy import ndimage  # noqa: PLC0415
 
@@ -175,9 +175,9 @@ def one_piece(mask: Any, voxel: float) -> tuple[Any, IntArray, list[str]]:
         inside = ndimage.find_objects(parts)[int(sizes.argmax())]
         cut = (parts == sizes.argmax() + 1)[inside]
         box = tuple(slice(b.start + i.start, b.start + i.stop) for b, i in zip(box, inside, strict=True))
-    ends = sum((part.start == 0) + (part.stop == size) for part, size in zip(box, mask.shape, strict=True))
-    if ends:
-        notices.append(f"cut off flat at the image's boundary on {ends} of 6 sides: do not touch it near these sides")
+    if sides := labels.sides(box):
+        notices.append(f"cut off flat at the image's end: {', '.join(sides)}. Do not touch it near there")
+    voxel = float(np.prod(labels.spacing))
     filled = ndimage.binary_fill_holes(cut)
     hollow = int(filled.sum() - cut.sum())
     if hollow > MOST_APART * cut.sum():

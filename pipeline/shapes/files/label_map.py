@@ -16,6 +16,8 @@ MOST_VOXELS = 1_000_000_000
 # Most bytes of values, also after unpacking: a larger label map does not fit into memory.
 LARGEST_IMAGE = 4_000_000_000
 _SHOWN = 20
+# Of the patient, towards lower and higher x, y and z.
+_SIDES = (("left", "right"), ("back", "front"), ("feet", "head"))
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,21 @@ class LabelMap:
         near = get_close_matches(_simple(label), {_simple(name): name for name in there}, n=3)
         meant = f"; is it {' or '.join(name for name in there if _simple(name) in near)}?" if near else ""
         raise SurfaceError(f"no label has the name `{label}`; names are {_listed(there)}{meant}")
+
+    def sides(self, box: Sequence[slice]) -> list[str]:
+        """Return the sides of the image that a box of voxels reaches, with their places in the patient's frame."""
+        found = []
+        for axis, (part, size) in enumerate(zip(box, self.values.shape, strict=True)):
+            column = self.affine[:, axis]
+            along = int(np.abs(column).argmax())
+            for is_reached, index in ((part.start == 0, -0.5), (part.stop == size, size - 0.5)):
+                if is_reached:
+                    middle = [(one.start + one.stop - 1) / 2 for one in box]
+                    middle[axis] = index
+                    place = float(self.affine[along, :3] @ middle + self.affine[along, 3])
+                    name = _SIDES[along][int((index > 0) == (column[along] > 0))]
+                    found.append(f"{name} ({'xyz'[along]} = {1e3 * place:.4g} mm)")
+        return found
 
     def written(self, label: int) -> str:
         """Return a label with its name, for messages."""

@@ -43,7 +43,7 @@ def partition_of(
         SurfaceError: if a label has no voxels, or is thinner than the filter.
     """
     masks = [of_label(found, label) for label in labels]
-    body, start, notices = one_piece(np.logical_or.reduce(masks), float(np.prod(found.spacing)))
+    body, start, notices = one_piece(np.logical_or.reduce(masks), found)
     box = tuple(slice(s, s + n) for s, n in zip(start, body.shape, strict=True))
     number = np.where(body, 0, OUTSIDE)
     for region, mask in enumerate(masks[1:], start=1):

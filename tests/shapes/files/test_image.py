@@ -140,9 +140,18 @@ def test_crumbs_hollows_and_the_image_s_end_are_told(tmp_path: Path):
     assert any("1 voxels that it encloses" in notice for notice in loaded.notices)
     assert loaded.triangles.volume == pytest.approx(VOLUME, rel=0.01)
     half = read_image(_nifti(tmp_path / "half.nii", values[25:], _affine(2.0, (10, -70, 5))), 2)
-    assert any("image's boundary on 1 of 6 sides" in notice for notice in half.notices)
+    assert any("cut off flat at the image's end: left (x = 9 mm)." in notice for notice in half.notices)
     more = np.pi * AXES[1] * AXES[2] * (CENTRE[0] - 9.0) * 1e-9  # the outermost voxels reach to x = 9 mm
     assert half.triangles.volume == pytest.approx(VOLUME / 2 + more, rel=0.01)
+
+
+def test_the_sides_that_are_cut_off_are_the_patient_s(tmp_path: Path):
+    affine = np.array([[0, -2.0, 0, 20], [0, 0, -2.0, 30], [2.0, 0, 0, -7], [0, 0, 0, 1]])
+    values = np.zeros((20, 21, 22), np.uint8)
+    values[3:, :15, 4:22] = 1
+    (notice,) = read_image(_nifti(tmp_path / "cut.nii", values, affine), 1).notices
+    # The first axis runs to the head, the second one to the left, the third one to the back.
+    assert "head (z = 32 mm), right (x = 21 mm), back (y = -13 mm)." in notice
 
 
 def test_what_is_no_label_map_is_refused(scan: Path, tmp_path: Path):
