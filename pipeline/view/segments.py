@@ -13,6 +13,7 @@ from pipeline.shapes.triangles import SurfaceError, enclosed
 MOST_LABELS = 250
 # Facets of a page, and the least of a label, before it is made coarser.
 _FACETS, _FEWEST = 200_000, 4_000
+_TABLE = 1_000_000  # largest label of a table
 _VOXELS = 3_000_000  # of the slices of a page
 # The drawn surface: filter, in its voxels.
 _SMOOTH = 0.8
@@ -71,8 +72,7 @@ def segments_of(found: LabelMap) -> list[Segment]:
         mask = found.values[within] == label
         parts, pieces = ndimage.label(mask)
         sizes = np.bincount(parts.ravel())[1:]
-        places = np.argwhere(_rim(mask)) + [part.start for part in within]
-        places = places @ found.affine[:, :3].T + found.affine[:, 3]
+        places = (_ends(mask) + [part.start for part in within]) @ found.affine[:, :3].T + found.affine[:, 3]
         ends = sum((p.start == 0) + (p.stop == n) for p, n in zip(within, found.values.shape, strict=True))
         box = np.array([places.min(axis=0) - half, places.max(axis=0) + half])
         share = float(sizes.max() / sizes.sum())
@@ -83,13 +83,25 @@ def segments_of(found: LabelMap) -> list[Segment]:
 
 def numbered(found: LabelMap) -> Any:
     """Return the voxels' positions among the labels, from 1, as bytes; 0 is background."""
-    return (np.searchsorted(found.labels, found.values) + 1).astype(np.uint8) * (found.values != 0)
+    if found.labels[-1] > _TABLE:
+        return (np.searchsorted(found.labels, found.values) + 1).astype(np.uint8) * (found.values != 0)
+    table = np.zeros(found.labels[-1] + 1, np.uint8)
+    table[list(found.labels)] = np.arange(1, len(found.labels) + 1)
+    return table[found.values.astype(np.intp, copy=False) if found.values.dtype.kind == "f" else found.values]
 
 
-def _rim(mask: Any) -> Any:
-    from scipy import ndimage  # noqa: PLC0415
+def _ends(mask: Any) -> Any:
+    """Return the indices (n, 3) of the first and the last voxel of each line along the first axis that has any."""
+    is_there = np.argwhere(mask.any(axis=0))
+    columns = mask[:, is_there[:, 0], is_there[:, 1]]
+    first, last = columns.argmax(axis=0), len(mask) - 1 - columns[::-1].argmax(axis=0)
+    return np.vstack([np.column_stack([end, is_there]) for end in (first, last)])
 
-    return mask & ~ndimage.binary_erosion(mask)
+
+def _faces(mask: Any) -> int:
+    """Return the number of the voxels' faces that bound a mask."""
+    whole = np.pad(mask, 1)
+    return int(sum(np.diff(whole, axis=axis).sum() for axis in range(3)))
 
 
 def height_to_fix(segment: Segment) -> float:
@@ -111,7 +123,7 @@ def block(segment: Segment, file: str, unit: str = "", names: str = "") -> str:
 def surfaces_of(found: LabelMap, segments: list[Segment]) -> list[tuple[FloatArray, IntArray]]:
     """Return points (n, 3), in m, and facets of each label as a page draws it: all pieces, large labels coarser."""
     masks = [found.values[one.within] == one.label for one in segments]
-    faces = np.array([2.0 * _rim(mask).sum() for mask in masks])
+    faces = np.array([2.0 * _faces(mask) for mask in masks])
     allowed = np.maximum(_FEWEST, _FACETS * faces / faces.sum())
     return [
         _surface(found, one, mask, float(np.sqrt(max(1.0, count / most))))
