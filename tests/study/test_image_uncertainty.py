@@ -165,9 +165,22 @@ def test_what_makes_no_sense_is_refused(image, keys, told):
         of(body(image, **keys))
 
 
-def test_bodies_without_an_image_have_no_boundary_to_move(tmp_path):
+def test_surfaces_that_regions_share_with_the_body_are_not_shifted(image, tmp_path):
+    """A region that reaches the body's surface: to shift one of the two alone would be wrong."""
+    found = nibabel.load(image)
+    values = (np.asarray(found.dataobj) > 0).astype(np.uint8)
+    values[: len(values) // 3][values[: len(values) // 3] > 0] = 2
+    nibabel.save(nibabel.Nifti1Image(values, found.affine, found.header), tmp_path / "cap.nii")
+    for keys in ({"offset": "0.5 mm"}, {"boundary_uncertainty": "0.5 voxel"}):
+        with pytest.raises(StudyError, match=r"must be inside the body|offset"):
+            of(body(tmp_path / "cap.nii", **keys))
+
+
+def test_a_surface_has_a_boundary_but_no_voxels_and_a_box_has_neither(tmp_path):
     write_stl(tmp_path / "box.stl", *box(0.02, 0.03, 0.01))
     surface = {"shape": "surface", "file": str(tmp_path / "box.stl"), "unit": "mm", "fixed": {"below": "-1 mm"}}
+    plan = make_plan(of(surface | {"boundary_uncertainty": "0.2 mm"}))
+    assert [(end.unknown, end.of_image) for end in plan.ends] == [("boundary", True)]
     with pytest.raises(StudyError, match="a surface has no voxels"):
         of(surface | {"boundary_uncertainty": "0.5 voxel"})
     with pytest.raises(StudyError, match="boundary_uncertainty"):

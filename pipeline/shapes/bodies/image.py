@@ -81,6 +81,7 @@ class FromImage(Segmented, Scanned):
                 piece.load(surface(label, given["smooth"] if piece.smooth is None else piece.smooth))
             except SurfaceError as error:
                 raise SurfaceError(f"{piece.name}, label {label}: {error}") from error
+        # The offset is that of one closed surface: surfaces that regions share with it would have to follow.
         return surface(given["label"], given["smooth"], tuple(labelled), given["offset"])
 
     @property
