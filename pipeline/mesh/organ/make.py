@@ -21,7 +21,7 @@ from pipeline.mesh.organ.volume import fill
 from pipeline.mesh.regions import embedded_sizes
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import FREE, Scene
-from pipeline.shapes.complex import Complex
+from pipeline.shapes.complex import TISSUE, Complex
 from pipeline.shapes.scanned import Scanned
 
 # Passes of surface meshing: only in the second pass points are dense where sizes change fast.
@@ -104,7 +104,12 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     inner = dict(zip(apart, embedded_surfaces(tuple(apart.values()), field), strict=True))
     parts = parts.holding(inner)
     empty = [number for number, piece in enumerate(scene.body.embedded, start=1) if piece.is_hollow]
-    points, cells, regions = fill(parts.without(empty), field)
+    tissue = parts.without(empty)
+    if (tissue.sides < TISSUE).all(axis=1).any():
+        raise GeometryError(
+            "a hollow region meets the body's surface or another hollow region: it must be inside tissue"
+        )
+    points, cells, regions = fill(tissue, field)
     if (flat := flat_cells(points, cells)).any():
         raise TangledError.at(points[cells[flat]], "gmsh left a flat tetrahedron")
     facets = {name: sheet.facets[sheet.kind == number] for number, name in group_names().items()}
