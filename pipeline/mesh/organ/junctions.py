@@ -17,6 +17,8 @@ from pipeline.mesh.organ.sheet import Sheet, compact
 
 # An edge is contracted below this length, in units of elements, if its curve moves by at most the second.
 _SHORT, _MOVES = 0.7, 0.15
+# Shorter edges are contracted whatever becomes of the facets there: the next remeshing moves these.
+_TINY = 0.2
 # Largest turn of a facet by a contraction (cosine), and its least height as a share of its longest edge.
 _TURN, _HEIGHT = 0.3, 0.02
 # Sizes of the first remeshing, in units of the facets', and their growth from each one to the next.
@@ -100,17 +102,20 @@ class _Curves:
 
     def _moved(self, gone: int, stays: int) -> bool:
         """Move a point of a curve to its neighbour if all facets there remain good; return whether they do."""
+        if len(self._along[gone]) != 2:  # a curve of two points
+            return False
         (other,) = self._along[gone] - {stays}
         both = {number for number in self._beside[gone] if stays in self.facets[number]}
         apexes = {point for number in both for point in self.facets[number]} - {gone, stays}
         if other in self._along[stays] or self._ring(gone) & self._ring(stays) != apexes:
             return False
-        if self._off(gone, stays, other) > _MOVES * self._size[gone]:
+        is_tiny = self._length(gone, stays) < _TINY * self._size[gone]
+        if not is_tiny and self._off(gone, stays, other) > _MOVES * self._size[gone]:
             return False
         changed = {}
         for number in self._beside[gone] - both:
             facet = [stays if point == gone else point for point in self.facets[number]]
-            if not self._is_good(self.facets[number], facet):
+            if not (is_tiny or self._is_good(self.facets[number], facet)):
                 return False
             changed[number] = facet
         for number in both:

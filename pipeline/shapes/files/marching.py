@@ -129,7 +129,7 @@ def _places(names: IntArray, weights: FloatArray, labels: IntArray, shape: tuple
     for size in (2, 3, 4):
         chosen = np.flatnonzero(count == size)
         corners = names[chosen][:, 4 - size :]
-        shares = _inside(_equal(corners, weights, labels))
+        shares = _equal(corners, weights, labels)
         at = np.stack(np.unravel_index(corners, shape), axis=2).astype(np.float64)
         places[chosen] = np.einsum("nk,nki->ni", shares, at)
     return places
@@ -137,6 +137,8 @@ def _places(names: IntArray, weights: FloatArray, labels: IntArray, shape: tuple
 
 def _equal(corners: IntArray, weights: FloatArray, labels: IntArray) -> FloatArray:
     """Return the barycentric coordinates (n, k) of the points in simplices at which the weights of all labels agree.
+
+    They are positive: if there is no such point inside, it is moved there.
 
     In a tetrahedron with three labels, that is the middle between the points in its two faces with three labels.
     """
@@ -148,23 +150,39 @@ def _equal(corners: IntArray, weights: FloatArray, labels: IntArray) -> FloatArr
     shares = np.full(corners.shape, 1 / size)
     whole = alike.max(axis=1, initial=1) == 1
     values = weights[own[whole][:, :, None], corners[whole][:, None]].astype(np.float64)
-    # Outside, which is 0 and sorted first, is compared to zero, not to the weight of a label.
-    last = values[:, -1:] * (own[whole][:, :-1, None] > 0)
-    system = np.concatenate([values[:, :-1] - last, np.ones((len(values), 1, size))], axis=1)
-    solvable = np.abs(np.linalg.det(system)) > _FLAT
-    right = np.broadcast_to(np.eye(size)[-1], (int(solvable.sum()), size))[:, :, None]
-    shares[np.flatnonzero(whole)[solvable]] = np.linalg.solve(system[solvable], right)[:, :, 0]
+    inner = own[whole][:, 0] > 0
+    found = np.empty((len(values), size))
+    found[inner] = _inside(_balanced(values[inner]))
+    # Points of the body's surface are in the plane of its points on edges, wherever the labels meet.
+    outer = values[~inner]
+    cuts = _inside(np.stack([-outer[:, 0, 1:], np.broadcast_to(outer[:, 0, :1], outer[:, 0, 1:].shape)], axis=2), 2)
+    at_cuts = cuts[:, None, :, 0] * outer[:, 1:, :1] + cuts[:, None, :, 1] * outer[:, 1:, 1:]
+    among = _inside(_balanced(at_cuts))
+    found[~inner] = np.column_stack([(among * cuts[:, :, 0]).sum(axis=1), among * cuts[:, :, 1]])
+    shares[whole] = found
     if size == len(_ALL) and not whole.all():
         shares[~whole] = 0.0
         for face in combinations(_ALL, 3):
             (left_out,) = {*_ALL} - {*face}
             chosen = np.flatnonzero(~whole & (alike[:, left_out] == 2))
-            part = _inside(_equal(corners[chosen][:, list(face)], weights, labels))
+            part = _equal(corners[chosen][:, list(face)], weights, labels)
             shares[chosen[:, None], np.array(face)] += part / 2
     return np.asarray(np.take_along_axis(shares, np.argsort(order, axis=1), axis=1))
 
 
-def _inside(shares: FloatArray) -> FloatArray:
-    """Return barycentric coordinates (n, k) clipped to the inside."""
+def _balanced(values: FloatArray) -> FloatArray:
+    """Return barycentric coordinates (n, k) at which k functions agree, by their ``values`` (n, k, k) at k corners."""
+    count, size = values.shape[:2]
+    system = np.concatenate([values[:, :-1] - values[:, -1:], np.ones((count, 1, size))], axis=1)
+    shares = np.full((count, size), 1 / size)
+    solvable = np.abs(np.linalg.det(system)) > _FLAT
+    right = np.broadcast_to(np.eye(size)[-1], (int(solvable.sum()), size))[:, :, None]
+    shares[solvable] = np.linalg.solve(system[solvable], right)[:, :, 0]
+    return shares
+
+
+def _inside(shares: FloatArray, axis: int = 1) -> FloatArray:
+    """Return barycentric coordinates, along an axis, clipped to the inside."""
+    shares = shares / shares.sum(axis=axis, keepdims=True)
     shares = np.maximum(shares, _AWAY)
-    return shares / shares.sum(axis=1, keepdims=True)
+    return np.asarray(shares / shares.sum(axis=axis, keepdims=True))
