@@ -29,6 +29,7 @@ def folder(tmp_path_factory):
 # Refusals that no table of features can hold: keys that a shape does not have, and ranges of Poisson's ratio.
 _OF_SCHEMA = (
     "has no layer",
+    "has no region",
     "would touch the body",
     'must be "unilateral"',
     "elements of degree 1 lock",

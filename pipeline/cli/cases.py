@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from pipeline.cli.faults import Fault, fail
 from pipeline.launcher import is_first_rank
 from pipeline.printable import counted
-from pipeline.study.select import cases_with
 
 if TYPE_CHECKING:
     from pipeline.study.case import Case
@@ -25,6 +24,8 @@ def find_case(study: "Study", text: str, word: str = "CASE") -> "Case":
         if number >= len(cases):
             fail(_of_case(word, text, f"there are {counted(len(cases), 'case')}, counted from 0"))
         return cases[number]
+    from pipeline.study.select import cases_with
+
     wanted: dict[str, str] = {}
     # A label may contain commas. A comma separates only before a name and "=".
     for part in re.split(r",(?=\s*\w+\s*=)", text):

@@ -21,14 +21,15 @@ def forecasts(study: "Study", cost: "CostModel") -> list[dict[str, Any]]:
         StudyError: if a scene cannot be run.
         ExperimentError: if the depths are those of files that are no curves.
     """
-    from pipeline.insertion.forecast import forecast as forecast_of_path
-    from pipeline.surrogate.forecast import forecast
-
     found: list[dict[str, Any]] = []
     if any(getattr(probe, "insertion", None) for probe in study.probes):
+        from pipeline.insertion.forecast import forecast as forecast_of_path
+
         found = [{"command": "insertion", "of": "the path", **vars(forecast_of_path(study, cost))}]
     if not (study.measurements or study.spread.varied):
         return found
+    from pipeline.surrogate.forecast import forecast
+
     return found + [
         {"command": command, "of": name, **vars(forecast(domain, cost, corrected=command == "identify"))}
         for command, name, domain in _domains(study)

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
+from pipeline.class_maps import CLASS_MAPS
 from pipeline.cli.console import say
 from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study
 from pipeline.cli.words import Json
 from pipeline.files import atomic, write_new, write_whole
-from pipeline.shapes.files.label_names import CLASS_MAPS
 from pipeline.study.named import NAME, SCHEMA, SHORT, examples, is_name
 
 _FOLDER = Path("studies")

@@ -19,7 +19,6 @@ from pipeline.cli.words import (
     check_output,
     read_all,
 )
-from pipeline.shapes.files.labels import is_image
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -77,6 +76,8 @@ def view(
     Example: epsmesh view meshes/liver.nii.gz
     """
     export = export or ("vtu" if vtk else None)
+    from pipeline.shapes.files.labels import is_image
+
     if is_image(file):
         if mesh_only or export not in (None, "html"):
             option = "--mesh-only" if mesh_only else f"--export {export}"

@@ -1,13 +1,16 @@
 """Whether a blade can be inserted as a study says: sound keys, room above the support, layers thicker than a step."""
 
 from math import isfinite
+from typing import TYPE_CHECKING, cast
 
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.insertion import Insertion
 from pipeline.shapes.probe import STICK, Probe
-from pipeline.shapes.probes.blade import Blade
 from pipeline.shapes.section import in_mm
 from pipeline.study.problems import Problems
+
+if TYPE_CHECKING:
+    from pipeline.shapes.probes.blade import Blade
 
 # Tissue that must be left beside the path of the tip: widths of the blade.
 ROOM = 2.0
@@ -15,26 +18,27 @@ ROOM = 2.0
 
 def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
     """Report an insertion for which keys are missing, or for which the body has no room."""
-    if not isinstance(probe, Blade):
+    if "insertion" not in type(probe).model_fields:
         return
-    insertion, before = probe.insertion, len(problems.errors)
+    blade, before = cast("Blade", probe), len(problems.errors)
+    insertion = blade.insertion
     if insertion is None:
-        if probe.toughness is not None:
+        if blade.toughness is not None:
             problems.error(
-                "probe.toughness", f"{probe.toughness:g} J/m^2", "is for an insertion: add [probe.insertion]"
+                "probe.toughness", f"{blade.toughness:g} J/m^2", "is for an insertion: add [probe.insertion]"
             )
         return
-    _check_keys(probe, problems)
+    _check_keys(blade, problems)
     if len(problems.errors) == before and isinstance(body, Layered):
-        _check_end(body, probe, insertion, problems)
-        _check_layers(body, probe, insertion, problems)
+        _check_end(body, blade, insertion, problems)
+        _check_layers(body, blade, insertion, problems)
         if insertion.withdraw and body.layer:
             problems.error(
                 "probe.insertion.withdraw", True, "withdrawal is computed in a body of one material: omit it, or layers"
             )
 
 
-def _check_keys(probe: Blade, problems: Problems) -> None:
+def _check_keys(probe: "Blade", problems: Problems) -> None:
     if probe.toughness is None:
         problems.error("probe.toughness", None, 'is required for an insertion, such as toughness = "200 J/m^2"')
     if not probe.is_unilateral:
@@ -45,7 +49,7 @@ def _check_keys(probe: Blade, problems: Problems) -> None:
         problems.error("probe.friction", STICK, "a blade that is inserted slides: give a coefficient, such as 0.2")
 
 
-def _check_end(body: Layered, probe: Blade, insertion: Insertion, problems: Problems) -> None:
+def _check_end(body: Layered, probe: "Blade", insertion: Insertion, problems: Problems) -> None:
     """Report a path through the bottom or the support, and one whose slit leaves the top."""
     low, top = body.heights
     end = min(top - low, *(top - level for level in body.support.edges()), top - low)
@@ -66,7 +70,7 @@ def _check_end(body: Layered, probe: Blade, insertion: Insertion, problems: Prob
         )
 
 
-def _check_layers(body: Layered, probe: Blade, insertion: Insertion, problems: Problems) -> None:
+def _check_layers(body: Layered, probe: "Blade", insertion: Insertion, problems: Problems) -> None:
     """Report layers that are thinner than a step, or than the blade is wide."""
     _, upper = body.heights
     step = insertion.to / insertion.steps

@@ -6,8 +6,8 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
+from pipeline.class_maps import CLASS_MAPS
 from pipeline.shapes.body import Body
-from pipeline.shapes.files.label_names import CLASS_MAPS
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis

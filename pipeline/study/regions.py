@@ -9,7 +9,6 @@ from typing import Any, cast
 import numpy as np
 
 from pipeline.quantities import RESERVED
-from pipeline.shapes.bodies.image import FromImage
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.closed import Closed
 from pipeline.shapes.from_file import FromFile
@@ -96,7 +95,8 @@ def _check_pieces(body: Body, problems: Problems) -> None:
 
 def _check_segments(body: FromFile, problems: Problems) -> None:
     """Check that each region has a file with its unit, or a label of its own of the body's image."""
-    taken: dict[int | str, str] = {body.label: "the body"} if isinstance(body, FromImage) else {}
+    label = getattr(body, "label", None)  # of an image
+    taken: dict[int | str, str] = {} if label is None else {label: "the body"}
     for number, piece in enumerate(body.region, start=1):
         key = f"body.region[{number}]"
         _check_hollow(piece, key, problems)
@@ -107,7 +107,7 @@ def _check_segments(body: FromFile, problems: Problems) -> None:
         elif piece.label is None:
             if piece.unit is None:
                 problems.error(f"{key}.unit", None, 'is required, since surface files have none: unit = "mm"')
-        elif not isinstance(body, FromImage):
+        elif label is None:
             problems.error(f"{key}.label", piece.label, "needs a body from an image: give `file`, a closed surface")
         else:
             for name in sorted(piece.model_fields_set & {"unit", "repair"}):

@@ -60,6 +60,7 @@ def test_notebook_runs(name, tmp_path, monkeypatch):
     assert not [output for output in outputs if output.get("name") == "stderr"], outputs
 
 
+@pytest.mark.nightly
 def test_the_notebook_of_a_patient_shows_the_fields_along_the_needle(tmp_path, monkeypatch):
     text = (ROOT / "studies" / "patient.toml").read_text(encoding="utf-8")
     text = text.replace('"1 %"', '"10 %"').replace("../meshes", str(ROOT / "meshes"))

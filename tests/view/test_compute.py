@@ -49,7 +49,7 @@ def test_strain_and_unknowns_are_the_record_s(changes):
     found = fields(**changes)
     (record,) = solve(**changes).values()
     assert np.abs(found.strain / record.max_strain - 1).min() < 1e-6
-    assert found.strain.max() >= record.max_strain  # it is the largest of cells clear of the probe's edge
+    assert found.strain.max() >= (1 - 1e-12) * record.max_strain  # it is the largest of cells clear of the probe's edge
     assert (found.dofs, len(found.cells)) == (record.dofs, record.cells)
 
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
+from pipeline.class_maps import CLASS_MAPS
 from pipeline.shapes.files.checked import kept_image
-from pipeline.shapes.files.label_names import CLASS_MAPS
 from pipeline.shapes.files.labels import LARGEST_IMAGE, LabelMap, files_of, of_label, read_labels
 from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.files.raw import Raw

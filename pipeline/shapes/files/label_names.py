@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from pipeline.class_maps import CLASS_MAPS
 from pipeline.printable import printable
 from pipeline.shapes.triangles import SurfaceError
 
 Names = dict[int, str]
-# Values of the key `names` that are no files.
-CLASS_MAPS = ("totalsegmentator", "totalsegmentator_mr")
 _CLASSES = Path(__file__).parent / "totalsegmentator.toml"
 _LARGEST = 10_000_000  # bytes of a file of names
 _LONGEST = 100  # letters of a name

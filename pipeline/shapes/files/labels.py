@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.class_maps import CLASS_MAPS
 from pipeline.shapes.files.dicom_labels import read_dicom, series_files
 from pipeline.shapes.files.label_map import LARGEST_IMAGE, UNITS, LabelMap, check_shape, of_label, unit_of, whole
-from pipeline.shapes.files.label_names import CLASS_MAPS, names_of_extensions, read_names
+from pipeline.shapes.files.label_names import names_of_extensions, read_names
 from pipeline.shapes.files.nrrd_labels import data_file, read_nrrd
 from pipeline.shapes.triangles import SurfaceError
 
