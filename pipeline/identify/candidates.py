@@ -72,9 +72,12 @@ def planned_trials(study: Study) -> tuple[Trial, ...]:
     Raises:
         StudyError: if a scene of it has several values of a key, or there is neither a depth nor a curve.
     """
+    has_depth = all(problem.key != "probe.depth" for problem in study.lacking)
     if not study.measurements:
+        if not has_depth:
+            raise StudyError(study.file, [Problem("probe.depth", None, "is required: the depth of the planned test")])
         return (Trial("test", _parsed(study, study.raw)),)
-    if any(problem.key == "probe.depth" for problem in study.lacking):
+    if not has_depth:
         study = pressed_to(study, _recorded(study))
     return tuple(Trial(one.name, scene_of(study, one), one.machine_compliance) for one in study.measurements)
 

@@ -24,10 +24,11 @@ _VALUES = "has no value of what [identify] is to find; only `epsmesh identify` d
 def completed(raw: Mapping[str, Any], *, is_scene: bool) -> tuple[dict[str, Any], tuple[Problem, ...]]:
     """Return a study with the depth and the values that it leaves out, and what its cases lack, as errors.
 
-    That is done to a study with [[measurement]], and to a scene of one (``is_scene``). Others are returned as they are.
+    That is done to a study with [[measurement]] or [identify], and to a scene of one (``is_scene``). Others are
+    returned as they are.
     """
     found = dict(raw)
-    if not (is_scene or "measurement" in raw):
+    if not (is_scene or {"measurement", "identify"} & raw.keys()):
         return found, ()
     lacking = [] if "mesh" in raw else [Problem("[mesh]", None, _ABSENT)]
     values = _values(raw)

@@ -277,6 +277,19 @@ def test_design_ranks_tests_without_any_curve(folder, epsmesh, tmp_path):
     assert all(one["half_widths"]["young"][0] > 0 for one in study["ranked"])
 
 
+def test_design_needs_neither_measurement_nor_mesh_but_a_depth(folder, epsmesh, tmp_path):
+    scene, _, rest = (folder / "none.toml").read_text().partition("[[measurement]]")
+    path = tmp_path / "scene.toml"
+    path.write_text(scene + rest[rest.index("[identify]") :])
+    done = epsmesh("identify", path, "--design", "--output", tmp_path)
+    assert done.exit_code == 2
+    assert "probe.depth: is required: the depth of the planned test" in done.stderr
+    path.write_text(path.read_text().replace('radius = "2 mm"', 'radius = "2 mm"\ndepth = "0.2 mm"'))
+    done = epsmesh("identify", path, "--design", "--output", tmp_path)
+    assert done.exit_code == 0, done.output
+    assert "a further punch of radius 6.00 mm" in done.output
+
+
 def test_design_needs_unknowns(folder, epsmesh, tmp_path):
     text = STUDY.format(file="x.csv", may_hide="[]").partition("[[measurement]]")[0]
     text = text.replace("poisson", 'young = "10 kPa"\npoisson').replace("[probe]", '[probe]\ndepth = "0.2 mm"')
