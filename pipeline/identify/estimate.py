@@ -60,11 +60,12 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
     low, high = x - np.hypot(x - low, ours), x + np.hypot(high - x, ours)
     wanted = tuple(k for k, unknown in enumerate(model.space.unknowns) if unknown.is_wanted)
     beyond = out_of_range(found)
-    verdict = beyond or _verdict(found)
-    does_fit = verdict == FITS
+    sticking = list(attractions([one.curve for one in measured], is_much=True))
+    does_fit = not (beyond or sticking) and _does_fit(found)
+    verdict = beyond or FITS
     if not (does_fit or beyond):
         found = _by_least_squares(found)
-        x = found.x
+        x, verdict = found.x, f"does not fit: {'; '.join(sticking) or _misfit(found)}"
     hidden_low, hidden_high = hidden_bars(found, wanted) if does_fit else (low, high)
     sides = [low, high, np.fmin(low, hidden_low), np.fmax(high, hidden_high)]
     estimate, low, high, low_hidden, high_hidden = (_values(model, np.clip(side, 0.0, 1.0)) for side in [x, *sides])
@@ -175,20 +176,21 @@ def _curve(found: Fit, number: int) -> CurveFit:
     )
 
 
-def _verdict(found: Fit) -> str:
-    """Return whether the law fits; if not, by how much it does not."""
-    if sticking := list(attractions([one.curve for one in found.model.measured], is_much=True)):
-        return f"does not fit: {'; '.join(sticking)}"
-    if found.misfit <= MISFIT or _is_small(found):
-        return FITS
-    number = int(np.argmax([belief.misfit for belief in found.beliefs]))
-    force, measured = _by_least_squares(found).force[number], found.model.measured[number]
+def _does_fit(found: Fit) -> bool:
+    """Return whether the law fits: a deviation from it is not much more probable than none, or too small to matter."""
+    return found.misfit <= MISFIT or _is_small(found)
+
+
+def _misfit(least: Fit) -> str:
+    """Return by how much a law that does not fit differs from the worst curve, by least squares."""
+    number = int(np.argmax([belief.misfit for belief in least.beliefs]))
+    force, measured = least.force[number], least.model.measured[number]
     residual = measured.curve.force - force
     largest = float(np.abs(residual).max() / np.ptp(measured.curve.force))
-    name = f' of "{measured.curve.name}"' if len(found.force) > 1 else ""
+    name = f' of "{measured.curve.name}"' if len(least.force) > 1 else ""
     return (
-        f"does not fit: the force{name} differs from the law's by a smooth curve, up to {100 * largest:.2g} % of the "
-        "largest force; no single modulus describes it"
+        f"the force{name} differs from the law's by a smooth curve, up to {100 * largest:.2g} % of the largest force; "
+        "no single modulus describes it"
     )
 
 
