@@ -114,8 +114,8 @@ plain-loop: setup ## compare a plain FEniCSx script of a study with this program
 	$(PYTHON) -m benchmarks.plain_loop $(STUDY) $(LOOP_ARGS)
 
 realtime: setup ## build the real-time evaluator in C; test it in C, C++ and Python, and with sanitizers
-	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic -fPIC -shared realtime/epsmesh_patch.c -o realtime/libepsmesh.so -lm
-	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic realtime/epsmesh_patch.c realtime/latency.c -o realtime/latency -lm
+	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic -fPIC -shared realtime/epsmesh.c -o realtime/libepsmesh.so -lm
+	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic realtime/epsmesh.c realtime/latency.c -o realtime/latency -lm
 	$(PYTHON) -m pytest tests/realtime $(PYTEST_ARGS)
 
 resolution: setup ## the effect of a file's resolution, noise and voxels on F (a quarter of an hour): results/resolution.png

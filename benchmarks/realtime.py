@@ -234,7 +234,7 @@ def _percent(value: float) -> str:
 def _latency(path: Path, seconds: float) -> str:
     """Return the time of queries in C and in numpy, and the late ticks of a loop at 1 kHz."""
     program = _FOLDER / "latency"
-    sources = ["realtime/epsmesh_patch.c", "realtime/latency.c"]
+    sources = ["realtime/epsmesh.c", "realtime/latency.c"]
     subprocess.run(["cc", "-std=c99", "-O2", *sources, "-o", str(program), "-lm"], check=True)
     arguments = [str(program), str(path), "20000", f"{seconds:g}"]
     in_c = subprocess.run(arguments, check=True, capture_output=True, text=True).stdout

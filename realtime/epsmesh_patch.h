@@ -1,7 +1,7 @@
 /* Any convex tip on a model of epsmesh.h; see pipeline/realtime/patch.py. C99; no allocation, locks, input or output.
  *
- * Build epsmesh_patch.c instead of epsmesh.c, which it includes. A patch is plain memory of about 150 kB. Each call starts
- * from the last one's contact, so every tool and thread needs its own patch.
+ * A patch is plain memory of about 150 kB. Each call starts from the last one's contact, so every tool and thread needs
+ * its own patch.
  */
 #ifndef EPSMESH_PATCH_H
 #define EPSMESH_PATCH_H

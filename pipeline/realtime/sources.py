@@ -1,9 +1,9 @@
-"""The evaluator's C sources in this package: `epsmesh.h`, `epsmesh.c`, any convex tip, examples for simulators."""
+"""The evaluator's C sources in this package: `epsmesh.h`, `epsmesh.c` with its parts, examples for simulators."""
 
 from pathlib import Path
 
 _FOLDER = Path(__file__).parent / "c"
-_PATTERNS = ("*.[ch]", "examples/*")
+_PATTERNS = ("*.[ch]", "src/*.c", "examples/*")
 
 
 def sources() -> Path:

@@ -209,7 +209,7 @@ def test_the_curves_of_a_study_are_taken_along(elsewhere):
 def test_the_evaluator_in_c_is_copied_and_nothing_overwritten(elsewhere):
     done = epsmesh("export", "--evaluator", "mine/c", "--json")
     names = json.loads(done.stdout)["files"]
-    assert {"epsmesh.h", "epsmesh.c", "epsmesh_patch.c", "examples/hand.h", "examples/unity.c"} <= {*names}
+    assert {"epsmesh.h", "epsmesh.c", "epsmesh_patch.h", "src/patch.c", "examples/unity.c"} <= {*names}
     for name in names:
         assert (elsewhere / "mine" / "c" / name).read_text() == (STUDIES.parent / "realtime" / name).read_text()
     (elsewhere / "mine" / "c" / "epsmesh.h").unlink()

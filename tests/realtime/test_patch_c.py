@@ -19,7 +19,7 @@ ROOM = 1 << 20
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 
 _PROGRAM = """
-#include "epsmesh_patch.c"
+#include "epsmesh.c"
 #include <stdio.h>
 static double bowl(double x, double y, void *user) { (void)user; return 30 * x * x + 120 * y * y; }
 static double dent(double x, double y, void *user) { (void)user; return sqrt(sqrt(x * x + y * y)); }
@@ -49,7 +49,7 @@ int main(int count, char **words) {
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
     path = tmp_path_factory.mktemp("patch") / "libpatch.so"
-    compiled("cc", *STRICT, "-fPIC", "-shared", SOURCES / "epsmesh_patch.c", "-o", path, "-lm")
+    compiled("cc", *STRICT, "-fPIC", "-shared", SOURCES / "epsmesh.c", "-o", path, "-lm")
     found = ctypes.CDLL(str(path))
     found.epsmesh_patch_touch.restype = Touch
     found.epsmesh_patch_make.argtypes = [ctypes.c_void_p, HEIGHT, ctypes.c_void_p, ctypes.c_double]
@@ -106,4 +106,4 @@ def test_nothing_breaks_it(tmp_path):
 @pytest.mark.skipif(shutil.which("c++") is None, reason="there is no C++ compiler")
 def test_it_is_cpp_as_well(tmp_path):
     strict = ("-std=c++11", *STRICT[1:])
-    compiled("c++", *strict, "-x", "c++", "-c", SOURCES / "epsmesh_patch.c", "-o", tmp_path / "patch.o")
+    compiled("c++", *strict, "-x", "c++", "-c", SOURCES / "epsmesh.c", "-o", tmp_path / "patch.o")

@@ -1,8 +1,4 @@
-/* See epsmesh_patch.h for what is offered, pipeline/realtime/patch.py for the formulas, under the same names. */
-#include "epsmesh_patch.h"
-
-#include "epsmesh.c"
-
+/* Any convex tip: epsmesh_patch.h. Formulas are in pipeline/realtime/patch.py, under the same names. */
 enum { ROUND = 48, HALVINGS = 50, CHORDS = 500, SETS = 40, GROWTHS = 8, N = EPSMESH_SIDE, ALL = EPSMESH_CELLS };
 static const double SHALLOWEST = 1e-5, FILLED = 0.82, GOOD = 0.007, THROUGH = 1e-10, BENT = 1e-6, FLAT = 1e-3;
 

@@ -1,0 +1,156 @@
+/* Contact of one tool with a body of E = 1 at one place. pipeline/realtime/contact.py and blade.py. */
+/* ---- contact ---- */
+
+typedef struct {
+    double force, aside[2], stiffness, radius, mean_square;
+} contact;
+
+typedef struct {
+    double depth, slope, force, square, growth, compliance;
+} pressed;
+
+static double cube(double x) { return x * x * x; }
+static double fifth(double x) { return x * x * x * x * x; }
+
+static double tangent(double a, const place *p) {
+    return 0.5 / (p->plane * a) + p->c + a * a / 3 * p->h - 2.0 / 45 * p->plane * p->h * p->h * fifth(a);
+}
+
+static contact press_disc(double a, double depth, const place *p) {
+    double stiff = p->plane, h = p->h;
+    contact k;
+    int i;
+    k.force = depth / (tangent(a, p) - 4.0 / 3 * stiff * cube(a) * p->tilt);
+    for (i = 0; i < 2; i++) {
+        double slope = p->slope_c[i] + p->slope_h[i] * (a * a / 3 - 4.0 / 45 * stiff * h * fifth(a));
+        k.aside[i] = 0.5 * k.force * k.force * (slope - 4.0 / 3 * stiff * cube(a) * p->slope_tilt[i]);
+    }
+    k.stiffness = k.force / depth, k.radius = a;
+    k.mean_square = 2.0 / 3 * a * a - 8.0 / 45 * stiff * h * fifth(a);
+    return k;
+}
+
+/* D(s), D'(s), and the integrals of D and s^2 D from 0 to s */
+static void profile(const epsmesh_query *tool, double s, double out[4]) {
+    if (tool->shape == EPSMESH_SPHERE) {
+        double big = tool->radius, t = (s / big) * (s / big), power = t, sum[4] = {0, 0, 0, 0};
+        int k;
+        for (k = 0; k < TERMS; k++) {
+            double term = power / (2 * k + 1);
+            sum[0] += term, sum[1] += (2 * k + 2) * term;
+            sum[2] += term / (2 * k + 3), sum[3] += term / (2 * k + 5);
+            if (term <= NEGLIGIBLE * sum[0]) break;
+            power *= t;
+        }
+        out[0] = big * sum[0], out[1] = big / s * sum[1], out[2] = big * s * sum[2], out[3] = big * cube(s) * sum[3];
+    } else {
+        double steep = 0.5 * PI / tan(tool->angle);
+        out[0] = steep * s, out[1] = steep, out[2] = steep * s * s / 2, out[3] = steep * s * s * s * s / 4;
+    }
+}
+
+static pressed press_to(double a, const epsmesh_query *tool, const place *p) {
+    double stiff = p->plane, h = p->h, d[4], own = 1 - 2.0 / 3 * stiff * h * cube(a), power, effect;
+    pressed k = {-1, 0, 0, 0, 0, 0};
+    if (!(own > 0)) return k;
+    profile(tool, a, d);
+    d[0] += p->bend * a * a, d[1] += 2 * p->bend * a, d[2] += p->bend * cube(a) / 3, d[3] += p->bend * fifth(a) / 5;
+    k.force = 2 * stiff * (a * d[0] - d[2]) / own;
+    k.square = 4 * stiff * (cube(a) / 3 * d[0] - d[3]) + 4.0 / 15 * stiff * h * k.force * fifth(a);
+    k.growth = 2 * stiff * a * d[1] + 2 * stiff * h * k.force * a * a;
+    if (k.growth <= 0 || k.force <= 0) {
+        pressed none = {-1, 0, 0, 0, 0, 0};
+        return none;
+    }
+    power = own / k.growth * k.force / a;
+    effect = -2.0 / 3 * stiff * p->tilt * cube(a) * k.force * (2 + 3 * power);
+    k.depth = d[0] + 0.5 * h * k.force * a * a + p->c * k.force + 0.25 * h * k.square + effect;
+    k.compliance = tangent(a, p) + effect * (1 + 3 * power) / k.force;
+    k.slope = k.compliance * k.growth / own;
+    return k;
+}
+
+static int press_round(const epsmesh_query *tool, const place *p, double most, contact *k) {
+    double limit = tool->shape == EPSMESH_SPHERE ? BALL_LIMIT * tool->radius : tool->radius, depth = tool->depth;
+    double low = 0, high = most < limit ? most : limit, a, step, of_h, of_tilt;
+    pressed found;
+    int i;
+    if (!(press_to(high, tool, p).depth >= depth)) return 0;
+    a = tool->shape == EPSMESH_SPHERE ? sqrt(tool->radius * depth) : 2 / PI * depth * tan(tool->angle);
+    if (!(a < 0.5 * high)) a = 0.5 * high;
+    for (i = 0; i < STEPS; i++) {
+        found = press_to(a, tool, p);
+        if (found.depth < depth) low = a; else high = a;
+        step = found.slope > 0 ? a - (found.depth - depth) / found.slope : low;
+        if (!(low < step && step < high)) step = 0.5 * (low + high);
+        if (fabs(step - a) <= SAME * a) break;
+        a = step;
+    }
+    found = press_to(a, tool, p);
+    k->force = found.force, k->stiffness = 1 / found.compliance, k->radius = a;
+    k->mean_square = found.square / found.force;
+    of_h = 0.25 * found.force * found.force * k->mean_square +
+           4.0 / 3 * p->plane * p->plane * p->tilt * fifth(a) * cube(found.force) / found.growth;
+    of_tilt = -2.0 / 3 * p->plane * cube(a) * found.force * found.force;
+    for (i = 0; i < 2; i++)
+        k->aside[i] = 0.5 * found.force * found.force * p->slope_c[i] + of_h * p->slope_h[i] +
+                      of_tilt * p->slope_tilt[i] + 0.5 * found.square * p->slope_bend[i];
+    return 1;
+}
+
+/* A rectangle's stiffness, second moments and tilting stiffness: pipeline/realtime/blade.py */
+static const double RECTANGLE[5][8] = {
+    {1.5467288, -0.5389724, 0.154788, -0.0121522, 0.0020102, -0.0001257, 6e-06, -1.4e-06},
+    {0.4134192, 0.0443058, 0.0039289, -0.0011234, -0.0003526, 1.7e-06, 2.01e-05, 4.2e-06},
+    {0.484368, -0.0181444, -0.0053293, -0.0007768, 1.19e-05, 3.22e-05, 7.5e-06, 8e-07},
+    {1.8450174, -0.0168921, 0.2328837, 0.0145178, 0.0050319, 0.0002247, -2e-06, -6.7e-06},
+    {1.7362244, 0.2238417, 0.0903649, 0.0247386, 0.0048149, 0.0006582, 5.88e-05, 3.6e-06},
+};
+
+static int press_blade(const epsmesh_query *q, const double edge[2], const place *p, double most, contact *k) {
+    double big = 0.5 * (q->length > q->width ? q->length : q->width), c8[3][EPSMESH_MOST], r[5] = {0, 0, 0, 0, 0};
+    double small = 0.5 * (q->length > q->width ? q->width : q->length), e[2][2], lean[2], twice[2], mean, half, soft;
+    double of_place[2], along_edge, across;
+    int i, j;
+    if (sqrt(big * big + small * small) > most) return 0;
+    polynomials(1 - 2 * log(small / big) / log(SLENDER), 8, c8);
+    for (i = 0; i < 5; i++)
+        for (j = 0; j < 8; j++) r[i] += RECTANGLE[i][j] * c8[0][j];
+    for (i = 0; i < 2; i++) e[0][i] = edge[i];
+    if (q->length < q->width) e[0][0] = -edge[1], e[0][1] = edge[0];
+    e[1][0] = -e[0][1], e[1][1] = e[0][0];
+    along_edge = r[1] * big * big, across = r[2] * small * small;
+    lean[0] = p->plane * r[3] * big * big * sqrt(big * small), lean[1] = p->plane * r[4] * small * small * big;
+    twice[0] = e[0][0] * e[0][0] - e[0][1] * e[0][1], twice[1] = 2 * e[0][0] * e[0][1];
+    mean = (along_edge + across) / 2, half = along_edge - across;
+    soft = 1 / (p->plane * r[0] * 2 * sqrt(big * small)) + p->c + mean * p->h +
+           half * (twice[0] * p->bent[0] + twice[1] * p->bent[1]);
+    for (i = 0; i < 2; i++)
+        of_place[i] = p->slope_c[i] + mean * p->slope_h[i] +
+                      half * (twice[0] * p->bent_slopes[0][i] + twice[1] * p->bent_slopes[1][i]);
+    for (j = 0; j < 2; j++) {
+        double slope = p->lean[0] * e[j][0] + p->lean[1] * e[j][1];
+        soft -= lean[j] * slope * slope / 4;
+        for (i = 0; i < 2; i++)
+            of_place[i] -= lean[j] / 2 * slope * (p->hessian[i][0] * e[j][0] + p->hessian[i][1] * e[j][1]);
+    }
+    k->force = q->depth / soft, k->stiffness = 1 / soft, k->radius = sqrt(big * big + small * small);
+    k->mean_square = along_edge + across;
+    for (i = 0; i < 2; i++) k->aside[i] = 0.5 * k->force * k->force * of_place[i];
+    return 1;
+}
+
+/* The last column of the inverse of compliances, as force per depth. */
+static contact press_bonded(double a, double depth, const place *p) {
+    double shear = 0.5 / (1 + p->poisson), soft = 1 - 2 * p->poisson, xx, yy, zz, xy, xz, yz, det;
+    double down = 4 * shear * a * (soft > SOFT ? log(1 + 2 * soft) / soft : 2);
+    double aside = 8 * shear * a / (2 - p->poisson);
+    contact k;
+    xx = p->regular[0][0] + 1 / aside, yy = p->regular[1][1] + 1 / aside, xy = p->regular[0][1];
+    xz = p->regular[0][2], yz = p->regular[1][2], zz = p->regular[2][2] + 1 / down + a * a / 3 * p->h;
+    det = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+    k.force = depth * (xx * yy - xy * xy) / det, k.stiffness = k.force / depth;
+    k.aside[0] = depth * (xy * yz - xz * yy) / det, k.aside[1] = depth * (xy * xz - xx * yz) / det;
+    k.radius = a, k.mean_square = 2.0 / 3 * a * a;
+    return k;
+}

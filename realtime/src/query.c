@@ -1,0 +1,208 @@
+/* Queries of one tool: what is refused, the place below a tip, force and error bar in the body's coordinates. */
+/* ---- queries ---- */
+
+static double smaller(double a, double b) { return a < b ? a : b; }
+
+static double room_at(const epsmesh_model *m, double x, double y) {
+    if (m->is_round) return smaller(m->sides[0] - sqrt(x * x + y * y), m->thickness);
+    return smaller(smaller(m->sides[0] - fabs(x), m->sides[1] - fabs(y)), m->thickness);
+}
+
+static int is_positive(double x) { return isfinite(x) && x > 0; }
+
+/* Return whether the model has this tool; `edge` is the direction of a blade on the face. */
+static epsmesh_status tool_of(const epsmesh_model *m, const epsmesh_query *q, double edge[2]) {
+    int i, j, is_blade = q->shape == EPSMESH_BLADE, has_angle = q->shape == EPSMESH_CONE;
+    edge[0] = 1, edge[1] = 0;
+    if ((int)q->shape < EPSMESH_DISC || (int)q->shape > EPSMESH_BONDED_DISC) return EPSMESH_TOOL;
+    if ((is_blade || q->shape == EPSMESH_BONDED_DISC) && !m->has_tensors) return EPSMESH_TOOL;
+    if (!is_blade) {
+        if (!isfinite(q->radius) || (has_angle && !isfinite(q->angle))) return EPSMESH_TOOL;
+        if (q->radius < SMALLEST || (has_angle && !(0.01 <= q->angle && q->angle <= PI / 2 - 0.001)))
+            return EPSMESH_INPUT;
+        return EPSMESH_OK;
+    }
+    if (!isfinite(q->length) || !isfinite(q->width)) return EPSMESH_TOOL;
+    if (q->length < SMALLEST || q->width < SMALLEST) return EPSMESH_INPUT;
+    if (!isfinite(q->along[0]) || !isfinite(q->along[1]) || !isfinite(q->along[2])) return EPSMESH_INPUT;
+    if (q->along[0] != 0 || q->along[1] != 0 || q->along[2] != 0) {
+        double size;
+        for (i = 0; i < 2; i++)
+            for (edge[i] = 0, j = 0; j < 3; j++) edge[i] += m->axes[i][j] * q->along[j];
+        size = sqrt(edge[0] * edge[0] + edge[1] * edge[1]);
+        if (!is_positive(size)) return EPSMESH_INPUT;
+        edge[0] /= size, edge[1] /= size;
+    }
+    return q->width < SLENDER * q->length || q->length < SLENDER * q->width ? EPSMESH_TOOL : EPSMESH_OK;
+}
+
+static epsmesh_status misfit(const epsmesh_model *m, const epsmesh_query *q, double local[3], double edge[2], spot *f) {
+    double length = 0, inward = 0, shift;
+    epsmesh_status status;
+    int i, j;
+    if (!m->is_loaded) return EPSMESH_NO_MODEL;
+    status = tool_of(m, q, edge);
+    if (status != EPSMESH_OK) return status;
+    if (!isfinite(q->depth) || !isfinite(q->poisson) || !is_positive(q->young)) return EPSMESH_INPUT;
+    for (i = 0; i < 3; i++) {
+        local[i] = 0;
+        for (j = 0; j < 3; j++) {
+            shift = q->at[j] - m->origin[j];
+            local[i] += m->axes[i][j] * shift;
+        }
+        if (!isfinite(local[i])) return EPSMESH_INPUT;
+    }
+    if (m->is_round ? !(local[0] * local[0] + local[1] * local[1] <= m->reach[0] * m->reach[0])
+                    : !(fabs(local[0]) <= m->reach[0] && fabs(local[1]) <= m->reach[1]))
+        return EPSMESH_OUTSIDE;
+    *f = face_at(m, local[0], local[1]);
+    for (i = 0; i < 3; i++) {
+        if (!isfinite(q->axis[i])) return EPSMESH_INPUT;
+        length += q->axis[i] * q->axis[i];
+        for (j = 0; j < 3; j++) inward -= f->normal[i] * m->axes[i][j] * q->axis[j];
+    }
+    if (!isfinite(length)) return EPSMESH_INPUT;
+    if (length > 0 && !(inward / sqrt(length) >= 1 - 0.5 * m->aligned * m->aligned)) return EPSMESH_TILTED;
+    if (!(fabs(local[2] - f->height) <= m->off)) return EPSMESH_OFF;
+    if (!(m->poisson_range[0] <= q->poisson && q->poisson <= m->poisson_range[1])) return EPSMESH_POISSON;
+    if (q->depth >= m->thickness) return EPSMESH_DEEP;
+    return q->depth <= TOUCHING ? EPSMESH_LOST : EPSMESH_OK;
+}
+
+/* Move a place to about the nearest one of the region; return whether it was outside. */
+static int into_region(const epsmesh_model *m, double place[2]) {
+    double r = sqrt(place[0] * place[0] + place[1] * place[1]);
+    int i, was_outside = 0;
+    for (i = 0; i < 2; i++) {
+        double size = m->is_round ? r : fabs(place[i]);
+        if (size > m->reach[i]) place[i] *= m->reach[i] / size * (1 - 1e-15), was_outside = 1;
+    }
+    return was_outside;
+}
+
+/* Newton's method for (tip - p) . dp/dx = (tip - p) . dp/dy = 0, from the place straight above. */
+static epsmesh_status curved_foot(const epsmesh_model *m, const double tip[3], double foot[3], double *depth) {
+    double place[2] = {tip[0], tip[1]};
+    int i, j, steps, cuts = into_region(m, place);
+    for (steps = 0; steps < FOOT_STEPS; steps++) {
+        spot f = face_at(m, place[0], place[1]);
+        double above = tip[2] - f.height, off[2], k[2][2], det, step[2];
+        if (steps == 0 && !cuts && above >= 0) return EPSMESH_LOST;
+        for (i = 0; i < 2; i++) {
+            off[i] = tip[i] - place[i] + above * f.slope[i];
+            for (j = 0; j < 2; j++) k[i][j] = (i == j) + f.slope[i] * f.slope[j] - above * f.second[i][j];
+        }
+        det = k[0][0] * k[1][1] - k[0][1] * k[1][0];
+        if (!(det > 0 && k[0][0] > 0)) return EPSMESH_DEEP;
+        step[0] = (k[1][1] * off[0] - k[0][1] * off[1]) / det, step[1] = (k[0][0] * off[1] - k[1][0] * off[0]) / det;
+        if (fabs(step[0]) <= FOOT_SAME * m->reach[0] && fabs(step[1]) <= FOOT_SAME * m->reach[1]) {
+            foot[0] = place[0], foot[1] = place[1], foot[2] = f.height;
+            *depth = -above / f.normal[2];
+            return above < 0 ? EPSMESH_OK : EPSMESH_LOST;
+        }
+        for (i = 0; i < 2; i++) place[i] += step[i];
+        /* If steps end at the border several times, the place is outside. */
+        if (into_region(m, place) && ++cuts > 2) return EPSMESH_OUTSIDE;
+    }
+    return EPSMESH_DEEP;
+}
+
+epsmesh_status epsmesh_foot(const epsmesh_model *m, const double tip[3], double at[3], double *depth) {
+    double local[3], foot[3];
+    epsmesh_status status;
+    int i, j;
+    if (!m->is_loaded) return EPSMESH_NO_MODEL;
+    for (i = 0; i < 3; i++) {
+        for (local[i] = 0, j = 0; j < 3; j++) local[i] += m->axes[i][j] * (tip[j] - m->origin[j]);
+        if (!isfinite(local[i])) return EPSMESH_INPUT;
+    }
+    if (m->is_flat) {
+        if (local[2] >= 0) return EPSMESH_LOST;
+        foot[0] = local[0], foot[1] = local[1], foot[2] = 0, *depth = -local[2];
+    } else {
+        status = curved_foot(m, local, foot, depth);
+        if (status != EPSMESH_OK) return status;
+    }
+    for (i = 0; i < 3; i++)
+        for (at[i] = m->origin[i], j = 0; j < 3; j++) at[i] += foot[j] * m->axes[j][i];
+    return EPSMESH_OK;
+}
+
+static epsmesh_touch all(epsmesh_status status, double number) {
+    epsmesh_touch t;
+    t.status = status;
+    t.force[0] = t.force[1] = t.force[2] = t.force_error = t.stiffness = t.contact_radius = number;
+    return t;
+}
+
+epsmesh_query epsmesh_ask(const epsmesh_model *m) {
+    epsmesh_query q;
+    memset(&q, 0, sizeof q);
+    q.radius = q.angle = q.depth = q.at[0] = q.at[1] = q.at[2] = (double)NAN;
+    q.length = q.width = (double)NAN;
+    q.young = m->young, q.poisson = m->poisson;
+    return q;
+}
+
+/* A valid query, with the values at its place. */
+typedef struct {
+    double local[3], edge[2], room;
+    spot f;
+    place p;
+} asked;
+
+static int surveyed(const epsmesh_model *m, const epsmesh_query *q, asked *a) {
+    if (!place_at(m, a->local[0], a->local[1], q->poisson, q->shape >= EPSMESH_BLADE, &a->p)) return 0;
+    a->p.bend = a->f.bend, a->p.slope_bend[0] = a->f.slope_bend[0], a->p.slope_bend[1] = a->f.slope_bend[1];
+    a->room = room_at(m, a->local[0], a->local[1]);
+    return 1;
+}
+
+/* Return whether the contact of a tool at a depth of its query is small enough. */
+static int press(const epsmesh_model *m, const epsmesh_query *q, const asked *a, contact *k) {
+    double most = m->largest * a->room;
+    if (q->shape == EPSMESH_BLADE) return press_blade(q, a->edge, &a->p, most, k);
+    if (q->shape == EPSMESH_SPHERE || q->shape == EPSMESH_CONE) return press_round(q, &a->p, most, k);
+    *k = q->shape == EPSMESH_DISC ? press_disc(q->radius, q->depth, &a->p) : press_bonded(q->radius, q->depth, &a->p);
+    return q->radius <= most;
+}
+
+static double bar_of(const epsmesh_model *m, const epsmesh_query *q, const asked *a, const contact *k) {
+    double share = (k->radius / a->room) * (k->radius / a->room), error;
+    double bent = fabs(a->p.h) + 2 * sqrt(a->p.bent[0] * a->p.bent[0] + a->p.bent[1] * a->p.bent[1]);
+    double sticks = q->shape == EPSMESH_BONDED_DISC ? STICKS * (1 - 2 * q->poisson) * k->radius / a->room : 0;
+    error = m->bar[3] + k->stiffness * ((m->bar[0] + m->bar[2] * share * share + sticks) / a->room +
+                                        m->bar[1] * bent * k->mean_square);
+    if (q->shape == EPSMESH_SPHERE || q->shape == EPSMESH_CONE) {
+        double growth = 3 * k->stiffness / k->force - 2 / q->depth;
+        error += m->bend_error / 2 * k->mean_square * (growth > 0 ? growth : 0);
+    }
+    return error;
+}
+
+/* Return a contact in the body's coordinates, of a tool at `depth` by itself. */
+static epsmesh_touch told(const epsmesh_model *m, double young, double depth, const asked *a, const contact *k,
+                          double error) {
+    epsmesh_touch t;
+    double force[3];
+    int i, j;
+    t.status = EPSMESH_OK, t.stiffness = young * k->stiffness, t.contact_radius = k->radius, t.force_error = error;
+    force_at(&a->f, k->force, k->aside, depth, force);
+    for (i = 0; i < 3; i++)
+        for (t.force[i] = 0, j = 0; j < 3; j++) t.force[i] += young * force[j] * m->axes[j][i];
+    if (!(k->force > 0 && is_positive(t.stiffness) && t.force_error >= 0 && isfinite(t.force_error) &&
+          isfinite(t.force[0]) && isfinite(t.force[1]) && isfinite(t.force[2])))
+        return all(EPSMESH_DAMAGED, (double)NAN);
+    return t;
+}
+
+epsmesh_touch epsmesh_touch_at(const epsmesh_model *m, const epsmesh_query *q) {
+    asked a;
+    contact k;
+    epsmesh_status status = misfit(m, q, a.local, a.edge, &a.f);
+    if (status == EPSMESH_LOST) return all(status, 0.0);
+    if (status != EPSMESH_OK) return all(status, (double)NAN);
+    if (!surveyed(m, q, &a)) return all(EPSMESH_DAMAGED, (double)NAN);
+    if (!press(m, q, &a, &k)) return all(EPSMESH_LARGE, (double)NAN);
+    return told(m, q->young, q->depth, &a, &k, bar_of(m, q, &a, &k));
+}
