@@ -94,7 +94,7 @@ def curved_region(scope: Scope, room: float) -> Region:
     """Return the region of a curved body round the study's place; ``room`` (m) is the distance to its boundary."""
     body, radius = scope.body, scope.case.probe.circumradius
     is_round, reach, even = False, (_REACH * radius,) * 2, (False, False)
-    if body.half_sides and not any(scope.case.probe.at[:2]) and not body.inclusion:
+    if body.half_sides and not any(scope.case.probe.at[:2]) and not body.embedded:
         is_round, even = body.is_round, (True, True)
         reach = (_OF_AXES * body.half_sides[0], _OF_AXES * body.half_sides[1])
     return Region(reach, (reach[0] + 2 * room, reach[1] + 2 * room), room, is_round, even)

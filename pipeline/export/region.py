@@ -30,7 +30,10 @@ class Region:
         """Return the region with a margin: a ``share`` of the smaller of half the width and the height."""
         sides, height = body.half_sides, body.heights[1] - body.heights[0]
         left = share * min(*sides, height)
-        even = tuple(all(abs(piece.at[axis]) <= _SAME * height for piece in body.inclusion) for axis in range(2))
+        even = tuple(
+            all(abs(piece.at[axis]) <= _SAME * height for piece in body.inclusion) and not body.region
+            for axis in range(2)
+        )
         is_square = sides[0] == sides[1] and body.holds_round
         reach = (sides[0] - left, sides[1] - left)
         return Region(reach, sides, body.depth_of_tissue, body.is_round, (even[0], even[1]), is_square)

@@ -3,13 +3,14 @@
 Both query the geometry kernel while its model is open.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import ceil
 
 import gmsh
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.regions import PointSizes
 from pipeline.scene.model import Scene
 from pipeline.shapes.bodies.cad import FromCad
 from pipeline.shapes.triangles import half_edges
@@ -24,21 +25,42 @@ _STRAIGHT = {1: "Line", 2: "Plane"}
 
 def rounded_sizes(scene: Scene, growth: float) -> Iterator[str]:
     """Yield the element sizes for rounded edges, as text for gmsh; they grow by ``growth`` per unit of distance."""
-    body = scene.body
-    if not isinstance(body, FromCad):
-        return
-    solid = body.solid
-    for radius in np.unique(solid.radius[solid.radius < body.bend]):
-        size = scene.units(max(_PER_RADIUS * float(radius), _LEAST * body.extent))
-        curves = _curves_of(scene.units(float(radius)))
-        if not curves:
-            continue
+    for size, curves in _rounded(scene):
         longest = max(gmsh.model.occ.getMass(1, curve) for curve in curves)
         distance = gmsh.model.mesh.field.add("Distance")
         gmsh.model.mesh.field.setNumbers(distance, "CurvesList", curves)
         points = min(_MOST, ceil(_POINTS * longest / size))
         gmsh.model.mesh.field.setNumber(distance, "NumPointsPerCurve", points)
         yield f"{size:.12g}+{growth:.12g}*F{distance}"
+
+
+def rounded_points(scene: Scene, growth: float) -> Iterator[PointSizes]:
+    """Yield the same sizes, for points of the rounded edges."""
+    for size, curves in _rounded(scene):
+        points = scene.scale * points_along(curves, size / _POINTS)
+        yield PointSizes(scene.scale * size, points, growth)
+
+
+def _rounded(scene: Scene) -> Iterator[tuple[float, list[int]]]:
+    """Yield the element size, in the model's unit, along the rounded edges of each radius, and their curves."""
+    body = scene.body
+    if not isinstance(body, FromCad):
+        return
+    solid = body.solid
+    for radius in np.unique(solid.radius[solid.radius < body.bend]):
+        size = scene.units(max(_PER_RADIUS * float(radius), _LEAST * body.extent))
+        if curves := _curves_of(scene.units(float(radius))):
+            yield size, curves
+
+
+def points_along(curves: Iterable[int], spacing: float) -> FloatArray:
+    """Return points (n, 3) along curves of the model, about ``spacing`` apart, in its unit."""
+    parts = []
+    for curve in curves:
+        (start,), (end,) = gmsh.model.getParametrizationBounds(1, curve)
+        count = min(_MOST, ceil(gmsh.model.occ.getMass(1, curve) / spacing)) + 1
+        parts.append(np.array(gmsh.model.getValue(1, curve, np.linspace(start, end, count).tolist())).reshape(-1, 3))
+    return np.vstack(parts)
 
 
 def _boundary() -> list[tuple[int, int]]:

@@ -1,11 +1,11 @@
 """Tetrahedral meshes of a scene from gmsh, on one process, as plain arrays."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import ceil, nan
-from typing import Any
+from typing import Any, TypeVar
 
 import gmsh
 import numpy as np
@@ -14,7 +14,7 @@ from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.follow import middle_nodes, rounded_sizes
 from pipeline.mesh.reason import reason
-from pipeline.mesh.regions import longest_at_rim, region_sizes
+from pipeline.mesh.regions import LocalSizes, longest_at_rim, region_sizes
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, SLIT, TISSUE, Scene, SceneError, build
 from pipeline.shapes.bodies.cad import FromCad
@@ -32,6 +32,9 @@ _ON_EDGES = 1e-6
 _FLAT = 1e-5
 # If gmsh fails, a round side gets the resolution of a side with the body's extent divided by this.
 _RETRIES = (4, 8)
+
+
+Taken = TypeVar("Taken")
 
 
 class MeshError(Exception):
@@ -64,7 +67,6 @@ class MeshArrays:
     deviation: float = nan
 
 
-@stage("gmsh")
 def generate(scene: Scene, sizes: Sizes) -> MeshArrays:
     """Mesh ``scene``: the same input gives the same arrays, bit for bit, on the same version of gmsh.
 
@@ -75,18 +77,43 @@ def generate(scene: Scene, sizes: Sizes) -> MeshArrays:
         MeshError: with gmsh's own message, if meshing fails.
     """
     start = time.perf_counter()
+
+    def made(sizes: Sizes) -> MeshArrays:
+        return in_model(scene, sizes, 3, lambda rim_curves, _: _collect(scene, rim_curves, start))
+
+    return with_smaller(made, scene, sizes)
+
+
+def with_smaller(made: Callable[[Sizes], MeshArrays], scene: Scene, sizes: Sizes) -> MeshArrays:
+    """Return the mesh that is ``made`` with ``sizes``, or with smaller elements far from the contact if that fails."""
     for divisor in _RETRIES:
         try:
-            return _generate(scene, sizes, start)
+            return made(sizes)
         except GeometryError:
             raise
         except MeshError:
             sizes = replace(sizes, column=min(sizes.column, scene.body.extent / divisor))
-    return _generate(scene, sizes, start)
+    return made(sizes)
 
 
-def _generate(scene: Scene, sizes: Sizes, start: float) -> MeshArrays:
-    with _model(scene) as kept:
+@stage("gmsh")
+def in_model(
+    scene: Scene,
+    sizes: Sizes,
+    dim: int,
+    take: Callable[[list[int], tuple[LocalSizes, ...]], Taken],
+    *,
+    stays: bool = True,
+) -> Taken:
+    """Mesh ``scene`` up to dimension ``dim``, and return what ``take`` returns while gmsh's model is open.
+
+    It is called with the curves of the probe's rim and the sizes of regions. A model that ``stays`` is used again.
+
+    Raises:
+        GeometryError: if there is nothing to mesh.
+        MeshError: with gmsh's own message, if meshing fails.
+    """
+    with _model(scene, stays) as kept:
         if "rim" not in kept:
             kept["rim"] = _built(scene)
         rim_curves = kept["rim"]
@@ -96,15 +123,17 @@ def _generate(scene: Scene, sizes: Sizes, start: float) -> MeshArrays:
                 least = ceil(scene.probe.perimeter / parts / longest_at_rim(scene.body))
                 edges = max(scene.rim_segments // parts, least)
                 gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], edges + 1)
-            more = [*region_sizes(scene, sizes.growth), *rounded_sizes(scene, sizes.growth)]
+            local, unit = region_sizes(scene, sizes.growth), 1 / scene.scale
+            more = [term for part in local for term in part.terms(unit, gmsh.model.geo)]
+            more += rounded_sizes(scene, sizes.growth)
             lifted = [] if scene.is_flat else rim_curves
             last = set_size_field(sizes, scene.probe, scene.frame, scene.scale, more, lifted)
-            gmsh.model.mesh.generate(3)
+            gmsh.model.mesh.generate(dim)
         except Exception as error:  # gmsh raises bare Exception
             raise MeshError(f"gmsh: {reason(error)}") from error
-        arrays = _collect(scene, rim_curves, start)
+        taken = take(rim_curves, local)
         _clear(last)
-        return arrays
+        return taken
 
 
 def _clear(last: int) -> None:
@@ -125,13 +154,13 @@ def _built(scene: Scene) -> list[int]:
 
 
 @contextmanager
-def _model(scene: Scene) -> Iterator[dict[str, Any]]:
-    """Open gmsh; later meshes of the same ``scene`` reuse the model that was built, and the data stored with it.
+def _model(scene: Scene, stays: bool) -> Iterator[dict[str, Any]]:
+    """Open gmsh; if it ``stays``, later meshes of the same ``scene`` reuse the model that was built and its data.
 
     Other element sizes give the same elements as on a new model, bit for bit.
     """
     drawn = scene if scene.straight else replace(scene, rim_segments=0)  # along curved edges segments are sizes
-    with gmsh_session(drawn if isinstance(scene.body, Drawn) else None) as kept:
+    with gmsh_session(drawn if stays and isinstance(scene.body, Drawn) else None) as kept:
         model_options()
         yield kept
 
@@ -180,12 +209,18 @@ def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
     return MeshArrays(points, orient(points, cells), facets, rim_points, time.perf_counter() - start, regions, bent)
 
 
-def _regions() -> IntArray:
-    """Return the region of each tetrahedron, in the order of the entities."""
+def region_of_volume() -> dict[int, int]:
+    """Return the region number of each volume of gmsh's current model."""
     number: dict[int, int] = {}
     for dim, group in gmsh.model.getPhysicalGroups(3):
         region = int(gmsh.model.getPhysicalName(dim, group).removeprefix(TISSUE) or 0)
-        number |= dict.fromkeys(gmsh.model.getEntitiesForPhysicalGroup(dim, group), region)
+        number |= dict.fromkeys(map(int, gmsh.model.getEntitiesForPhysicalGroup(dim, group)), region)
+    return number
+
+
+def _regions() -> IntArray:
+    """Return the region of each tetrahedron, in the order of the entities."""
+    number = region_of_volume()
     tags = [tag for _, tag in gmsh.model.getEntities(3)]
     counts = [sum(map(len, gmsh.model.mesh.getElements(3, tag)[1])) for tag in tags]
     return np.repeat(np.array([number[tag] for tag in tags], dtype=np.int64), counts)

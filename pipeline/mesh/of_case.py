@@ -38,7 +38,7 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" = None
     segments = sizes.rim_segments(case.probe)
     held, ball = not (case.mesh.keeps_all or case.mesh.outside == "free"), case.is_closed
     scene = Scene(case.body, case.probe, _column(case), held, segments, straight, planes, ball)
-    arrays = _of_triangles(scene, case.body, sizes, kept) if isinstance(case.body, Scanned) else generate(scene, sizes)
+    arrays = _meshed(scene, sizes, kept)
     arrays = open_slit(arrays, scene) if scene.has_inner_slit else arrays
     arrays = arrays if straight else curve(arrays, scene)
     arrays = _with_linear(arrays, case) if case.is_linear_beyond else arrays
@@ -61,12 +61,18 @@ def _column(case: Case) -> float:
     return footprint if is_thin and case.mesh.outside == "free" and case.probe.is_round else column
 
 
-def _of_triangles(scene: Scene, body: Scanned, sizes: Sizes, kept: "Kept | None") -> MeshArrays:
-    """Return the mesh of a scene on a scanned ``body``."""
+def _meshed(scene: Scene, sizes: Sizes, kept: "Kept | None") -> MeshArrays:
+    """Return the mesh of a scene by the generator for its body."""
     # Imported here, since libigl and other libraries take 80 ms to load, which other bodies do not need.
-    from pipeline.mesh.organ.make import mesh_scanned  # noqa: PLC0415
+    if isinstance(scene.body, Scanned):
+        from pipeline.mesh.organ.make import mesh_scanned  # noqa: PLC0415
 
-    return mesh_scanned(scene, body, sizes, kept)
+        return mesh_scanned(scene, scene.body, sizes, kept)
+    if scene.body.region:
+        from pipeline.mesh.organ.solid import mesh_solid  # noqa: PLC0415
+
+        return mesh_solid(scene, sizes)
+    return generate(scene, sizes)
 
 
 def upright(case: Case, arrays: MeshArrays) -> MeshArrays:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import inf
-from typing import Any
+from typing import Any, Protocol
 
 import gmsh
 import numpy as np
@@ -39,19 +39,75 @@ def longest_at_rim(body: Body) -> float:
     return _LONGER * _IN_LAYER * (body.heights[1] - body.interfaces[0]) if body.interfaces else inf
 
 
-def region_sizes(scene: Scene, growth: float) -> Iterator[str]:
-    """Yield the element sizes of the regions of a body, as text for gmsh in units of the model.
+class LocalSizes(Protocol):
+    """Upper limits of the element size (m) near a part of a scene."""
 
-    They grow by ``growth`` per unit of distance.
-    """
-    body, unit = scene.body, 1 / scene.scale
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the limit (m) at points (n, 3)."""
+
+    def terms(self, unit: float, kernel: Any) -> Iterator[str]:
+        """Yield limits, whose minimum counts, as text for gmsh, with ``unit`` units in a metre.
+
+        Points that they refer to are added to gmsh's current model with its ``kernel``.
+        """
+
+
+def region_sizes(scene: Scene, growth: float) -> tuple[LocalSizes, ...]:
+    """Return the element sizes of the regions of a body, which grow by ``growth`` per unit of distance."""
+    body, contact = scene.body, scene.frame.point
     low, high = body.heights
     # The part below the last interface is treated as a layer, too.
     heights = (high, *body.interfaces, low) if body.interfaces else ()
-    for top, bottom in pairwise(heights):
-        yield _in_layer(scene, (unit * bottom, unit * top), growth)
-    for inclusion in embedded_sizes(body, growth, scene.frame.point):
-        yield from inclusion.terms(unit)
+    layers = [
+        LayerSizes(bottom, top, contact, scene.probe.circumradius + high - bottom, growth)
+        for top, bottom in pairwise(heights)
+    ]
+    return (*layers, *embedded_sizes(body, growth, contact))
+
+
+@dataclass(frozen=True)
+class LayerSizes:
+    """Element sizes (m) in a layer between two heights, within a distance ``reach`` of the ``contact``; all in m."""
+
+    bottom: float
+    top: float
+    contact: Vector
+    reach: float
+    growth: float
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the size (m) at points (n, 3)."""
+        off = np.maximum(np.maximum(self.bottom - points[:, 2], points[:, 2] - self.top), 0.0)
+        away = np.maximum(np.linalg.norm(points - np.array(self.contact), axis=1) - self.reach, 0.0)
+        return np.asarray(_IN_LAYER * (self.top - self.bottom) + self.growth * (off + away))
+
+    def terms(self, unit: float, kernel: Any) -> Iterator[str]:
+        """Yield the same as text for gmsh."""
+        bottom, top = unit * self.bottom, unit * self.top
+        away = f"Max({_distance(self.contact, unit)}-({unit * self.reach:.12g}),0)"
+        off = f"Max(Max({bottom:.12g}-z,z-({top:.12g})),0)"
+        yield f"{_IN_LAYER * (top - bottom):.12g}+{self.growth:.12g}*({off}+{away})"
+
+
+@dataclass(frozen=True, eq=False)
+class PointSizes:
+    """Elements of one ``size`` (m) at ``points`` (n, 3), in m."""
+
+    size: float
+    points: FloatArray
+    growth: float
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.points)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the size (m) at points (n, 3)."""
+        return np.asarray(self.size + self.growth * self._tree.query(points)[0])
+
+    def terms(self, unit: float, kernel: Any) -> Iterator[str]:
+        """Yield the same as text for gmsh."""
+        yield f"{unit * self.size:.12g}+{self.growth:.12g}*F{distance_field(self.points * unit, kernel)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +127,8 @@ class EmbeddedSizes:
             self.on_surface(points), self.room + self.growth * np.linalg.norm(points - np.array(self.nearest), axis=1)
         )
 
-    def terms(self, unit: float, kernel: Any = None) -> Iterator[str]:
-        """Yield sizes, whose minimum counts, as text for gmsh, with ``unit`` units in a metre.
-
-        Points that they refer to are added to gmsh's current model with its ``kernel``.
-        """
+    def terms(self, unit: float, kernel: Any) -> Iterator[str]:
+        """Yield the same as text for gmsh."""
         yield from self.terms_on_surface(unit, kernel)
         yield f"{unit * self.room:.12g}+{self.growth:.12g}*{_distance(self.nearest, unit)}"
 
@@ -116,22 +169,22 @@ class ShellSizes(EmbeddedSizes):
     contact: Vector
 
     @cached_property
-    def _parts(self) -> list[tuple[float, FloatArray, cKDTree]]:
-        """Sizes (m), the points (n, 3) of the parts with such elements, and their search trees."""
+    def _parts(self) -> list[PointSizes]:
+        """Parts with elements of one size."""
         points, sizes, _ = self.surface.sizes(self.contact)
         least = float(sizes.min())
         step = np.floor(np.log(sizes / least) / np.log(_STEP)).astype(int)
         parts = {number: points[step == number] for number in np.unique(step).tolist()}
-        return [(least * _STEP**number, part, cKDTree(part)) for number, part in parts.items()]
+        return [PointSizes(least * _STEP**number, part, self.growth) for number, part in parts.items()]
 
     def on_surface(self, points: FloatArray) -> FloatArray:
         """Return the size (m) at points (n, 3) by their distance to parts of the surface."""
-        return np.min([size + self.growth * tree.query(points)[0] for size, _, tree in self._parts], axis=0)
+        return np.asarray(np.min([part.at(points) for part in self._parts], axis=0))
 
     def terms_on_surface(self, unit: float, kernel: Any) -> Iterator[str]:
         """Yield the same as text for gmsh."""
-        for size, points, _ in self._parts:
-            yield f"{unit * size:.12g}+{self.growth:.12g}*F{distance_field(points * unit, kernel)}"
+        for part in self._parts:
+            yield from part.terms(unit, kernel)
 
 
 def embedded_sizes(body: Body, growth: float, contact: Vector) -> tuple[EmbeddedSizes, ...]:
@@ -155,16 +208,6 @@ def distance_field(points: FloatArray, kernel: Any) -> int:
     distance = int(field.add("Distance"))
     field.setNumbers(distance, "NodesList", tags)
     return distance
-
-
-def _in_layer(scene: Scene, heights: tuple[float, float], growth: float) -> str:
-    """Return the element size in a layer as text: fine below the probe, within the layer's thickness of it."""
-    bottom, top = heights
-    unit = 1 / scene.scale
-    beyond = unit * scene.probe.circumradius + unit * scene.body.heights[1] - bottom
-    away = f"Max({_distance(scene.frame.point, unit)}-({beyond:.12g}),0)"
-    off = f"Max(Max({bottom:.12g}-z,z-({top:.12g})),0)"
-    return f"{_IN_LAYER * (top - bottom):.12g}+{growth:.12g}*({off}+{away})"
 
 
 def _distance(point: Vector, unit: float) -> str:

@@ -20,7 +20,7 @@ _SEGMENT_MULTIPLE = 4
 # A column has at least a dozen edges around it, and a body a few elements across wherever it is round.
 EDGES_PER_RADIUS = 2
 # Points per element on a rim that is not plane; distance to the rim is distance to these points.
-_POINTS_PER_EDGE = 6
+POINTS_PER_EDGE = 6
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def set_size_field(
     if rim and probe.has_singular_edge:
         distance = field.add("Distance")
         field.setNumbers(distance, "CurvesList", rim)
-        field.setNumber(distance, "NumPointsPerCurve", ceil(_POINTS_PER_EDGE * probe.perimeter / sizes.rim))
+        field.setNumber(distance, "NumPointsPerCurve", ceil(POINTS_PER_EDGE * probe.perimeter / sizes.rim))
         to_rim = f"F{distance}"
     else:
         to_rim = probe.rim_distance(*frame.expressions(unit), unit)

@@ -74,14 +74,14 @@ def _notes(plan: Plan) -> list[str]:
 
 def _of_place(case: Case) -> list[str]:
     """Return the extent of a body from a file, and the point and direction of contact of its first case."""
-    if not isinstance(case.body, Scanned) or case.lost_contact:
-        return []
-    ends = zip("xyz", *case.body.triangles.bounds, strict=True)
-    extent = ", ".join(f"{name} from {in_mm(low)} to {in_mm(high)}" for name, low, high in ends)
-    point, axis = np.multiply(1e3, case.frame.point).round(2), np.round(case.frame.axis, 3)
-    place, way = (f"({', '.join(f'{c:g}' for c in vector)})" for vector in (point, axis))
-    notes = [f"Body: {extent}. The first case touches it at {place} mm and advances along {way}."]
-    if pieces := case.body.embedded:
+    notes = []
+    if isinstance(case.body, Scanned) and not case.lost_contact:
+        ends = zip("xyz", *case.body.triangles.bounds, strict=True)
+        extent = ", ".join(f"{name} from {in_mm(low)} to {in_mm(high)}" for name, low, high in ends)
+        point, axis = np.multiply(1e3, case.frame.point).round(2), np.round(case.frame.axis, 3)
+        place, way = (f"({', '.join(f'{c:g}' for c in vector)})" for vector in (point, axis))
+        notes.append(f"Body: {extent}. The first case touches it at {place} mm and advances along {way}.")
+    if (pieces := case.body.embedded) and (notes or case.body.region):
         volumes = [piece.surface.volume for piece in pieces]
         listed = [_of_region(piece, volume) for piece, volume in zip(pieces, volumes, strict=True)]
         notes.append(f"Regions: {', '.join(listed)}; {_in_cm3(case.body.volume - sum(volumes))} around them.")

@@ -22,7 +22,6 @@ from pipeline.report.values import at_full_order, with_flags
 from pipeline.run.outcome import without_contact
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
-from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.scanned import Scanned
 from pipeline.states import LOST, OK, PENDING
 from pipeline.study.axis import Axis
@@ -196,7 +195,7 @@ def _texts(
     plan: Plan, cases: Sequence[Case], flat: Sequence[Record | None], exact: Sequence[Record | None]
 ) -> dict[str, Any]:
     """Return what is told in words of each case."""
-    notices = ["; ".join(case.body.notices) if isinstance(case.body, FromFile) else "" for case in cases]
+    notices = ["; ".join(case.body.notices) for case in cases]
     texts = {
         "status": [r.status if r else PENDING for r in flat],
         "message": [r.message if r else "" for r in flat],

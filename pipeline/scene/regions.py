@@ -37,7 +37,7 @@ def regions_of(body: Body, inclusions: Sequence[Sequence[Tag]], scale: float) ->
     ``inclusions`` are the pieces of each inclusion; other volumes are assigned by their height.
     """
     numbers: dict[Tag, int] = {}
-    first = len(body.regions) - len(body.inclusion) + 1
+    first = len(body.regions) - len(body.embedded) + 1
     for number, pieces in enumerate(inclusions, start=first):
         numbers |= dict.fromkeys(pieces, number)
     found: dict[int, list[int]] = {}
@@ -52,5 +52,4 @@ def _layer_of(body: Body, volume: Tag, scale: float) -> int:
     if not body.interfaces and not body.is_filled:
         return 0
     *_, height = gmsh.model.occ.getCenterOfMass(*volume)
-    number = 1 + sum(scale * height < end for end in body.interfaces)
-    return number if body.is_filled or number <= len(body.interfaces) else 0
+    return body.layer_at(scale * height)

@@ -12,6 +12,7 @@ from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.half_plane import HalfPlane
 from pipeline.shapes.regions import Embedded, Inclusion, Layer, Region
 from pipeline.shapes.section import Section, Words
+from pipeline.shapes.segment import Segment
 from pipeline.shapes.support import Fixed, Support, support_of
 from pipeline.shapes.surface import Surface
 from pipeline.shapes.tissue import Tissue
@@ -45,6 +46,10 @@ class Body(Section, ABC):
     inclusion: Annotated[
         tuple[Inclusion, ...],
         Words("Inclusions: balls and ellipsoids of another material inside the body.", "[[body.inclusion]]"),
+    ] = ()
+    region: Annotated[
+        tuple[Segment, ...],
+        Words("Regions of any shape, of another material, inside the body.", "[[body.region]]"),
     ] = ()
 
     @property
@@ -96,7 +101,19 @@ class Body(Section, ABC):
     @property
     def pressures(self) -> dict[str, float]:
         """Pressures (Pa) in its hollow regions, by name, where there is one."""
-        return {}
+        return {piece.name: piece.pressure for piece in self.region if piece.hollow and piece.pressure}
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Notices about what was read from files that the author of the study should know."""
+        return tuple(f"{piece.name}: {notice}" for piece in self.region for notice in piece.notices)
+
+    def layer_at(self, height: float) -> int:
+        """Return the number of the layer at a height (m), 0 in the rest of the body."""
+        if not self.interfaces and not self.is_filled:
+            return 0
+        number = 1 + sum(height < end for end in self.interfaces)
+        return number if self.is_filled or number <= len(self.interfaces) else 0
 
     @cached_property
     def support(self) -> Support:

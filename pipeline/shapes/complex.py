@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
+from types import MappingProxyType
 
 import numpy as np
 
@@ -32,11 +33,17 @@ class Complex:
         """Return a body of one region."""
         return Complex(surface.points, surface.facets, np.tile([TISSUE, OUTSIDE], (len(surface.facets), 1)))
 
-    def holding(self, surfaces: Mapping[int, tuple[FloatArray, IntArray]]) -> "Complex":
-        """Return it with closed surfaces (m) within the body's own tissue: points and facets by number of region."""
+    def holding(
+        self, surfaces: Mapping[int, tuple[FloatArray, IntArray]], within: Mapping[int, int] = MappingProxyType({})
+    ) -> "Complex":
+        """Return it with closed surfaces (m): points and facets by number of region.
+
+        They are in the body's own tissue, or in the region that has the number ``within``.
+        """
         start = np.cumsum([len(self.points), *(len(points) for points, _ in surfaces.values())])
         facets = [corners + offset for (_, corners), offset in zip(surfaces.values(), start, strict=False)]
-        sides = [np.tile([n, TISSUE], (len(corners), 1)) for n, corners in zip(surfaces, facets, strict=True)]
+        beside = [(number, within.get(number, TISSUE)) for number in surfaces]
+        sides = [np.tile(pair, (len(corners), 1)) for pair, corners in zip(beside, facets, strict=True)]
         return Complex(
             np.vstack([self.points, *(points for points, _ in surfaces.values())]),
             np.vstack([self.facets, *facets]),

@@ -11,7 +11,6 @@ from pipeline.shapes.complex import Complex
 from pipeline.shapes.facetted import Facetted
 from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.section import Words
-from pipeline.shapes.segment import Segment
 from pipeline.shapes.support import Below, Fixed
 from pipeline.shapes.triangles import SurfaceError, Triangles
 
@@ -31,10 +30,6 @@ class FromFile(Facetted):
 
     if TYPE_CHECKING:
         file: str  # not declared here, or it would be validated before the fields that control reading
-    region: Annotated[
-        tuple[Segment, ...],
-        Words("Regions of any shape, of another material, inside the body.", "[[body.region]]"),
-    ] = ()
     fixed: Annotated[
         Fixed,
         Words(
@@ -92,11 +87,6 @@ class FromFile(Facetted):
         return f"{_VERSION} {self.triangles.hash}"
 
     @property
-    def pressures(self) -> dict[str, float]:
-        """Pressures (Pa) in its hollow regions, by name, where there is one."""
-        return {piece.name: piece.pressure for piece in self.region if piece.hollow and piece.pressure}
-
-    @property
     def triangles(self) -> Triangles:
         """The surface in the file, in m."""
         return self._loaded.triangles
@@ -109,5 +99,4 @@ class FromFile(Facetted):
     @property
     def notices(self) -> tuple[str, ...]:
         """Notices about changes to the surface, and to those of its regions, that the author should know."""
-        own = [f"{piece.name}: {notice}" for piece in self.region for notice in piece.notices]
-        return *self._loaded.notices, *own
+        return *self._loaded.notices, *super().notices

@@ -144,10 +144,9 @@ def warn_of_depth(probe: Probe, problems: Problems) -> None:
 
 
 def _tell_notices(body: Body, problems: Problems) -> None:
-    """Warn of what was found in the file of a body."""
-    if isinstance(body, FromFile):
-        for notice in body.notices:
-            problems.warn("body.file", body.file, notice)
+    """Warn of what was found in the files of a body and of its regions."""
+    for notice in body.notices:
+        problems.warn("body.file" if isinstance(body, FromFile) else "body.region", getattr(body, "file", None), notice)
 
 
 def _check_boundary(body: Body, problems: Problems) -> None:

@@ -8,10 +8,10 @@ from typing import Any, cast
 
 import numpy as np
 
+from pipeline.arrays import FloatArray
 from pipeline.quantities import RESERVED
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.closed import Closed
-from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.regions import Embedded, Inclusion
 from pipeline.shapes.section import Section, in_mm
 from pipeline.shapes.segment import Segment
@@ -89,11 +89,10 @@ def _check_pieces(body: Body, problems: Problems) -> None:
     for number, inclusion in enumerate(body.inclusion, start=1):
         if (inclusion.radius is None) == (inclusion.axes is None):
             problems.error(f"body.inclusion[{number}]", None, "needs a radius (a ball) or axes (an ellipsoid)")
-    if isinstance(body, FromFile):
-        _check_segments(body, problems)
+    _check_segments(body, problems)
 
 
-def _check_segments(body: FromFile, problems: Problems) -> None:
+def _check_segments(body: Body, problems: Problems) -> None:
     """Check that each region has a file with its unit, or a label of its own of the body's image."""
     label = getattr(body, "label", None)  # of an image
     taken: dict[int | str, str] = {} if label is None else {label: "the body"}
@@ -186,13 +185,14 @@ def _check_room(body: Body, problems: Problems) -> None:
     for (one, first_place), (other, place) in itertools.combinations(pieces, 2):
         thinner = min(one.surface, other.surface, key=lambda surface: surface.least)
         gap = GAP * thinner.least
-        if (room := _apart(one.surface, other.surface)) < gap:
+        room, where = _apart(one.surface, other.surface)
+        if room < gap:
             key, found = _place_of(other, place)
             problems.error(
                 key,
                 found,
                 f"{other.name} must be at least {in_mm(gap)} (a tenth of {thinner.LEAST}) from {one.name}, "
-                f"{first_place}; {_distance(room)}",
+                f"{first_place}; {_distance(room)} at {where}",
             )
 
 
@@ -209,14 +209,23 @@ def _where(body: Body, piece: Embedded) -> str:
     if isinstance(piece, Inclusion):
         return _tissue_at(body, piece.at)
     points = piece.surface.sample(_POINTS)
-    x, y, z = points[int(np.argmin(body.inside(points)))]
-    return f"This is at x = {in_mm(x)}, y = {in_mm(y)}, z = {in_mm(z)}"
+    return f"This is at {_point(points[int(np.argmin(body.inside(points)))])}"
+
+
+def _point(point: FloatArray) -> str:
+    return ", ".join(f"{name} = {in_mm(value)}" for name, value in zip("xyz", point, strict=True))
 
 
 @lru_cache(_MANY)
-def _apart(one: Closed, other: Closed) -> float:
-    """Return the distance (m) between two closed surfaces, negative where one reaches into the other."""
-    return min(float(b.distance(a.sample(_POINTS)).min()) for a, b in ((one, other), (other, one)))
+def _apart(one: Closed, other: Closed) -> tuple[float, str]:
+    """Return the distance (m) between two closed surfaces, negative where one reaches into the other, and its place."""
+    found = []
+    for a, b in ((one, other), (other, one)):
+        points = a.sample(_POINTS)
+        distance = b.distance(points)
+        nearest = int(np.argmin(distance))
+        found.append((float(distance[nearest]), _point(points[nearest])))
+    return min(found)
 
 
 def _distance(room: float) -> str:

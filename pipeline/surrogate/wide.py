@@ -46,7 +46,7 @@ def profile_of(probe: Probe) -> Profile | None:
 def layered_body(case: Case) -> LayeredBody | None:
     """Return the layers of a case on their rigid base; None if the equation does not have what the case has."""
     body, frame = case.body, case.frame
-    is_flat = isinstance(body, Layered) and not body.inclusion and body.fixed in _SUPPORTS
+    is_flat = isinstance(body, Layered) and not body.embedded and body.fixed in _SUPPORTS
     is_on_top = frame.is_upright and frame.point[2] == body.heights[1]
     is_elastic = not (case.material.is_large or any(region.is_large for region in body.regions))
     if not (isinstance(body, Layered) and is_flat and is_on_top and is_elastic and _slides(case.probe)):

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.mesh.generate import MeshError
 from pipeline.mesh.of_case import mesh_arrays
-from pipeline.mesh.organ import make
+from pipeline.mesh.organ import make, regions
 from pipeline.mesh.organ.embedded import embedded_surfaces
 from pipeline.plan.key import case_key, mesh_key
 from tests.cases import study
@@ -82,11 +82,11 @@ def test_a_surface_that_meets_the_bodys_is_never_filled(body, monkeypatch):
     """The check of the study refuses it; if that check fails, the mesh must not be another body's."""
     case = case_of(body, CYST)
 
-    def shifted(regions, field):
-        return [(points + np.array([0.0, 0.0, 20e-3]), facets) for points, facets in embedded_surfaces(regions, field)]
+    def shifted(pieces, field):
+        return [(points + np.array([0.0, 0.0, 20e-3]), facets) for points, facets in embedded_surfaces(pieces, field)]
 
     monkeypatch.setattr(make, "_FINER", (1,))
-    monkeypatch.setattr(make, "embedded_surfaces", shifted)
+    monkeypatch.setattr(regions, "embedded_surfaces", shifted)
     with pytest.raises(MeshError, match=r"."):
         mesh_arrays(case, ())
 

@@ -153,7 +153,7 @@ def test_mistakes_are_named(folder):
         (body(folder, OF_FILE | {"file": "none.stl"}), ["body.region[1].file", "cannot be read"]),
         (body(folder, OF_FILE | {"unit": "cm"}), ["body.region[1].file", "out of the body", "This is at x = "]),
         (body(folder, OF_FILE, OF_FILE | {"name": "b"}), ["body.region[2].file", "from tumour, region[1]", "overlap"]),
-        ({"region": [OF_FILE]}, ["a box has no region: cad, image and surface have"]),
+        ({"region": [OF_LABEL]}, ["body.region[1].label = 2", "needs a body from an image"]),
     ):  # fmt: skip
         said = message(body=held)
         for part in parts:

@@ -8,14 +8,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray
-from pipeline.mesh.regions import EmbeddedSizes, distance_field
+from pipeline.mesh.regions import LocalSizes, distance_field
 from pipeline.mesh.size import Sizes, set_background
 from pipeline.shapes.frame import Frame
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """``sizes`` around a ``frame``, and those of ``embedded`` regions.
+    """``sizes`` around a ``frame``, and those of the body's regions.
 
     ``edge`` (n, 3), in m, are dense points along the footprint's edge.
     """
@@ -23,7 +23,7 @@ class Field:
     sizes: Sizes
     frame: Frame
     edge: FloatArray
-    embedded: tuple[EmbeddedSizes, ...] = ()
+    local: tuple[LocalSizes, ...] = ()
 
     @cached_property
     def _tree(self) -> cKDTree:
@@ -31,17 +31,23 @@ class Field:
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the size (m) at points (n, 3) of the surface."""
-        distance, _ = self._tree.query(points)
-        size = self.sizes.at(points, self.frame.point, distance)
-        for region in self.embedded:
-            size = np.minimum(size, region.at(points))
+        size = self.sizes.at(points, self.frame.point, self._to_rim(points))
+        for part in self.local:
+            size = np.minimum(size, part.at(points))
         return size
 
     def set(self, scale: float, kernel: Any) -> None:
         """Set the background field of gmsh's current model, whose unit is ``scale`` metres.
 
-        Distances are those from points along the footprint's edge, which are added to the model with its ``kernel``.
+        Points to which it refers are added to the model with its ``kernel``.
         """
-        distance = distance_field(self.edge / scale, kernel)
-        terms = self.sizes.terms(self.frame.point, f"F{distance}", 1 / scale)
-        set_background([*terms, *(term for region in self.embedded for term in region.terms(1 / scale, kernel))])
+        terms = self.sizes.terms(self.frame.point, self._rim_text(1 / scale, kernel), 1 / scale)
+        set_background([*terms, *(term for part in self.local for term in part.terms(1 / scale, kernel))])
+
+    def _to_rim(self, points: FloatArray) -> FloatArray:
+        """Return distances (m) to the expected edge of contact."""
+        return np.asarray(self._tree.query(points)[0])
+
+    def _rim_text(self, unit: float, kernel: Any) -> str:
+        """Return the same as text for gmsh: the distance from points along the footprint's edge."""
+        return f"F{distance_field(unit * self.edge, kernel)}"

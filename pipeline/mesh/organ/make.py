@@ -8,20 +8,19 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError, flat_cells, orient
+from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError
 from pipeline.mesh.organ.base import DEVIATION, Base, Kept, Near, far_surface, put_back
 from pipeline.mesh.organ.contact import Contact, FoldedError, set_in
-from pipeline.mesh.organ.embedded import embedded_surfaces
 from pipeline.mesh.organ.faces import Faces
 from pipeline.mesh.organ.field import Field
+from pipeline.mesh.organ.regions import fill_regions
 from pipeline.mesh.organ.remesh import remesh
 from pipeline.mesh.organ.sheet import PROBE, Sheet, edges_of, group_names
 from pipeline.mesh.organ.untangle import TangledError, untangled
-from pipeline.mesh.organ.volume import fill
 from pipeline.mesh.regions import embedded_sizes
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import FREE, Scene
-from pipeline.shapes.complex import TISSUE, Complex
+from pipeline.shapes.complex import Complex
 from pipeline.shapes.scanned import Scanned
 
 # Passes of surface meshing: only in the second pass points are dense where sizes change fast.
@@ -100,24 +99,12 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     _check_whole(sheet, far.faces, scene.body.volume)
     deviation = _deviation(sheet, far.faces, field)
     parts = Complex(sheet.points, sheet.facets, sheet.sides)
-    apart = {n: piece for n, piece in enumerate(scene.body.embedded, start=1) if n not in parts.regions}
-    inner = dict(zip(apart, embedded_surfaces(tuple(apart.values()), field), strict=True))
-    parts = parts.holding(inner)
-    empty = [number for number, piece in enumerate(scene.body.embedded, start=1) if piece.is_hollow]
-    tissue = parts.without(empty)
-    if (tissue.sides < TISSUE).all(axis=1).any():
-        raise GeometryError(
-            "a hollow region meets the body's surface or another hollow region: it must be inside tissue"
-        )
-    points, cells, regions = fill(tissue, field)
-    if (flat := flat_cells(points, cells)).any():
-        raise TangledError.at(points[cells[flat]], "gmsh left a flat tetrahedron")
+    filled = fill_regions(parts, scene.body, field)
     facets = {name: sheet.facets[sheet.kind == number] for number, name in group_names().items()}
-    walls = parts.facets[np.isin(parts.sides, empty).any(axis=1)]
-    facets[FREE] = np.vstack([facets[FREE], walls])
+    facets[FREE] = np.vstack([facets[FREE], filled.walls])
     rim = np.unique(sheet.border(PROBE))
     seconds = perf_counter() - start
-    return MeshArrays(points, orient(points, cells), facets, rim, seconds, regions, deviation=deviation)
+    return MeshArrays(filled.points, filled.cells, facets, rim, seconds, filled.regions, deviation=deviation)
 
 
 def _check(scene: Scene) -> None:

@@ -133,8 +133,8 @@ class Cylinder(Layered):
         return self.radius, self.radius
 
     def half_plane(self) -> Rectangle | None:
-        """Return radius, height and layers; None with inclusions."""
-        return None if self.inclusion else Rectangle(self.radius, self.height, self.interfaces, self.is_filled)
+        """Return radius, height and layers; None with inclusions or regions."""
+        return None if self.embedded else Rectangle(self.radius, self.height, self.interfaces, self.is_filled)
 
     def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:
         """Add the cylinder, with the seam of its side away from the frame."""

@@ -157,9 +157,9 @@ class Ellipsoid(Drawn):
         return self.axes[0], self.axes[1]
 
     def half_plane(self) -> HalfEllipse | None:
-        """Return half of its ellipse if it is one of revolution; None with inclusions or otherwise."""
+        """Return half of its ellipse if it is one of revolution; None with regions or otherwise."""
         a, b, c = self.axes
-        return HalfEllipse(a, c) if a == b and not self.inclusion else None
+        return HalfEllipse(a, c) if a == b and not self.embedded else None
 
     def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:
         """Add a stretched ball; its seam is opposite to the point of contact, its poles are away from both."""

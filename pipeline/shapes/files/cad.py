@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import FloatArray
 from pipeline.files import atomic, cache_folder
 from pipeline.launcher import run_alone
 from pipeline.npz import read_npz
@@ -103,7 +103,7 @@ def _solid(arrays: dict[str, Any], size: float, entities: dict[int, str], conten
     facets, flipped = oriented(edges)
     if flipped is None:
         raise SurfaceError("its faces form a one-sided surface, which encloses no volume")
-    facets = _outside_out(points, facets, edges)
+    facets = check.outside_out(points, facets, edges)
     if abs(enclosed(points, facets) - volume) > _MISSED * abs(volume):
         raise SurfaceError(
             f"its faces enclose {enclosed(points, facets) * size**3 * 1e6:.3g} cm³, but its solid "
@@ -125,14 +125,6 @@ def _solid(arrays: dict[str, Any], size: float, entities: dict[int, str], conten
         volume * size**3,
         content,
     )
-
-
-def _outside_out(points: FloatArray, facets: IntArray, edges: Edges) -> IntArray:
-    """Return facets oriented outward from the tissue: outward on the largest shell, inward on those of hollows."""
-    count, shell = edges.shells
-    volumes = check.shell_volumes(points, facets, shell, count)
-    wanted = np.where(np.arange(count) == np.argmax(np.abs(volumes)), 1, -1)
-    return np.where((volumes * wanted < 0)[shell][:, None], facets[:, ::-1], facets)
 
 
 def _outward(normals: FloatArray, of_facets: FloatArray) -> FloatArray:

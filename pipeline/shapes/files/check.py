@@ -171,3 +171,11 @@ def _length(metres: float) -> str:
         if metres >= size:
             return f"{metres / size:.3g} {unit}"
     return f"{metres * 1e3:.3g} mm"
+
+
+def outside_out(points: FloatArray, facets: IntArray, edges: Edges) -> IntArray:
+    """Return facets oriented outward from the tissue: outward on the largest shell, inward on those of hollows."""
+    count, shell = edges.shells
+    volumes = shell_volumes(points, facets, shell, count)
+    wanted = np.where(np.arange(count) == np.argmax(np.abs(volumes)), 1, -1)
+    return np.where((volumes * wanted < 0)[shell][:, None], facets[:, ::-1], facets)

@@ -36,7 +36,6 @@ _OF_LAW = "with a law of large displacements"
 REFUSALS: tuple[Refusal, ...] = (
     # What the shapes have no keys for: the schema refuses it.
     Refusal("layers", "curved body", "layers need the flat top of a box or a cylinder"),
-    Refusal("region", "CAD solid", "a solid of a CAD file has inclusions only: write [[body.inclusion]]"),
     Refusal("tool that is not flat", "frictionless contact", "the area in contact is computed, not prescribed"),
     # A half ball that a far field closes.
     Refusal("half ball", "accuracy", "the far field adds an error that accuracy does not cover: omit accuracy"),
@@ -48,6 +47,7 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal("half ball", "layers", _ONE_MATERIAL),
     Refusal("half ball", "inclusion", _ONE_MATERIAL),
+    Refusal("half ball", "region", _ONE_MATERIAL),
     Refusal("half ball", "slice", _PRESSES),
     Refusal("half ball", "slit", _PRESSES),
     Refusal("half ball", "six motions", _PRESSES),
@@ -62,6 +62,7 @@ REFUSALS: tuple[Refusal, ...] = (
         "surface or image",
         f"a column cannot be cut out of triangles: {_COARSE}",
     ),
+    Refusal("column", "region", f"a column cannot be cut out of a body with regions of triangles: {_COARSE}"),
     Refusal("fixed column", "open slit", 'would stop the open slit at the side of the column: use ends = "blade"'),
     Refusal(
         "free column",
@@ -77,6 +78,7 @@ REFUSALS: tuple[Refusal, ...] = (
         "is too low for unilateral contact, since elements are straight: use 2 or 3",
     ),
     Refusal("degree 1", "inclusion", "is too low for inclusions, since elements are straight: use 2 or 3"),
+    Refusal("degree 1", "region", "is too low for regions of any shape, since elements are straight: use 2 or 3"),
     Refusal("degree 1", "curved or inclined surface", "is too low for a curved surface, or a tilted tool: use 2 or 3"),
     Refusal("degree 1", "slit", "is too low for a slit, whose front needs quarter-point elements: use 2 or 3"),
     Refusal("mixed elements", "degree 1", "there is no stable mixed element of degree 1: use 2 or 3"),
@@ -123,6 +125,7 @@ REFUSALS: tuple[Refusal, ...] = (
         "the tool touches beside its axis, where its surface is inclined, and with a linear law friction is across the "
         "axis: turn the axis to the surface's normal, use a law of large displacements, or omit friction",
     ),
+    Refusal("slit", "region", "slits in a body with regions of triangles are not computed: use an inclusion"),
     Refusal("slit", "no flat top", "a slit needs the flat top of a box or a cylinder, and goes straight down"),
     Refusal(
         "oblique slit",
@@ -144,6 +147,7 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal("insertion", "large displacements", f"{_LINEAR}: cuts at large displacements are not computed"),
     Refusal("insertion", "inclusion", "needs a body of layers: cuts through inclusions are not computed"),
+    Refusal("insertion", "region", "needs a body of layers: cuts through regions are not computed"),
     Refusal("insertion", "loads", "cuts in tissue under loads are not computed: omit [load]"),
     # Loads.
     Refusal(
