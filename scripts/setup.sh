@@ -14,9 +14,9 @@ packages=(
 python=/usr/bin/python3
 venv=.venv
 # EXTRAS=view adds PyVista, for pictures of a case. A venv that has it keeps it.
-extras=dev,docs,images,repair
+extras=dev,docs,images,repair,fmi
 if [[ ${EXTRAS:-} == view ]] || compgen -G "$venv/lib/python*/site-packages/pyvista" >/dev/null; then
-    extras=dev,docs,images,repair,view
+    extras=dev,docs,images,repair,fmi,view
     packages+=(libegl1)
 fi
 stamp=$venv/.epsmesh-setup

@@ -9,7 +9,7 @@ import typer
 from pipeline import __version__
 from pipeline.cli.console import say, warning
 from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option, of_unwritten, refusing
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, by_name, check_machine, check_output, read_all
+from pipeline.cli.words import DEFAULT_OUTPUT, MODEL, Json, by_name, check_machine, check_output, read_all
 from pipeline.files import write_new
 from pipeline.printable import counted
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 # The page on what can be exported; refusals refer to it.
 _HOWTO = "docs/realtime.md"
+_FMU = "docs/howto/fmu.md"
 # The range of --accuracy: tables and formulas allow no less, and more is of no use.
 _ACCURACIES = (0.002, 0.2)
 _MOST_CHECKS = 1000
@@ -28,7 +29,11 @@ _COVERED = 0.95
 def export(
     file: Annotated[
         Path | None,
-        typer.Argument(metavar="FILE", help="A study file (TOML), or a name in studies/.", show_default=False),
+        typer.Argument(
+            metavar="FILE",
+            help="A study file (TOML), or a name in studies/. With --fmu also a model.",
+            show_default=False,
+        ),
     ] = None,
     accuracy: Annotated[str, typer.Option(help='Largest error of a force, against a full solve: "1%".')] = "1%",
     output: Annotated[
@@ -48,6 +53,15 @@ def export(
         bool,
         typer.Option("--surface/--no-surface", help="Include the deforming surface for `epsmesh touch` (megabytes)."),
     ] = True,
+    fmu: Annotated[
+        Path | None,
+        typer.Option(
+            "--fmu",
+            metavar="UNIT",
+            help="Also write the model as a co-simulation unit (FMI 3.0) to this file; needs a C compiler.",
+            show_default=False,
+        ),
+    ] = None,
     evaluator: Annotated[
         Path | None,
         typer.Option(
@@ -68,6 +82,8 @@ def export(
 
     Example: mpirun -n 2 epsmesh export studies/quick.toml -o box.epsm.nc
 
+    Example: epsmesh export results/quick.epsm.nc --fmu quick.fmu
+
     Example: epsmesh export --evaluator simulator/epsmesh
     """
     if evaluator is not None:
@@ -75,19 +91,18 @@ def export(
         return
     if file is None:
         fail(Fault("FILE is missing: give a study, or --evaluator FOLDER", key="FILE", howto=_HOWTO))
+    if fmu is not None:
+        _check_unit(fmu)
+        if file.name.endswith(MODEL):
+            packed, line = _pack(file, fmu)
+            say(packed, *line)
+            return
     from pipeline.export.scope import ExportError, scope_of
-    from pipeline.units import parse_quantity
 
-    try:
-        wanted = parse_quantity(accuracy, "")
-    except ValueError as wrong:
-        fail(of_option("--accuracy", accuracy, f"must be {wrong}"))
-    if not _ACCURACIES[0] <= wanted <= _ACCURACIES[1]:
-        least, most = (f"{100 * share:g}%" for share in _ACCURACIES)
-        fail(of_option("--accuracy", accuracy, f"must be between {least} and {most}"))
+    wanted = _share(accuracy)
     file = by_name(file)
     (study,) = read_all([file])
-    path = output or DEFAULT_OUTPUT / f"{study.name}.epsm.nc"
+    path = output or DEFAULT_OUTPUT / f"{study.name}{MODEL}"
     check_output(path)
     check_machine()
     with refusing(ExportError, file=file, howto=_HOWTO):
@@ -121,17 +136,31 @@ def export(
     if status != DONE:
         fail(fault, status=status)
     if comm.rank == 0:
-        _print_result(exported, wanted, path)
+        _print_result(exported, wanted, path, _pack(path, fmu))
     raise typer.Exit(DONE if exported.covered >= _COVERED else SOME_FAILED)
 
 
-def _print_result(exported: "Exported", wanted: float, path: Path) -> None:
-    """Print what the model is for, and how good it is."""
+def _share(accuracy: str) -> float:
+    """Return --accuracy as a number; exit if it is none, or out of range."""
+    from pipeline.units import parse_quantity
+
+    try:
+        wanted = parse_quantity(accuracy, "")
+    except ValueError as wrong:
+        fail(of_option("--accuracy", accuracy, f"must be {wrong}"))
+    if not _ACCURACIES[0] <= wanted <= _ACCURACIES[1]:
+        least, most = (f"{100 * share:g}%" for share in _ACCURACIES)
+        fail(of_option("--accuracy", accuracy, f"must be between {least} and {most}"))
+    return wanted
+
+
+def _print_result(exported: "Exported", wanted: float, path: Path, packed: tuple[dict[str, str], list[str]]) -> None:
+    """Print what the model is for, and how good it is; then what was ``packed``."""
     if exported.unseen:
         warning(f"{path} has no deforming surface: {exported.unseen}")
     found, checked = exported.summary(wanted), len(exported.fitted) + len(exported.judged)
     say(
-        found | {"file": str(path)},
+        found | {"file": str(path)} | packed[0],
         repr(exported.model),
         f"tools: {exported.tools}",
         f"wrote {path}: {counted(int(found['places']), 'place')} solved, {found['coefficients']} coefficients",
@@ -139,7 +168,36 @@ def _print_result(exported: "Exported", wanted: float, path: Path) -> None:
         f"{1e3 * found['largest_force']:.3g} mN",
         f"test on {found['tested']} touches: error bar covers {100 * found['covered']:.0f} % of the errors; largest "
         f"error {100 * found['largest_error']:.2g} %, median error bar {100 * found['median_bar']:.2g} %",
+        *packed[1],
     )
+
+
+def _check_unit(unit: Path) -> None:
+    """Exit, before any computation, if no unit can be written to a file, or compiled."""
+    from pipeline.export.fmu import NoCompilerError, compiler, library_place
+
+    check_output(unit)
+    try:
+        library_place()
+        compiler()
+    except NoCompilerError as problem:
+        fail(of_option("--fmu", unit, str(problem), _FMU))
+
+
+def _pack(model: Path, unit: Path | None) -> tuple[dict[str, str], list[str]]:
+    """Write the co-simulation ``unit`` of a model, or exit; return what to print, as JSON and as lines."""
+    if unit is None:
+        return {}, []
+    from pipeline.export.fmu import NoCompilerError, write_fmu
+    from pipeline.realtime import ModelError
+
+    try:
+        write_fmu(model, unit, __version__)
+    except NoCompilerError as problem:
+        fail(of_option("--fmu", unit, str(problem), _FMU))
+    except (ModelError, OSError) as problem:
+        fail(of_file(model, getattr(problem, "strerror", None) or str(problem), _HOWTO))
+    return {"unit": str(unit)}, [f"wrote {unit}: a co-simulation unit (FMI 3.0)"]
 
 
 def _copy_evaluator(folder: Path) -> None:

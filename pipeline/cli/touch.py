@@ -9,9 +9,7 @@ import typer
 
 from pipeline.cli.console import say
 from pipeline.cli.faults import fail, of_file
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, by_name, check_output
-
-MODEL = ".epsm.nc"  # the suffix of models that `export` writes
+from pipeline.cli.words import DEFAULT_OUTPUT, MODEL, Json, by_name, check_output
 
 
 def _by_study(file: Path) -> Path:

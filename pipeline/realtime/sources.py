@@ -3,7 +3,7 @@
 from pathlib import Path
 
 _FOLDER = Path(__file__).parent / "c"
-_PATTERNS = ("*.[ch]", "src/*.c", "examples/*")
+_PATTERNS = ("*.[ch]", "src/*.c", "examples/*", "fmu/*.c")
 
 
 def sources() -> Path:
