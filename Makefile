@@ -49,8 +49,7 @@ else
 endif
 
 studies: setup ## run every study in studies/
-	$(EPSMESH) run $(filter-out studies/identify-% studies/%-path.toml,$(wildcard studies/*.toml))
-	$(EPSMESH) insertion studies/scalpel-path.toml
+	$(EPSMESH) run $(filter-out studies/identify-%,$(wildcard studies/*.toml))
 	$(EPSMESH) identify studies/identify-*.toml
 	$(EPSMESH) sensitivity studies/sensitivity.toml
 

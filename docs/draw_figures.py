@@ -21,7 +21,6 @@ from matplotlib.figure import Figure
 import pipeline
 from pipeline.report.compliance import sinking
 from pipeline.report.figures import STYLE, figure
-from pipeline.report.figures.insertion import insertion
 from pipeline.report.figures.style import COLOURS
 
 DOCS = Path(__file__).parent
@@ -148,7 +147,7 @@ FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
     "path": ("path", of_kind("map")),
     "path_excess": ("path", path_excess),
     "retractor": ("retractor", of_kind("force")),
-    "insertion": ("scalpel-path_insertion", insertion),
+    "insertion": ("scalpel-path", of_kind("insertion")),
     "deep": ("deep", deep),
     "large_depth": ("large_depth", of_kind("force")),
 }
@@ -165,7 +164,7 @@ def main(names: list[str]) -> int:
             missing += 1
             continue
         with mpl.rc_context(STYLE):
-            drawn = draw(xr.load_dataset(path) if study.endswith("_insertion") else pipeline.open(path))
+            drawn = draw(pipeline.open(path))
             drawn.savefig(PICTURES / f"{name}.png", dpi=DPI)
         plt.close(drawn)
         print(f"{name}: {PICTURES / name}.png")

@@ -164,28 +164,6 @@ class RunnableStudy:
             warnings.warn(f"{case}: {solved.record.message}", RuntimeWarning, stacklevel=2)
         return CaseSolution(solved)
 
-    def insertion(self, *, output: str | Path = "results", store: str | Path | None = None) -> "xr.Dataset":
-        """Follow the insertion of the study's blade, and return F over depth with its phases; collective.
-
-        Writes ``<study>_insertion.nc`` and its figure into ``output``; solved states are cases of ``store``
-        (``cases.sqlite`` in ``output``), computed once.
-
-        Raises:
-            StudyError: if the study has no insertion, or is not one scene.
-            SurrogateError: if the intact body, or the first step, cannot be solved.
-            StoreError: on every rank, if the store cannot be used.
-        """
-        from pipeline.insertion.dataset import dataset_of  # noqa: PLC0415
-        from pipeline.insertion.path import follow  # noqa: PLC0415
-        from pipeline.insertion.publish import publish  # noqa: PLC0415
-        from pipeline.surrogate.cases import stored_in  # noqa: PLC0415 (MPI starts as it solves)
-
-        path = Path(store) if store else Path(output) / STORE_NAME
-        dataset = dataset_of(self.declared, follow(self.declared, stored_in(path)))
-        if is_first_rank():
-            publish(dataset, Path(output), self.name)
-        return dataset
-
     def identify(self, *, output: str | Path = "results", store: str | Path | None = None) -> "xr.Dataset":
         """Find the parameters of the study from its measured curves, and return the dataset of what was found.
 

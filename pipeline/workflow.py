@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
+from pipeline.insertion.paths import complete
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.shard import Shard
@@ -48,6 +49,7 @@ class Opened:
     records: dict[str, Record] = field(default_factory=dict)
     begun: Begun = field(default_factory=Begun)
     notices: tuple[str, ...] = ()  # what the user should know of the store
+    is_fresh: bool = False  # nothing is read from it
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def prepare(
     Raises:
         StoreError: on every rank, if the store cannot be used.
     """
-    opened, message, cost = Opened(meshes=meshes, begun=Begun(store_path)), "", CostModel()
+    opened, message, cost = Opened(meshes=meshes, begun=Begun(store_path), is_fresh=fresh), "", CostModel()
     if comm.rank == 0:
         try:
             opened.store = Store(store_path)
@@ -123,6 +125,8 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
     """
     start = _now()
     interrupted = _compute(plan, opened, comm, progress)
+    while not interrupted and plan.part is None and (further := _lacking(plan, opened, comm)):
+        interrupted = _compute(further, opened, comm, None)
     files: tuple[Path, ...] = ()
     wrong: ResultsError | None = None
     if opened.store is not None:
@@ -218,6 +222,16 @@ def _compute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
     except KeyboardInterrupt:
         return True
     return False
+
+
+def _lacking(plan: Plan, opened: Opened, comm: MPI.Comm) -> Plan | None:
+    """Return the plan of what insertions need besides their stages, and what is not stored; collective."""
+
+    def get(keys: Collection[str]) -> dict[str, Record]:
+        found = opened.store.get(keys) if opened.store and not opened.is_fresh else {}
+        return {key: record for key, record in found.items() if record.is_ok}
+
+    return comm.bcast(complete(plan, opened.records, get) if comm.rank == 0 else None)
 
 
 def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None, signals: list[int]) -> None:

@@ -83,7 +83,7 @@ def _probe(**keys: Any) -> Callable[[Study], None]:
 
 
 def _insertion(study: Study) -> None:
-    _probe(**_BLADE, contact="unilateral", toughness="5 J/m^2", insertion={"to": "5 mm", "steps": 5})(study)
+    _probe(**_BLADE, contact="unilateral", toughness="5 J/m^2", insertion={"to": "5 mm", "steps": 2})(study)
     del study["probe"]["depth"]
 
 
@@ -300,6 +300,8 @@ def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> 
     if study.solve.exact and (reason := obstacle("F_exact", next(study.cases()))):
         return done("refused", reason)
     (key, *_) = declare(study).keys
+    if study.is_insertion:  # toughness and friction are not its states'
+        key = f"{key} {study.tool(next(study.cases()))!r}"
     if not solved:
         return done("taken", key=key)
     from mpi4py import MPI

@@ -37,6 +37,8 @@ _OF_SCHEMA = (
     "elements of degree 1 lock",
     "must be 0.2 to 0.45",
     "is not computed over time",
+    "is not computed along an insertion",
+    "has no F_exact",
 )
 
 

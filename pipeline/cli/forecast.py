@@ -1,4 +1,4 @@
-"""What `epsmesh plan` tells of the forces that `epsmesh identify`, `sensitivity` and `insertion` need."""
+"""What `epsmesh plan` tells of the forces that `epsmesh identify` and `sensitivity` need."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -21,16 +21,11 @@ def forecasts(study: "Study", cost: "CostModel") -> list[dict[str, Any]]:
         StudyError: if a scene cannot be run.
         ExperimentError: if the depths are those of files that are no curves.
     """
-    found: list[dict[str, Any]] = []
-    if any(getattr(probe, "insertion", None) for probe in study.probes):
-        from pipeline.insertion.forecast import forecast as forecast_of_path
-
-        found = [{"command": "insertion", "of": "the path", **vars(forecast_of_path(study, cost))}]
     if not (study.measurements or study.spread.varied):
-        return found
+        return []
     from pipeline.surrogate.forecast import forecast
 
-    return found + [
+    return [
         {"command": command, "of": name, **vars(forecast(domain, cost, corrected=command == "identify"))}
         for command, name, domain in _domains(study)
     ]

@@ -51,8 +51,8 @@ def report(
     kind: Annotated[
         list[str] | None,
         typer.Option(
-            help="With --figures: kind of figure; may be repeated: history, ratio, error, force, map, compliance. "
-            "Default: all that suit the study.",
+            help="With --figures: kind of figure; may be repeated: insertion, history, ratio, error, force, map, "
+            "compliance. Default: all that suit the study.",
             show_default=False,
         ),
     ] = None,

@@ -3,6 +3,7 @@
 import sys
 import time
 from collections import Counter
+from itertools import islice
 from pathlib import Path
 from shlex import quote
 from textwrap import shorten
@@ -36,6 +37,8 @@ from pipeline.printable import counted
 from pipeline.states import FAILED, FAILURES, PENDING, SKIPPED
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from pipeline.plan.plan import Plan
     from pipeline.plan.shard import Shard
     from pipeline.run.progress import Terminal
@@ -44,6 +47,8 @@ if TYPE_CHECKING:
 
 # So many failed cases are listed; `status` lists all.
 _MOST_FAILURES = 20
+# So many lines tell of insertions.
+_MOST_LINES = 40
 # The line of a study has so many reasons, of so many letters each.
 _MOST_REASONS, _LONGEST_REASON = 2, 120
 
@@ -138,10 +143,7 @@ def run(
 
 
 def _check_measured(studies: "list[Study]", output: Path) -> None:
-    """Say that measurements, or insertions, are left out; exit if results would replace an identification's."""
-    for study in studies:
-        if any(getattr(probe, "insertion", None) for probe in study.probes):
-            warning(f"{study.file}: its insertion is for `epsmesh insertion`: only the press of the intact body is run")
+    """Say that measurements are left out; exit if results would replace an identification's."""
     for study in (study for study in studies if study.measurements):
         file = output / f"{study.name}.nc"
         if file.exists() and _is_identification(file):
@@ -221,11 +223,22 @@ def _conclude(
         error(f"… and {len(outcome.failures) - _MOST_FAILURES} more: `epsmesh status {file}` lists them")
     if not quiet:
         print(_line(plan, opened, outcome, seconds, shard), flush=True)
+        for line in islice(_of_insertions(plan, outcome), _MOST_LINES):
+            print(f"  {line}")
     if outcome.interrupted:
         cases = sum(outcome.counts.values())
         done = cases - outcome.counts[PENDING]
         again = f"`epsmesh run {file}{f' --shard {shard}' if shard else ''}` continues"
         error(f"interrupted: {done} of {cases} cases are stored; {again}")
+
+
+def _of_insertions(plan: "Plan", outcome: "Outcome") -> "Iterator[str]":
+    """Yield what is told of the paths of insertions, as the dataset has them."""
+    if plan.study.is_insertion and outcome.files:
+        from pipeline.report.insertion import answer
+        from pipeline.report.read import read_file
+
+        yield from answer(read_file(outcome.files[0]))
 
 
 def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, shard: "Shard | None") -> str:

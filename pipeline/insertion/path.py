@@ -7,7 +7,6 @@ G = Γ, as in cutting. No threshold is fitted. Friction μ N acts on both flanks
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import nan
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -16,45 +15,71 @@ from scipy.optimize import brentq
 from pipeline.arrays import FloatArray
 from pipeline.insertion.cutting import Cutting, cuttings
 from pipeline.insertion.states import Scene
-from pipeline.insertion.steps import CUTTING, INDENTATION, PUNCTURE, Step
+from pipeline.insertion.steps import CUTTING, INDENTATION, Step
 from pipeline.insertion.withdrawal import withdrawn
-from pipeline.study.sweep import Study
-from pipeline.surrogate.cases import Solve, SurrogateError
+from pipeline.states import FAILED, OK, PARTIAL, PENDING
 
 # The least depth at which a slit is solved, in widths of the blade.
 _LEAST = 0.25
-# The state after the puncture is so much deeper (m) than the one before: depths of a dataset rise.
-_AFTER = 1e-9
 _TINY = 1e-9
 
 
 @dataclass(frozen=True)
-class Path:
-    """Steps of an insertion; depth (m) and force (N) of the puncture with error bars, NaN if the tissue stays whole.
+class Puncture:
+    """The puncture: the step ``before`` it, the peak, and the one ``after`` it, at the same depth (m).
 
-    The ``withdrawal``, if any, has a step for each depth, in the same order.
-    ``message`` says at which depth the path ended early, and why.
+    Error bars are those of the depth (m), and of the force (N) before.
     """
 
-    steps: tuple[Step, ...]
-    puncture: tuple[float, float] = (nan, nan)
-    puncture_error: tuple[float, float] = (nan, nan)
+    before: Step
+    after: Step
+    depth_error: float
+    force_error: float
+
+    @property
+    def depth(self) -> float:
+        """Depth (m) of the tip."""
+        return self.before.depth
+
+    @property
+    def force(self) -> float:
+        """The largest force (N) of the indentation."""
+        return self.before.force
+
+
+@dataclass(frozen=True)
+class Path:
+    """Steps of an insertion, at the depths of its scene up to where it ended, and the puncture between them.
+
+    Without a puncture the tissue stays whole. The ``withdrawal``, if any, has steps at the same depths. ``message``
+    says at which depth the path ended early, and why; ``is_pending`` that states are still to be solved.
+    """
+
+    steps: tuple[Step, ...] = ()
+    puncture: Puncture | None = None
     message: str = ""
     withdrawal: tuple[Step, ...] = ()
+    is_pending: bool = False
+
+    @property
+    def status(self) -> str:
+        """The state of the case: "partial" if its path ended early."""
+        if self.is_pending:
+            return PENDING
+        return OK if not self.message else PARTIAL if self.steps else FAILED
 
 
-def follow(study: Study, solve: Solve) -> Path:
-    """Return the path of the insertion of a study.
+def follow(scene: Scene) -> Path:
+    """Return the path of a scene, as far as its states are solved."""
+    path = _follow(scene)
+    return replace(path, is_pending=True) if scene.is_pending else path
 
-    Raises:
-        StudyError: if the study has no insertion, or is not one scene.
-        SurrogateError: if the intact body, or the first step, cannot be solved.
-    """
-    scene = Scene(study, solve)
-    to, count = scene.insertion.to, scene.insertion.steps
-    depths = np.unique([scene.clear(to * number / count) for number in range(1, count + 1)])
-    stiffness, bar = scene.stiffness()
-    whole = _Whole(stiffness, bar)
+
+def _follow(scene: Scene) -> Path:
+    pressed, depths = scene.stiffness(), np.array(scene.depths)
+    if isinstance(pressed, str):
+        return Path(message=pressed)
+    whole = _Whole(*pressed)
     # No slit is cheaper than its work of fracture alone: before, the tissue is whole.
     first = next((depth for depth in depths if whole.energy(depth) >= scene.blade.length * scene.tear(depth)), np.inf)
     withdraws = scene.insertion.withdraw and np.isfinite(first)  # through all depths, after the tissue is cut
@@ -64,21 +89,19 @@ def follow(study: Study, solve: Solve) -> Path:
     intact, cut = found[:count], found[count:]
     if not cut:
         deepest = intact[-1].depth if intact else max(depths[depths < first], default=0.0)
-        steps = tuple(whole.step(depth) for depth in depths if depth <= deepest)
-        if not steps:
-            raise SurrogateError(f"{study.file}: the path ends at its first step, {message}")
-        return Path(steps, message=message)
-    puncture = _puncture(scene, whole, intact, cut[0], max(depths[depths < first], default=0.0))
-    kept = [whole.step(depth) for depth in depths if depth < puncture.depth]
-    steps = (*kept, *_steps(scene, whole, puncture, cut))
+        return Path(tuple(whole.step(depth) for depth in depths if depth <= deepest), message=message)
+    pierced_at = _puncture(scene, whole, intact, cut[0], max(depths[depths < first], default=0.0))
+    states = [pierced_at.after, *(one for one in cut if one.depth > pierced_at.depth)]
+    after = _steps(scene, states)
+    steps = [whole.step(depth) for depth in depths if depth < pierced_at.depth] + [
+        step for step in after if step.depth in scene.depths
+    ]
     back: list[Step] = []
     if withdraws:
-        above = [one for one in found if one.depth < puncture.depth]
-        below = [one for one in cut if one.depth > puncture.depth]
-        states = [*above, puncture.after, *below][::-1]
-        back = withdrawn(scene, states, steps[-1])[::-1]
-        back.insert(len(above), replace(back[len(above)], depth=puncture.depth))  # the puncture has two steps
-    return Path(steps, (puncture.depth, stiffness * puncture.depth), puncture.errors(whole), message, tuple(back))
+        above = [one for one in found if one.depth < pierced_at.depth]
+        back = [step for step in withdrawn(scene, [*above, *states][::-1], after[-1]) if step.depth in scene.depths]
+    puncture = Puncture(whole.step(pierced_at.depth), after[0], *pierced_at.errors(whole))
+    return Path(tuple(steps), puncture, message, tuple(back[::-1]))
 
 
 @dataclass(frozen=True)
@@ -91,9 +114,9 @@ class _Whole:
     def energy(self, depth: float) -> float:
         return self.stiffness * depth**2 / 2
 
-    def step(self, depth: float, phase: str = INDENTATION) -> Step:
+    def step(self, depth: float) -> Step:
         energy = self.energy(depth)
-        return Step(phase, depth, self.stiffness * depth, error=self.bar * depth, stored=energy, work=energy)
+        return Step(INDENTATION, depth, self.stiffness * depth, error=self.bar * depth, stored=energy, work=energy)
 
 
 @dataclass(frozen=True)
@@ -155,35 +178,31 @@ def _between(before: Cutting, after: Cutting, depth: float) -> Cutting:
     return replace(after, **(mixed | {"depth": depth, "stored": float(stored(depth))}))
 
 
-def _steps(scene: Scene, whole: _Whole, puncture: _Puncture, cut: list[Cutting]) -> list[Step]:
-    """Return the steps from the puncture on: the peak, the force after it, and cutting."""
+def _steps(scene: Scene, states: list[Cutting]) -> list[Step]:
+    """Return the steps through ``states`` of cutting, the first of which is that after the puncture."""
     friction = 2 * scene.blade.friction
-    states = [puncture.after, *(one for one in cut if one.depth > puncture.depth)]
     depths = np.array([one.depth for one in states])
     rubs = np.array([friction * one.squeeze for one in states])
     rubbed = _sums(depths, rubs)
     worked = _work(scene, states)
-    found = [whole.step(puncture.depth, PUNCTURE)]
-    start = puncture.after.energy
     missed = [0.0 if _crosses(scene, *pair) else _defect(*pair) for pair in pairwise(states)]
     missed = [max(pair) for pair in pairwise([0.0, *missed, 0.0])]
-    for number, one in enumerate(states):
-        found.append(
-            Step(
-                phase=CUTTING,
-                depth=one.depth if number else one.depth + _AFTER,
-                elastic=one.elastic,
-                cutting=one.cutting,
-                friction=float(rubs[number]),
-                error=one.elastic_error + friction * one.squeeze_error + missed[number],
-                stored=one.stored,
-                fracture=one.fracture,
-                rubbed=float(rubbed[number]),
-                work=start + float(worked[number] + rubbed[number]),
-                crack_depth=one.crack_depth,
-            )
+    return [
+        Step(
+            phase=CUTTING,
+            depth=one.depth,
+            elastic=one.elastic,
+            cutting=one.cutting,
+            friction=float(rubs[number]),
+            error=one.elastic_error + friction * one.squeeze_error + missed[number],
+            stored=one.stored,
+            fracture=one.fracture,
+            rubbed=float(rubbed[number]),
+            work=states[0].energy + float(worked[number] + rubbed[number]),
+            crack_depth=one.crack_depth,
         )
-    return found
+        for number, one in enumerate(states)
+    ]
 
 
 def _work(scene: Scene, states: list[Cutting]) -> FloatArray:

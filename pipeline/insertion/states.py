@@ -1,37 +1,52 @@
-"""States of a body that are solved: intact under the edge of a blade, and with a slit in which the blade is.
+"""The body and the blade of an insertion, and its solved states: intact, and with a slit in which the blade is."""
 
-They are ordinary cases, kept in the case store: a path that is computed again, or goes on after an interruption, reads
-them.
-"""
-
-from collections.abc import Iterator, Mapping, Sequence
-from copy import deepcopy
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from pipeline.shapes.body import Layered
-from pipeline.shapes.probes.blade import Blade
 from pipeline.states import OK
-from pipeline.study.problems import Problem, StudyError
-from pipeline.study.read import parse
-from pipeline.study.schema import SECTIONS, Material
-from pipeline.study.sweep import Study
-from pipeline.study.toml import to_toml
-from pipeline.surrogate.cases import Solve, SurrogateError
-from pipeline.units import canonical
+from pipeline.study.insertion_stages import SHORT, clear, first_ahead, interfaces
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from pipeline.shapes.body import Layered
+    from pipeline.shapes.insertion import Insertion
+    from pipeline.shapes.probes.blade import Blade
+    from pipeline.study.schema import Material
 
-# Keys of a blade that is inserted which no solved state has.
-_OF_PATH = ("insertion", "toughness", "friction", "depth", "contact")
-# The front is solved this share of the distance to an interface ahead of it.
-SHORT = 0.75
-# A depth without effect, in widths of the blade: the force of a blade that slides in a slit does not depend on it.
-_ANY = 0.01
+__all__ = ["SHORT", "Cut", "Scene", "Solved", "States", "Tissue"]
+
+
+class Solved(Protocol):
+    """A solved state: energy (J), force (N), energy release rate (J/m²); bars are relative half widths, of 95 %."""
+
+    @property
+    def status(self) -> str: ...  # noqa: D102
+    @property
+    def message(self) -> str: ...  # noqa: D102
+    @property
+    def energy(self) -> float: ...  # noqa: D102
+    @property
+    def force(self) -> float: ...  # noqa: D102
+    @property
+    def force_error(self) -> float: ...  # noqa: D102
+    @property
+    def energy_release(self) -> float: ...  # noqa: D102
+    @property
+    def energy_release_error(self) -> float: ...  # noqa: D102
+
+
+class States(Protocol):
+    """What has the solved states of a scene: None for one that is still to be solved."""
+
+    def intact(self) -> Solved | None:
+        """Return the blade at its last depth on the intact body."""
+        ...
+
+    def slit(self, depth: float, ahead: float) -> Solved | None:
+        """Return the blade with its tip at a depth (m), in a slit whose front is ``ahead`` (m) of it."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -63,33 +78,25 @@ class Cut:
 
 
 class Scene:
-    """The body and the blade of a study with an insertion, and what solves its states."""
+    """A body, a blade that is inserted, the depths (m) of its steps, and its solved states.
 
-    def __init__(self, study: Study, solve: Solve):
-        """Read the scene.
+    ``is_pending`` tells whether a state was asked for that is still to be solved.
+    """
 
-        Raises:
-            StudyError: if the study has no insertion, or is not one scene.
-        """
-        self.study, self._solve = study, solve
-        if study.axes:
-            raise StudyError(
-                study.file,
-                [Problem(axis.path, None, f"is a list of {len(axis)}: one value is needed") for axis in study.axes],
-            )
-        case = study.case(())
-        blade, body = case.probe, case.body
-        if not isinstance(blade, Blade) or blade.insertion is None:
-            why = 'is required for `epsmesh insertion`: a table of a blade with `to`, such as {to = "15 mm"}'
-            raise StudyError(study.file, [Problem("probe.insertion", None, why)])
-        assert isinstance(body, Layered) and blade.toughness is not None
-        self.blade, self.insertion, self.toughness = blade, blade.insertion, blade.toughness
+    def __init__(
+        self, blade: "Blade", body: "Layered", material: "Material", *, depths: Sequence[float], states: States
+    ):
+        assert blade.insertion is not None
+        assert blade.toughness is not None
+        self.blade, self.depths, self._states = blade, tuple(depths), states
+        self.insertion: Insertion = blade.insertion
+        self.toughness, self.is_pending = blade.toughness, False
         top = body.heights[1]
-        self.interfaces = tuple(top - end for end in body.interfaces)
+        self.interfaces = interfaces([body])
         self.bottom = min(top - level for level in (body.heights[0], *body.support.edges()))
-        self.layers = tuple(self._layers(body, case.material))
+        self.layers = tuple(self._layers(body, material))
 
-    def _layers(self, body: Layered, material: Material) -> Iterator[Tissue]:
+    def _layers(self, body: "Layered", material: "Material") -> Iterator[Tissue]:
         tops = (0.0, *self.interfaces)
         for number, top in enumerate(tops):
             within = body.layer[number] if number < len(body.layer) else material
@@ -112,72 +119,39 @@ class Scene:
 
     def clear(self, depth: float) -> float:
         """Return the depth (m) nearest to ``depth`` at which the tip is half a width or more away from interfaces."""
-        room = self.blade.width / 2
-        for end in self.interfaces:
-            if abs(depth - end) < room:
-                return canonical(end + (room if depth >= end else -room))
-        return canonical(depth)
+        return clear(depth, self.interfaces, self.blade.width / 2)
 
     def ahead(self, depth: float) -> float:
         """Return the distance (m) of the front of the slit that is solved first, for a tip at a depth (m)."""
-        found = min(self.blade.width, 2 * depth)
-        for end in self.interfaces:
-            if depth < end < depth + found / SHORT:
-                found = SHORT * (end - depth)
-        return canonical(found)
+        return first_ahead(self.blade, depth, self.interfaces)
 
     # ---- solved states --------------------------------------------------------------------------------
 
-    def stiffness(self) -> tuple[float, float]:
-        """Return force over depth (N/m) of the blade on the intact surface, and its error bar.
-
-        Raises:
-            SurrogateError: if it cannot be solved.
-        """
-        dataset = self._solve(self._study({"depth": f"{self.insertion.to:.12g} m"}))
-        if str(dataset["status"].values) != OK:
-            raise SurrogateError(f"{self.study.file}: the intact body: {dataset['message'].values}")
-        return float(dataset["force"]) / self.insertion.to, float(dataset["force_error"]) / self.insertion.to
+    def stiffness(self) -> tuple[float, float] | str:
+        """Return force over depth (N/m) of the blade on the intact surface, and its error bar; or why there is none."""
+        found = self._states.intact()
+        if why := self._why_not(found):
+            return f"the intact body: {why}"
+        assert found is not None
+        return found.force / self.insertion.to, found.force * found.force_error / self.insertion.to
 
     def cuts(self, places: Sequence[tuple[float, float]]) -> dict[tuple[float, float], Cut | str]:
-        """Return the solved slits of pairs of depth and distance ahead (m), or why one cannot be solved."""
-        found: dict[tuple[float, float], Cut | str] = {}
-        for ahead, group in groupby(sorted(places, key=lambda place: place[::-1]), key=lambda place: place[1]):
-            depths = [depth for depth, _ in group]
-            dataset = self._solve(self.slit_study(depths, ahead))
-            for number, depth in enumerate(depths):
-                one = dataset.isel(incision=number) if "incision" in dataset.dims else dataset
-                found[depth, ahead] = _cut(one, depth, ahead)
-        return found
+        """Return the solved slits of pairs of depth and distance ahead (m), or why there is none."""
+        return {place: self._cut(*place) for place in places}
 
-    def slit_study(self, depths: Sequence[float], ahead: float) -> Study:
-        """Return the study of slits with the tip of the blade at ``depths`` (m), and the front ``ahead`` (m) of it."""
-        fronts = [f"{depth + ahead:.12g} m" for depth in depths]
-        return self._study(
-            {
-                "incision": fronts if len(fronts) > 1 else fronts[0],
-                "ahead": f"{ahead:.12g} m",
-                "depth": f"{_ANY * self.blade.width:.12g} m",
-            }
-        )
+    def _cut(self, depth: float, ahead: float) -> Cut | str:
+        found = self._states.slit(depth, ahead)
+        if why := self._why_not(found):
+            return why
+        assert found is not None
+        # The bar on the force contains that on the energy.
+        energy, drive, error, release = found.energy, found.force, found.force_error, found.energy_release
+        release_error = found.energy_release_error * release
+        return Cut(depth, ahead, energy, error * energy, release, release_error, drive, error * abs(drive))
 
-    def _study(self, probe: Mapping[str, Any]) -> Study:
-        """Return the study of states with the blade's keys and those of ``probe``, which slides without friction."""
-        raw = {name: deepcopy(section) for name, section in self.study.raw.items() if name in SECTIONS}
-        own = {key: value for key, value in raw["probe"].items() if key not in _OF_PATH}
-        raw["probe"] = {**own, **probe, "contact": "frictionless"}
-        for layer in raw["body"].get("layer", ()):
-            layer.pop("toughness", None)
-        raw["solve"] = {**raw.get("solve", {}), "exact": False, "timing": False}
-        raw.pop("figure", None)
-        return parse(raw, file=self.study.file, text=to_toml(raw, self.study.file))
-
-
-def _cut(one: "xr.Dataset", depth: float, ahead: float) -> Cut | str:
-    if str(one["status"].values) != OK:
-        return str(one["message"].values) or str(one["status"].values)
-    energy, drive, error = (float(one[name]) for name in ("energy", "force", "force_error"))
-    # The bar on the force contains that on the energy.
-    relative = error / abs(drive)
-    release, release_error = float(one["energy_release"]), float(one["energy_release_error"])
-    return Cut(depth, ahead, energy, relative * energy, release, release_error, drive, error)
+    def _why_not(self, found: Solved | None) -> str:
+        """Return why a state has no force, "" if it has."""
+        if found is None:
+            self.is_pending = True
+            return "not yet solved"
+        return "" if found.status == OK else found.message or found.status

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
-INDENTATION, PUNCTURE, CUTTING, WITHDRAWAL = "indentation", "puncture", "cutting", "withdrawal"
-PHASES = (INDENTATION, PUNCTURE, CUTTING, WITHDRAWAL)
+# "ended": the path ended before this depth.
+INDENTATION, CUTTING, WITHDRAWAL, ENDED = "indentation", "cutting", "withdrawal", "ended"
+PHASES = (INDENTATION, CUTTING, WITHDRAWAL, ENDED)
 
 
 @dataclass(frozen=True)

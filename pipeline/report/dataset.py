@@ -16,6 +16,7 @@ from pipeline.plan.equivalent_places import EquivalentPlace
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST, MESH_DIMENSIONS, RUN, attributes, quantity_of
+from pipeline.report.along_path import along_path
 from pipeline.report.history import over_time
 from pipeline.report.uncertainty import uncertainties
 from pipeline.report.values import at_full_order, with_flags
@@ -111,10 +112,10 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if "stiffness" in variables:
         coordinates |= _motions()
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
-    dataset = over_time(dataset, study, cases, flat)
+    dataset = along_path(over_time(dataset, study, cases, flat), plan, records)
     if any(case.is_closed for case in cases if not case.lost_contact):
         dataset["force_error"].attrs["comment"] = _OF_CLOSURE
-    for name in of_scene:
+    for name in (name for name in of_scene if name in dataset):
         dataset[name] = dataset[name].isel(_shared(study, reference_keys), drop=True)
     path = {axis.name for axis in study.axes if axis.off}
     for name in {*_PLACE, "axis", "body_message", "tool_depth"} & {*dataset.variables}:

@@ -67,7 +67,7 @@ def over_time(dataset: xr.Dataset, study: Study, cases: Sequence[Case], records:
         depths = np.moveaxis(depths, [axis.is_stage for axis in study.axes].index(True), -1)
     depths = depths.reshape(len(whole), -1)
     convolutions = [convolution_of(case, times, tuple(own)) for case, own in zip(whole, depths, strict=True)]
-    last = _last_stage(dataset)
+    last = last_stage(dataset)
     found = {"force_elastic": last["force"].assign_attrs(attributes("force_elastic"))}
     for name in (name for name in OVER_TIME if name in dataset):
         found[name] = _transformed(dataset, name, dims, convolutions)
@@ -202,7 +202,7 @@ def _contact(
     return {one: _variable(dataset, one, dims, part, "time") for one, part in zip(names, found, strict=True)}
 
 
-def _last_stage(dataset: xr.Dataset) -> xr.Dataset:
+def last_stage(dataset: xr.Dataset) -> xr.Dataset:
     """Return the dataset at the last stage, with what all stages cost, and the worst of their states."""
     last = dataset.isel({_STAGE: -1}, drop=True)
     found = {name: dataset[name].sum(_STAGE) for name in _SUMS if name in dataset}

@@ -8,15 +8,24 @@ import xarray as xr
 from pipeline.quantities import write
 
 
-def answer(dataset: xr.Dataset) -> list[str]:
-    """Return the lines that tell of an insertion."""
-    return list(_lines(dataset))
+def answer(dataset: xr.Dataset) -> Iterator[str]:
+    """Yield the lines that tell of each insertion of a dataset."""
+    dims = list(dataset["status"].dims)
+    for index in np.ndindex(*dataset["status"].shape):
+        one = dataset.isel(dict(zip(dims, index, strict=True)))
+        where = ", ".join(f"{dim} = {write(str(dim), one[dim].item(), one[dim].attrs.get('units'))}" for dim in dims)
+        yield from (f"{where}: {line}" if where else line for line in _lines(one))
 
 
 def _lines(dataset: xr.Dataset) -> Iterator[str]:
-    back = dataset.isel(direction=-1, depth=-1) if "direction" in dataset.dims else None
-    whole, dataset = dataset, dataset.isel(direction=0) if back is not None else dataset
-    last = dataset.isel(depth=-1)
+    back = dataset.isel(stroke=-1) if "stroke" in dataset.dims else None
+    whole, dataset = dataset, dataset.isel(stroke=0) if back is not None else dataset
+    reached = dataset.isel(depth=np.flatnonzero(np.isfinite(dataset["force"].values)))
+    if message := str(dataset["message"].values):
+        yield f"the path ends early, at {message}" if reached.sizes["depth"] else f"no path: {message}"
+    if not reached.sizes["depth"]:
+        return
+    last = reached.isel(depth=-1)
     if np.isnan(float(dataset["puncture_depth"])):
         yield f"the tissue stays whole down to {write('depth', float(last['depth']))}: F is {_force(last)} there"
     else:
@@ -27,16 +36,11 @@ def _lines(dataset: xr.Dataset) -> Iterator[str]:
             f"{part} {1e3 * float(last[f'force_{part}']):.4g}" for part in ("elastic", "cutting", "friction")
         )
         yield f"cutting at {write('depth', float(last['depth']))}: F = {_force(last)} (in mN: {parts})"
-    if back is not None:
-        pulled = whole.isel(direction=-1)["force"]
-        yield (
-            f"withdrawal: F from {1e3 * float(pulled[-1]):.4g} to {1e3 * float(pulled[0]):.4g} mN, at least "
-            f"{1e3 * float(pulled.values.min()):.4g} mN"
-        )
-    worst = float(np.abs(whole["balance"].values).max())
+    if back is not None and bool(np.isfinite(back["force"]).any()):
+        pulled = back["force"].dropna("depth").values * 1e3
+        yield f"withdrawal: F from {pulled[-1]:.4g} to {pulled[0]:.4g} mN, at least {pulled.min():.4g} mN"
+    worst = float(np.nanmax(np.abs(whole["energy_balance"].values)))
     yield f"work is stored energy + fracture + friction within {100 * worst:.2g} %"
-    if message := str(dataset.attrs["message"]):
-        yield f"the path ends early, at {message}"
 
 
 def _force(step: xr.Dataset) -> str:

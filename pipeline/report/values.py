@@ -39,15 +39,45 @@ def by_case(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def at_peak(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset at the time of each case's largest force; a static one as it is."""
-    if "time" not in dataset.dims:
+    """Return a dataset at the time, or the depth of an insertion, of the largest force; a static one as it is."""
+    dataset = dataset.isel(stroke=0, drop=True) if "stroke" in dataset.dims else dataset
+    along = "depth" if has_path(dataset) else "time"
+    if along not in dataset.dims:
         return dataset
-    last = abs(dataset["force"]).fillna(-1.0).argmax("time")
-    return dataset.isel(time=last).drop_vars("time")
+    last = abs(dataset["force"]).fillna(-1.0).argmax(along)
+    return dataset.isel({along: last}).drop_vars(along)
+
+
+def has_path(dataset: xr.Dataset) -> bool:
+    """Tell whether a dataset has the paths of insertions: F over depth, and a puncture."""
+    return "puncture_depth" in dataset
+
+
+def of_path(dataset: xr.Dataset) -> xr.Dataset:
+    """Return what a path of an insertion is judged by, as ``force`` along the dimension ``quantity``.
+
+    These are force and depth of the puncture, and the force at the last depth.
+    """
+    dataset = dataset.isel(stroke=0, drop=True) if "stroke" in dataset.dims else dataset
+    last = dataset.isel(depth=-1, drop=True)
+    found = {}
+    for name, parts in (("force", _JUDGED), ("force_error", [f"{name}_error" for name in _JUDGED])):
+        found[name] = xr.concat([last[part] for part in parts], "quantity").transpose(..., "quantity")
+    full = at_full_order(found["force"]) if "epsilon" in found["force"].dims else found["force"] * np.nan
+    found |= {"force_max": full, "force_ratio": found["force"] / full}
+    return last.assign(found).assign_coords(quantity=["force of the puncture", "depth of the puncture", "last force"])
+
+
+_JUDGED = ("puncture_force", "puncture_depth", "force")
 
 
 def elastic(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with elastic forces, of the instantaneous modulus at `depth`; a static one as it is."""
+    """Return a dataset with elastic forces, of the instantaneous modulus at `depth`; a static one as it is.
+
+    That of an insertion has what its path is judged by.
+    """
+    if has_path(dataset):
+        return of_path(dataset)
     if "time" not in dataset.dims:
         return dataset
     dataset = at_peak(dataset)

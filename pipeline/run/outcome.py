@@ -1,13 +1,17 @@
 """The outcome of a study: counts of its cases by state, failures, and cases without contact."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST
 from pipeline.run.record import Record
-from pipeline.states import FAILED, LOST, OK, PARTIAL, PENDING, SKIPPED, worst
+from pipeline.states import FAILED, FAILURES, LOST, OK, PARTIAL, PENDING, SKIPPED, worst
 from pipeline.study.case import Case
 from pipeline.study.place import CLEAR
+
+if TYPE_CHECKING:
+    from pipeline.insertion.path import Path
 
 
 def without_contact(case: Case) -> Record | None:
@@ -43,15 +47,20 @@ def without_contact(case: Case) -> Record | None:
 def count_states(plan: Plan, records: Mapping[str, Record]) -> dict[str, int]:
     """Return the number of a plan's cases in each state; for a shard, only its own cases count.
 
-    The stages of a history are one case.
+    The stages of a history are one case, and so is an insertion, the path through them.
     """
+    if plan.study.is_insertion and plan.part is None:
+        return _counted([path.status for path in _paths(plan, records)])
     own = [None if plan.part is not None and key not in plan.part else key for key in plan.keys]
     each = [
         None if key is None else _status(records.get(key) or without_contact(case))
         for key, case in zip(own, plan.study.cases(), strict=True)
     ]
     grouped = [[state for state in stages if state is not None] for stages in plan.study.by_case(each)]
-    states = [worst(found) for found in grouped if found]
+    return _counted([worst(found) for found in grouped if found])
+
+
+def _counted(states: Sequence[str]) -> dict[str, int]:
     counts = {state: states.count(state) for state in (OK, SKIPPED, FAILED, PENDING)}
     return counts | {state: states.count(state) for state in (PARTIAL, LOST) if state in states}
 
@@ -61,8 +70,23 @@ def failures(plan: Plan, records: Mapping[str, Record]) -> tuple[tuple[str, str]
     failed = [
         (str(case), records[key].message) for key, case in _cases(plan) if key in records and records[key].has_failed
     ]
+    if plan.study.is_insertion:
+        whole = [case for _, case in plan.study.whole_cases()]
+        ended = zip(whole, _paths(plan, records), strict=True)
+        return tuple((_without_stage(case), path.message) for case, path in ended if path.status in FAILURES)
     exact = {key: records[key].message for key in plan.reference_keys if key in records and not records[key].is_ok}
     return (*failed, *((f"F_exact ({key[:6]})", message) for key, message in exact.items()))
+
+
+def _paths(plan: Plan, records: Mapping[str, Record]) -> "list[Path]":
+    from pipeline.insertion.paths import paths  # noqa: PLC0415 (it loads scipy)
+
+    return paths(plan, records)
+
+
+def _without_stage(case: Case) -> str:
+    words = {name: text for name, text in case.words.items() if name != "stage"}
+    return ", ".join(f"{name} = {text}" for name, text in words.items()) or "the one case"
 
 
 def _status(record: Record | None) -> str:

@@ -43,7 +43,12 @@ def known_of(path: Path, plan: Plan) -> tuple[dict[str, Record], CostModel]:
     if not path.exists():
         return {}, CostModel()
     with open_to_read(path) as store:
-        return store.get(plan.all_keys), store.cost_model()
+        records = store.get(plan.all_keys)
+        if plan.study.is_insertion:
+            from pipeline.insertion.paths import complete  # noqa: PLC0415 (it loads scipy)
+
+            complete(plan, records, store.get)
+        return records, store.cost_model()
 
 
 def plan_the_rest(study: Study, path: Path, without: Collection[str] = ()) -> tuple[Plan, dict[str, Record]]:

@@ -18,7 +18,7 @@ class Axis:
     unit: str
     piece: str = ""  # of an array of tables within the section, such as layer[2]
     owner: str = ""  # the name of that piece
-    is_stage: bool = False  # depths on the way of a history, which the dataset replaces by time
+    is_stage: bool = False  # what is solved on the way of a history, or of an insertion, which is one case
     off: str = ""  # of a path: what becomes of places off the body, "refuse" or "lost"
 
     @property
@@ -35,7 +35,7 @@ class Axis:
     def path(self) -> str:
         """Place in the study file."""
         if self.is_stage:
-            return "probe.history"
+            return f"probe.{self.piece}"
         if self.off:
             return "probe.path" if self.key == "path" else f"probe.path.raster.{self.key}"
         return ".".join(part for part in (self.section, self.piece, self.key) if part)

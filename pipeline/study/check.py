@@ -30,7 +30,8 @@ from pipeline.study.check_mesh import (
     check_support,
 )
 from pipeline.study.closure import check_ball
-from pipeline.study.insertion import check_insertion
+from pipeline.study.insertion import check_insertion, check_same_path
+from pipeline.study.insertion_stages import has_insertion
 from pipeline.study.place import place_error
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
@@ -74,9 +75,22 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     problems.each(check_locking, body=bodies, material=materials, mesh=meshes)
     check_reference(meshes, axes, problems)
     _check_times(probes, axes, problems)
+    check_same_path(probes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
+        if solve.exact and "exact" in solve.model_fields_set and has_insertion(probes):
+            problems.error("solve.exact", solve.exact, "the path of an insertion has no F_exact: omit it")
         if "repeats" in solve.model_fields_set and not solve.timing:
             problems.error("solve.repeats", solve.repeats, "is of timing studies: add `timing = true`, or omit it")
+
+
+def check_steps(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
+    """Check the stages of an insertion as the cases that they are: slits, in which a blade slides."""
+    if "tool" not in sections or problems.errors:
+        return
+    found = Problems()
+    check_sense(sections, axes, found)
+    for problem in found.errors:
+        problems.error("probe.insertion", None, f"its states are slits: {problem.key}: {problem.allowed}")
 
 
 def _check_times(probes: Sequence[Probe], axes: tuple[Axis, ...], problems: Problems) -> None:

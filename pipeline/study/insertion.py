@@ -1,5 +1,6 @@
 """Whether a blade can be inserted as a study says: sound keys, room above the support, layers thicker than a step."""
 
+from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, cast
 
@@ -36,6 +37,17 @@ def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
             problems.error(
                 "probe.insertion.withdraw", True, "withdrawal is computed in a body of one material: omit it, or layers"
             )
+
+
+def check_same_path(probes: Sequence[Probe], problems: Problems) -> None:
+    """Report tools that are not all inserted, or not to the same depths: one dimension has them."""
+    insertions = {getattr(probe, "insertion", None) for probe in probes}
+    if len(insertions) > 1:
+        problems.error(
+            "probe.insertion",
+            None,
+            "must be the same in all [[probe]] tables, since the depths are one dimension of the dataset",
+        )
 
 
 def _check_keys(probe: "Blade", problems: Problems) -> None:

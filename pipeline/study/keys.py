@@ -52,7 +52,7 @@ SECTION_TEXTS = {
     "`points`. Optional.",
     "probe.history": "Depth of the tool over time: ramp, hold and sine, or a table. The dataset has the dimension "
     "`time`. Optional; every value but the table can be swept.",
-    "probe.insertion": "Insertion of a blade: indentation, puncture and cutting, for `epsmesh insertion`. Give `to` in "
+    "probe.insertion": "Insertion of a blade: indentation, puncture and cutting. Give `to` in "
     "place of `depth`, and `toughness`. Optional.",
     "mesh": "Sizes and degree of elements, and the meshed part of the body.",
     "solve": "Solver, and timing of cases. Optional; its lists are no sweeps.",

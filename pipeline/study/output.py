@@ -13,6 +13,7 @@ from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section, Words
 from pipeline.study.axis import Axis
+from pipeline.study.insertion_stages import has_insertion
 from pipeline.study.problems import Problems, nearest, tuples
 from pipeline.units import Coordinate, parse_quantity
 
@@ -200,3 +201,5 @@ def check_outputs(
                 break
     if outputs and any(isinstance(probe, Probe) and probe.history for probe in sections["probe"]):
         problems.error("output", None, "is not computed over time: omit [probe.history], or [[output]]")
+    if outputs and has_insertion(sections["probe"]):
+        problems.error("output", None, "is not computed along an insertion: omit [probe.insertion], or [[output]]")

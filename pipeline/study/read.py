@@ -11,10 +11,11 @@ from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
-from pipeline.study.check import check_sense
+from pipeline.study.check import check_sense, check_steps
 from pipeline.study.check_loads import check_loads
 from pipeline.study.identification import Identification, check_shared, read_identify, read_measurements
 from pipeline.study.identified import with_identified
+from pipeline.study.insertion_stages import with_steps
 from pipeline.study.loads import Load
 from pipeline.study.measured import MESH, completed
 from pipeline.study.measurement import Measurement
@@ -98,7 +99,10 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene:
     spread = _read_spread(given, sections, outputs, problems)
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))
-    sections, every_axis = with_stages(sections, tuple(axes))
+    sections, every_axis = with_steps(*with_stages(sections, tuple(axes)))
+    check_steps(sections, every_axis, problems)
+    if problems.errors:
+        raise StudyError(file, problems.named(problems.errors))
     warnings = tuple(f"{file}: {warning}" for warning in problems.told_once())
     title = str(raw.get("title", Path(file).stem))
     experiment = (given, measurements, identification, identified, spread)

@@ -68,7 +68,7 @@ def with_stages(
     )
     return sections | {"probe": staged}, (
         *axes,
-        Axis("probe", "stage", tuple(range(1, _COUNT + 1)), "1", is_stage=True),
+        Axis("probe", "stage", tuple(range(1, _COUNT + 1)), "1", piece="history", is_stage=True),
     )
 
 

@@ -8,6 +8,7 @@ from math import prod
 from typing import Any, TypeVar
 
 from pipeline.shapes.body import Body
+from pipeline.shapes.insertion import Insertion
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
@@ -64,6 +65,39 @@ class Study:
     def probes(self) -> tuple[Probe, ...]:
         """The probes, with every value that is swept of them."""
         return tuple(probe for probe in self.sections["probe"] if isinstance(probe, Probe))
+
+    @property
+    def is_insertion(self) -> bool:
+        """Whether its tools are inserted: a case is then a path through its stages."""
+        return "tool" in self.sections
+
+    @property
+    def insertion(self) -> Insertion:
+        """The insertion of all of its tools.
+
+        Raises:
+            AttributeError: if they are not inserted.
+        """
+        found: Insertion = self.sections["tool"][0].insertion  # type: ignore[attr-defined]
+        return found
+
+    @property
+    def step_depths(self) -> tuple[float, ...]:
+        """The depths (m) of the steps of its insertion."""
+        (axis,) = (axis for axis in self.axes if axis.is_stage)
+        return tuple(float(depth) for depth in axis.labels[1:])
+
+    def tool(self, case: Case) -> Probe:
+        """Return the tool of a case as the file has it, not at one of its stages."""
+        if not self.is_insertion:
+            return case.probe
+        flat = 0
+        for axis, number in zip(case.axes, case.index, strict=True):
+            if axis.section == "probe" and not axis.is_stage:
+                flat = flat * len(axis) + number
+        tool = self.sections["tool"][flat]
+        assert isinstance(tool, Probe)
+        return tool
 
     @cached_property
     def planning(self) -> Planning:

@@ -38,4 +38,4 @@ NOT_COMPUTED = {
 }
 
 # Each is drawn by the module of its name in pipeline/report/figures.
-FIGURES = ("history", "ratio", "error", "force", "map", "compliance")
+FIGURES = ("insertion", "history", "ratio", "error", "force", "map", "compliance")

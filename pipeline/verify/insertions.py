@@ -1,20 +1,17 @@
 """Insertion of a blade: the force of cutting against energies, and the field near the tip against a nearer front."""
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Any
 
-import xarray as xr
 from mpi4py import MPI
 
 from pipeline.insertion.near_tip import EXTENSION_ERROR, NearTip, strength
-from pipeline.insertion.path import follow
-from pipeline.insertion.states import Cut, Scene
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
+from pipeline.insertion.paths import lacking, paths, scenes
+from pipeline.insertion.states import Cut
+from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.execute import compute
+from pipeline.run.record import Record
 from pipeline.study.read import parse
-from pipeline.study.sweep import Study
 from pipeline.verify.row import Row
 
 _STUDY: dict[str, dict[str, Any]] = {
@@ -38,8 +35,9 @@ def insertion_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows of insertions, none if ``quick``; collective."""
     if quick:
         return
-    solve, study = partial(_solved, comm), parse(_STUDY)
-    path = follow(study, solve)
+    plan = make_plan(parse(_STUDY))
+    records = _solved(comm, plan)
+    (path,) = paths(plan, records)
     before, after = path.steps[-2:]
     gained = after.stored + after.fracture - before.stored - before.fracture
     force = (before.force + after.force) / 2
@@ -52,10 +50,7 @@ def insertion_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
         max(before.error, after.error) / force,
         message=path.message,
     )
-    cuts = Scene(study, solve).cuts([(_DEPTH, _NEAR), (_DEPTH, _FAR)])
-    near, far = cuts[_DEPTH, _NEAR], cuts[_DEPTH, _FAR]
-    assert isinstance(near, Cut)
-    assert isinstance(far, Cut)
+    near, far = _fronts(comm, plan)
     field = NearTip.through(strength(20e3, 0.3, 0.4e-3), _FAR, far.release)
     yield Row(
         "front near a blade's tip, ν = 0.3: energy release",
@@ -68,6 +63,21 @@ def insertion_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     )
 
 
-def _solved(comm: MPI.Comm, study: Study) -> xr.Dataset:
-    plan = make_plan(study)
-    return build(plan, compute(plan, comm))
+def _solved(comm: MPI.Comm, plan: Plan) -> dict[str, Record]:
+    """Return the records of a plan, and of what its paths need besides."""
+    records: dict[str, Record] = {}
+    further: Plan | None = plan
+    while further:
+        records |= compute(further, comm)
+        further = lacking(plan, records)
+    return records
+
+
+def _fronts(comm: MPI.Comm, plan: Plan) -> list[Cut]:
+    """Return the solved slits with a near and a far front."""
+    places = [(_DEPTH, _NEAR), (_DEPTH, _FAR)]
+    ((scene, states),) = scenes(plan, {})
+    scene.cuts(places)
+    records = {key: record for own in states.further.values() for key, record in compute(own, comm).items()}
+    ((scene, _),) = scenes(plan, records)
+    return [cut for cut in scene.cuts(places).values() if isinstance(cut, Cut)]

@@ -78,7 +78,7 @@ def test_a_command_of_another_name_is_told_by_its_new_one(epsmesh, words):
 
 
 def test_commands_are_few():
-    assert len(COMMANDS) <= 14
+    assert len(COMMANDS) <= 13
 
 
 def test_help_of_report_names_every_figure(epsmesh):

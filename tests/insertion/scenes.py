@@ -1,9 +1,12 @@
 """A scene of an insertion, and a body whose states have closed forms."""
 
 import numpy as np
-import xarray as xr
 
 from pipeline.insertion.near_tip import NearTip, strength
+from pipeline.insertion.paths import lacking
+from pipeline.plan.plan import make_plan
+from pipeline.run.record import Record
+from pipeline.states import FAILED, OK
 
 LENGTH, WIDTH, YOUNG, POISSON = 8e-3, 0.4e-3, 20e3, 0.3
 STIFFNESS, GROWTH, FAR = 80.0, 1e-3, 5e-3  # N/m, N, m
@@ -35,30 +38,25 @@ def elastic(depth, ahead):
     return GROWTH + 2 * FIELD.per_length(ahead, FAR)
 
 
-def _values(case):
+def _record(key, case, bar, deepest):
     slit = case.probe.slit
+    if slit is not None and slit.depth > deepest:
+        return Record(key, FAILED, "the mesh is too coarse")
+    scale = {"young": case.scale.stress, "depth": case.scale.length, "force_error": bar}
     if slit is None:
         force = STIFFNESS * case.probe.depth
-        return force, force * case.probe.depth / 2, np.nan
+        return Record(key, OK, force=force, energy=force * case.probe.depth / 2, **scale)
     release = FIELD.release(slit.ahead)
     drive = elastic(slit.tip, slit.ahead) + (LENGTH + 2 * slit.ahead) * release
-    return drive, stored(slit.tip, slit.ahead), release
+    of_front = {"energy_release": release, "energy_release_error": bar}
+    return Record(key, OK, force=drive, energy=stored(slit.tip, slit.ahead), **of_front, **scale)
 
 
-def closed_form(bar=1e-3, deepest=np.inf):
-    """Return what makes the dataset of a study of that body; states below the ``deepest`` front (m) fail."""
-
-    def solve(study):
-        cases = list(study.cases())
-        force, energy, release = np.array([_values(case) for case in cases]).T
-        fails = [case.probe.slit is not None and case.probe.slit.depth > deepest for case in cases]
-        data = {"force": force, "energy": energy, "energy_release": release}
-        data |= {f"{name}_error": bar * data[name] for name in ("force", "energy_release")}
-        data |= {
-            "status": np.where(fails, "failed", "ok").astype(object),
-            "message": np.where(fails, "the mesh is too coarse", "").astype(object),
-        }
-        dims = [axis.name for axis in study.axes]
-        return xr.Dataset({name: (dims, np.reshape(values, study.shape)) for name, values in data.items()})
-
-    return solve
+def solved(study, bar=1e-3, deepest=np.inf):
+    """Return the plan of a study of that body, and its records; states below the ``deepest`` front (m) fail."""
+    plan = further = make_plan(study)
+    records = {}
+    while further:
+        records |= {solve.key: _record(solve.key, solve.case, bar, deepest) for solve in further.solves}
+        further = lacking(plan, records)
+    return plan, records

@@ -16,20 +16,22 @@ from pipeline.report.figures.compliance import compliance
 from pipeline.report.figures.error import error, error_facets
 from pipeline.report.figures.facets import Facets, is_meshed, rest, swept
 from pipeline.report.figures.force import force, history, nothing
+from pipeline.report.figures.insertion import insertion
 from pipeline.report.figures.map import force_map
 from pipeline.report.figures.ratio import ratio, ratio_facets
 from pipeline.report.figures.style import STYLE, add_note, save
 from pipeline.report.table import study_of, warnings_of
-from pipeline.report.values import at_peak
+from pipeline.report.values import at_peak, has_path
 from pipeline.report.words import is_numeric, without_shared
 from pipeline.states import FAILED, LOST, PARTIAL, PENDING, SKIPPED
 from pipeline.study.vocabulary import FIGURES
 
 __all__ = ["KINDS", "STYLE", "choose", "describe", "draw", "figure", "files", "lacks", "save"]
 
-# Kinds that show time; all others show the time of the largest force.
-_OVER_TIME = ("history",)
+# Kinds that show time, or the depth of an insertion; all others show those of the largest force.
+_OVER_TIME = ("history", "insertion")
 _DRAWN: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
+    "insertion": insertion,
     "history": history,
     "ratio": ratio,
     "error": error,
@@ -42,6 +44,7 @@ _DRAWN: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
 KINDS = (*FIGURES, "nothing")
 _FACETS: dict[str, Callable[[xr.Dataset], Facets]] = {"ratio": ratio_facets, "error": error_facets}
 _NEEDS = {
+    "insertion": "an insertion ([probe.insertion])",
     "history": "a history of the depth ([probe.history])",
     "ratio": "several ε, and the full order among them",
     "error": "swept meshes, and F_exact or F_max",
@@ -59,10 +62,11 @@ def choose(dataset: xr.Dataset) -> list[str]:
     """Return the kinds of figures that suit ``dataset``, its main one first: what its study asks for, if it suits."""
     if not _known(dataset, "force"):
         return ["nothing"]
-    is_over_time = "time" in dataset.dims
+    is_over_time, is_path = "time" in dataset.dims, has_path(dataset)
     dataset = at_peak(dataset)
     is_of_depth = dataset.sizes.get("depth", 0) > 1
     suits = {
+        "insertion": is_path,
         "history": is_over_time,
         "force": is_of_depth and (_known(dataset, "linear_ratio") or _known(dataset, "contact_area")),
         "ratio": dataset.sizes.get("epsilon", 0) > 1 and _known(dataset, "force_ratio"),

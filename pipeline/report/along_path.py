@@ -1,0 +1,107 @@
+"""The dataset of a study with insertions: F over depth with its parts, phases and energies, and the puncture."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline.insertion.path import Path
+from pipeline.insertion.paths import paths
+from pipeline.insertion.steps import ENDED, PHASES, Step
+from pipeline.plan.plan import Plan
+from pipeline.quantities import RUN, attributes
+from pipeline.report.history import last_stage
+from pipeline.run.record import Record
+
+# What has a value at each depth, in the order of ``_of``.
+STEPS = (
+    "force",
+    "force_error",
+    "force_elastic",
+    "force_cutting",
+    "force_friction",
+    "crack_depth",
+    "energy_stored",
+    "energy_fracture",
+    "energy_friction",
+    "work",
+    "energy_balance",
+)
+# What both sides of the puncture have.
+AT_PUNCTURE = STEPS[:-1]
+_PUNCTURE = ("puncture_depth", "puncture_depth_error", "puncture_force", "puncture_force_error")
+# What a case has besides, of the variables of other studies: where it is, what it cost, and what became of it.
+_KEPT = (
+    "status", "message", "body_message", "axis", "at_x", "at_y", "at_z", "surface_deviation", "force_exact",
+    "force_exact_error", "force_exact_message", *(name for name in RUN if name != "energy"),
+)  # fmt: skip
+
+
+def along_path(dataset: xr.Dataset, plan: Plan, records: Mapping[str, Record]) -> xr.Dataset:
+    """Return the dataset of a study with depths in place of the stages of its insertions; another one as it is.
+
+    All cases have the same depths; values are missing beyond the depth at which a path ended. With a withdrawal there
+    is the dimension ``stroke``, too.
+    """
+    study = plan.study
+    if not study.is_insertion:
+        return dataset
+    found, depths, withdraws = paths(plan, records), study.step_depths, study.insertion.withdraw
+    axes = [axis for axis in study.axes if not axis.is_stage]
+    dims, shape = tuple(axis.name for axis in axes), tuple(len(axis) for axis in axes)
+    more = ("stroke", "depth") if withdraws else ("depth",)
+    strokes = [(path.steps, path.withdrawal) if withdraws else (path.steps,) for path in found]
+    dataset = last_stage(dataset)
+    whole = dataset[[name for name in _KEPT if name in dataset]]
+
+    def variable(name: str, values: Any, *own: str, **texts: Any) -> Any:
+        array = np.array(values)
+        return (*dims, *own), array.reshape((*shape, *array.shape[1:])), attributes(name) | texts
+
+    values = np.array([[_column(steps, depths) for steps in each] for each in strokes])
+    phases = np.array([[_phases(steps, depths) for steps in each] for each in strokes], dtype=np.int8)
+    if not withdraws:
+        values, phases = values[:, 0], phases[:, 0]
+    both, sides = np.array([_at_puncture(path) for path in found]), ["before", "after"]
+    variables = {name: variable(name, values[..., number], *more) for number, name in enumerate(STEPS)}
+    flags = {"flag_values": np.arange(len(PHASES), dtype=np.int8), "flag_meanings": " ".join(PHASES)}
+    variables["phase"] = variable("phase", phases, *more, **flags)
+    for name, own in zip(_PUNCTURE, np.array([_puncture(path) for path in found]).T, strict=True):
+        variables[name] = variable(name, own)
+    for number, name in enumerate(AT_PUNCTURE):
+        what = f"{attributes(name)['long_name']}; on both sides of the puncture"
+        variables[f"{name}_at_puncture"] = variable(name, both[..., number], "side", long_name=what)
+    for name in ("status", "message"):
+        texts = np.array([getattr(path, name) for path in found], dtype=object)
+        variables[name] = variable(name, texts)
+    coordinates = {"depth": ("depth", list(depths), attributes("depth")), "side": ("side", sides, attributes("side"))}
+    if withdraws:
+        coordinates["stroke"] = ("stroke", ["insertion", "withdrawal"], attributes("stroke"))
+    return whole.assign(variables).assign_coords(coordinates)
+
+
+def _of(step: Step) -> tuple[float, ...]:
+    forces = step.force, step.error, step.elastic, step.cutting, step.friction
+    energies = step.stored, step.fracture, step.rubbed, step.work
+    return (*forces, step.crack_depth, *energies, step.balance)
+
+
+def _column(steps: Sequence[Step], depths: Sequence[float]) -> list[tuple[float, ...]]:
+    by_depth = {step.depth: _of(step) for step in steps}
+    return [by_depth.get(depth, (np.nan,) * len(STEPS)) for depth in depths]
+
+
+def _phases(steps: Sequence[Step], depths: Sequence[float]) -> list[int]:
+    by_depth = {step.depth: step.phase for step in steps}
+    return [PHASES.index(by_depth.get(depth, ENDED)) for depth in depths]
+
+
+def _puncture(path: Path) -> tuple[float, ...]:
+    one = path.puncture
+    return (one.depth, one.depth_error, one.force, one.force_error) if one else (np.nan,) * len(_PUNCTURE)
+
+
+def _at_puncture(path: Path) -> list[tuple[float, ...]]:
+    sides = (path.puncture.before, path.puncture.after) if path.puncture else ()
+    return [_of(side)[:-1] for side in sides] or [(np.nan,) * len(AT_PUNCTURE)] * 2
