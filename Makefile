@@ -22,6 +22,9 @@ NONE_OK = $(if $(PYTEST_ARGS),|| [ $$? -eq 5 ])
 # One test process per core, each with whole files, so that a file's fixtures are made once.
 SIDE_BY_SIDE := -n logical --maxprocesses 8 --dist loadfile
 
+# Tests and documentation start hundreds of processes: each would compile the package again.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Huge pages for large arrays: a tenth of a run's time (docs/performance.md).
 export GLIBC_TUNABLES ?= glibc.malloc.hugetlb=1
 

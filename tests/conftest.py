@@ -1,12 +1,19 @@
 """What tests of the command line share: `epsmesh` in this process, `spawn` in one of its own, and a small study."""
 
 import pytest
+from mpi4py import MPI
 
 from pipeline.shapes.files import checked
 from tests import commands
 from tests.studies import small_text
 
 SMALL = small_text(material={"poisson": [0.3, 0.4]}, mesh={"outside": ["coarse", "free"]})
+
+
+def pytest_ignore_collect(collection_path):
+    """On several ranks, load only files with tests for several: those with the mark ``mpi``."""
+    is_test = collection_path.name.startswith("test_") and collection_path.suffix == ".py"
+    return True if is_test and MPI.COMM_WORLD.size > 1 and "mark.mpi" not in collection_path.read_text() else None
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -9,15 +9,12 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from mpi4py import MPI
 
 from pipeline.report.read import read_file
 from pipeline.run.reading import open_to_read
 from tests.commands import ENVIRONMENT, ROOT, command
 from tests.compare import assert_same
 from tests.conftest import SMALL
-
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself")
 
 
 @pytest.fixture(scope="module")

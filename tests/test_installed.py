@@ -7,9 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from mpi4py import MPI
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself")
 ROOT = Path(__file__).parents[1]
 
 

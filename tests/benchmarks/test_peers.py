@@ -3,7 +3,6 @@
 import json
 
 import pytest
-from mpi4py import MPI
 
 from benchmarks.peers import figure, program, results
 from benchmarks.peers.processes import PEERS_PYTHON, ask
@@ -13,7 +12,6 @@ from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth
 from benchmarks.peers.worker import Answer, answers
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="times one process")
 NEEDS_PEERS = pytest.mark.skipif(not PEERS_PYTHON.exists(), reason="scripts/peers.sh has not been run")
 
 

@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 import xarray as xr
-from mpi4py import MPI
 
 from benchmarks import plain_loop
 from benchmarks.plain_case import MOST_DIRECT, solve
 from pipeline.study.read import read_study
 from tests import cases
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="times one process")
 MESH = {"epsilon": ["6 mm", "full"], "outside": ["coarse", "fixed"], "rim": "0.3 mm", "growth": 0.6}
 
 

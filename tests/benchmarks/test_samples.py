@@ -4,13 +4,10 @@ import json
 import sys
 
 import pytest
-from mpi4py import MPI
 
 from benchmarks import communication, contact, one_run, organs, products, solvers
 from benchmarks.processor import by_turns
 from benchmarks.scenes import BOX, DISC, graded, study
-
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="times one process")
 
 
 @pytest.mark.parametrize("method", ["direct", "iterative"])

@@ -1,13 +1,9 @@
 """The work–precision benchmark: measures what it says, and draws every curve from its own numbers."""
 
 import numpy as np
-import pytest
 import xarray as xr
-from mpi4py import MPI
 
 from benchmarks import work_precision, work_precision_figure
-
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="times one process")
 
 
 def test_dataset_and_figure(tmp_path, monkeypatch):

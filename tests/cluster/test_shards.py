@@ -6,15 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from typer.testing import Result
 
 from pipeline.report.read import read_file
 from tests.commands import epsmesh
 from tests.compare import all_done, assert_same
 from tests.studies import small_text
-
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="runs studies by itself")
 
 SMALL = small_text(
     material={"young": ["5 kPa", "10 kPa"], "poisson": [0.3, 0.4]},

@@ -6,10 +6,10 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from itertools import groupby
 from pathlib import Path
 
 import pytest
-from mpi4py import MPI
 
 from pipeline.report.dataset import write
 from pipeline.study.read import parse
@@ -17,8 +17,6 @@ from pipeline.study.starter import starter
 from tests.docs.blocks import PYTHON, ROOT, blocks, missing, pages
 from tests.report.synthetic import FIGURE, dataset
 from tests.test_cli import ENVIRONMENT
-
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself")
 
 # Most of the blocks of a page may not be exceptions.
 _MOST_NOT_RUN = 0.5
@@ -77,18 +75,21 @@ def python(root: Path, text: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.parametrize("page", pages(), ids=lambda page: str(page.relative_to(ROOT)))
 def test_blocks_of_a_page_run(page, checkout):
+    """Python blocks without a command between them run in one process."""
+    run = [block for block in blocks(page) if not block.why_not]
     session = ""  # what a reader has typed into Python so far
-    for block in blocks(page):
-        if block.why_not:
-            continue
-        if block.language == PYTHON:
-            session += block.text
+    for is_python, group in groupby(run, lambda block: block.language == PYTHON):
+        together = list(group)
+        if is_python:
+            session += "".join(block.text for block in together)
             done = python(checkout, session)
-        else:
+            assert done.returncode == 0, f"{together[0]} and after\n{done.stdout}\n{done.stderr}"
+            continue
+        for block in together:
             done = shell(checkout, block.text)
-        assert done.returncode == block.status, f"{block}\n{block.text}\n{done.stdout}\n{done.stderr}"
-        absent = missing(block.expected, done.stdout + done.stderr)
-        assert not absent, f"{block}: no line {absent!r} in\n{done.stdout}\n{done.stderr}"
+            assert done.returncode == block.status, f"{block}\n{block.text}\n{done.stdout}\n{done.stderr}"
+            absent = missing(block.expected, done.stdout + done.stderr)
+            assert not absent, f"{block}: no line {absent!r} in\n{done.stdout}\n{done.stderr}"
 
 
 _PIECES = [block for page in pages() for block in blocks(page, ("toml",))]

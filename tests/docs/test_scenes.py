@@ -3,13 +3,10 @@
 import importlib.util
 
 import pytest
-from mpi4py import MPI
 
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.study.read import read_study
 from tests.docs.blocks import ROOT
-
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="once is enough")
 
 _SPEC = importlib.util.spec_from_file_location("draw_scenes", ROOT / "docs" / "draw_scenes.py")
 scenes = importlib.util.module_from_spec(_SPEC)

@@ -5,7 +5,6 @@ import subprocess
 import sys
 
 import pytest
-from mpi4py import MPI
 
 from pipeline.cli import app
 from pipeline.plan.plan import make_plan
@@ -13,8 +12,6 @@ from pipeline.report.dataset import build
 from pipeline.study.keys import all_sections, keys_of
 from tests.cases import study
 from tests.docs.blocks import ROOT
-
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="once is enough")
 
 
 @pytest.fixture(scope="module")

@@ -7,13 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from mpi4py import MPI
 
 from tests.commands import ENVIRONMENT, ROOT
 from tests.fuzz.conftest import MOST_MEMORY
 from tests.fuzz.profile import IS_CAMPAIGN
-
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself")
 
 SIZE = 100_000_000  # bytes
 # What would end the machine ends the process first: bytes.

@@ -87,7 +87,6 @@ def test_where_it_begins_tells_nothing_of_where_it_ends():
     assert other.force[2] == pytest.approx(2 * touch.force[2], rel=5e-3)
 
 
-@pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="one process")
 def test_a_rounded_cone_is_that_of_a_full_solve(rounded):
     model, force, bar = rounded
     slope, r = 1 / tan(pi / 3), 1.5e-3

@@ -6,14 +6,12 @@ from base64 import b64encode
 from hashlib import sha256
 
 import pytest
-from mpi4py import MPI
 
 from pipeline.report.page import write_page
 from tests.report.browser import CHROMIUM, Browser
 from tests.report.synthetic import EPSILONS, dataset
 
 pytestmark = [
-    pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself"),
     pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="chromium is not installed"),
 ]
 NASTY = "a < b & <script>c</script>"

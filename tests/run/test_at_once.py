@@ -5,7 +5,6 @@ import subprocess
 import numpy as np
 import pytest
 import xarray as xr
-from mpi4py import MPI
 
 from pipeline.report.dataset import write
 from pipeline.run.record import Record
@@ -15,7 +14,6 @@ from tests.compare import assert_same
 from tests.report.synthetic import dataset
 from tests.studies import small_text
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself")
 TINY = {"mesh": {"epsilon": ["4 mm", "full"], "degree": 1}, "solve": {"exact": False}}
 
 

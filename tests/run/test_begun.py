@@ -19,8 +19,6 @@ from tests.cases import study
 from tests.commands import ENVIRONMENT, ROOT
 from tests.studies import small_text
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself")
-
 # The command, with a solve in it that ends the process, and one that only it is told of.
 COMMAND = """
 import os, sys

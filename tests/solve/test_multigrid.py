@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from pipeline.solve import SolveError
 from pipeline.solve.conditions import Conditions
@@ -14,7 +13,6 @@ from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from tests.solve.test_mixed import PRESS, law, make_mesh
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="for one process")
 FINE = {"mesh": {"rim": "0.5 mm", "fine": "3 mm"}}
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.solve.conditions import Conditions
@@ -11,7 +10,6 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from tests.solve.test_mixed import make_mesh
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="for one process")
 LAYERS = {"body": {"layer": [{"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.48}]}}
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from dolfinx import fem
-from mpi4py import MPI
 
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.elements import elements_of
@@ -13,7 +12,6 @@ from pipeline.solve.spaces import Spaces
 from tests.sampling import sampled
 from tests.solve.test_mixed import make_mesh
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="for one process")
 SKIN = {"body": {"layer": [{"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.48}]}}
 # Moduli are kept in single precision.
 ROUNDING = 1e-6

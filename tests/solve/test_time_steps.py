@@ -19,7 +19,6 @@ from pipeline.solve.time_steps import PressedFootprint, TimeSteps
 from pipeline.viscoelastic import Motion, Terms, respond
 from tests.cases import study
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="for one process")
 TERMS = ((0.4, 0.5), (0.2, 3.0))
 LARGE = {"law": "neo-hookean", "poisson": 0.45}
 LINEAR = {"poisson": 0.45}

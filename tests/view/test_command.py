@@ -4,12 +4,9 @@ import importlib.util
 import re
 
 import pytest
-from mpi4py import MPI
 
 from tests.commands import epsmesh
 from tests.studies import small_text
-
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="one process")
 
 STUDY = small_text(
     probe=[

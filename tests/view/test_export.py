@@ -13,8 +13,6 @@ from pipeline.view.compute import compute_fields, fields_of
 from pipeline.view.export import write_fields
 from tests.cases import study
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="writes files of one process")
-
 
 def fields(mesh_only=False, **mesh):
     made = study(mesh={"epsilon": "8 mm"} | mesh)

@@ -7,7 +7,6 @@ from pathlib import Path
 import nibabel
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from pipeline.shapes.files.labels import read_labels
 from pipeline.study.read import read_text
@@ -16,7 +15,6 @@ from tests.commands import epsmesh
 from tests.report.browser import Browser
 from tests.view.test_page import in_browser
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="one process")
 # Middles (mm) and radii (mm) of balls by label; the affine is mirrored and turned.
 BALLS = {2: ((-30.0, 10.0, 60.0), 18.0), 5: ((-30.0, -40.0, 60.0), 12.0)}
 NAMES = {2: "liver", 5: "a < b"}

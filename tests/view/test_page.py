@@ -26,7 +26,6 @@ from tests.cases import study
 from tests.report.browser import CHROMIUM, Browser
 from tests.report.synthetic import dataset
 
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="one process")
 NAMES = ("skin", "fat </script>")
 
 

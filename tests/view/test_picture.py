@@ -17,7 +17,6 @@ if not os.environ.get("DISPLAY"):
         ctypes.CDLL("libEGL.so.1")
     except OSError:
         pytest.skip("no libEGL to draw without a display", allow_module_level=True)
-pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="draws on one process")
 
 
 def fields(mesh_only=False, **changes):
