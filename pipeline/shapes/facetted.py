@@ -14,6 +14,7 @@ from pipeline.shapes.complex import Complex
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.rays import nearest_point, pierce
 from pipeline.shapes.section import in_mm
+from pipeline.shapes.shell import Shell
 from pipeline.shapes.skin import Skin
 from pipeline.shapes.triangles import Triangles
 
@@ -110,7 +111,10 @@ class Facetted(Body):
 def _room(body: Facetted, surface: Closed) -> float:
     (low, high), points = np.array(surface.bounds), body.triangles.points
     within = points[((points > low) & (points < high)).all(axis=1)]
-    return min(Body.room(body, surface), float(surface.distance(within).min()) if len(within) else inf)
+    room = min(Body.room(body, surface), float(surface.distance(within).min()) if len(within) else inf)
+    # Edges may cross although no corner of one surface is beyond the other.
+    crosses = room > 0 and isinstance(surface, Shell) and surface.crossing(body.triangles)
+    return 0.0 if crosses else room
 
 
 @lru_cache(_FEW)

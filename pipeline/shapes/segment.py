@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from functools import lru_cache
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.files.loaded import UNITS, Loaded
+from pipeline.shapes.files.loaded import UNITS, LengthUnit, Loaded, Repair
 from pipeline.shapes.regions import Embedded
-from pipeline.shapes.section import Words
+from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.shell import Shell
 from pipeline.shapes.tissue import Tissue
 from pipeline.shapes.triangles import SurfaceError, Triangles
@@ -41,19 +41,11 @@ class Segment(Embedded):
         Words("Pressure in a hollow region, on its wall: a load.", '"10 mmHg"', default="none"),
     ] = None
     unit: Annotated[
-        Literal["m", "cm", "mm", "um", "µm"] | None,
+        LengthUnit | None,
         Field(exclude=True),
         Words("Unit of length of `file`; surface files have none.", '"mm"', default="none: a label is given"),
     ] = None
-    repair: Annotated[
-        bool,
-        Field(exclude=True),
-        Words(
-            "Repair of a broken surface: holes are closed, and small loose parts are removed. A "
-            "warning lists the changes.",
-            "true",
-        ),
-    ] = False
+    repair: Repair = False
     smooth: Annotated[
         Travel | None,
         Field(exclude=True),
@@ -126,7 +118,11 @@ class Segment(Embedded):
     @property
     def notices(self) -> tuple[str, ...]:
         """Notices about changes to its surface that the author of the study should know."""
-        return self._loaded.notices if self._loaded else ()
+        found = self._loaded.notices if self._loaded else ()
+        if not self.surface.is_thin:
+            return found
+        least = in_mm(2 * self.surface.least)
+        return *found, f"is thin for its size, at most {least} over a tenth of its surface: it needs many elements"
 
 
 @lru_cache(_FEW)

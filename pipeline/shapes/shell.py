@@ -21,6 +21,8 @@ _APART, _SAME = 0.5, 1e-6
 # Far from the contact, element sizes are this share of the distance from it, up to the second in units of half of the
 # thickness.
 _OF_DISTANCE, _LARGEST = 0.15, 0.8
+# A surface is thin if its area is so many squares of its thickness: a sheet 10, a thread 60 times as long as thick.
+_SHEET = 200.0
 # Fractions of a low-discrepancy sequence in two dimensions (M. Roberts, 2018).
 _PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])
 
@@ -122,6 +124,32 @@ class Shell(Closed):
     def least(self) -> float:
         """Half of its thickness (m) where it is thin."""
         return float(self.thin[1].min())
+
+    @property
+    def is_thin(self) -> bool:
+        """Whether it is a thin sheet or a long thread, on which elements by its thickness are many."""
+        return self.triangles.area > _SHEET * (2 * self.least) ** 2
+
+    def crossing(self, other: Triangles) -> Vector | None:
+        """Return a place (m) at which a facet crosses or touches one of an ``other`` surface."""
+        from pipeline.shapes.files.crossings import crossings  # noqa: PLC0415 (only when a file is read)
+
+        both = self.triangles, other
+        ends = np.array([one.bounds for one in both])
+        low, high = ends[:, 0].max(axis=0), ends[:, 1].min(axis=0)
+        near = []
+        for one in both:
+            corners = one.points[one.facets]
+            near.append(one.facets[((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)])
+        if not all(map(len, near)):
+            return None
+        points, facets = np.vstack([one.points for one in both]), np.vstack([near[0], near[1] + len(both[0].points)])
+        pairs = crossings(points, facets)
+        pairs = pairs[(pairs < len(near[0])).sum(axis=1) == 1]
+        if not len(pairs):
+            return None
+        x, y, z = map(float, points[facets[pairs[0]]].mean(axis=(0, 1)))
+        return x, y, z
 
     def sizes(self, contact: Vector) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return points (n, 3), element sizes (n) by the thickness there, and equal areas (n) of parts around them.

@@ -15,6 +15,7 @@ from pipeline.shapes.closed import Closed
 from pipeline.shapes.regions import Embedded, Inclusion
 from pipeline.shapes.section import Section, in_mm
 from pipeline.shapes.segment import Segment
+from pipeline.shapes.shell import Shell
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.axis import Axis
 from pipeline.study.howto import page_of
@@ -225,6 +226,8 @@ def _apart(one: Closed, other: Closed) -> tuple[float, str]:
         distance = b.distance(points)
         nearest = int(np.argmin(distance))
         found.append((float(distance[nearest]), _point(points[nearest])))
+    if isinstance(one, Shell) and isinstance(other, Shell) and (place := one.crossing(other.triangles)):
+        found.append((0.0, _point(np.array(place))))
     return min(found)
 
 

@@ -7,8 +7,12 @@ import pytest
 from pipeline.compat import gmsh_session
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.plan.key import case_key, mesh_key
+from pipeline.plan.plan import make_plan
 from pipeline.plan.symmetry import mirror_planes
+from pipeline.report.dataset import build
 from pipeline.scene.model import FREE
+from pipeline.shapes.shell import Shell
+from pipeline.shapes.triangles import Triangles
 from pipeline.study.problems import StudyError
 from tests.cases import solve, study
 from tests.mesh.test_regions import volumes
@@ -146,3 +150,22 @@ def test_what_does_not_fit_is_named_with_its_place(folder):
             study(body=held(folder, body, *regions, **more), probe=PROBE, mesh=MESH)
         for part in parts:
             assert part in str(caught.value), str(caught.value)
+
+
+def test_a_thin_sheet_is_told_in_the_study_and_in_its_dataset(folder):
+    points, facets = sphere(12)
+    write_stl(folder / "sheet.stl", AT + [10e-3, 9e-3, 0.8e-3] * points, facets)
+    for file, told in (("sheet.stl", "tumour: is thin for its size"), ("tumour.stl", "")):
+        checked = study(body=held(folder, BOX, REGION | {"file": file}), probe=PROBE, mesh=MESH)
+        assert any("is thin" in str(warning) for warning in checked.warnings) is bool(told)
+        dataset = build(make_plan(checked), {})
+        assert told in str(dataset["body_message"].values) if told else "body_message" not in dataset
+
+
+def test_edges_may_cross_where_no_corner_is_inside():
+    needle = np.array([[-1, -1, 0.9], [1, -1, 0.9], [0, -1.1, 1.1], [0, 3, 1]])
+    facets = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    one = Shell(Triangles(needle, facets))
+    across, apart = (needle[:, [1, 0, 2]] + offset for offset in ([0, 0, 0.05], [0, 0, 3]))
+    assert one.crossing(Triangles(across, facets[:, ::-1])) is not None
+    assert one.crossing(Triangles(apart, facets[:, ::-1])) is None

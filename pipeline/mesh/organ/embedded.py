@@ -22,8 +22,8 @@ from pipeline.shapes.shell import Shell
 _POINTS, _PASSES = 1000, 2
 # Largest deviation of chords from the surface, in units of half of its smallest thickness: the field rules the sizes.
 _DEVIATION = 0.12
-# Largest change of the volume by chords, which curved edges restore.
-_EXCESS = 0.1
+# Largest change of the volume by chords, which curved edges restore. Beyond, elements are smaller by these factors.
+_EXCESS, _FINER = 0.1, (1.0, 1.5, 2.0)
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
 
 
@@ -41,14 +41,16 @@ def embedded_surfaces(regions: Sequence[Embedded], field: Field) -> list[tuple[F
 def _to_sizes(region: Embedded, field: Field) -> tuple[FloatArray, IntArray]:
     surface = region.surface
     points, facets = _triangles(surface)
-    sheet = Sheet(points, facets, np.full(len(facets), FREE), _NO_EDGES)
-    for _ in range(_PASSES):
-        sheet = remesh(sheet, field.at(sheet.points), _DEVIATION * surface.least)
-        sheet = settled(sheet, surface.project(sheet.points))
-    edges_of(sheet.facets)
-    if abs(excess := sheet.volume / surface.volume - 1) > _EXCESS:
-        raise MeshError(f"the remeshed surface of {region.name} encloses {excess:+.2%} of its volume")
-    return sheet.points, sheet.facets
+    given = Sheet(points, facets, np.full(len(facets), FREE), _NO_EDGES)
+    for finer in _FINER:
+        sheet = given
+        for _ in range(_PASSES):
+            sheet = remesh(sheet, field.at(sheet.points) / finer, _DEVIATION / finer * surface.least)
+            sheet = settled(sheet, surface.project(sheet.points))
+        edges_of(sheet.facets)
+        if abs(excess := sheet.volume / surface.volume - 1) <= _EXCESS:
+            return sheet.points, sheet.facets
+    raise MeshError(f"the volume in the remeshed surface of {region.name} has changed by {excess:+.2%}")
 
 
 def _triangles(surface: Closed) -> tuple[FloatArray, IntArray]:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from pipeline.arrays import FloatArray
-from pipeline.shapes.files.loaded import UNITS, Loaded
+from pipeline.shapes.files.loaded import UNITS, LengthUnit, Loaded
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
 from pipeline.shapes.segmented import Segmented
@@ -42,7 +42,7 @@ class FromImage(Segmented, Scanned):
         ),
     ] = ""
     unit: Annotated[
-        Literal["m", "cm", "mm", "um", "µm"] | None,
+        LengthUnit | None,
         Field(exclude=True),
         Words("Unit of length, if the image's header has none.", '"mm"', "the header's"),
     ] = None

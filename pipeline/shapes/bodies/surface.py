@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.files.loaded import UNITS, Loaded
+from pipeline.shapes.files.loaded import UNITS, LengthUnit, Loaded, Repair
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
 from pipeline.shapes.segmented import Segmented
@@ -21,19 +21,11 @@ class FromSurface(Segmented, Scanned):
 
     shape: Literal["surface"]
     unit: Annotated[
-        Literal["m", "cm", "mm", "um", "µm"],
+        LengthUnit,
         Field(exclude=True),
         Words("Unit of length; surface files have none.", '"mm"'),
     ]
-    repair: Annotated[
-        bool,
-        Field(exclude=True),
-        Words(
-            "Repair of a broken surface: holes are closed, and small loose parts are removed. A "
-            "warning lists the changes.",
-            "true",
-        ),
-    ] = False
+    repair: Repair = False
     smooth: Annotated[
         Travel | None,
         Field(exclude=True),

@@ -26,12 +26,14 @@ from pipeline.shapes.triangles import SurfaceError, Triangles, enclosed
 # Voxels outside the largest piece, or enclosed by it, are noise up to this share of it.
 MOST_APART = 0.05
 # Increase by hand when the same label gives another surface.
-_METHOD = 2
-_REACH = 4.0  # truncation of the filter, in standard deviations
+_METHOD = 3
+REACH = 4.0  # truncation of the filter, in standard deviations
 # The default filter is narrowed by a factor until its largest value shows that tissue is thick enough for it: 0.985 is
 # that in the middle of a ball of 3.2 standard deviations. It is not narrowed below this share of a voxel. On an
 # ellipsoid of 10 × 8 × 6 mm, voxels of 1, 2 and 4 mm then give distances of .09, .2 and .74 mm, close to the least.
 _THICK, _NARROWER, _NARROWEST = 0.985, 0.85, 0.75
+# A label of so few voxels that its largest value would be below one half, with a margin, has the second share instead.
+_PRESENT, _LEAST = 0.6, 0.5
 # Tolerance on the volume in the search for the level, and most steps.
 _SAME_VOLUME, _LEVELS = 5e-4, 6
 # Largest shift, in standard deviations of the filter: beyond, levels are too near to 0 and 1.
@@ -146,7 +148,7 @@ def surface_of(
     mask = np.logical_or.reduce([of_label(labels, one) for one in (label, *inner)])
     mask, start, notices = one_piece(mask, labels)
     sigma = (default_smooth(labels.spacing) if smooth is None else smooth) / labels.spacing
-    margin = np.ceil(_REACH * sigma).astype(int) + 2
+    margin = np.ceil(REACH * sigma).astype(int) + 2
     indices, facets = _smoothed(np.pad(mask, [(m, m) for m in margin]), sigma, smooth is None, offset / labels.spacing)
     points = (indices + (start - margin)) @ labels.affine[:, :3].T + labels.affine[:, 3]
     if enclosed(points, facets) < 0:  # a mirrored frame
@@ -189,26 +191,34 @@ def one_piece(mask: Any, labels: LabelMap) -> tuple[Any, IntArray, list[str]]:
     return filled, np.array([part.start for part in box]), notices
 
 
+def filtered(mask: Any, sigma: FloatArray, *, may_narrow: bool) -> tuple[Any, FloatArray]:
+    """Return the filtered indicator of a mask, and the width (3,) of the filter in voxels, narrowed for thin masks."""
+    from scipy import ndimage  # noqa: PLC0415
+
+    steps = mask.astype(np.float32)
+    while True:
+        values = ndimage.gaussian_filter(steps, sigma, truncate=REACH)
+        least = _NARROWEST if values.max() >= _PRESENT else _LEAST
+        if not may_narrow or values.max() >= _THICK or sigma.max() * _NARROWER <= least:
+            return values, sigma
+        sigma = sigma * _NARROWER
+
+
 def _smoothed(mask: Any, sigma: FloatArray, may_narrow: bool, offset: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return the surface, in indices, of a mask after the filter, at the level that keeps its volume.
 
     It is then shifted outward by ``offset`` (3,), in voxels.
     """
-    from scipy import ndimage  # noqa: PLC0415
     from scipy.special import ndtr, ndtri  # noqa: PLC0415
 
-    steps = mask.astype(np.float32)
     if abs(offset[0]) > _MOST_OFFSET * sigma[0]:
         raise SurfaceError(
             f"`offset` is more than {_MOST_OFFSET:g} times the smoothing length: use a smaller one or more `smooth`"
         )
     if not sigma.any():
-        return march(steps, 0.5)
+        return march(mask.astype(np.float32), 0.5)
     volume = float(mask.sum())
-    values = ndimage.gaussian_filter(steps, sigma, truncate=_REACH)
-    while may_narrow and values.max() < _THICK and sigma.max() * _NARROWER > _NARROWEST:
-        sigma = sigma * _NARROWER
-        values = ndimage.gaussian_filter(steps, sigma, truncate=_REACH)
+    values, sigma = filtered(mask, sigma, may_narrow=may_narrow)
     # Secant method for the level at which the volume is that of the mask, from one half.
     level, before = 0.5, None
     for _ in range(_LEVELS):

@@ -1,13 +1,27 @@
 """Results of reading a body's file."""
 
 from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.complex import Complex
+from pipeline.shapes.section import Words
 from pipeline.shapes.triangles import Triangles
 
 # Metres in the units of length of files.
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
+# The keys of a study that say how a surface file is read.
+LengthUnit = Literal["m", "cm", "mm", "um", "µm"]
+Repair = Annotated[
+    bool,
+    Field(exclude=True),
+    Words(
+        "Repair of a broken surface: holes are closed, and small loose parts are removed. A warning lists the changes.",
+        "true",
+    ),
+]
 
 
 @dataclass(frozen=True)

@@ -13,21 +13,17 @@ import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.complex import OUTSIDE, Complex
-from pipeline.shapes.files.image import default_smooth, one_piece
+from pipeline.shapes.files.image import REACH, default_smooth, filtered, one_piece
 from pipeline.shapes.files.labels import LabelMap, of_label
 from pipeline.shapes.files.marching import march
 from pipeline.shapes.triangles import SurfaceError, doubled_normals
 
-_REACH = 4.0  # truncation of the filter, in standard deviations
 # Tolerance on volumes in the search for the factors, most steps, and largest step (of a logarithm).
 _SAME_VOLUME, _STEPS, _LARGEST = 5e-4, 12, 0.5
 # A step's part of what was wanted that is believed.
 _LEAST_GAIN, _MOST_GAIN = 0.1, 3.0
 # A region must keep its volume within this share; parts below this number of voxels are left to their neighbours.
 MOST_VOLUME, CRUMB = 0.01, 8
-# The filter of a thin label is narrowed by this factor until its largest value shows that the label is thick enough for
-# it: 0.97 is that in the middle of a ball of three standard deviations. It is not narrowed below this share of a voxel.
-_THICK, _NARROWER, _NARROWEST = 0.97, 0.8, 0.4
 _TINY, _EVEN = 1e-6, 0.5
 
 
@@ -49,27 +45,15 @@ def partition_of(
     for region, mask in enumerate(masks[1:], start=1):
         number[mask[box] & body] = region
     sigma = (default_smooth(found.spacing) if smooth is None else smooth) / found.spacing
-    margin = np.ceil(_REACH * sigma).astype(int) + 2
+    margin = np.ceil(REACH * sigma).astype(int) + 2
     number = np.pad(number, [(m, m) for m in margin], constant_values=OUTSIDE)
-    whole, width = _filtered(number != OUTSIDE, sigma, may_narrow=smooth is None)
+    whole, width = filtered(number != OUTSIDE, sigma, may_narrow=smooth is None)
     weights, said = _without_crumbs(whole, _weights(number, len(labels), sigma, may_narrow=smooth is None), labels)
     points, facets, sides = _keeping_volumes(whole, weights, number, (width, sigma), labels)
     places = (points + (start - margin)) @ found.affine[:, :3].T + found.affine[:, 3]
     if np.linalg.det(found.affine[:, :3]) < 0:  # a mirrored frame
         facets = np.ascontiguousarray(facets[:, ::-1])
     return Complex(places, facets, sides), (*found.notices, *notices, *said)
-
-
-def _filtered(mask: Any, sigma: FloatArray, *, may_narrow: bool) -> tuple[Any, FloatArray]:
-    """Return the filtered indicator of a mask, and the width (3,) of the filter, narrowed for thin ones."""
-    from scipy import ndimage  # noqa: PLC0415
-
-    steps = mask.astype(np.float32)
-    while True:
-        values = ndimage.gaussian_filter(steps, sigma, truncate=_REACH)
-        if not may_narrow or values.max() >= _THICK or sigma.max() * _NARROWER <= _NARROWEST:
-            return values, sigma
-        sigma = sigma * _NARROWER
 
 
 def _weights(number: IntArray, count: int, sigma: FloatArray, *, may_narrow: bool) -> FloatArray:
@@ -83,9 +67,9 @@ def _weights(number: IntArray, count: int, sigma: FloatArray, *, may_narrow: boo
 
         nearest = distance_transform_edt(number == OUTSIDE, 1 / sigma, return_distances=False, return_indices=True)
         number = number[tuple(nearest)]
-    filtered = [_filtered(number == label, sigma, may_narrow=may_narrow and label > 0) for label in range(count)]
-    weights = np.stack([values for values, _ in filtered])
-    wide = [width is sigma for _, width in filtered]
+    passed = [filtered(number == label, sigma, may_narrow=may_narrow and label > 0) for label in range(count)]
+    weights = np.stack([values for values, _ in passed])
+    wide = [width is sigma for _, width in passed]
     if not all(wide):
         left = np.maximum(1 - weights[np.logical_not(wide)].sum(axis=0), 0.0)
         weights[wide] *= left / np.maximum(weights[wide].sum(axis=0), _TINY)
