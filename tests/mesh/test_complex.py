@@ -8,7 +8,8 @@ import pytest
 from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ.base import base
 from pipeline.mesh.organ.field import Field
-from pipeline.mesh.organ.sheet import FIXED
+from pipeline.mesh.organ.remesh import _closed
+from pipeline.mesh.organ.sheet import FIXED, TangledError
 from pipeline.mesh.organ.untangle import untangled
 from pipeline.mesh.organ.volume import fill
 from pipeline.mesh.size import Sizes
@@ -19,6 +20,7 @@ from pipeline.shapes.frame import Frame
 from pipeline.shapes.skin import Skin
 from tests.complexes import are_closed, blocks, scene
 
+APART = np.array([[[1, 0, 1]]])
 LAYERS = np.array([[[0, 1, 2]]])
 QUARTERS = np.array([[[0], [1]], [[3], [2]]])
 DIAGONAL = np.array([[[0], [1]], [[1], [0]]])
@@ -40,7 +42,7 @@ def walls(points, cells, regions):
     return {facet for facet, sides in of_facet.items() if len({*sides, *[OUTSIDE] * (2 - len(sides))}) == 2}
 
 
-@pytest.mark.parametrize("labels", [LAYERS, QUARTERS, DIAGONAL, WITHIN, HOLLOW], ids="lqdwh")
+@pytest.mark.parametrize("labels", [LAYERS, APART, QUARTERS, DIAGONAL, WITHIN, HOLLOW], ids="laqdwh")
 def test_regions_that_touch_are_filled_up_to_their_common_facets(labels):
     body = blocks(labels)
     points, cells, regions = fill(body, even(4e-3))
@@ -80,13 +82,29 @@ def test_surfaces_between_regions_are_meshed_together_with_the_bodys(organ):
     assert are_closed(coarse.facets, coarse.sides, (OUTSIDE, 0, 1, 2))
     assert not len(crossings(coarse.points, coarse.facets))
     for region in parts.regions:
-        assert coarse.volume(region) == pytest.approx(parts.volume(region), rel=0.06)
+        assert coarse.volume(region) == pytest.approx(parts.volume(region), rel=0.03)
     assert {*map(tuple, coarse.walls()[0].tolist())} == {*map(tuple, parts.walls()[0].tolist())}
     distance = made.faces.distance(sheet)
-    assert np.median(distance) < 1e-9 and distance.max() < 2e-3
+    assert np.quantile(distance, 0.95) < 1e-9 and distance.max() < 0.5e-3
     edges = sheet.points[sheet.junctions]
-    assert len(edges) > 8 and np.median(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)) > 1e-3
+    assert len(edges) > 8 and np.median(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)) > 1.5e-3
     assert np.abs(edges[..., 0] - 19.5e-3).max() < 2e-3
+
+
+def test_a_facet_that_the_remesher_doubled_within_a_wall_is_removed(organ):
+    _, made = organ
+    sheet = made.sheet
+    number = int(np.flatnonzero((sheet.sides == (1, 0)).all(axis=1))[0])
+    doubled = replace(
+        sheet,
+        facets=np.vstack([sheet.facets, sheet.facets[number : number + 1]]),
+        group=np.append(sheet.group, sheet.group[number]),
+    )
+    with pytest.raises(TangledError, match=r"not closed at \("):
+        doubled.neighbours()
+    mended = _closed(doubled)
+    mended.neighbours()
+    assert len(mended.facets) == len(sheet.facets)
 
 
 def test_the_support_ends_at_its_level_in_all_regions(organ):

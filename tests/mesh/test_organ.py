@@ -17,8 +17,8 @@ from pipeline.mesh.organ.base import far_surface
 from pipeline.mesh.organ.contact import set_in
 from pipeline.mesh.organ.make import mesh_organ, mesh_scanned
 from pipeline.mesh.organ.remesh import _closed
-from pipeline.mesh.organ.sheet import FREE, PROBE, Sheet, edges_of
-from pipeline.mesh.organ.untangle import TangledError, bad_facets, untangled
+from pipeline.mesh.organ.sheet import FREE, PROBE, Sheet, TangledError, edges_of
+from pipeline.mesh.organ.untangle import bad_facets, untangled
 from pipeline.mesh.size import Sizes
 from pipeline.plan.plan import make_plan
 from pipeline.scene.model import Scene

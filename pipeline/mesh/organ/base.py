@@ -17,8 +17,7 @@ from pipeline.mesh.organ.faces import Faces
 from pipeline.mesh.organ.junctions import coarsened
 from pipeline.mesh.organ.prepare import cut, level_line, merged, sharp_edges
 from pipeline.mesh.organ.remesh import release, remesh
-from pipeline.mesh.organ.sheet import Sheet
-from pipeline.mesh.organ.untangle import TangledError
+from pipeline.mesh.organ.sheet import Sheet, TangledError
 from pipeline.mesh.size import EDGES_PER_RADIUS
 from pipeline.shapes.complex import OUTSIDE, Complex
 from pipeline.shapes.frame import Vector

@@ -15,8 +15,8 @@ from pipeline.mesh.organ.faces import Faces
 from pipeline.mesh.organ.field import Field
 from pipeline.mesh.organ.regions import fill_regions
 from pipeline.mesh.organ.remesh import remesh
-from pipeline.mesh.organ.sheet import PROBE, Sheet, edges_of, group_names
-from pipeline.mesh.organ.untangle import TangledError, untangled
+from pipeline.mesh.organ.sheet import PROBE, Sheet, TangledError, edges_of, group_names
+from pipeline.mesh.organ.untangle import untangled
 from pipeline.mesh.regions import embedded_sizes
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import FREE, Scene

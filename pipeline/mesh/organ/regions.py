@@ -8,7 +8,7 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError, flat_cells, orient
 from pipeline.mesh.organ.embedded import embedded_surfaces
 from pipeline.mesh.organ.field import Field
-from pipeline.mesh.organ.untangle import TangledError
+from pipeline.mesh.organ.sheet import TangledError
 from pipeline.mesh.organ.volume import fill
 from pipeline.shapes.body import Body
 from pipeline.shapes.complex import TISSUE, Complex

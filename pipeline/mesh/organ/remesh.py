@@ -168,11 +168,13 @@ def _closed(sheet: Sheet) -> Sheet:
 
 
 def _without_fins(sheet: Sheet) -> Sheet:
-    """Return the sheet without facets that are connected by one edge or none."""
+    """Return the sheet without facets that are connected by one edge or none, or doubled within a wall."""
     while True:
         keys = _keys(half_edges(sheet.facets), len(sheet.points))
         _, number, times = np.unique(keys, return_inverse=True, return_counts=True)
         joined = (times[number].reshape(-1, 3) > 1).sum(axis=1) > 1
+        if sheet.is_divided:
+            joined &= ~sheet.open_edges().all(axis=1)
         if joined.all():
             return sheet
         sheet = compact(Sheet(sheet.points, sheet.facets[joined], sheet.group[joined], sheet.sharp))[0]

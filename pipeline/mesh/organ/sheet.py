@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
 from pipeline.scene import model
 from pipeline.shapes.complex import OUTSIDE
@@ -18,6 +18,20 @@ from pipeline.shapes.triangles import closed_edges, doubled_normals, edge_keys, 
 # their numbers are added in multiples of these. The remesher keeps the groups apart.
 WALL, FREE, FIXED, PROBE = 0, 1, 2, 3
 _KINDS, _REGIONS = 4, 1024
+
+
+class TangledError(MeshError):
+    """A surface bounds no volume at ``places`` (n, 3), within a distance ``reach`` (n) of each, all in m."""
+
+    def __init__(self, places: FloatArray, reach: FloatArray, what: str = "the remeshed surface crosses itself"):
+        self.places, self.reach = places, reach
+        x, y, z = 1e3 * places[0]
+        super().__init__(f"{what} at ({x:.4g}, {y:.4g}, {z:.4g}) mm; `smooth`, or `repair`, may help there")
+
+    @staticmethod
+    def at(corners: FloatArray, *what: str) -> "TangledError":
+        """Return the error for facets or cells by their ``corners`` (n, k, 3), in m."""
+        return TangledError(corners.mean(axis=1), np.ptp(corners, axis=1).max(axis=1), *what)
 
 
 def group_names() -> dict[int, str]:
@@ -80,13 +94,15 @@ class Sheet:
         junctions there are several pairs of facets.
 
         Raises:
-            MeshError: if the body's surface, or that of a region, is not closed.
+            MeshError: if the body's surface is not closed.
+            TangledError: if that of a region is not.
         """
         if not self.is_divided:
             edges, facets = edges_of(self.facets)
             return edges, facets, np.ones(len(edges), dtype=np.int64)
-        for region in np.unique(self.sides):
-            edges_of(self.facets[(self.sides == region).any(axis=1)])
+        if (is_open := self.open_edges()).any():
+            corners = self.points[self.facets[is_open.any(axis=1)]]
+            raise TangledError.at(corners, "the remeshed surface of a region is not closed")
         pairs = half_edges(self.facets)
         ordered = np.sort(pairs, axis=1)
         order = np.lexsort((ordered[:, 1], ordered[:, 0]))
@@ -102,6 +118,16 @@ class Sheet:
         here, there = order[one], order[following[one]]
         turned = np.where(pairs[here, 0] == pairs[there, 0], -1, 1)
         return ordered[here], np.column_stack([here // 3, there // 3]), turned
+
+    def open_edges(self) -> BoolArray:
+        """Return a mask (m, 3) of edges, from each corner to the next, at which a region beside them is not closed."""
+        sides, keys = self.sides, edge_keys(self.facets, len(self.points)).reshape(-1, 3)
+        found = np.zeros(keys.shape, dtype=bool)
+        for region in np.unique(sides):
+            mine = (sides == region).any(axis=1)
+            _, number, times = np.unique(keys[mine], return_inverse=True, return_counts=True)
+            found[mine] |= (times % 2 == 1)[number].reshape(-1, 3)
+        return found
 
     @property
     def normals(self) -> FloatArray:

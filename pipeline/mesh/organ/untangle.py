@@ -5,9 +5,8 @@ from math import cos, radians
 import numpy as np
 from scipy.sparse import coo_array
 
-from pipeline.arrays import BoolArray, FloatArray, IntArray
-from pipeline.mesh.generate import MeshError
-from pipeline.mesh.organ.sheet import WALL, Sheet
+from pipeline.arrays import BoolArray, IntArray
+from pipeline.mesh.organ.sheet import WALL, Sheet, TangledError
 from pipeline.shapes.files.crossings import crossings
 
 # Neighbouring facets with a smaller angle between them are folded: a tetrahedron between them would be flat. A fold of
@@ -18,20 +17,6 @@ _FOLDED, _SHARPEST = radians(10.0), radians(1.0)
 _THIN, _THINNEST = 1e-3, 1e-6
 # Rounds of moving the points of bad facets; after the second number of rounds their neighbours are moved, too.
 _ROUNDS, _WIDER = 12, 4
-
-
-class TangledError(MeshError):
-    """A surface bounds no volume at ``places`` (n, 3), within a distance ``reach`` (n) of each, all in m."""
-
-    def __init__(self, places: FloatArray, reach: FloatArray, what: str = "the remeshed surface crosses itself"):
-        self.places, self.reach = places, reach
-        x, y, z = 1e3 * places[0]
-        super().__init__(f"{what} at ({x:.4g}, {y:.4g}, {z:.4g}) mm; `smooth`, or `repair`, may help there")
-
-    @staticmethod
-    def at(corners: FloatArray, *what: str) -> "TangledError":
-        """Return the error for facets or cells by their ``corners`` (n, k, 3), in m."""
-        return TangledError(corners.mean(axis=1), np.ptp(corners, axis=1).max(axis=1), *what)
 
 
 def bad_facets(sheet: Sheet) -> BoolArray:

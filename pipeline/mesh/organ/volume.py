@@ -1,17 +1,19 @@
 """Tetrahedra on both sides of the surfaces that divide a body into regions; the surfaces remain unchanged."""
 
-from dataclasses import replace
-
 import gmsh
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import MeshError, model_options
 from pipeline.mesh.organ.field import Field
-from pipeline.mesh.organ.untangle import TangledError
+from pipeline.mesh.organ.sheet import TangledError
 from pipeline.mesh.reason import reason
 from pipeline.shapes.complex import Complex
+from pipeline.shapes.skin import Skin
+from pipeline.shapes.triangles import Triangles, enclosed, half_edges
 from pipeline.stages import stage
 
 # Cells below this quality are optimised. With gmsh's default, 0.3, flat cells may remain that have all four corners in
@@ -34,11 +36,34 @@ def fill(surfaces: Complex, field: Field) -> tuple[FloatArray, IntArray, IntArra
         MeshError: with gmsh's own message, if it fails, or if the cells of a region do not fill it.
     """
     scale = float(np.ptp(surfaces.points, axis=0).max()) / MODEL_SIZE
-    scaled = surfaces.points / scale
+    points, cells, numbers = [surfaces.points], [], []
+    for region in surfaces.regions.tolist():
+        # Each by itself: gmsh may mix up the sides of surfaces that meet along curves.
+        for shells in _pieces(surfaces.points, surfaces.boundary(region)):
+            on_it, around = np.unique(np.vstack(shells), return_inverse=True)
+            ends = np.cumsum([len(shell) for shell in shells])[:-1]
+            found, corners = _fill(surfaces.points[on_it], np.split(around.reshape(-1, 3), ends), scale, field)
+            inner = sum(map(len, points)) + np.arange(len(found) - len(on_it))
+            points.append(found[len(on_it) :])
+            cells.append(np.concatenate([on_it, inner])[corners])
+            numbers.append(np.full(len(corners), region))
+    return np.vstack(points), np.vstack(cells), np.concatenate(numbers) if len(surfaces.regions) > 1 else None
+
+
+def _fill(points: FloatArray, shells: list[IntArray], scale: float, field: Field) -> tuple[FloatArray, IntArray]:
+    """Return the points of a mesh in the first shell and outside of the others, given ones first, and its cells."""
+    scaled = points / scale
     with gmsh_session():
         model_options()
         model = gmsh.model
-        volumes = _add_volumes(replace(surfaces, points=scaled))
+        skins = []
+        for facets in shells:
+            skins.append(model.addDiscreteEntity(2))
+            own = np.unique(facets)
+            model.mesh.addNodes(2, skins[-1], own + 1, scaled[own].ravel())
+            model.mesh.addElementsByType(skins[-1], _TRIANGLE, [], (facets + 1).ravel())
+        volume = model.geo.addVolume([model.geo.addSurfaceLoop(skins)])
+        model.geo.synchronize()
         field.set(scale, model.geo)
         gmsh.option.setNumber("Mesh.OptimizeThreshold", _OPTIMISED)
         try:
@@ -46,39 +71,37 @@ def fill(surfaces: Complex, field: Field) -> tuple[FloatArray, IntArray, IntArra
         except Exception as error:  # gmsh raises bare Exception
             raise _named(f"gmsh: {reason(error)}", scale) from error
         found, coordinates, _ = model.mesh.getNodes()
-        parts = [model.mesh.getElementsByType(_TETRAHEDRON, volume)[1] for volume in volumes]
-        if not all(map(len, parts)):
+        corners = model.mesh.getElementsByType(_TETRAHEDRON, volume)[1]
+        if not len(corners):
             raise MeshError("gmsh made no tetrahedra of the surface")
         order = np.argsort(found)
         place = coordinates.reshape(-1, 3)[order]
-        cells = np.searchsorted(found[order], np.concatenate(parts)).reshape(-1, 4)
-    points, cells = _first(surfaces.points, scaled, place * scale, place, cells)
-    if len(parts) == 1:
-        return points, cells, None
-    numbers = np.repeat(surfaces.regions, [len(part) // 4 for part in parts])
-    _check_filled(points, cells, numbers, surfaces)
-    return points, cells, numbers
+        cells = np.searchsorted(found[order], corners).reshape(-1, 4)
+    points, cells = _first(points, scaled, place * scale, place, cells)
+    corners = points[cells]
+    filled = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6
+    if not np.isclose(filled, enclosed(points, np.vstack(shells)), rtol=_SAME, atol=0):
+        raise MeshError("gmsh did not fill the surface of a region: it meets another one; use a smaller `fine`")
+    return points, cells
 
 
-def _add_volumes(surfaces: Complex) -> list[int]:
-    """Add the regions to the model: one discrete surface for each pair of regions, with common points at junctions."""
-    model, skins = gmsh.model, []
-    walls, wall = surfaces.walls()
-    # A point belongs to the first wall that it is in.
-    owner = np.empty(len(surfaces.points), dtype=np.int64)
-    for number in reversed(range(len(walls))):
-        owner[surfaces.facets[wall == number]] = number
-    for number in range(len(walls)):
-        skin = model.addDiscreteEntity(2)
-        mine = np.flatnonzero(owner == number)
-        model.mesh.addNodes(2, skin, mine + 1, surfaces.points[mine].ravel())
-        skins.append(skin)
-    for number, skin in enumerate(skins):
-        model.mesh.addElementsByType(skin, _TRIANGLE, [], (surfaces.facets[wall == number] + 1).ravel())
-    around = [np.flatnonzero((walls == region).any(axis=1)) for region in surfaces.regions]
-    volumes = [model.geo.addVolume([model.geo.addSurfaceLoop([skins[k] for k in beside])]) for beside in around]
-    model.geo.synchronize()
-    return volumes
+def _pieces(points: FloatArray, facets: IntArray) -> list[list[IntArray]]:
+    """Return the facets of each piece of a region: those of its outer surface, then those of each cavity in it."""
+    ends = half_edges(facets).T
+    count = len(points)
+    _, shell = connected_components(coo_array((np.ones(ends.shape[1]), tuple(ends)), shape=(count, count)), False)
+    shells = [facets[shell[facets[:, 0]] == part] for part in np.unique(shell[facets[:, 0]])]
+    if len(shells) == 1:
+        return [shells]
+    volumes = [enclosed(points, part) for part in shells]
+    pieces = [[part] for part, volume in zip(shells, volumes, strict=True) if volume > 0]
+    pieces.sort(key=lambda piece: enclosed(points, piece[0]))
+    for part in (part for part, volume in zip(shells, volumes, strict=True) if volume <= 0):
+        around = (
+            piece for piece in pieces if Skin(Triangles(points.copy(), piece[0])).depth(points[part[:1, 0]])[0] > 0
+        )
+        next(around, pieces[-1]).append(part)
+    return pieces
 
 
 def _named(words: str, scale: float) -> MeshError:
@@ -88,16 +111,6 @@ def _named(words: str, scale: float) -> MeshError:
         return MeshError(words)
     places = scale * np.array([gmsh.model.mesh.getNode(node)[0] for node in nodes])
     return TangledError(places, np.zeros(len(places)), words)
-
-
-def _check_filled(points: FloatArray, cells: IntArray, numbers: IntArray, surfaces: Complex) -> None:
-    """Check that the tetrahedra of each region fill it."""
-    corners = points[cells]
-    volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
-    filled = np.bincount(numbers, volumes)[surfaces.regions]
-    wanted = [surfaces.volume(region) for region in surfaces.regions]
-    if not np.allclose(filled, wanted, rtol=_SAME, atol=0):
-        raise MeshError("gmsh did not fill the surface of a region: it meets another one; use a smaller `fine`")
 
 
 def _first(
@@ -115,8 +128,9 @@ def _first(
     number[is_given] = order[at[is_given]]
     inner = used & ~is_given
     number[inner] = len(points) + np.arange(inner.sum())
-    if len(np.unique(number[used & is_given])) != len(points):
-        raise MeshError("gmsh changed the surface that it was given")
+    left = np.setdiff1d(np.arange(len(points)), number[used & is_given])
+    if len(left):
+        raise TangledError(points[left], np.zeros(len(left)), "gmsh changed the surface that it was given")
     return np.vstack([points, found[inner]]), number[cells]
 
 
