@@ -174,6 +174,11 @@ def axisymmetric_gradient(u: Any, r: Any) -> Any:
     return ufl.Identity(3) + ufl.as_tensor(rows)
 
 
+def plane_gradient(u: Any) -> Any:
+    """Return the deformation gradient F (x, y, z) of a displacement (u_x, u_z) in plane strain."""
+    return ufl.Identity(3) + ufl.as_tensor([[u[0].dx(0), 0, u[0].dx(1)], [0, 0, 0], [u[1].dx(0), 0, u[1].dx(1)]])
+
+
 def small_strain(strain: Any, lame_lambda: Any, lame_mu: Any) -> Any:
     """Linear elasticity: λ/2 (tr ε)² + μ ε : ε."""
     return lame_lambda / 2 * ufl.tr(strain) ** 2 + lame_mu * ufl.inner(strain, strain)

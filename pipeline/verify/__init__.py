@@ -23,6 +23,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from pipeline.verify.insertions import insertion_rows  # noqa: PLC0415
     from pipeline.verify.laws import law_rows  # noqa: PLC0415
     from pipeline.verify.loads import load_rows  # noqa: PLC0415
+    from pipeline.verify.needles import needle_rows  # noqa: PLC0415
     from pipeline.verify.paths import path_rows  # noqa: PLC0415
     from pipeline.verify.regions import region_rows  # noqa: PLC0415
     from pipeline.verify.relaxation import relaxation_rows  # noqa: PLC0415
@@ -43,6 +44,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from wedge_rows(comm, quick=quick)
     yield from slit_rows(comm, quick=quick)
     yield from insertion_rows(comm, quick=quick)
+    yield from needle_rows(comm, quick=quick)
     yield from far_field_rows(comm, quick=quick)
     yield from path_rows(comm, quick=quick)
     yield from load_rows(comm, quick=quick)

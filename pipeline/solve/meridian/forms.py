@@ -27,14 +27,16 @@ Meshes = dict[int, tuple[Any, dict[str, Int32Array]]]
 class MeridianForms:
     """Elements of one ``degree`` on the meshes of all regions of a half plane, for a ``law``, on this process alone."""
 
-    def __init__(self, meshes: Meshes, degree: int, law: MaterialLaw):
+    def __init__(self, meshes: Meshes, degree: int, law: MaterialLaw, *, is_plane: bool = False):
         """Compile, and number the dofs.
 
         Raises:
             SolveError: if the meshes of two regions do not match.
         """
         unit = law.parameters[0].lame_mu
-        parts = [Region(*mesh, degree, law.parameters[region], unit) for region, mesh in meshes.items()]
+        parts = [
+            Region(*mesh, degree, law.parameters[region], unit, is_plane=is_plane) for region, mesh in meshes.items()
+        ]
         self.is_definite = not any(part.is_mixed for part in parts)
         self._parts: list[tuple[Region, IntArray]] = []  # with the number of each dof
         self.dofs, joined = 0, 0

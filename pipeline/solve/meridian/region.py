@@ -1,7 +1,8 @@
 """One material of a half plane (r, z): space, energy, residual, tangent and strains on its own mesh.
 
 The energy of a law is integrated over r dr dz. A linear law has the axisymmetric strain of
-:mod:`pipeline.solve.physics`; others have the deformation gradient (r, θ, z) with the hoop stretch 1 + u_r/r.
+:mod:`pipeline.solve.physics`; others have the deformation gradient (r, θ, z) with the hoop stretch 1 + u_r/r. In plane
+strain the energy is that of a unit of thickness.
 """
 
 from dataclasses import replace
@@ -26,6 +27,7 @@ from pipeline.solve.physics import (
     SplitLaw,
     axisymmetric_gradient,
     axisymmetric_strain,
+    plane_gradient,
     pressurised,
     small_strain,
 )
@@ -46,8 +48,18 @@ _INSIDE = 20
 class Region:
     """Elements of one ``degree`` on a mesh of one ``material``, with moduli in units of ``unit`` (Pa)."""
 
-    def __init__(self, mesh: Any, facets: dict[str, Int32Array], degree: int, material: Parameters, unit: float):
-        self._mesh, self._facets = mesh, facets
+    def __init__(
+        self,
+        mesh: Any,
+        facets: dict[str, Int32Array],
+        degree: int,
+        material: Parameters,
+        unit: float,
+        *,
+        is_plane: bool = False,
+    ):
+        """Compile the forms: of a half plane (r, z), or of plane strain if it ``is_plane``."""
+        self._mesh, self._facets, self._is_plane = mesh, facets, is_plane
         self._material, self._unit, self._degree = material, unit, degree
         self.is_linear = material.law == "linear"
         self.is_mixed = material.poisson >= (MIXED_FROM if self.is_linear else LARGE_MIXED_FROM)
@@ -56,6 +68,7 @@ class Region:
         self._solution = fem.Function(self._space)
         self.dofs = len(self._solution.x.array)
         self._r = ufl.SpatialCoordinate(mesh)[0]
+        self._weight: Any = fem.Constant(mesh, 1.0) if is_plane else self._r
         self._u: Any = self._solution
         if self.is_mixed:
             self._u, self._p = ufl.split(self._solution)
@@ -65,12 +78,12 @@ class Region:
         self._density = self._linear() if self.is_linear else self._hyperelastic()
         first = self._density.derivative(self._solution, ufl.TestFunction(self._space))
         second = first.derivative(self._solution, ufl.TrialFunction(self._space))
-        self._action, self._stiffness = (form(each.value * self._r * self._dx) for each in (first, second))
+        self._action, self._stiffness = (form(each.value * self._weight * self._dx) for each in (first, second))
         _ = self._strains, self._areas, self.is_linear or self._energies  # all forms are compiled now
 
     def _linear(self) -> Energy:
         material, unit, mesh = self._material, self._unit, self._mesh
-        strain, mu = axisymmetric_strain(self._u, self._r), fem.Constant(mesh, material.lame_mu / unit)
+        strain, mu = self._strain, fem.Constant(mesh, material.lame_mu / unit)
         if self.is_mixed:
             compliance = fem.Constant(mesh, unit / material.lame_lambda)
             energy = pressurised(strain, 0, mu, self._p, compliance)
@@ -84,13 +97,25 @@ class Region:
         volume = split.elastic.parameters[0].lame_lambda if self.is_mixed else material.ratio
         of = {name: fem.Constant(mesh, value) for name, value in material.further}
         of |= {"lame_mu": fem.Constant(mesh, share), "lame_lambda": fem.Constant(mesh, volume * share)}
-        gradient = axisymmetric_gradient(self._u, self._r)
+        gradient = self._gradient
         if not self.is_mixed:
             return LAWS[material.law].density(gradient, of)
         pressure, compliance = ufl.variable(self._p), fem.Constant(mesh, split.compliance[0] / share)
         energy = LAWS[material.law].density(gradient, of, (pressure, compliance))
         # One function has displacement and pressure: what its derivative reads of an energy by parts is a part, too.
         return replace(energy, parts={**energy.parts, pressure: self._p}) if energy.parts else energy
+
+    @property
+    def _gradient(self) -> Any:
+        return plane_gradient(self._u) if self._is_plane else axisymmetric_gradient(self._u, self._r)
+
+    @property
+    def _strain(self) -> Any:
+        return (
+            ufl.sym(plane_gradient(self._u)) - ufl.Identity(3)
+            if self._is_plane
+            else axisymmetric_strain(self._u, self._r)
+        )
 
     def on(self, name: str) -> tuple[IntArray, FloatArray]:
         """Return the dofs (n, 2) of u_r and u_z on a group of facets, and their coordinates (n, 2)."""
@@ -130,14 +155,15 @@ class Region:
 
     @cached_property
     def _energies(self) -> list[Any]:
-        """Forms of the energy, and of one that is NaN if tissue is inside out.
+        """Forms of the energy, and in a half plane of one that is NaN if tissue is inside out.
 
         Next to the axis the hoop stretch and the area's change may both be negative, and J positive: Newton's method
-        converges then to F wrong by 0.2 to 0.4 %. Both have a sign of their own in a logarithm.
+        converges then to F wrong by 0.2 to 0.4 %. Both have a sign of their own in a logarithm. In plane
+        strain J is the area's change; at a crack's tip, where F is singular, polynomials fold beside these points.
         """
-        forms = [form(self._density.value * self._r * self._dx)]
-        if not self.is_linear:
-            gradient, zero = axisymmetric_gradient(self._u, self._r), fem.Constant(self._mesh, 0.0)
+        forms = [form(self._density.value * self._weight * self._dx)]
+        if not (self.is_linear or self._is_plane):
+            gradient, zero = self._gradient, fem.Constant(self._mesh, 0.0)
             inside = ufl.dx(metadata={"quadrature_degree": _INSIDE})
             area = gradient[0, 0] * gradient[2, 2] - gradient[0, 2] * gradient[2, 0]
             forms.append(form(zero * (ufl.ln(area) + ufl.ln(gradient[1, 1])) * inside))

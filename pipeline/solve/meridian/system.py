@@ -49,36 +49,11 @@ class Pressed:
         return 2 * pi * float(self.solution @ self.residual)
 
 
-class System:
-    """Elements of a half plane with conditions on support, axis and tool; ``radii`` (n) are those of the tool's nodes.
+class FreeSystem:
+    """Elements of a plane, ``forms``, and the dofs ``free`` that are not zero."""
 
-    ``probe`` and ``slide`` (n) are the dofs there of u_z and u_r, from the axis outwards; ``support`` those of u_z on
-    the support; ``free`` are all dofs but those that are zero.
-    """
-
-    def __init__(self, meshes: Meshes, degree: int, law: MaterialLaw, *, bonded: bool = False):
-        """Assemble; tissue that is not ``bonded`` slides along the tool."""
-        self.forms = MeridianForms(meshes, degree, law)
-        dofs, places = self.forms.on(PROBE)
-        order = np.argsort(places[:, 0], kind="stable")
-        self.radii = places[order, 0]
-        self.slide, self.probe = dofs[order].T
-        fixed, axis = self.forms.on(FIXED)[0], self.forms.on(AXIS)[0]
-        self.support = fixed[:, 1]
-        zero = np.concatenate([fixed.ravel(), axis[:, 0], self.slide if bonded else self.slide[:0]])
-        self.free = np.setdiff1d(np.arange(self.forms.dofs), zero)
-
-    @cached_property
-    def _stiffness(self) -> sp.csr_matrix:
-        return self.forms.stiffness()
-
-    @contextmanager
-    def factors(self, held: IntArray) -> Iterator[Callable[[FloatArray], Pressed]]:
-        """Factorise with the dofs ``held`` of u_z below the tool fixed; lend the solver for their values."""
-        free = np.setdiff1d(self.free, held)
-        unknown = self._stiffness[free][:, free]
-        with self.inverse(unknown, is_definite=self.forms.is_definite) as solve, stage("solve"):
-            yield lambda values: self._refined(solve, free, held, values)
+    def __init__(self, forms: MeridianForms, free: IntArray):
+        self.forms, self.free = forms, free
 
     @contextmanager
     def inverse(self, unknown: sp.csr_matrix, *, is_definite: bool) -> Iterator[Callable[[FloatArray], FloatArray]]:
@@ -101,6 +76,38 @@ class System:
                 return np.array(right.array)
 
             yield solve
+
+
+class System(FreeSystem):
+    """Elements of a half plane with conditions on support, axis and tool; ``radii`` (n) are those of the tool's nodes.
+
+    ``probe`` and ``slide`` (n) are the dofs there of u_z and u_r, from the axis outwards; ``support`` those of u_z on
+    the support; ``free`` are all dofs but those that are zero.
+    """
+
+    def __init__(self, meshes: Meshes, degree: int, law: MaterialLaw, *, bonded: bool = False):
+        """Assemble; tissue that is not ``bonded`` slides along the tool."""
+        forms = MeridianForms(meshes, degree, law)
+        dofs, places = forms.on(PROBE)
+        order = np.argsort(places[:, 0], kind="stable")
+        self.radii = places[order, 0]
+        self.slide, self.probe = dofs[order].T
+        fixed, axis = forms.on(FIXED)[0], forms.on(AXIS)[0]
+        self.support = fixed[:, 1]
+        zero = np.concatenate([fixed.ravel(), axis[:, 0], self.slide if bonded else self.slide[:0]])
+        super().__init__(forms, np.setdiff1d(np.arange(forms.dofs), zero))
+
+    @cached_property
+    def _stiffness(self) -> sp.csr_matrix:
+        return self.forms.stiffness()
+
+    @contextmanager
+    def factors(self, held: IntArray) -> Iterator[Callable[[FloatArray], Pressed]]:
+        """Factorise with the dofs ``held`` of u_z below the tool fixed; lend the solver for their values."""
+        free = np.setdiff1d(self.free, held)
+        unknown = self._stiffness[free][:, free]
+        with self.inverse(unknown, is_definite=self.forms.is_definite) as solve, stage("solve"):
+            yield lambda values: self._refined(solve, free, held, values)
 
     def _refined(
         self, solve: Callable[[FloatArray], FloatArray], free: IntArray, held: IntArray, values: FloatArray

@@ -9,14 +9,14 @@ import scipy.sparse as sp
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.solve.contact.deformed import Constraint
-from pipeline.solve.meridian.system import System
+from pipeline.solve.meridian.system import FreeSystem
 from pipeline.stages import stage
 
 
 class MeridianTissue:
     """The elements of a ``system``, with nodes ``dofs`` (n, 2) at ``places`` (n, 2): see :class:`.deformed.Tissue`."""
 
-    def __init__(self, system: System, dofs: IntArray, places: FloatArray):
+    def __init__(self, system: FreeSystem, dofs: IntArray, places: FloatArray):
         """Begin at rest."""
         self.system, self.places = system, places
         self._dofs, self._free = dofs, system.free

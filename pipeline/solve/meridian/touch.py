@@ -182,6 +182,7 @@ class MeridianTouch:
     def balance(self) -> float:
         """The relative difference of the forces on tool and support."""
         system = self.tissue.system
+        assert isinstance(system, System)
         return abs(2 * pi * float(self.tissue.residual()[system.support].sum()) / self.force - 1)
 
     @cached_property

@@ -1,0 +1,1 @@
+"""Plane strain: what is long in one direction, and has the same section everywhere."""
