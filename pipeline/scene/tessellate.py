@@ -45,7 +45,10 @@ def read_solid(path: str, unit: str, factor: float = 1.0) -> int:
     if len(solids) == 1 and len(found) == 1:
         return int(solids[0])
     if len(solids) > 1:
-        raise NotASolid(f"has {len(solids)} solids, but a body is one: unite them, or export the one to be used")
+        raise NotASolid(
+            f"has {len(solids)} solids: unite them, or export each to a file of its own. One is the body, without "
+            "hollows for the others; these are its regions, [[body.region]]"
+        )
     faces = len(gmsh.model.getEntities(2))
     raise NotASolid(
         f"has {faces} faces that bound no solid: sew them to a closed shell, make a solid of that, and export it"

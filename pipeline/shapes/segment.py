@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.files.loaded import UNITS, LengthUnit, Loaded, Repair
+from pipeline.shapes.files.loaded import SOLIDS, UNITS, LengthUnit, Loaded, Repair
 from pipeline.shapes.regions import Embedded
 from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.shell import Shell
@@ -43,7 +43,7 @@ class Segment(Embedded):
     unit: Annotated[
         LengthUnit | None,
         Field(exclude=True),
-        Words("Unit of length of `file`; surface files have none.", '"mm"', default="none: a label is given"),
+        Words("Unit of length of `file`.", '"mm"', default="none: a label is given"),
     ] = None
     repair: Repair = False
     smooth: Annotated[
@@ -69,8 +69,8 @@ class Segment(Embedded):
         str | None,
         Field(exclude=True),
         Words(
-            "File of a closed surface, STL, PLY or OBJ, in the frame of the body: its path from the folder of the "
-            "study.",
+            "File of a closed surface (STL, PLY, OBJ) or of a solid (STEP, BREP), in the frame of the body: its path "
+            "from the folder of the study.",
             '"tumour.stl"',
             default="none: a label is given",
         ),
@@ -132,6 +132,13 @@ def shell_of(triangles: Triangles) -> Shell:
 
 
 def _read(file: str, given: Mapping[str, Any]) -> Loaded:
-    from pipeline.shapes.files.read import read_surface  # noqa: PLC0415 (only when a file is read)
+    path, size = Path(file), UNITS[given["unit"]]
+    if path.suffix.lower() in SOLIDS:
+        from pipeline.shapes.files.cad import read_solid  # noqa: PLC0415 (only when a file is read)
 
-    return read_surface(Path(file), UNITS[given["unit"]], given["repair"], given["smooth"] or None)
+        if given["repair"] or given["smooth"]:
+            raise SurfaceError("is a solid: `repair` and `smooth` are for files of triangles")
+        return read_solid(path, given["unit"], size)
+    from pipeline.shapes.files.read import read_surface  # noqa: PLC0415
+
+    return read_surface(path, size, given["repair"], given["smooth"] or None)

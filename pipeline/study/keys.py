@@ -36,8 +36,8 @@ SECTION_TEXTS = {
     "body. It must not touch the surface, other inclusions or the ends of layers. Optional; every value can "
     "be "
     "swept.",
-    "body.region": "Regions of any shape, of other materials, one table each: closed surfaces from files in any body, "
-    "or labels of the body's image. A region is inside the body. It must not touch the surface, inclusions, ends of "
+    "body.region": "Regions of any shape, of other materials, one table each: closed surfaces or solids from files, or "
+    "labels of the body's image. A region is inside the body. It must not touch the surface, inclusions, ends of "
     "layers, or other regions. Optional; every value can be swept.",
     "material": "Material of all tissue outside layers, inclusions and regions: isotropic, and elastic or "
     "relaxing. Omit it if layers fill the body.",

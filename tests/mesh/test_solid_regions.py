@@ -54,6 +54,10 @@ def folder(tmp_path_factory):
         occ.fillet([box], [upright], [ROUNDED])
         occ.synchronize()
         gmsh.write(str(folder / "plate.step"))
+        gmsh.clear()
+        occ.dilate([(3, occ.addSphere(2, 1, -9, 1))], 2, 1, -9, 5, 4, 3)
+        occ.synchronize()
+        gmsh.write(str(folder / "tumour.step"))
     return folder
 
 
@@ -120,6 +124,16 @@ def test_a_hollow_region_has_no_cells_and_curved_edges_follow_its_wall_and_the_k
     (x, y, _), axis = np.abs(mesh.points[middle]).T, 20e-3 - 1e-3 * ROUNDED
     on_edge = np.abs(np.hypot(x - axis, y - axis) - 1e-3 * ROUNDED) < 1e-9
     assert (on_edge & (x > axis) & (y > axis)).sum() > 50
+
+
+def test_a_solid_is_a_region_by_its_triangles(folder):
+    solid, surface = (
+        case_of(folder, BOX, REGION | {"file": f"tumour.{kind}"}).body.region[0] for kind in ("step", "stl")
+    )
+    assert 1e9 * solid.surface.volume == pytest.approx(VOLUME, rel=0.01)
+    assert np.abs(surface.surface.distance(solid.surface.sample(500))).max() < 0.1e-3
+    with pytest.raises(StudyError, match="`repair` and `smooth` are for files of triangles"):
+        case_of(folder, BOX, REGION | {"file": "tumour.step", "repair": True})
 
 
 def test_a_region_leaves_no_symmetry(folder):

@@ -14,12 +14,11 @@ from pipeline.launcher import run_alone
 from pipeline.npz import read_npz
 from pipeline.shapes.files import check
 from pipeline.shapes.files.edges import Edges, oriented
-from pipeline.shapes.files.loaded import Solid
+from pipeline.shapes.files.loaded import SOLIDS, STEP, Solid
 from pipeline.shapes.files.read import LARGEST_FILE, state_of
 from pipeline.shapes.files.step import entities_of, named_faces, unit_of
 from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals, enclosed
 
-STEP, BREP = (".step", ".stp"), (".brep",)
 # Increase by hand when the same file gives other triangles.
 _VERSION = 4
 _PROGRAM = "pipeline.scene.tessellate"
@@ -40,8 +39,8 @@ def read_solid(path: Path, unit: str, size: float) -> Solid:
 @lru_cache(maxsize=8)
 def _load(path: Path, _changed: int, length: int, unit: str, size: float) -> Solid:
     ending = path.suffix.lower()
-    if ending not in STEP + BREP:
-        raise SurfaceError(f"its name ends in `{path.suffix}`; allowed are {', '.join(STEP + BREP)}")
+    if ending not in SOLIDS:
+        raise SurfaceError(f"its name ends in `{path.suffix}`; allowed are {', '.join(SOLIDS)}")
     if not 0 < length <= LARGEST_FILE:
         raise SurfaceError("is empty: copy or export it again" if length == 0 else f"has {length / 1e9:.2g} GB")
     try:

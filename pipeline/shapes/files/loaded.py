@@ -12,6 +12,9 @@ from pipeline.shapes.triangles import Triangles
 
 # Metres in the units of length of files.
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
+# Endings of files of CAD solids.
+STEP, BREP = (".step", ".stp"), (".brep",)
+SOLIDS = STEP + BREP
 # The keys of a study that say how a surface file is read.
 LengthUnit = Literal["m", "cm", "mm", "um", "µm"]
 Repair = Annotated[
