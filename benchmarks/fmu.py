@@ -1,7 +1,7 @@
 """60 s at 1 kHz of a co-simulation unit in FMPy: time, and the largest difference to the evaluator's forces.
 
-    epsmesh export studies/mine.toml -o pad.epsm.nc --fmu pad.fmu
-    python -m benchmarks.fmu pad.epsm.nc pad.fmu
+    epsmesh export studies/mine.toml -o pad.epsm --fmu pad.fmu
+    python -m benchmarks.fmu pad.epsm pad.fmu
 
 It needs FMPy (`pip install epsmesh[fmi]`). The tool is a ball on a random smooth path, in and out of contact.
 """
@@ -41,7 +41,7 @@ def main() -> None:
         path / np.abs(path).max() * size for path, size in zip(sums, (*model.table.reach, _DEPTH * room), strict=True)
     )
     x, y = 0.7 * x, 0.7 * y
-    spots = [model.face.at(model.table, *place) for place in zip(x.tolist(), y.tolist(), strict=True)]
+    spots = [model.spot(*place) for place in zip(x.tolist(), y.tolist(), strict=True)]
     local = np.array([(a, b, s.height) for a, b, s in zip(x, y, spots, strict=True)])
     normals = np.array([s.normal for s in spots])
     tips = model.origin + (local - depth[:, None] * normals) @ model.axes

@@ -23,14 +23,14 @@ import numpy as np
 
 from benchmarks.tables import markdown
 from benchmarks.touches import NAMES, add_groups, flat_kinds, groups_of
+from epsmesh_realtime import read
+from epsmesh_realtime.model import Model
 from pipeline.arrays import FloatArray
 from pipeline.export.checks import TOOLS, Check, with_bar
 from pipeline.export.export import export, write
 from pipeline.export.full import Solver
 from pipeline.export.scope import Scope, scope_of
 from pipeline.export.tabulate import shares
-from pipeline.realtime import read
-from pipeline.realtime.model import Model
 from pipeline.study.read import read_study
 
 _FOLDER = Path("results/realtime")
@@ -111,11 +111,11 @@ def main() -> None:
         for name in list(rounds):
             if next(rounds[name], None) is None:
                 del rounds[name]
-    rows = [row for name in names for row in _rows(name, read(_FOLDER / f"{name}.epsm.nc"))]
+    rows = [row for name in names for row in _rows(name, read(_FOLDER / f"{name}.epsm"))]
     print(markdown(rows, dict.fromkeys(_COLUMNS, "")))
     if asked.seconds > 0:
         print()
-        print(_latency(_FOLDER / f"{names[0]}.epsm.nc", asked.seconds))
+        print(_latency(_FOLDER / f"{names[0]}.epsm", asked.seconds))
 
 
 def _records(name: str, tools: str = "touches") -> Path:
@@ -139,7 +139,7 @@ def _model(name: str) -> tuple[Model, Solver]:
 
 def model_of(name: str, folder: Path, checks: int) -> tuple[Model, Scope]:
     """Return the model of a study by its ``name`` in :data:`STUDIES`, made in ``folder`` if there is none."""
-    study, path = folder / f"{name}.toml", folder / f"{name}.epsm.nc"
+    study, path = folder / f"{name}.toml", folder / f"{name}.epsm"
     folder.mkdir(parents=True, exist_ok=True)
     study.write_text(STUDIES[name], encoding="utf-8")
     scope = scope_of(read_study(study))
@@ -167,7 +167,7 @@ def _judged(model: Model, groups: Mapping[int, Sequence[Check]]) -> list[list[Ch
 
 def _is_answered(model: Model, check: Check) -> bool:
     """Return whether a tool, drawn for another model of the body, is within the range of this one."""
-    return check.radius <= model.largest * model.room(check.x, check.y) and model.table.holds(check.x, check.y)
+    return check.radius <= model.largest * model.room(check.x, check.y) and model.holds(check.x, check.y)
 
 
 def _cells(model: Model, groups: Sequence[Sequence[Check]]) -> list[str]:
@@ -232,16 +232,16 @@ def _percent(value: float) -> str:
 
 
 def _latency(path: Path, seconds: float) -> str:
-    """Return the time of queries in C and in numpy, and the late ticks of a loop at 1 kHz."""
+    """Return the time of queries in C and from Python, and the late ticks of a loop at 1 kHz."""
     program = _FOLDER / "latency"
     sources = ["realtime/epsmesh.c", "realtime/latency.c"]
     subprocess.run(["cc", "-std=c99", "-O2", *sources, "-o", str(program), "-lm"], check=True)
     arguments = [str(program), str(path), "20000", f"{seconds:g}"]
     in_c = subprocess.run(arguments, check=True, capture_output=True, text=True).stdout
-    return in_c + "".join(_in_numpy(read(path)))
+    return in_c + "".join(_in_python(read(path)))
 
 
-def _in_numpy(model: Model) -> Iterator[str]:
+def _in_python(model: Model) -> Iterator[str]:
     """Yield for each tool the time of 20,000 queries, elapsed and of the processor, next to that of an empty call.
 
     Tools alternate, so that other load affects all of them equally.
@@ -260,7 +260,7 @@ def _in_numpy(model: Model) -> Iterator[str]:
     took: dict[str, list[tuple[float, float]]] = {name: [] for name in (*tools, "nothing")}
     for _ in range(20_000):
         x, y = (0.8 * rng.uniform(-0.7, 0.7, 2) * model.table.reach).tolist()
-        at = (model.origin + np.array([x, y, model.face.at(model.table, x, y).height]) @ model.axes).tolist()
+        at = (model.origin + np.array([x, y, model.spot(x, y).height]) @ model.axes).tolist()
         ratio = float(rng.uniform(*model.table.poisson))
         for name, times in took.items():
             begin, of_thread = time.perf_counter(), time.thread_time()
@@ -270,7 +270,7 @@ def _in_numpy(model: Model) -> Iterator[str]:
             times.append((1e6 * (time.perf_counter() - begin), 1e6 * (time.thread_time() - of_thread)))
     for name, times in took.items():
         (p50, p99), (own50, own99) = (np.percentile(column, [50, 99]) for column in zip(*times, strict=True))
-        yield f"numpy {name:8} p50 {p50:.0f}  p99 {p99:.0f} us; of the processor {own50:.0f}, {own99:.0f}\n"
+        yield f"Python {name:8} p50 {p50:.0f}  p99 {p99:.0f} us; of the processor {own50:.0f}, {own99:.0f}\n"
 
 
 if __name__ == "__main__":

@@ -20,16 +20,17 @@ import numpy as np
 
 from benchmarks.realtime import model_of
 from benchmarks.two_discs import Disc, forces, meshed
+from epsmesh_realtime.model import Model
 from pipeline.export.checks import random_place
 from pipeline.export.scope import Scope
-from pipeline.realtime import Model
-from pipeline.realtime.several import NEAR
 from pipeline.shapes.body import Layered
 
 _FOLDER = Path("results/two_tools")
 _CHECKS, _SIZES, _DEPTHS, _SEED = 6, (0.04, 0.25), (5e-5, 2e-4), 77
 # Largest distance of the centres, in units of the sum of both radii: beyond it the interaction is small.
 _APART = 8.0
+# A model answers for no nearer tools.
+_NEAR = 2.0
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ def _pair(model: Model, rng: np.random.Generator) -> list[Disc]:
             x, y = random_place(model, rng)
             discs.append((x, y, model.room(x, y) * float(np.exp(rng.uniform(*np.log(_SIZES))))))
         (x, y, a), (to_x, to_y, b) = discs
-        if NEAR < hypot(x - to_x, y - to_y) / (a + b) < _APART:
+        if _NEAR < hypot(x - to_x, y - to_y) / (a + b) < _APART:
             return discs
 
 

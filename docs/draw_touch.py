@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 from types import MappingProxyType
 
-from pipeline.realtime import read_surface
+from epsmesh_realtime import read_surface
 from pipeline.touch.page import write_touch_page
 from tests.report.browser import Browser
 

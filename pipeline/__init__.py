@@ -50,11 +50,11 @@ def open(path: str | Path, output: str | Path = "results") -> "xr.Dataset":
 
 
 def __getattr__(name: str) -> Any:
-    """Return the errors that are raised, from where they are defined, and `pipeline.realtime` when it is asked for."""
+    """Return the errors that are raised, and `pipeline.realtime`, the evaluator of real-time models, when asked for."""
     from importlib import import_module  # noqa: PLC0415
 
     if name in _ERRORS:
         return getattr(import_module(_ERRORS[name]), name)
     if name == "realtime":
-        return import_module("pipeline.realtime")
+        return import_module("epsmesh_realtime")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

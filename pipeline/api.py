@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.files import STORE_NAME
+from pipeline.files import MODEL_ENDING, STORE_NAME
 from pipeline.launcher import is_first_rank
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import Plan, make_plan
@@ -193,9 +193,15 @@ class RunnableStudy:
 def open_dataset(path: str | Path, output: str | Path = "results") -> "xr.Dataset":
     """Return the dataset at ``path``, or that of a study file in ``output``, in memory and with ``dataset.epsmesh``.
 
+    The file of a real-time model becomes a dataset of its arrays.
+
     Raises:
-        DatasetError: if there is none, or if it is not a study's.
+        DatasetError: if there is none, or if it is not a study's; ModelError: if it is no real-time model.
     """
+    if Path(path).suffix == MODEL_ENDING:
+        from pipeline.export.file import open_model  # noqa: PLC0415 (xarray is slow to load)
+
+        return open_model(Path(path))
     from pipeline.report import accessor  # noqa: F401, PLC0415 (registers dataset.epsmesh)
     from pipeline.report.read import read  # noqa: PLC0415 (xarray is slow to read_file)
 

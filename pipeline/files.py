@@ -11,6 +11,8 @@ _TRIED = 4096
 # Of a study, in the folder of its results.
 STORE_NAME = "cases.sqlite"
 FIGURE_FORMATS = ("png", "svg")
+# Of real-time models.
+MODEL_ENDING = ".epsm"
 NOT_UTF8 = "is no UTF-8, and netCDF and solvers take no other names (PYTHONUTF8=1 where the locale alone is at fault)"
 
 

@@ -1,19 +1,21 @@
 /* Forces of tools on a body, from a model file of `epsmesh export`. C99; no allocation, no locks, no input or output.
  *
- * SI units. A model is plain memory: epsmesh_load fills it once from the bytes of the file; then any number of threads
- * may query it. Formulas are derived in pipeline/realtime/contact.py and blade.py.
+ * SI units. A model is plain memory that points into the bytes of its file, which epsmesh_load checks once and which must
+ * stay where they are. Any number of threads may query a model.
  */
 #ifndef EPSMESH_H
 #define EPSMESH_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-enum { EPSMESH_MOST = 64, EPSMESH_MOST_IN_ALL = 4096, EPSMESH_TENSORS = 7 };
-enum { EPSMESH_MOST_TOOLS = 8, EPSMESH_MOST_MODES = 96, EPSMESH_MOST_TERMS = 16384, EPSMESH_MOST_LINKS = 3 };
+/* Largest numbers: of polynomials along a direction, of tools at once, of modes of the interaction and of the surface. */
+enum { EPSMESH_MOST = 64, EPSMESH_TENSORS = 7, EPSMESH_MOST_TOOLS = 16 };
+enum { EPSMESH_MOST_MODES = 96, EPSMESH_MOST_LINKS = 3, EPSMESH_MOST_SEEN = 512 };
 
 typedef enum {
     EPSMESH_OK,
@@ -36,15 +38,35 @@ typedef enum {
 
 typedef enum { EPSMESH_DISC, EPSMESH_SPHERE, EPSMESH_CONE, EPSMESH_BLADE, EPSMESH_BONDED_DISC } epsmesh_shape;
 
+/* Why a file is no model. */
+typedef enum {
+    EPSMESH_SOUND,
+    EPSMESH_FOREIGN,   /* it is of another kind */
+    EPSMESH_VERSION,   /* of another version */
+    EPSMESH_UNALIGNED, /* its bytes do not begin at a multiple of 8 */
+    EPSMESH_CUT,       /* it has not the length that its header tells */
+    EPSMESH_HEADER,    /* its header is damaged, or the machine is not little-endian */
+    EPSMESH_ABSENT,    /* an array is absent, */
+    EPSMESH_SHAPE,     /* has another type, rank or shape, or ends beyond the file, */
+    EPSMESH_INFINITE,  /* is not finite, */
+    EPSMESH_VALUE      /* or has an invalid value */
+} epsmesh_flaw;
+
 typedef struct {
-    double reciprocal[EPSMESH_MOST_IN_ALL], curvature[EPSMESH_MOST_IN_ALL]; /* Chebyshev, over (nu, v, u) */
-    double tensors[EPSMESH_TENSORS * EPSMESH_MOST_IN_ALL], height[EPSMESH_MOST_IN_ALL], bend[EPSMESH_MOST_IN_ALL];
+    const double *reciprocal, *curvature, *tensors, *height, *bend; /* Chebyshev, over (nu, v, u) */
     int counts[3], face_counts[2], is_round, even[2], leans, has_tensors, is_flat, is_loaded;
     double c_ref, reach[2], sides[2], thickness, origin[3], axes[3][3], poisson_range[2];
     double young, poisson, largest, off, aligned, bar[4], bend_error;
-    double pair_modes[EPSMESH_MOST_TERMS], pair_links[EPSMESH_MOST_LINKS * EPSMESH_MOST_MODES * EPSMESH_MOST_MODES];
+    const double *pair_modes, *pair_links;
     double pair_error, pair_aside;
     int pair_counts[4], has_pairs; /* nu, modes, and polynomials of y and x */
+    const float *surface_points, *surface_amounts;
+    const int32_t *surface_triangles;
+    const int16_t *surface_modes;
+    double surface_error;
+    int vertices, triangles, surface_counts[4]; /* modes, and polynomials of nu, y and x */
+    epsmesh_flaw flaw;
+    const char *flawed; /* the array with the flaw */
 } epsmesh_model;
 
 typedef struct {
@@ -67,7 +89,7 @@ typedef struct {
     double contact_radius; /* m */
 } epsmesh_touch;
 
-/* Fill `model` from the `size` bytes of a file at `data`: EPSMESH_OK or EPSMESH_NO_MODEL. */
+/* Point `model` at the `size` bytes of a file at `data`, a multiple of 8: EPSMESH_OK, or EPSMESH_NO_MODEL with its flaw. */
 epsmesh_status epsmesh_load(epsmesh_model *model, const void *data, size_t size);
 
 /* Find the place `at` of the face for a tool whose lowest point is at `tip` (m), and its `depth` (m) along the inward
@@ -81,13 +103,22 @@ epsmesh_query epsmesh_ask(const epsmesh_model *model);
 /* Answer a query; all numbers are NaN unless the status is EPSMESH_OK or EPSMESH_LOST. */
 epsmesh_touch epsmesh_touch_at(const epsmesh_model *model, const epsmesh_query *query);
 
+/* Answer `count` queries, each by itself. */
+void epsmesh_touch_each(const epsmesh_model *model, size_t count, const epsmesh_query *queries, epsmesh_touch *touches);
+
 /* Answer `count` queries of tools that press at the same time, with equal E and nu. The stiffness of each tool is at fixed
  * depths of the others. If one has no answer, the others get EPSMESH_OTHERS. More than EPSMESH_MOST_TOOLS, or different E
- * or nu, give EPSMESH_INPUT. Formulas: pipeline/realtime/several.py, pairs.py and doubt.py. */
+ * or nu, give EPSMESH_INPUT. */
 void epsmesh_touch_all(const epsmesh_model *model, int count, const epsmesh_query *queries, epsmesh_touch *touches);
 
 /* Return the name of a status in Python. */
 const char *epsmesh_word(epsmesh_status status);
+
+/* Return why epsmesh_load failed, and the name of the array in question, "" if it is none. */
+epsmesh_flaw epsmesh_flaw_of(const epsmesh_model *model, const char **array);
+
+/* Put the sizes (bytes) of a model, a query, a touch and a patch (epsmesh_patch.h) into `sizes`, for other languages. */
+void epsmesh_sizes(size_t sizes[4]);
 
 #ifdef __cplusplus
 }

@@ -109,7 +109,7 @@ static double paced(const int *kinds, int count, long ticks, double *took, long 
 }
 
 int main(int count, char **words) {
-    static unsigned char data[1 << 26];
+    static double data[1 << 23]; /* of which a model is a part */
     long i, n = count > 2 ? atol(words[2]) : 20000, ticks = count > 3 ? (long)(1000 * atof(words[3])) : 0;
     FILE *file = count > 1 ? fopen(words[1], "rb") : NULL;
     int kinds[KINDS], known = 0, kind;

@@ -4,7 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "epsmesh.h"
+#include "epsmesh_surface.h"
+
+enum { VERTICES = 2000, HEADER = 2400 }; /* bytes of a file's header and its table of arrays, about */
 
 static unsigned long state = 1;
 
@@ -49,6 +51,25 @@ static void ask_around(const epsmesh_model *model, int times) {
     }
 }
 
+/* Ask for the surface: it moves, or nothing does. */
+static void ask_surface(const epsmesh_model *model, int times) {
+    static double room[6 * VERTICES], moved[3 * VERTICES];
+    int i, j;
+    if (model->vertices > VERTICES) return;
+    for (i = 0; i < times; i++) {
+        epsmesh_query query = epsmesh_ask(model);
+        epsmesh_touch touch;
+        double sum = 0;
+        query.shape = (epsmesh_shape)(i % 5), query.radius = 1e-3, query.angle = 1.2, query.length = 3e-3, query.width = 5e-4;
+        for (j = 0; j < 3; j++) query.at[j] = model->origin[j] + within(-1, 1) * model->reach[0] * model->axes[0][j];
+        query.depth = within(-1e-5, 2e-4);
+        touch = epsmesh_surface_press(model, &query, room, moved);
+        for (j = 0; j < 3 * model->vertices; j++) sum += moved[j];
+        expect((touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) == (isfinite(sum) != 0) || !model->vertices,
+               "the surface moves, or nothing is known of it");
+    }
+}
+
 /* Ask for some tools at once: either all have an answer, or none has numbers. */
 static void ask_several(const epsmesh_model *model, int times) {
     epsmesh_query queries[EPSMESH_MOST_TOOLS];
@@ -84,12 +105,12 @@ static void miscount(unsigned char *part, size_t size) {
     size_t at = 4 * (draw() % (size / 4));
     unsigned long number = numbers[draw() % (sizeof numbers / sizeof *numbers)];
     int i;
-    for (i = 0; i < 4; i++) part[at + (size_t)i] = (unsigned char)(number >> (24 - 8 * i) & 0xff);
+    for (i = 0; i < 4; i++) part[at + (size_t)i] = (unsigned char)(number >> 8 * i & 0xff);
 }
 
 int main(int count, char **words) {
     static epsmesh_model model, damaged;
-    static unsigned char data[1 << 20];
+    static double data[1 << 17];
     unsigned char *part;
     size_t size, i;
     epsmesh_query query;
@@ -100,6 +121,8 @@ int main(int count, char **words) {
     expect(epsmesh_load(&model, data, size) == EPSMESH_OK, "the model is read");
     ask_around(&model, 3000);
     ask_several(&model, 2000);
+    ask_surface(&model, 200);
+    expect(model.vertices > 0, "the model has a surface");
     expect(epsmesh_load(&damaged, NULL, 0) == EPSMESH_NO_MODEL, "nothing is no model");
     memset(&query, 0, sizeof query);
     expect(epsmesh_touch_at(&damaged, &query).status == EPSMESH_NO_MODEL, "what was not loaded is not asked");
@@ -116,12 +139,13 @@ int main(int count, char **words) {
         int flips = 1 + (int)(draw() % 4);
         memcpy(part, data, size);
         while (flips--) {
-            if (i % 3 == 2) miscount(part, 3000 < size ? 3000 : size); /* the header of a model with pairs, all of it */
-            else part[draw() % (i % 3 ? size : 1500 < size ? 1500 : size)] = (unsigned char)draw();
+            if (i % 3 == 2) miscount(part, HEADER);
+            else part[draw() % (i % 3 ? size : (size_t)HEADER)] = (unsigned char)draw();
         }
         if (epsmesh_load(&damaged, part, size) == EPSMESH_OK) {
             ask_around(&damaged, 6);
             ask_several(&damaged, 2);
+            ask_surface(&damaged, 1);
         }
     }
     free(part);

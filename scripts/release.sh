@@ -12,7 +12,7 @@ quiet=(--quiet --disable-pip-version-check --no-input)
 # Building leaves files beside the sources; and what is not theirs must not get in.
 mkdir "$work/source"
 tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --exclude='*.egg-info' \
-    --exclude=./realtime/libepsmesh.so --exclude=./realtime/latency --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
+    --exclude=./realtime/libepsmesh.so --exclude=./realtime/latency --exclude=./realtime/.built --exclude=./realtime/build --exclude='*.so' --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
     tar -xf - -C "$work/source"
 
 # ---- build: the wheel is made from the sdist, and has what that has ------------------------------------
@@ -20,11 +20,12 @@ tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --
 "$work/build/bin/python" -m pip install "${quiet[@]}" build
 rm -rf dist
 "$work/build/bin/python" -m build --outdir dist "$work/source" >"$work/log" 2>&1 || { tail -n 30 "$work/log" >&2; fail "cannot be built"; }
+"$work/build/bin/python" -m build --outdir dist "$work/source/realtime" >"$work/log" 2>&1 || { tail -n 30 "$work/log" >&2; fail "realtime/ cannot be built"; }
 version=$(sed -nE 's/^__version__ = "(.*)"$/\1/p' pipeline/__init__.py)
 [[ -f dist/epsmesh-$version.tar.gz && -f dist/epsmesh-$version-py3-none-any.whl ]] || fail "dist/ has $(ls dist), not version $version"
 
 # Templates, C sources, studies to begin with: all that a package folder holds.
-"$python" - "$work/source" dist/*.whl dist/*.tar.gz <<'PYTHON'
+"$python" - "$work/source" dist/epsmesh-*.whl dist/epsmesh-*.tar.gz <<'PYTHON'
 import sys
 import tarfile
 import zipfile
@@ -34,7 +35,7 @@ source, wheel, sdist = Path(sys.argv[1]), *sys.argv[2:]
 held = set(zipfile.ZipFile(wheel).namelist())
 sent = {name.split("/", 1)[-1] for name in tarfile.open(sdist).getnames()}
 files = {path.relative_to(source) for path in source.rglob("*") if path.is_file()}
-links = {"studies": "pipeline/study/examples", "meshes": "pipeline/study/meshes", "realtime": "pipeline/realtime/c"}
+links = {"studies": "pipeline/study/examples", "meshes": "pipeline/study/meshes"}
 linked = {Path(links[path.parts[0]], *path.parts[1:]) for path in files if path.parts[0] in links}
 package = {str(path) for path in files | linked if path.parts[0] == "pipeline"}
 if missing := sorted(package - held):
@@ -73,8 +74,8 @@ print(f"release: {dataset['status'].size} cases, F = {float(dataset['force'].max
 PYTHON
     )
 }
-"${install[@]}" dist/*.whl
+"${install[@]}" dist/epsmesh_realtime-*.whl dist/epsmesh-*.whl
 try wheel
-"${install[@]}" --force-reinstall --no-deps dist/*.tar.gz
+"${install[@]}" --force-reinstall --no-deps dist/epsmesh_realtime-*.tar.gz dist/epsmesh-*.tar.gz
 try sdist
 echo "release: dist/epsmesh-$version.tar.gz and .whl install and run on Debian $(cat /etc/debian_version)"

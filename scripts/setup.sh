@@ -65,7 +65,7 @@ fi
 # ---- venv ---------------------------------------------------------------------------------------------
 # The stamp records the project file, interpreter and folder of the last complete setup. The other mark exists while the
 # venv is being changed: after a killed setup the venv is made anew, because pip takes half a package for a whole one.
-state=$({ cat pyproject.toml scripts/setup.sh scripts/constraints.py; readlink -f "$python"; pwd; echo "$extras"; } | sha256sum)
+state=$({ cat pyproject.toml realtime/pyproject.toml realtime/setup.py scripts/setup.sh scripts/constraints.py; readlink -f "$python"; pwd; echo "$extras"; } | sha256sum)
 unfinished=$venv/.epsmesh-unfinished
 [[ -f $stamp && $(<"$stamp") == "$state" && -x $venv/bin/epsmesh && ! -e $unfinished ]] && exit 0
 
@@ -88,6 +88,7 @@ install() { # $1: a name for messages; the rest: pip's arguments. A failed pip r
     ((status > 128)) || rm -f "$unfinished"
     fail "pip could not install $1"
 }
+install "the evaluator of real-time models" -c "$constraints" -e ./realtime
 install "the project" -c "$constraints" -e ".[$extras]"
 # This package contains the program mmgs, the remesher of surfaces. Its Python part is not used, so its dependencies (a
 # newer numpy than Debian 12's) are not installed.
@@ -99,6 +100,10 @@ import dolfinx, gmsh, matplotlib, mpi4py, netCDF4, numpy, petsc4py, scipy, xarra
 
 for module in (numpy, scipy, xarray, netCDF4, matplotlib, mpi4py, petsc4py, dolfinx, gmsh):
     assert module.__file__.startswith("/usr/lib/"), f"{module.__name__} does not come from Debian: {module.__file__}"
+
+import epsmesh_realtime.library  # noqa: E402
+
+epsmesh_realtime.library.library()  # compiles the checkout's sources
 PYTHON
 multiarch=$("$python" -c 'import sysconfig; print(sysconfig.get_config_var("MULTIARCH"))')
 for library in libblas.so.3 liblapack.so.3; do

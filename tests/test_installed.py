@@ -22,8 +22,11 @@ def installed(tmp_path_factory):
         shutil.copytree(ROOT / package, folder / "src" / package, ignore=ignored)
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, folder / "src" / name)
+    ignored = shutil.ignore_patterns("__pycache__", ".built", "build", "*.so")
+    shutil.copytree(ROOT / "realtime", folder / "realtime", ignore=ignored)
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
-    subprocess.run([*pip, "--target", folder / "site", folder / "src"], check=True, capture_output=True, timeout=300)
+    for source in (folder / "realtime", folder / "src"):
+        subprocess.run([*pip, "--target", folder / "site", source], check=True, capture_output=True, timeout=300)
     (folder / "away").mkdir()
 
     def run(*arguments):

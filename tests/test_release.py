@@ -11,7 +11,8 @@ def test_one_version_everywhere(epsmesh):
     done = epsmesh("--version")
     assert (done.exit_code, done.stdout.strip()) == (0, f"epsmesh {__version__}")
     assert re.fullmatch(r"\d+\.\d+\.\d+", __version__)
-    assert tomllib.loads(Path("pyproject.toml").read_text())["project"]["version"] == __version__
+    for folder in (Path(), Path("realtime")):
+        assert tomllib.loads((folder / "pyproject.toml").read_text())["project"]["version"] == __version__
     assert f"\nversion: {__version__}\n" in Path("CITATION.cff").read_text()
     headings = re.findall(r"^## (.*)$", Path("CHANGELOG.md").read_text(), re.MULTILINE)
     released = [heading for heading in headings if heading != "Unreleased"]

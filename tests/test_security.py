@@ -7,15 +7,12 @@ import os
 import re
 import sqlite3
 from pathlib import Path
-from struct import pack
 
 import numpy as np
 import pytest
 
 from pipeline.files import cache_folder
 from pipeline.plan.plan import make_plan
-from pipeline.realtime import ModelError
-from pipeline.realtime.classic import read_doubles
 from pipeline.report.page import render
 from pipeline.report.read import read
 from pipeline.report.table import DatasetError, study_of
@@ -235,13 +232,13 @@ def test_no_file_writes_on_a_terminal_what_it_does_not_say(tmp_path):
     """Neither by its name, nor by names in it, nor by keys of records, for people or for scripts."""
     mine = tmp_path / f"{HOSTILE}.toml"
     mine.write_text("title = 1")
-    store, model = tmp_path / "cases.sqlite", tmp_path / "model.nc"
+    store, model = tmp_path / "cases.sqlite", tmp_path / "model.epsm"
     opened = Store(store)
     opened.put_rows([(HOSTILE, "{", 0.0)])
     opened.close()
     write_random(model)
-    start = (data := bytearray(model.read_bytes())).index(b"reciprocal")
-    data[start : start + 3], data[start + 16 : start + 20] = b"\x1b[2", b"\xff" * 4
+    start = (data := bytearray(model.read_bytes())).index(b"check_bar")
+    data[start : start + 3], data[start + 32 : start + 36] = b"\x1b[2", b"\xff" * 4
     model.write_bytes(data)
     commands = [("plan", "--check", mine), ("status", "--store", store), ("touch", model), ("touch", mine)]
     for words in (*commands, *((*words, "--json") for words in commands)):
@@ -289,22 +286,6 @@ def test_records_that_nest_without_end_are_none(tmp_path):
     database.close()
     with pytest.raises(StoreError, match="cannot be read"):
         known_of(path, plan)
-
-
-def test_the_parts_of_a_model_do_not_overlap():
-    def name(text: str) -> bytes:
-        return pack(">I", len(text)) + text.encode() + bytes(-len(text) % 4)
-
-    nothing, values = bytes(8), np.ones(1000, dtype=">f8").tobytes()
-    head = b"CDF\2" + pack(">III", 0, 10, 1) + name("n") + pack(">I", 1000) + nothing
-    parts = [name(f"v{k}") + pack(">II", 1, 0) + nothing + pack(">IIQ", 6, 8000, 2000) for k in range(20)]
-
-    def model(count: int) -> bytes:
-        return (head + pack(">II", 11, count) + b"".join(parts[:count])).ljust(2000, b"\0") + values
-
-    assert set(read_doubles(model(1))) == {"v0"}
-    with pytest.raises(ModelError, match="overlap"):
-        read_doubles(model(20))
 
 
 def nrrd(path: Path, data: bytes, *lines: str) -> Path:

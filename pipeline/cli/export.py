@@ -9,8 +9,8 @@ import typer
 from pipeline import __version__
 from pipeline.cli.console import say, warning
 from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option, of_unwritten, refusing
-from pipeline.cli.words import DEFAULT_OUTPUT, MODEL, Json, by_name, check_machine, check_output, read_all
-from pipeline.files import write_new
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, by_name, check_machine, check_output, read_all
+from pipeline.files import MODEL_ENDING, write_new
 from pipeline.printable import counted
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def export(
             "--output",
             "-o",
             metavar="MODEL",
-            help="File of the model [default: results/STUDY.epsm.nc].",
+            help="File of the model [default: results/STUDY.epsm].",
             show_default=False,
         ),
     ] = None,
@@ -78,11 +78,11 @@ def export(
     calibrate its error bar and test it. Under mpirun the ranks share the solves. Exit status 1: the bar covers the
     error of less than 95 % of the test touches.
 
-    Example: epsmesh export studies/quick.toml --accuracy 1% -o box.epsm.nc
+    Example: epsmesh export studies/quick.toml --accuracy 1% -o box.epsm
 
-    Example: mpirun -n 2 epsmesh export studies/quick.toml -o box.epsm.nc
+    Example: mpirun -n 2 epsmesh export studies/quick.toml -o box.epsm
 
-    Example: epsmesh export results/quick.epsm.nc --fmu quick.fmu
+    Example: epsmesh export results/quick.epsm --fmu quick.fmu
 
     Example: epsmesh export --evaluator simulator/epsmesh
     """
@@ -93,7 +93,7 @@ def export(
         fail(Fault("FILE is missing: give a study, or --evaluator FOLDER", key="FILE", howto=_HOWTO))
     if fmu is not None:
         _check_unit(fmu)
-        if file.name.endswith(MODEL):
+        if file.name.endswith(MODEL_ENDING):
             packed, line = _pack(file, fmu)
             say(packed, *line)
             return
@@ -102,9 +102,10 @@ def export(
     wanted = _share(accuracy)
     file = by_name(file)
     (study,) = read_all([file])
-    path = output or DEFAULT_OUTPUT / f"{study.name}{MODEL}"
+    path = output or DEFAULT_OUTPUT / f"{study.name}{MODEL_ENDING}"
     check_output(path)
     check_machine()
+    _check_evaluator()
     with refusing(ExportError, file=file, howto=_HOWTO):
         scope = scope_of(study)
     from threadpoolctl import threadpool_limits
@@ -154,6 +155,16 @@ def _share(accuracy: str) -> float:
     return wanted
 
 
+def _check_evaluator() -> None:
+    """Exit, before any computation, if the evaluator in C is not built and cannot be."""
+    from epsmesh_realtime.library import BuildError, library
+
+    try:
+        library()
+    except BuildError as problem:
+        fail(Fault(str(problem), howto=_HOWTO))
+
+
 def _print_result(exported: "Exported", wanted: float, path: Path, packed: tuple[dict[str, str], list[str]]) -> None:
     """Print what the model is for, and how good it is; then what was ``packed``."""
     if exported.unseen:
@@ -188,8 +199,8 @@ def _pack(model: Path, unit: Path | None) -> tuple[dict[str, str], list[str]]:
     """Write the co-simulation ``unit`` of a model, or exit; return what to print, as JSON and as lines."""
     if unit is None:
         return {}, []
+    from epsmesh_realtime import ModelError
     from pipeline.export.fmu import NoCompilerError, write_fmu
-    from pipeline.realtime import ModelError
 
     try:
         write_fmu(model, unit, __version__)
@@ -202,7 +213,7 @@ def _pack(model: Path, unit: Path | None) -> tuple[dict[str, str], list[str]]:
 
 def _copy_evaluator(folder: Path) -> None:
     """Copy the evaluator's sources to a folder; exit if one of them exists there."""
-    from pipeline.realtime.sources import source_files, sources
+    from epsmesh_realtime import source_files, sources
 
     names = source_files()
     for name in names:

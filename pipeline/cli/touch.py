@@ -8,15 +8,16 @@ from typing import Annotated
 import typer
 
 from pipeline.cli.console import say
-from pipeline.cli.faults import fail, of_file
-from pipeline.cli.words import DEFAULT_OUTPUT, MODEL, Json, by_name, check_output
+from pipeline.cli.faults import Fault, fail, of_file
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, by_name, check_output
+from pipeline.files import MODEL_ENDING
 
 
 def _by_study(file: Path) -> Path:
     """Return a model: ``file`` itself, or the one in results/ of a study's file or name, if it exists."""
-    of_study = DEFAULT_OUTPUT / f"{by_name(file).stem}{MODEL}"
+    of_study = DEFAULT_OUTPUT / f"{by_name(file).stem}{MODEL_ENDING}"
     is_study = file.suffix == ".toml" or not file.exists()
-    return of_study if is_study and not file.name.endswith(MODEL) and of_study.is_file() else file
+    return of_study if is_study and not file.name.endswith(MODEL_ENDING) and of_study.is_file() else file
 
 
 def touch(
@@ -41,11 +42,11 @@ def touch(
 
     The page shows the surface, the force and its error bar. It is served to this machine only, until Ctrl-C.
 
-    Example: epsmesh touch results/quick.epsm.nc
+    Example: epsmesh touch results/quick.epsm
 
-    Example: epsmesh touch results/quick.epsm.nc -o quick.html
+    Example: epsmesh touch results/quick.epsm -o quick.html
     """
-    from pipeline.realtime import ModelError, read_surface
+    from epsmesh_realtime import BuildError, ModelError, read_surface
     from pipeline.touch.page import render, write_touch_page
 
     if output is not None:
@@ -58,6 +59,8 @@ def touch(
             say({"file": str(path), "bytes": size}, f"wrote {path} ({size / 1e6:.1f} MB): open it in a browser")
             return
         text = render(surface, model.name)
+    except BuildError as problem:
+        fail(Fault(str(problem), howto="docs/howto/touch.md"))
     except (ModelError, OSError) as problem:
         why = getattr(problem, "strerror", None) or str(problem)
         fail(of_file(model, f"{why}{_meant(model)}", "docs/howto/touch.md"))
@@ -69,7 +72,11 @@ def _meant(file: Path) -> str:
     study = by_name(file)
     study = study if study.suffix == ".toml" else study.with_suffix(".toml")
     text = quote(str(study) if study.exists() else study.name)
-    return "" if file.name.endswith(MODEL) else f"; a model ends in {MODEL}: `epsmesh export {text}` makes one"
+    return (
+        ""
+        if file.name.endswith(MODEL_ENDING)
+        else f"; a model ends in {MODEL_ENDING}: `epsmesh export {text}` makes one"
+    )
 
 
 def _serve(text: str, *, open_it: bool) -> None:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 _SKIPPING, CLUSTER = "docs/skipping.md", "docs/cluster.md"  # pages that errors refer to
 _SQLITE = b"SQLite format 3\0"
 DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")
-MODEL = ".epsm.nc"  # the suffix of real-time models
 
 STUDIES = Path("studies")
 

@@ -6,10 +6,10 @@ from math import nan
 
 import numpy as np
 
+from epsmesh_realtime.model import Model
 from pipeline.arrays import FloatArray
 from pipeline.export.full import Full, Solver, Tool
 from pipeline.export.ranks import ALONE, Ranks
-from pipeline.realtime.model import Model
 from pipeline.stages import stage
 
 # Half sizes of the tools, in units of the largest allowed one at the place; depth in units of the half size.
@@ -132,7 +132,7 @@ def with_bar(model: Model, check: Check) -> Check:
 
 def on_face(model: Model, x: float, y: float) -> tuple[FloatArray, FloatArray]:
     """Return a point of the face in the body's coordinates (3,), in m, and the outward normal there."""
-    spot = model.face.at(model.table, x, y)
+    spot = model.spot(x, y)
     return model.origin + np.array([x, y, spot.height]) @ model.axes, spot.normal @ model.axes
 
 
@@ -160,11 +160,9 @@ def error_of_full(checks: Sequence[Check], bar: float) -> float:
     return min(bar, max(_LEAST * bar, _SAFETY_FEW * seen))
 
 
-def columns(fitted: Sequence[Check], judged: Sequence[Check]) -> dict[str, tuple[str, FloatArray]]:
-    """Return all checks as units and values by name: first the calibration set, then the test set."""
-    units = {"x": "m", "y": "m", "radius": "m", "depth": "m", "poisson": "1", "full": "N", "full_error": "1"}
-    units |= {"force": "N", "bar": "1", "error": "1", "kind": "1", "aside": "1"}
+def columns(fitted: Sequence[Check], judged: Sequence[Check]) -> dict[str, FloatArray]:
+    """Return all checks as arrays by name: first the calibration set, then the test set."""
+    names = ("x", "y", "radius", "depth", "poisson", "full", "full_error", "force", "bar", "error", "kind", "aside")
     checks = [*fitted, *judged]
-    found = {name: (unit, np.array([getattr(check, name) for check in checks])) for name, unit in units.items()}
-    is_judged = np.array([0.0] * len(fitted) + [1.0] * len(judged))
-    return {**found, "judged": ("1", is_judged)}
+    found = {name: np.array([float(getattr(check, name)) for check in checks]) for name in names}
+    return {**found, "judged": np.array([0.0] * len(fitted) + [1.0] * len(judged))}

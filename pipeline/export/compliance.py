@@ -95,7 +95,7 @@ def compliances(
     """Return the values to tabulate, shape (places, 9); ``law`` gives the tissues of a body with several.
 
     The values are c (1/m); h, A₁, A_xy (1/m³); and of R (1/m): R_xz, R_yz, the mean of R_xx and R_yy, half their
-    difference, R_xy. See ``pipeline.realtime.table``.
+    difference, R_xy. See ``epsmesh_realtime.table``.
 
     Raises:
         SolveError: if a solve fails, or if the mesh is too coarse.

@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from epsmesh_realtime.evaluator import Evaluator
+from epsmesh_realtime.model import Model
+from epsmesh_realtime.table import Face, Table
 from pipeline.arrays import FloatArray
 from pipeline.export.full import Solver, Tool
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
 from pipeline.export.tabulate import Places, ratios_of, tabulate
-from pipeline.realtime.face import Face
-from pipeline.realtime.model import Model
-from pipeline.realtime.table import Table
 from pipeline.shapes.frame import PlaceError
 
 # Radii of the two discs, in units of the study's; the larger one is close to the model's largest contact.
@@ -139,8 +139,8 @@ def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, 
     rows = vander if count > 1 else np.ones((1, 1))
     height = _fitted(rows, vander, heights)
     if scope.body.half_sides:  # a smooth body
-        plain = Face(height, np.zeros_like(height) + 1e-300)
-        bends, doubt = np.array([[_bend(plain, table, x, y) for x in xs] for y in ys]), 0.0
+        plain = table.with_arrays(Face(height, np.zeros_like(height)).numbers())
+        bends, doubt = np.array([[_bend(plain, x, y) for x in xs] for y in ys]), 0.0
     else:
         bends, doubt = _bends(scope, middle, xs, ys)
     bend = _fitted(rows, vander, bends)
@@ -188,16 +188,16 @@ def _paraboloid(away: FloatArray, reach: float) -> float:
     x, y, z = away[away[:, 0] ** 2 + away[:, 1] ** 2 <= reach**2].T
     terms = np.column_stack([np.ones_like(x), x, y, x**2 / 2, x * y, y**2 / 2])
     _, *slope, xx, xy, yy = np.linalg.lstsq(terms, z, rcond=None)[0].tolist()
-    return _mean_curvature(slope, [[xx, xy], [xy, yy]])
+    return _mean_curvature(np.array(slope), np.array([[xx, xy], [xy, yy]]))
 
 
-def _bend(face: Face, table: Table, x: float, y: float) -> float:
+def _bend(face: Evaluator, x: float, y: float) -> float:
     """Return the mean curvature (1/m), positive on a dome."""
-    spot = face.at(table, x, y)
+    spot = face.spot(x, y)
     return _mean_curvature(spot.slope, spot.second)
 
 
-def _mean_curvature(slope: Sequence[float], second: Sequence[Sequence[float]]) -> float:
+def _mean_curvature(slope: FloatArray, second: FloatArray) -> float:
     metric = np.eye(2) + np.outer(slope, slope)
     return float(-0.5 * np.trace(np.linalg.solve(metric, second)) / np.sqrt(1 + np.dot(slope, slope)))
 

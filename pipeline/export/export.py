@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from epsmesh_realtime.model import Model
+from epsmesh_realtime.surface import SurfaceTable
 from pipeline.arrays import FloatArray
 from pipeline.export.checks import TOOLS, Check, check_touches, columns, error_of_full, needed, random_touches, with_bar
 from pipeline.export.compliance import coarse_mesh, compliances, law_of
@@ -19,8 +21,6 @@ from pipeline.export.scope import ExportError, Scope
 from pipeline.export.surface import tabulate_surface
 from pipeline.export.surface_body import surface_body
 from pipeline.export.tabulate import Places, tabulate
-from pipeline.realtime.model import Model
-from pipeline.realtime.surface import SurfaceTable
 from pipeline.shapes.body import Layered
 
 # Margin beside the sides, in units of half the width or the thickness, whichever is smaller. Largest contact, in units

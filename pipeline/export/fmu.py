@@ -15,13 +15,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from xml.etree import ElementTree as Xml
 
-from pipeline.files import atomic
-from pipeline.realtime.file import model_of
-from pipeline.realtime.model import Model
-from pipeline.realtime.sources import source_files, sources
+from epsmesh_realtime import source_files, sources
+from epsmesh_realtime.model import Model, model_of
+from pipeline.files import MODEL_ENDING, atomic
 
 NAME = "epsmesh"
-MODEL_FILE = "model.epsm.nc"  # the same in realtime/fmu/fmi3.c, as is the token
+MODEL_FILE = "model.epsm"  # the same in realtime/fmu/fmi3.c, as is the token
 TOKEN = "{epsmesh-realtime-fmi3-1}"
 # What is compiled; epsmesh.c includes what is in src/.
 _COMPILED = ("fmu/fmi3.c", "epsmesh.c")
@@ -218,7 +217,7 @@ def write_fmu(model_file: Path, path: Path, version: str) -> None:
     """
     data = model_file.read_bytes()
     model, place, command = model_of(data), library_place(), compiler()
-    name = model_file.name.removesuffix(".epsm.nc")
+    name = model_file.name.removesuffix(MODEL_ENDING)
     with TemporaryDirectory() as folder:
         library, code = Path(folder) / NAME, [str(sources() / each) for each in _COMPILED]
         done = subprocess.run(

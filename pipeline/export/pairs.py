@@ -1,4 +1,4 @@
-"""Interaction of forces at two places of a flat face, as a few modes: ``pipeline.realtime.pairs``.
+"""Interaction of forces at two places of a flat face, as a few modes: ``epsmesh_realtime.table.Pairs``.
 
 R, the regular part of the normal displacement at one Chebyshev node for a force at another, is a symmetric matrix up to
 the mesh's error. A truncated singular value decomposition gives its range; the modes are polynomials through it.
@@ -9,11 +9,14 @@ from math import pi
 
 import numpy as np
 
+from epsmesh_realtime.evaluator import MOST_MODES
+from epsmesh_realtime.table import Pairs
 from pipeline.arrays import FloatArray
 from pipeline.export.far import FarFields, least_rank, located
-from pipeline.realtime.pairs import MOST_MODES, MOST_TERMS, Pairs
 from pipeline.stages import stage
 
+# Largest number of the modes' coefficients: what a query can sum up in microseconds.
+_MOST_TERMS = 16384
 # Error of the truncation, in R times the distance to the nearest side.
 _CUT = 1e-3
 # A node is on the face if its distance, in units of the thickness, is at most this.
@@ -30,7 +33,7 @@ def tabulate_pairs(far: FarFields) -> Pairs:
     weights = np.multiply.outer(ways, ways)
     solved = _between(far) * weights
     even = (solved + solved.transpose(0, 2, 1)) / 2
-    range_of = _range(even, min(MOST_MODES, MOST_TERMS // int(np.prod(far.degrees))))
+    range_of = _range(even, min(MOST_MODES, _MOST_TERMS // int(np.prod(far.degrees))))
     modes = np.linalg.lstsq(far.basis(), range_of / ways[:, None], rcond=None)[0].T.reshape(-1, *far.degrees)
     links = far.over_ratios(range_of.T @ even @ range_of)
     links = (links + links.transpose(0, 2, 1)) / 2

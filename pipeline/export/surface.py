@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from epsmesh_realtime.surface import SurfaceTable
 from pipeline.arrays import FloatArray
 from pipeline.export.far import FarFields, image_of, least_rank
-from pipeline.realtime.surface import SurfaceTable
 
 # Error of the truncation, in R × room, as a share of its largest value.
 _CUT = 0.03

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 from mpi4py import MPI
 
+from epsmesh_realtime.model import Model
 from pipeline.export.compliance import coarse_mesh, law_of
 from pipeline.export.curved import curved_region
 from pipeline.export.far import Pressed
@@ -15,7 +16,6 @@ from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.of_case import mesh_arrays
-from pipeline.realtime.model import Model
 from pipeline.shapes.body import Layered
 from pipeline.solve.far_field import PointForce
 from pipeline.study.schema import Mesh
@@ -52,7 +52,7 @@ def _curved(scope: Scope, model: Model, ranks: Ranks) -> Pressed:
     region = curved_region(scope, model.thickness)
 
     def on_face(place: tuple[float, float], poisson: float) -> PlacedForce:
-        spot = model.face.at(model.table, *place)
+        spot = model.spot(*place)
         x, y, z = np.add(model.origin, [*place, spot.height]).tolist()
         first, second, third = ((float(a), float(b), float(c)) for a, b, c in spot.turn)
         return PlacedForce(poisson, (x, y, z), region.room(*place), (first, second, third), _BLUNT * radius)

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from epsmesh_realtime.table import Table
 from pipeline.arrays import FloatArray
 from pipeline.export.region import Region
-from pipeline.realtime.table import Table, factors
 
 Places = Sequence[tuple[float, float]]
 # Returns c, h, and the values for blades and bonded tools (places, 9) for a Poisson's ratio; or c and h only.
@@ -95,15 +95,16 @@ def _table(region: Region, poissons: tuple[float, float], size: int, values: Flo
 
 def _tensors(region: Region, size: int, values: Sequence[FloatArray]) -> FloatArray:
     """Return the coefficients of the tables for blades and bonded tools, divided by their known factors."""
-    xi, eta = (shares(size, even) for even in region.even)
+    xi, eta = (reach * shares(size, even) for reach, even in zip(region.reach, region.even, strict=True))
     eta = np.zeros(1) if region.is_round else eta
+    plain = Table.none(region.reach, is_round=region.is_round, even=region.even)
+    factors = np.array([[plain.factors(x, y) for x in xi] for y in eta])
     found: list[FloatArray] = []
     for number, value in enumerate(values):
         if region.is_round and number in _TWINS:
             found.append(found[_TWINS[number]])
             continue
-        known = [[factors((x, y), region.reach, region.even, region.is_round)[number][0] for x in xi] for y in eta]
-        found.append(_divided(value, np.array(known)))
+        found.append(_divided(value, factors[..., number]))
     return np.array(found)
 
 

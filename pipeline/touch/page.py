@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from epsmesh_realtime.evaluator import rectangle
+from epsmesh_realtime.surface import Surface
+from epsmesh_realtime.touch import SENTENCES
 from pipeline.files import write_whole
-from pipeline.realtime.blade import RECTANGLE
-from pipeline.realtime.file import numbers_of
-from pipeline.realtime.surface import Surface
-from pipeline.realtime.touch import SENTENCES
 from pipeline.view import palette
 from pipeline.view.page import render_scene
 
@@ -101,9 +100,9 @@ def _told(surface: Surface) -> dict[str, Any]:
     """Return what the script is told besides the arrays; the camera's lengths are in mm, along the face's axes."""
     model, table = surface.model, surface.table
     low, high = table.points.min(axis=0), table.points.max(axis=0)
-    numbers = {name: values.tolist() for name, values in numbers_of(model).items()}
+    numbers = {name: np.asarray(values).tolist() for name, values in model.numbers().items() if "pair_" not in name}
     return {
-        "model": {"tensors": [], "rectangle": RECTANGLE.tolist()} | numbers,
+        "model": {"tensors": [], "rectangle": rectangle().tolist()} | numbers,
         "shape": table.amounts.shape,
         "eye": (np.array([-0.5, -0.75, 0.55]) / hypot(0.5, 0.75, 0.55)).tolist(),
         "centre": (_MM * (low + high) / 2).tolist(),

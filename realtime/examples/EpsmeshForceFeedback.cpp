@@ -2,7 +2,7 @@
  *
  * In the scene, beside the driver:
  *
- *     <EpsmeshForceFeedback name="tissue" model="pad.epsm.nc" radius="5e-3" most="3" />
+ *     <EpsmeshForceFeedback name="tissue" model="pad.epsm" radius="5e-3" most="3" />
  *     <GeomagicDriver forceFeedBack="@tissue" scale="0.001" ... />
  *
  * The driver's positions come in the scene's unit, here metres. The scene's own deformable body must not push the tool

@@ -18,6 +18,7 @@
 
 typedef struct {
     epsmesh_model model;
+    void *data;            /* the bytes of its file, into which it points */
     epsmesh_query tool;    /* shape and sizes; place and depth are filled in */
     double most;           /* N: no device is asked for more */
     double share;          /* of the force that is rendered: 1, but after a refusal */
@@ -26,6 +27,11 @@ typedef struct {
     double error;          /* relative */
     epsmesh_status status; /* of the last call */
 } hand;
+
+static void hand_free(hand *h) {
+    free(h->data);
+    h->data = NULL, h->model.is_loaded = 0;
+}
 
 /* Read a model: NULL, or what went wrong. The tool is a ball of `radius` (m). */
 static const char *hand_load(hand *h, const char *path, double radius, double most) {
@@ -38,10 +44,12 @@ static const char *hand_load(hand *h, const char *path, double radius, double mo
     rewind(file);
     if (size > 0) data = malloc((size_t)size);
     if (data && fread(data, 1, (size_t)size, file) == (size_t)size) status = epsmesh_load(&h->model, data, (size_t)size);
-    free(data);
     fclose(file);
-    if (status != EPSMESH_OK) return "the file is no model that this version reads";
-    if (!(radius > 0 && most > 0)) return "radius and largest force must be positive";
+    h->data = data;
+    if (status != EPSMESH_OK || !(radius > 0 && most > 0)) {
+        hand_free(h);
+        return status == EPSMESH_OK ? "radius and largest force must be positive" : "the file is no model that this version reads";
+    }
     h->tool = epsmesh_ask(&h->model);
     h->tool.shape = EPSMESH_SPHERE, h->tool.radius = radius;
     h->most = most, h->share = 1, h->stiffness = h->error = 0, h->status = EPSMESH_LOST;

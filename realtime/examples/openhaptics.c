@@ -1,6 +1,6 @@
 /* OpenHaptics (3D Systems Touch): the servo callback, 1,000 times a second.
  *
- *     cc -O2 openhaptics.c ../epsmesh.c -lHD -lHDU -lm && ./a.out pad.epsm.nc
+ *     cc -O2 openhaptics.c ../epsmesh.c -lHD -lHDU -lm && ./a.out pad.epsm
  *
  * The device speaks of millimetres, y up; the model of metres, along its own axes.
  */

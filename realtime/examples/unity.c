@@ -23,6 +23,7 @@ EXPORTED void *epsmesh_unity_open(const char *path, double radius, double most) 
 }
 
 EXPORTED void epsmesh_unity_close(void *tool) {
+    if (tool) hand_free((hand *)tool);
     free(tool);
 }
 

@@ -25,7 +25,7 @@ typedef const char *fmi3String;
 typedef void (*fmi3LogMessageCallback)(void *environment, fmi3Status status, fmi3String category, fmi3String message);
 
 static const char *const TOKEN = "{epsmesh-realtime-fmi3-1}";
-static const char *const FILE_NAME = "model.epsm.nc";
+static const char *const FILE_NAME = "model.epsm";
 
 /* Doubles come first, then integers. */
 enum { TIME, TIP, AXIS = TIP + 3, ALONG = AXIS + 3, YOUNG = ALONG + 3, POISSON, RADIUS, ANGLE, LENGTH, WIDTH };
@@ -46,6 +46,7 @@ typedef struct {
 
 typedef struct {
     epsmesh_model model;
+    void *data; /* the bytes of its file, into which it points */
     state now, first;
     fmi3LogMessageCallback log;
     void *environment;
@@ -56,11 +57,11 @@ static void say(const unit *u, fmi3Status status, const char *category, const ch
     if (u->log && (u->tells || status >= fmi3Error)) u->log(u->environment, status, category, text);
 }
 
-static epsmesh_status loaded(epsmesh_model *model, const char *folder) {
+/* Load the model into the unit; its bytes are kept as long as the unit. */
+static epsmesh_status loaded(unit *u, const char *folder) {
     size_t room = strlen(folder) + strlen(FILE_NAME) + 2;
     char *path = (char *)malloc(room);
     FILE *file;
-    void *data = NULL;
     long size = -1;
     epsmesh_status status = EPSMESH_NO_MODEL;
     if (!path) return status;
@@ -71,9 +72,9 @@ static epsmesh_status loaded(epsmesh_model *model, const char *folder) {
     if (!file) return status;
     if (!fseek(file, 0, SEEK_END)) size = ftell(file);
     rewind(file);
-    if (size > 0) data = malloc((size_t)size);
-    if (data && fread(data, 1, (size_t)size, file) == (size_t)size) status = epsmesh_load(model, data, (size_t)size);
-    free(data);
+    if (size > 0) u->data = malloc((size_t)size);
+    if (u->data && fread(u->data, 1, (size_t)size, file) == (size_t)size)
+        status = epsmesh_load(&u->model, u->data, (size_t)size);
     fclose(file);
     return status;
 }
@@ -136,13 +137,13 @@ EXPORTED fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String to
     u->log = log, u->environment = environment, u->tells = tells;
     if (!token || strcmp(token, TOKEN)) {
         say(u, fmi3Error, "logStatusError", "the instantiation token is another one: description and library differ");
-    } else if (!resources || loaded(&u->model, resources) != EPSMESH_OK) {
+    } else if (!resources || loaded(u, resources) != EPSMESH_OK) {
         say(u, fmi3Error, "logStatusError", "resources/ has no model that this version reads");
     } else {
         begin(u);
         return u;
     }
-    free(u);
+    free(u->data), free(u);
     return NULL;
 }
 
@@ -155,6 +156,7 @@ EXPORTED fmi3Instance fmi3InstantiateScheduledExecution(void) {
 }
 
 EXPORTED void fmi3FreeInstance(fmi3Instance instance) {
+    if (instance) free(((unit *)instance)->data);
     free(instance);
 }
 

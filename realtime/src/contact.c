@@ -1,5 +1,19 @@
-/* Contact of one tool with a body of E = 1 at one place. pipeline/realtime/contact.py and blade.py. */
-/* ---- contact ---- */
+/* Frictionless contact of a tool with a body, from c, h and their gradients at one place: closed forms, E = 1.
+ *
+ * A force F at t displaces the face at s (both from the tool's axis) by its field on a half-space, plus
+ * F (c + g.(s + t) + h (s^2 + t^2)/4), grad c = 2g: the regular part of the body's Green's function up to second order. For
+ * a round tool this is exactly the half-space under a tool whose profile has Fh/4 r^2 more (I. N. Sneddon, 1965):
+ *
+ *     D(a) = a int f'(r) / (a^2 - r^2)^(1/2) dr,    F = 2E* int D_e(a) - D_e(s) ds,    D_e(s) = D(s) + F h s^2/2,
+ *     d = D_e(a) + F c + h/4 int p r^2,             int p r^2 = 4E* int s^2 (D_e(a) - D_e(s)) ds.
+ *
+ * The gradient g tilts the face by Fg. The pressure changes as under a tilted disc of the contact's radius, which adds
+ * -2/3 E* a^3 F^2 g^2 to the complementary energy U(F), d = dU/dF. All forces derive from one energy: at a fixed depth the
+ * lateral force is dU/dx, so a closed path does no work. On a dome of mean curvature k a tool acts like one whose profile
+ * has k r^2/2 more. D(s) is s artanh(s/R) for a ball (by a series without cancellation) and pi/2 m s for a cone whose flank
+ * rises by m (A. E. H. Love, 1939); the first radii are H. Hertz's (1882) and Love's. A bonded disc has V. I. Mossakovskii's
+ * normal stiffness (1954), and R. D. Mindlin's lateral one (1949).
+ */
 
 typedef struct {
     double force, aside[2], stiffness, radius, mean_square;
@@ -98,8 +112,11 @@ static int press_round(const epsmesh_query *tool, const place *p, double most, c
     return 1;
 }
 
-/* A rectangle's stiffness, second moments and tilting stiffness: pipeline/realtime/blade.py */
-static const double RECTANGLE[5][8] = {
+/* A rectangle's stiffness, second moments and tilting stiffness: half sides l >= w, E* = 1, in Chebyshev
+ * polynomials of 1 - 2 log(w/l)/log(1/50): F/d in units of 2 sqrt(l w), <x^2>/l^2 and <y^2>/w^2 of its pressure, and moment
+ * per tilt about its short and long axis in l^2.5 w^0.5 and l w^2. Fitted to boundary elements (A. E. H. Love's
+ * rectangles, graded to the edges), within 1e-5. */
+const double epsmesh_rectangle[5][8] = {
     {1.5467288, -0.5389724, 0.154788, -0.0121522, 0.0020102, -0.0001257, 6e-06, -1.4e-06},
     {0.4134192, 0.0443058, 0.0039289, -0.0011234, -0.0003526, 1.7e-06, 2.01e-05, 4.2e-06},
     {0.484368, -0.0181444, -0.0053293, -0.0007768, 1.19e-05, 3.22e-05, 7.5e-06, 8e-07},
@@ -115,7 +132,7 @@ static int press_blade(const epsmesh_query *q, const double edge[2], const place
     if (sqrt(big * big + small * small) > most) return 0;
     polynomials(1 - 2 * log(small / big) / log(SLENDER), 8, c8);
     for (i = 0; i < 5; i++)
-        for (j = 0; j < 8; j++) r[i] += RECTANGLE[i][j] * c8[0][j];
+        for (j = 0; j < 8; j++) r[i] += epsmesh_rectangle[i][j] * c8[0][j];
     for (i = 0; i < 2; i++) e[0][i] = edge[i];
     if (q->length < q->width) e[0][0] = -edge[1], e[0][1] = edge[0];
     e[1][0] = -e[0][1], e[1][1] = e[0][0];

@@ -1,45 +1,70 @@
-/* Any convex tip: epsmesh_patch.h. Formulas are in pipeline/realtime/patch.py, under the same names. */
+/* Any convex tip: pressures on a patch of rectangles, with a half-space's kernel plus the regular part.
+ *
+ * Inside the contact the face has the tip's shape and pressures are not negative; outside, the face is below the tip:
+ *
+ *     sum_j (K_ij/E* + c + g.(s_i + t_j) + (s_i.A s_i + t_j.A t_j)/2) p_j >= d - f(s_i),    p >= 0,    one of both equal,
+ *
+ * K is the displacement of a half-space by uniform pressure on a rectangle (A. E. H. Love, Phil. Trans. R. Soc. A 228,
+ * 1929). The other terms, those of contact.c, are multiplied by its area. The patch depends on the depth only, so that
+ * forces derive from one energy. The active set of the last call is the initial guess.
+ */
+
+/* Rays for a tip's outlines, bisections, chords of the test of convexity, active sets, growths of the patch. */
 enum { ROUND = 48, HALVINGS = 50, CHORDS = 500, SETS = 40, GROWTHS = 8, N = EPSMESH_SIDE, ALL = EPSMESH_CELLS };
+/* Shallowest outline in units of the deepest; the contact's share of the patch; relative error of the force: the largest for
+ * balls and cones with any size of patch, times 1.3. In units of a depth: penetration of the tip by the face, and concavity
+ * of the tip; least height of the rim in units of its largest. */
 static const double SHALLOWEST = 1e-5, FILLED = 0.82, GOOD = 0.007, THROUGH = 1e-10, BENT = 1e-6, FLAT = 1e-3;
 
 /* ---- the tip ---- */
 
-static double height_of(const epsmesh_patch *t, double x, double y) { return t->height(x, y, t->user); }
+static void heights_of(const epsmesh_patch *t, int count, const double *x, const double *y, double *z) {
+    int i;
+    if (t->heights) t->heights((size_t)count, x, y, z, t->user);
+    for (i = 0; i < count && !t->heights; i++) z[i] = t->height(x[i], y[i], t->user);
+}
 
 static int is_convex(const epsmesh_patch *t, double size) {
     unsigned long state = 1;
-    double at[4];
     int i, k;
     for (i = 0; i < CHORDS; i++) {
+        double at[4], x[3], y[3], z[3];
         for (k = 0; k < 4; k++) { /* two places, by radius and angle */
             state = (state * 1664525UL + 1013904223UL) & 0xffffffffUL;
             at[k] = (double)state / 4294967296.0;
         }
-        for (k = 0; k < 4; k += 2) {
-            double r = t->reach * sqrt(at[k]), angle = 2 * PI * at[k + 1];
-            at[k] = r * cos(angle), at[k + 1] = r * sin(angle);
+        for (k = 0; k < 2; k++) {
+            double r = t->reach * sqrt(at[2 * k]), angle = 2 * PI * at[2 * k + 1];
+            x[k] = r * cos(angle), y[k] = r * sin(angle);
         }
-        if (!(height_of(t, (at[0] + at[2]) / 2, (at[1] + at[3]) / 2) <=
-              (height_of(t, at[0], at[1]) + height_of(t, at[2], at[3])) / 2 + BENT * size))
-            return 0;
+        x[2] = (x[0] + x[1]) / 2, y[2] = (y[0] + y[1]) / 2;
+        heights_of(t, 3, x, y, z);
+        if (!(z[2] <= (z[0] + z[1]) / 2 + BENT * size)) return 0;
     }
     return 1;
 }
 
 static void outline_to(const epsmesh_patch *t, double depth, double out[2]) {
-    int i, k;
+    double ray[2][ROUND], low[ROUND], high[ROUND], at[2][ROUND], z[ROUND];
+    int i, k, halved;
     out[0] = out[1] = SMALLEST * t->reach;
     for (i = 0; i < ROUND; i++) {
-        double ray[2], low = 0, high = t->reach;
-        ray[0] = cos(2 * PI * i / ROUND), ray[1] = sin(2 * PI * i / ROUND);
-        for (k = 0; k < HALVINGS; k++) {
-            double middle = (low + high) / 2;
-            if (height_of(t, middle * ray[0], middle * ray[1]) < depth) low = middle;
-            else high = middle;
-        }
-        for (k = 0; k < 2; k++)
-            if (fabs(ray[k]) * high > out[k]) out[k] = fabs(ray[k]) * high;
+        ray[0][i] = cos(2 * PI * i / ROUND), ray[1][i] = sin(2 * PI * i / ROUND);
+        low[i] = 0, high[i] = t->reach;
     }
+    for (halved = 0; halved < HALVINGS; halved++) {
+        for (i = 0; i < ROUND; i++)
+            for (k = 0; k < 2; k++) at[k][i] = (low[i] + high[i]) / 2 * ray[k][i];
+        heights_of(t, ROUND, at[0], at[1], z);
+        for (i = 0; i < ROUND; i++) {
+            double middle = (low[i] + high[i]) / 2;
+            if (z[i] < depth) low[i] = middle;
+            else high[i] = middle;
+        }
+    }
+    for (i = 0; i < ROUND; i++)
+        for (k = 0; k < 2; k++)
+            if (fabs(ray[k][i]) * high[i] > out[k]) out[k] = fabs(ray[k][i]) * high[i];
 }
 
 static void outline_at(const epsmesh_patch *t, double depth, double out[2]) {
@@ -103,18 +128,22 @@ typedef struct {
 } cells;
 
 static void lay(const epsmesh_patch *t, const place *p, double depth, double turn, const double size[2], cells *c) {
-    double along = cos(turn), aside = sin(turn);
-    int i, k;
+    double along = cos(turn), aside = sin(turn), at[2][ALL], z[ALL];
+    int i, k, inside = 0;
     for (k = 0; k < 2; k++) c->step[k] = 2 * size[k] / N;
     c->area = c->step[0] * c->step[1];
     for (i = 0; i < ALL; i++) {
         double x = size[0] * (2 * (i / N + 0.5) / N - 1), y = size[1] * (2 * (i % N + 0.5) / N - 1), u, v;
         c->own[0][i] = x, c->own[1][i] = y;
         u = c->at[0][i] = along * x - aside * y, v = c->at[1][i] = aside * x + along * y;
-        c->gap[i] = x * x + y * y <= t->reach * t->reach ? depth - height_of(t, x, y) : -HUGE_VAL;
+        c->gap[i] = -HUGE_VAL;
+        if (x * x + y * y <= t->reach * t->reach) c->gap[i] = 0, at[0][inside] = x, at[1][inside++] = y;
         c->bent[i] = p->h / 4 * (u * u + v * v) + (p->bent[0] * (u * u - v * v) + p->bent[1] * 2 * u * v) / 2 +
                      (p->lean[0] * u + p->lean[1] * v) / 2;
     }
+    heights_of(t, inside, at[0], at[1], z);
+    for (i = 0, k = 0; i < ALL; i++)
+        if (c->gap[i] == 0) c->gap[i] = depth - z[k++];
 }
 
 typedef struct {
@@ -214,22 +243,23 @@ static int within(epsmesh_patch *t, const place *p, double depth, double turn, s
     return 0;
 }
 
-epsmesh_status epsmesh_patch_make(epsmesh_patch *t, epsmesh_height height, void *user, double reach) {
-    double rim = HUGE_VAL, top = 0;
+static epsmesh_status patch_make(epsmesh_patch *t, double reach) {
+    double rim = HUGE_VAL, top = 0, x = 0, y = 0, z;
     place none;
     spread s;
     int i, k, again;
-    memset(t, 0, sizeof *t);
     memset(&none, 0, sizeof none);
-    none.plane = 1;
-    t->height = height, t->user = user, t->reach = reach;
-    if (!height || !(reach >= SMALLEST && isfinite(reach))) return EPSMESH_INPUT;
+    none.plane = 1, t->reach = reach;
+    if (!(t->height || t->heights) || !(reach >= SMALLEST && isfinite(reach))) return EPSMESH_INPUT;
+    heights_of(t, 1, &x, &y, &z);
+    if (z != 0) return EPSMESH_INPUT;
     for (i = 0; i < ROUND; i++) {
-        double z = height_of(t, reach * cos(2 * PI * i / ROUND), reach * sin(2 * PI * i / ROUND));
+        x = reach * cos(2 * PI * i / ROUND), y = reach * sin(2 * PI * i / ROUND);
+        heights_of(t, 1, &x, &y, &z);
         if (!isfinite(z)) return EPSMESH_INPUT;
         rim = smaller(rim, z), top = z > top ? z : top;
     }
-    if (height_of(t, 0, 0) != 0 || !(rim > FLAT * top) || !is_convex(t, top)) return EPSMESH_INPUT;
+    if (!(rim > FLAT * top) || !is_convex(t, top)) return EPSMESH_INPUT;
     for (i = 0; i < EPSMESH_DEPTHS; i++) {
         t->depths[i] = rim * exp(log(SHALLOWEST) * (1 - (double)i / (EPSMESH_DEPTHS - 1)));
         outline_to(t, t->depths[i], t->outlines[i]);
@@ -251,6 +281,20 @@ epsmesh_status epsmesh_patch_make(epsmesh_patch *t, epsmesh_height height, void 
     t->is_made = 1;
     return EPSMESH_OK;
 }
+
+epsmesh_status epsmesh_patch_make(epsmesh_patch *t, epsmesh_height height, void *user, double reach) {
+    memset(t, 0, sizeof *t);
+    t->height = height, t->user = user;
+    return patch_make(t, reach);
+}
+
+epsmesh_status epsmesh_patch_make_of(epsmesh_patch *t, epsmesh_heights heights, void *user, double reach) {
+    memset(t, 0, sizeof *t);
+    t->heights = heights, t->user = user;
+    return patch_make(t, reach);
+}
+
+double epsmesh_patch_deepest(const epsmesh_patch *t) { return t->depths[EPSMESH_DEPTHS - 1]; }
 
 epsmesh_touch epsmesh_patch_touch(epsmesh_patch *t, const epsmesh_model *m, const epsmesh_query *query, double turn) {
     double local[3], edge[2], room, share, bent, force[3];

@@ -8,7 +8,18 @@ static double room_at(const epsmesh_model *m, double x, double y) {
     return smaller(smaller(m->sides[0] - fabs(x), m->sides[1] - fabs(y)), m->thickness);
 }
 
+static int is_inside(const epsmesh_model *m, double x, double y) {
+    if (m->is_round) return x * x + y * y <= m->reach[0] * m->reach[0];
+    return fabs(x) <= m->reach[0] && fabs(y) <= m->reach[1];
+}
+
 static int is_positive(double x) { return isfinite(x) && x > 0; }
+
+static void into_face(const epsmesh_model *m, const double at[3], double local[3]) {
+    int i, j;
+    for (i = 0; i < 3; i++)
+        for (local[i] = 0, j = 0; j < 3; j++) local[i] += m->axes[i][j] * (at[j] - m->origin[j]);
+}
 
 /* Return whether the model has this tool; `edge` is the direction of a blade on the face. */
 static epsmesh_status tool_of(const epsmesh_model *m, const epsmesh_query *q, double edge[2]) {
@@ -37,24 +48,16 @@ static epsmesh_status tool_of(const epsmesh_model *m, const epsmesh_query *q, do
 }
 
 static epsmesh_status misfit(const epsmesh_model *m, const epsmesh_query *q, double local[3], double edge[2], spot *f) {
-    double length = 0, inward = 0, shift;
+    double length = 0, inward = 0;
     epsmesh_status status;
     int i, j;
     if (!m->is_loaded) return EPSMESH_NO_MODEL;
     status = tool_of(m, q, edge);
     if (status != EPSMESH_OK) return status;
     if (!isfinite(q->depth) || !isfinite(q->poisson) || !is_positive(q->young)) return EPSMESH_INPUT;
-    for (i = 0; i < 3; i++) {
-        local[i] = 0;
-        for (j = 0; j < 3; j++) {
-            shift = q->at[j] - m->origin[j];
-            local[i] += m->axes[i][j] * shift;
-        }
-        if (!isfinite(local[i])) return EPSMESH_INPUT;
-    }
-    if (m->is_round ? !(local[0] * local[0] + local[1] * local[1] <= m->reach[0] * m->reach[0])
-                    : !(fabs(local[0]) <= m->reach[0] && fabs(local[1]) <= m->reach[1]))
-        return EPSMESH_OUTSIDE;
+    into_face(m, q->at, local);
+    if (!(isfinite(local[0]) && isfinite(local[1]) && isfinite(local[2]))) return EPSMESH_INPUT;
+    if (!is_inside(m, local[0], local[1])) return EPSMESH_OUTSIDE;
     *f = face_at(m, local[0], local[1]);
     for (i = 0; i < 3; i++) {
         if (!isfinite(q->axis[i])) return EPSMESH_INPUT;
@@ -112,10 +115,8 @@ epsmesh_status epsmesh_foot(const epsmesh_model *m, const double tip[3], double 
     epsmesh_status status;
     int i, j;
     if (!m->is_loaded) return EPSMESH_NO_MODEL;
-    for (i = 0; i < 3; i++) {
-        for (local[i] = 0, j = 0; j < 3; j++) local[i] += m->axes[i][j] * (tip[j] - m->origin[j]);
-        if (!isfinite(local[i])) return EPSMESH_INPUT;
-    }
+    into_face(m, tip, local);
+    if (!(isfinite(local[0]) && isfinite(local[1]) && isfinite(local[2]))) return EPSMESH_INPUT;
     if (m->is_flat) {
         if (local[2] >= 0) return EPSMESH_LOST;
         foot[0] = local[0], foot[1] = local[1], foot[2] = 0, *depth = -local[2];
@@ -205,4 +206,9 @@ epsmesh_touch epsmesh_touch_at(const epsmesh_model *m, const epsmesh_query *q) {
     if (!surveyed(m, q, &a)) return all(EPSMESH_DAMAGED, (double)NAN);
     if (!press(m, q, &a, &k)) return all(EPSMESH_LARGE, (double)NAN);
     return told(m, q->young, q->depth, &a, &k, bar_of(m, q, &a, &k));
+}
+
+void epsmesh_touch_each(const epsmesh_model *m, size_t count, const epsmesh_query *q, epsmesh_touch *t) {
+    size_t i;
+    for (i = 0; i < count; i++) t[i] = epsmesh_touch_at(m, &q[i]);
 }

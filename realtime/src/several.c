@@ -1,4 +1,22 @@
-/* Several tools at once. pipeline/realtime/pairs.py, several.py and doubt.py. */
+/* Several tools at once on a flat face, E = 1, with their interaction.
+ *
+ *     U(F) = sum U_i(F_i) + sum_{i<j} F_i F_j (G + m_i w_i + m_j w_j)(x_i, x_j),    d_i = dU/dF_i,    aside on i: dU/dx_i
+ *
+ * Each tool follows its own model (contact.c), at its depth minus the displacement by the others. G is the displacement of
+ * one place by a unit force at another:
+ *
+ *     G(x, y) = (1 - nu^2)/(pi |x - y|) + R(x, y),    R(x, y) = sum phi_k(x) S_kl(nu) phi_l(y).
+ *
+ * The first term is a half-space's (J. Boussinesq, 1885). The regular part R has low rank: modes phi are polynomials over
+ * the region, and links S are symmetric, because R is (E. Betti, 1872). m is the second moment of a contact on a
+ * half-space, which depends on its force only; M is its tensor, and m w = 1/2 M:grad grad G its effect on a half-space's G.
+ *
+ * Error bars: errors of depths and of the tools' models propagate between tools in the worst case. Neglected in G are the
+ * second moments on R, the error of these moments, and the next order on a half-space: FOURTH and FOURTH_BLADE are the
+ * largest effects of two contacts' fourth moments, in units of (m_i + m_j)^2/D^4; BENDS_BLADE multiplies second derivatives
+ * of R for blades. The complementary energy has -2/3 E* a^3 times the squared slope of the face; the model includes only a
+ * tool's own slope. Lateral forces of bonded discs displace other places, and others pull at them.
+ */
 enum { TOOLS = EPSMESH_MOST_TOOLS };
 
 /* Of places i and j: G, its slope with x_i, the size of the Laplacian of R, a half-space's share of G, x_i - x_j over
@@ -42,7 +60,7 @@ static double moment(const epsmesh_query *q, double plane, double force, double 
     if (q->shape != EPSMESH_BLADE) return 2.0 / 3 * q->radius * q->radius;
     polynomials(1 - 2 * log(small / big) / log(SLENDER), 8, c8);
     for (i = 0; i < 2; i++)
-        for (j = 0; j < 8; j++) r[i] += RECTANGLE[i + 1][j] * c8[0][j];
+        for (j = 0; j < 8; j++) r[i] += epsmesh_rectangle[i + 1][j] * c8[0][j];
     return r[0] * big * big + r[1] * small * small;
 }
 
@@ -55,7 +73,7 @@ static void tensor(const epsmesh_query *q, const double edge[2], double t[2][2])
     if (q->shape != EPSMESH_BLADE) return;
     polynomials(1 - 2 * log(small / big) / log(SLENDER), 8, c8);
     for (i = 0; i < 2; i++)
-        for (j = 0; j < 8; j++) r[i] += RECTANGLE[i + 1][j] * c8[0][j];
+        for (j = 0; j < 8; j++) r[i] += epsmesh_rectangle[i + 1][j] * c8[0][j];
     e[0] = q->length < q->width ? -edge[1] : edge[0], e[1] = q->length < q->width ? edge[0] : edge[1];
     r[0] *= big * big, r[1] *= small * small, share = r[0] / (r[0] + r[1]);
     for (i = 0; i < 2; i++)
@@ -79,21 +97,27 @@ static void bent_at(const epsmesh_query *q, const double edge[2], int n, int i, 
     }
 }
 
-static void influences(const epsmesh_model *m, int n, const epsmesh_query *q, const asked *a, influence *g) {
-    double f[TOOLS][4][EPSMESH_MOST_MODES], linked[TOOLS][EPSMESH_MOST_MODES], nu[3][EPSMESH_MOST];
-    double low = m->poisson_range[0], high = m->poisson_range[1], plane = 1 / (1 - q->poisson * q->poisson);
+/* Put the modes of the displacement by a unit force at each of `n` places, from their own modes, into `linked`. */
+static void linked_by(const epsmesh_model *m, double poisson, int n, double f[][4][EPSMESH_MOST_MODES],
+                      double linked[][EPSMESH_MOST_MODES]) {
+    double nu[3][EPSMESH_MOST], low = m->poisson_range[0], high = m->poisson_range[1];
     int i, j, k, l, rank = m->pair_counts[1];
-    polynomials(high == low ? 0 : (2 * q->poisson - low - high) / (high - low), m->pair_counts[0], nu);
-    for (i = 0; i < n; i++) {
-        modes_at(m, a[i].local[0], a[i].local[1], f[i]);
+    polynomials(high == low ? 0 : (2 * poisson - low - high) / (high - low), m->pair_counts[0], nu);
+    for (i = 0; i < n; i++)
         for (k = 0; k < rank; k++) linked[i][k] = 0;
-    }
     for (l = 0; l < rank; l++)
         for (k = 0; k < rank; k++) {
             double s = 0;
             for (j = 0; j < m->pair_counts[0]; j++) s += nu[0][j] * m->pair_links[(j * rank + l) * rank + k];
             for (i = 0; i < n; i++) linked[i][k] += f[i][0][l] * s;
         }
+}
+
+static void influences(const epsmesh_model *m, int n, const epsmesh_query *q, const asked *a, influence *g) {
+    double f[TOOLS][4][EPSMESH_MOST_MODES], linked[TOOLS][EPSMESH_MOST_MODES], plane = 1 / (1 - q->poisson * q->poisson);
+    int i, j, k, l, rank = m->pair_counts[1];
+    for (i = 0; i < n; i++) modes_at(m, a[i].local[0], a[i].local[1], f[i]);
+    linked_by(m, q->poisson, n, f, linked);
     for (i = 0; i < n; i++)
         for (j = 0; j < n; j++) {
             double x = a[i].local[0] - a[j].local[0], y = a[i].local[1] - a[j].local[1], d = sqrt(x * x + y * y);

@@ -1,5 +1,4 @@
-/* Values of the tables at a place, with derivatives; the face there. pipeline/realtime/table.py and face.py. */
-/* ---- the table ---- */
+/* Values of the tables at a place, with derivatives (epsmesh_realtime/table.py defines the tables); the face there. */
 
 typedef struct {
     double c, h, tilt, slope_c[2], slope_h[2], slope_tilt[2], plane, poisson, bend, slope_bend[2];
@@ -65,22 +64,33 @@ static value along(const epsmesh_model *m, const double *table, const terms *p, 
     return found;
 }
 
-/* Values for blades and bonded tools; the factors of the seven tables are those of pipeline/realtime/table.py. */
-static void shape_at(const epsmesh_model *m, const terms *s, double x, double y, double t, const double slope_t[2],
-                     place *p) {
+/* The factor of one of the seven tables, with its gradient (1/m): what symmetry implies, epsmesh_realtime/table.py. */
+static double factor(const epsmesh_model *m, int k, double x, double y, double own[2]) {
     double xi = m->even[0] ? x / m->reach[0] : 1, eta = m->even[1] ? y / m->reach[1] : 1;
     double of_x = m->even[0] ? 1 / m->reach[0] : 0, of_y = m->even[1] ? 1 / m->reach[1] : 0;
+    own[0] = own[1] = 0;
+    if ((k == 0 || k == 5) && m->is_round) {
+        own[0] = 2 * xi * of_x, own[1] = -2 * eta * of_y;
+        return xi * xi - eta * eta;
+    }
+    if (k == 1 || k == 6) {
+        own[0] = 2 * eta * of_x, own[1] = 2 * xi * of_y;
+        return 2 * xi * eta;
+    }
+    if (k == 2) own[0] = of_x;
+    if (k == 3) own[1] = of_y;
+    return k == 2 ? xi : k == 3 ? eta : 1;
+}
+
+/* Values for blades and bonded tools. */
+static void shape_at(const epsmesh_model *m, const terms *s, double x, double y, double t, const double slope_t[2],
+                     place *p) {
     double f[EPSMESH_TENSORS], g, own[2];
     size_t whole = (size_t)m->counts[0] * (size_t)m->counts[1] * (size_t)m->counts[2];
     int i, k;
     for (k = 0; k < EPSMESH_TENSORS; k++) {
         value v = along(m, m->tensors + (size_t)k * whole, s, m->counts, x, y);
-        g = 1, own[0] = own[1] = 0;
-        if ((k == 0 || k == 5) && m->is_round) g = xi * xi - eta * eta, own[0] = 2 * xi * of_x, own[1] = -2 * eta * of_y;
-        if (k == 1 || k == 6) g = 2 * xi * eta, own[0] = 2 * eta * of_x, own[1] = 2 * xi * of_y;
-        if (k == 2) g = xi;
-        if (k == 3) g = eta;
-        f[k] = g * v.f;
+        g = factor(m, k, x, y, own), f[k] = g * v.f;
         for (i = 0; i < 2 && k < 2; i++)
             p->bent_slopes[k][i] = ((g * v.slope[i] + v.f * own[i]) - 3 * f[k] * slope_t[i] / t) / (t * t * t);
     }
@@ -123,9 +133,7 @@ static int place_at(const epsmesh_model *m, double x, double y, double ratio, in
 
 /* ---- the face ---- */
 
-typedef struct {
-    double height, slope[2], second[2][2], bend, slope_bend[2], normal[3];
-} spot;
+typedef epsmesh_spot spot;
 
 static spot face_at(const epsmesh_model *m, double x, double y) {
     spot f = {0, {0, 0}, {{0, 0}, {0, 0}}, 0, {0, 0}, {0, 0, 1}};
@@ -148,6 +156,15 @@ static spot face_at(const epsmesh_model *m, double x, double y) {
     }
     f.normal[2] = 1 / steep;
     return f;
+}
+
+/* Rows: two unit tangents, the first one above x, and the outward normal. */
+static void turn_of(const spot *f, double turn[3][3]) {
+    const double *n = f->normal, size = sqrt(n[2] * n[2] + n[0] * n[0]);
+    int i;
+    turn[0][0] = n[2] / size, turn[0][1] = 0, turn[0][2] = -n[0] / size;
+    for (i = 0; i < 3; i++) turn[2][i] = n[i];
+    for (i = 0; i < 3; i++) turn[1][i] = n[(i + 1) % 3] * turn[0][(i + 2) % 3] - n[(i + 2) % 3] * turn[0][(i + 1) % 3];
 }
 
 /* The force on a tool whose tip is at p - d n: its work is the decrease of the energy. */

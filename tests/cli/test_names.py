@@ -27,8 +27,8 @@ def test_the_model_of_a_study_is_found_by_the_study(epsmesh, tmp_path, monkeypat
     without = epsmesh("touch", word)
     assert "`epsmesh export studies/mine.toml` makes one" in without.stderr
     (tmp_path / "results").mkdir(exist_ok=True)
-    (tmp_path / "results" / "mine.epsm.nc").write_bytes(b"cut short")
-    assert epsmesh("touch", word).stderr.startswith("results/mine.epsm.nc: ")
+    (tmp_path / "results" / "mine.epsm").write_bytes(b"cut short")
+    assert epsmesh("touch", word).stderr.startswith("results/mine.epsm: ")
 
 
 @pytest.mark.parametrize(
@@ -36,8 +36,8 @@ def test_the_model_of_a_study_is_found_by_the_study(epsmesh, tmp_path, monkeypat
     [
         (("run", "known.nc"), "a dataset is for `report` and `guide`, a model for `touch`"),
         (("plan", "small.toml", "small.toml"), "with --check several files are looked at"),
-        (("touch", "small.toml"), "a model ends in .epsm.nc: `epsmesh export small.toml` makes one"),
-        (("touch", "known.nc"), "a model ends in .epsm.nc: `epsmesh export known.toml` makes one"),
+        (("touch", "small.toml"), "a model ends in .epsm: `epsmesh export small.toml` makes one"),
+        (("touch", "known.nc"), "a model ends in .epsm: `epsmesh export known.toml` makes one"),
     ],
 )
 def test_a_file_of_another_kind_is_told_with_what_it_is_for(epsmesh, small, tmp_path, monkeypatch, words, told):

@@ -102,8 +102,8 @@ COMMANDS = {
     "merge": ("more/small.png", ("status", "small.toml", "out/cases.sqlite", "--merge", "--output", "more")),
     "view as a page": ("more/small_0.html", ("view", "small.toml", "0", "--export", "html", "--output", "more")),
     "view for ParaView": ("more/small_0.vtu", ("view", "small.toml", "0", "--export", "vtu", "--output", "more")),
-    "touch": ("more/page.html", ("touch", "none.epsm.nc", "--output", "more/page.html")),
-    "export": ("more/m.epsm.nc", ("export", "small.toml", "--output", "more/m.epsm.nc")),
+    "touch": ("more/page.html", ("touch", "none.epsm", "--output", "more/page.html")),
+    "export": ("more/m.epsm", ("export", "small.toml", "--output", "more/m.epsm")),
 }
 
 

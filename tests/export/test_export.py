@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from epsmesh_realtime.model import Model
+from epsmesh_realtime.table import Table
 from pipeline.export.checks import Check, error_of_full, needed
 from pipeline.export.compliance import coarse_mesh, compliances
 from pipeline.export.curved import curved_model
@@ -15,12 +17,10 @@ from pipeline.export.full import Full, Tool
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, scope_of
 from pipeline.export.tabulate import tabulate
-from pipeline.realtime import Model
-from pipeline.realtime.contact import tangent
-from pipeline.realtime.place import Place
 from pipeline.solve.physics import MaterialLaw
 from pipeline.study.read import parse
 from pipeline.verify.compare import solve
+from tests.realtime.synthetic import of_place
 
 DISC = {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "frictionless"}
 BALL = {"shape": "sphere", "radius": "6 mm", "depth": "0.1 mm", "contact": "unilateral"}
@@ -94,11 +94,11 @@ def test_tables_of_tensors_know_their_images(shape):
     table, _ = tabulate(region, (0.3, 0.49), body, 1e-4)
     for x, y in np.random.default_rng(2).uniform(-0.6, 0.6, (20, 2)) * reach:
         ((c, h, apart, twist, xz, yz, mean, half, xy),) = body([(x, y)], 0.4)
-        place = table.at(x, y, 0.4, whole=True)
+        place = table.at(x, y, 0.4)
         assert (place.c, place.h) == pytest.approx((c, h), rel=2e-3)
-        assert place.shape.bent == pytest.approx([apart, twist], abs=2e-3 * 1e5)
+        assert place.bent == pytest.approx([apart, twist], abs=2e-3 * 1e5)
         known = [[mean + half, xy, xz], [xy, mean - half, yz], [xz, yz, c]]
-        assert np.allclose(place.shape.regular, known, atol=0.05)
+        assert np.allclose(place.regular, known, atol=0.05)
 
 
 @pytest.mark.parametrize(
@@ -162,8 +162,6 @@ def test_a_study_of_several_ratios_makes_a_model_of_their_range():
 @pytest.fixture(scope="module")
 def middle() -> Model:
     """A model of the middle of a cylinder, at one Poisson's ratio, as a table of one number."""
-    from pipeline.realtime.table import Table
-
     scope = scope_of(study())
     region = Region.of(scope.body, 0.5)
     ((c, h, *_),) = compliances(coarse_mesh(scope.case, region), region, [(0.0, 0.0)], 0.45)
@@ -203,11 +201,12 @@ class Known:
     accuracy: float = 0.01
 
     def press_all(self, tool: Tool, at: tuple[float, ...], depths: Sequence[float], poissons=None) -> list[Full]:
-        ((depth,), nothing) = depths, np.zeros(2)
+        (depth,) = depths
         found = []
         for poisson in poissons or [0.45]:
-            place = Place(*self.regular(*at, poisson), 0.0, nothing, nothing, nothing, 1 / (1 - poisson**2))
-            found.append(Full(self.young * depth / tangent(tool.radius, place), 0.0, np.zeros(3)))
+            place = of_place(*self.regular(*at, poisson), poisson)
+            touch = place.query("disc", radius=tool.radius, at=(0.0, 0.0, 0.0), depth=depth)
+            found.append(Full(self.young * float(touch.force[2]), 0.0, np.zeros(3)))
         return found
 
     def regular(self, x: float, y: float, poisson: float = 0.45) -> tuple[float, float]:
@@ -224,13 +223,13 @@ def test_a_curved_body_is_what_two_discs_tell(axes):
     assert missed < 5e-3
     assert places == (5 if axes[0] == axes[1] else 13)
     for x, y in np.random.default_rng(5).uniform(-0.25, 0.25, (20, 2)) * (a, b):
-        found, spot = model.table.at(x, y, 0.45), model.face.at(model.table, x, y)
+        found, spot = model.table.at(x, y, 0.45), model.spot(x, y)
         assert (found.c, found.h) == pytest.approx(solver.regular(x, y), rel=2e-3)
         z = c * np.sqrt(1 - (x / a) ** 2 - (y / b) ** 2)
         steepest = np.array([x / a**2, y / b**2, z / c**2])
         assert spot.height == pytest.approx(z, abs=1e-6 * c)
         assert spot.normal == pytest.approx(steepest / np.linalg.norm(steepest), abs=1e-5)
-    top = model.face.at(model.table, 0.0, 0.0)
+    top = model.spot(0.0, 0.0)
     assert top.bend == pytest.approx((c / a**2 + c / b**2) / 2, rel=1e-3)
     at, depth = (0.0, 0.0, c), 2e-5
     touch = model.query("disc", radius=2e-3, at=at, depth=depth, young=20e3)
@@ -253,13 +252,13 @@ def test_a_layer_is_a_load_on_the_regular_part_of_the_skin():
     region = Region.of(scope.body, 0.5)
     mesh = coarse_mesh(scope.case, region)
     ((c, h, *_),) = compliances(mesh, region, [(0.0, 0.0)], 0.45, MaterialLaw.of(*scope.tissues_at(scope.poisson)))
-    nothing = np.zeros(2)
-    place = Place(c, h, 0.0, nothing, nothing, nothing, 1 / (1 - 0.45**2))
+    place = of_place(c, h, 0.45)
     for radius, most in ((1e-3, 3e-3), (2e-3, 6e-3)):
         disc = DISC | {"radius": f"{radius} m"}
         force, *_ = solve(MPI.COMM_SELF, "2D", {"body": layered, "material": SOFT, "probe": disc})
+        touch = place.query("disc", radius=radius, at=(0.0, 0.0, 0.0), depth=1e-4)
         # Without what is below the skin it were 19 and 36 % more.
-        assert scope.young * 1e-4 / tangent(radius, place) == pytest.approx(force, rel=most)
+        assert scope.young * touch.force[2] == pytest.approx(force, rel=most)
 
 
 def test_other_tissue_bounds_what_is_answered_for():

@@ -23,8 +23,8 @@ RADIUS, STEP, COUNT = 5e-3, 1e-3, 400
 def made(request, tmp_path_factory):
     """Return a model and the file of its unit."""
     folder = tmp_path_factory.mktemp("unit")
-    model = write_random(folder / "pad.epsm.nc", **request.param)
-    write_fmu(folder / "pad.epsm.nc", folder / "pad.fmu", "0")
+    model = write_random(folder / "pad.epsm", **request.param)
+    write_fmu(folder / "pad.epsm", folder / "pad.fmu", "0")
     return model, folder / "pad.fmu"
 
 
@@ -39,7 +39,7 @@ def path_of(model):
     x[300:330] = 1.1 * model.table.reach[0]
     rows, places = [], []
     for number in range(COUNT):
-        spot = model.face.at(model.table, x[number], y[number])
+        spot = model.spot(x[number], y[number])
         local = np.array([x[number], y[number], spot.height])
         places.append(model.origin + local @ model.axes)
         rows.append(model.origin + (local - depth[number] * np.array(spot.normal)) @ model.axes)
@@ -149,16 +149,16 @@ def test_another_description_or_a_missing_model_is_refused(made, tmp_path):
 
 
 def test_the_command_packs_a_model_and_needs_a_compiler(epsmesh, tmp_path, monkeypatch):
-    write_random(tmp_path / "pad.epsm.nc")
-    done = epsmesh("export", tmp_path / "pad.epsm.nc", "--fmu", tmp_path / "pad.fmu")
+    write_random(tmp_path / "pad.epsm")
+    done = epsmesh("export", tmp_path / "pad.epsm", "--fmu", tmp_path / "pad.fmu")
     assert done.exit_code == 0, done.output
     assert zipfile.is_zipfile(tmp_path / "pad.fmu")
     monkeypatch.setenv("CC", "no-such-compiler")
-    wrong = epsmesh("export", tmp_path / "pad.epsm.nc", "--fmu", tmp_path / "other.fmu")
+    wrong = epsmesh("export", tmp_path / "pad.epsm", "--fmu", tmp_path / "other.fmu")
     assert wrong.exit_code == 2
     assert "there is no C compiler 'no-such-compiler': install gcc, or set CC" in wrong.output
     monkeypatch.delenv("CC")
-    (tmp_path / "bad.epsm.nc").write_bytes(b"CDF\x02")
-    wrong = epsmesh("export", tmp_path / "bad.epsm.nc", "--fmu", tmp_path / "other.fmu")
+    (tmp_path / "bad.epsm").write_bytes(b"CDF\x02")
+    wrong = epsmesh("export", tmp_path / "bad.epsm", "--fmu", tmp_path / "other.fmu")
     assert wrong.exit_code == 2
     assert not (tmp_path / "other.fmu").exists()

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from benchmarks.two_discs import forces, meshed
+from epsmesh_realtime.model import Model
+from epsmesh_realtime.table import Table
 from pipeline.export import far, tabulate
 from pipeline.export.compliance import compliances
 from pipeline.export.far import FarFields, far_fields
 from pipeline.export.pairs import tabulate_pairs
 from pipeline.export.scope import scope_of
 from pipeline.export.surface_body import surface_body
-from pipeline.realtime.model import Model
-from pipeline.realtime.near import boussinesq
-from pipeline.realtime.table import Table
 from tests.export.test_export import BOX, CYLINDER, SKIN, study
+from tests.realtime.synthetic import point_force
 
 
 def fields(body: dict, poissons: tuple[float, float], margin: float) -> FarFields:
@@ -40,14 +40,6 @@ def test_a_table_of_two_places_is_reciprocal_and_knows_each_by_itself(body, most
         for number, row in enumerate(compliances(known.body.mesh, region, places, poisson, law)):
             room = region.room(*places[number])
             assert told[number, number] * room == pytest.approx(row[0] * room, abs=2 * most)
-    between = pairs.between(places, poisson)
-    step = 1e-5
-    for axis in range(2):
-        moved = [
-            pairs.between([tuple(np.add(places[0], way * step * np.eye(2)[axis])), places[1]], poisson).sinks[0, 1]
-            for way in (-1, 1)
-        ]
-        assert between.slopes[0, 1, axis] == pytest.approx((moved[1] - moved[0]) / (2 * step), rel=1e-4)
 
 
 def test_a_force_draws_other_places_along_the_face_no_more_than_the_file_says():
@@ -62,7 +54,7 @@ def test_a_force_draws_other_places_along_the_face_no_more_than_the_file_says():
         away = solved.nodes - (*source, 0.0)
         way = np.linalg.norm(away, axis=1)
         beside = on & (way > 2e-3)
-        moved = regular[beside, :2] + boussinesq(away[beside], 0.3, 1e-30)[:, :2]
+        moved = regular[beside, :2] + point_force(away[beside], 0.3)[:, :2]
         largest = max(largest, float((np.linalg.norm(moved, axis=1) * way[beside]).max()))
     assert told == pytest.approx(largest, rel=0.02)
 

@@ -5,6 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
+from epsmesh_realtime.surface import SurfaceTable
 from pipeline.compat import geometry_dofs
 from pipeline.export import compliance, far, tabulate
 from pipeline.export.compliance import compliances
@@ -15,9 +16,8 @@ from pipeline.export.scope import scope_of
 from pipeline.export.surface import tabulate_surface
 from pipeline.export.surface_body import surface_body
 from pipeline.mesh.curve import EDGES
-from pipeline.realtime.near import boussinesq
-from pipeline.realtime.surface import SurfaceTable
 from tests.export.test_export import CYLINDER, DISC, DOME, SKIN, Known, study
+from tests.realtime.synthetic import point_force
 
 POISSON = 0.4
 BOX = {"shape": "box", "size": ["40 mm", "50 mm", "20 mm"]}
@@ -51,7 +51,7 @@ def test_the_far_field_is_that_of_the_body(body, volume):
     held = np.flatnonzero(table.points[:, 2] < -region.thickness + 1e-6)
     for place in ((0.0, 0.0), (-0.004, 0.007)):
         regular = table.far(*place, POISSON)
-        near = boussinesq(table.points - np.array([*place, 0.0]), POISSON, 1e-30)
+        near = point_force(table.points - np.array([*place, 0.0]), POISSON)
         room = region.room(*place)
         assert room * np.abs(near[held] + regular[held]).max() < 0.03
     under = np.argmin(np.linalg.norm(table.points - np.array([*place, 0.0]), axis=1))
@@ -86,16 +86,16 @@ def test_what_a_force_on_a_dome_does_elsewhere_a_force_there_does_here():
 
     def moved(force: int, point: int) -> float:
         x, y = table.points[force, :2].tolist()
-        turns = [model.face.at(model.table, *table.points[n, :2].tolist()).turn for n in (force, point)]
+        turns = [model.spot(*table.points[n, :2].tolist()).turn for n in (force, point)]
         away = (table.points[[point]] - table.points[force]).astype(float) @ turns[0].T
-        own = boussinesq(away, scope.poisson, 1e-30)[0] @ turns[0]
+        own = point_force(away, scope.poisson)[0] @ turns[0]
         return float((own + table.far(x, y, scope.poisson)[point]) @ turns[1][2])
 
     assert moved(here, there) == pytest.approx(moved(there, here), rel=0.03)
     x, y = table.points[here, :2].tolist()
     held = np.flatnonzero(table.points[:, 2] < below - 1e-6)
-    turn = model.face.at(model.table, x, y).turn
-    own = boussinesq((table.points[held] - table.points[here]).astype(float) @ turn.T, scope.poisson, 1e-30) @ turn
+    turn = model.spot(x, y).turn
+    own = point_force((table.points[held] - table.points[here]).astype(float) @ turn.T, scope.poisson) @ turn
     assert model.thickness * np.abs(own + table.far(x, y, scope.poisson)[held]).max() < 0.03
     assert table.error < 0.1
 

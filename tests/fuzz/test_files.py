@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from epsmesh_realtime import ModelError
+from epsmesh_realtime import read as read_model
 from pipeline.experiment.read import read_curve
 from pipeline.experiment.reading import ExperimentError, Reading
 from pipeline.plan.plan import make_plan
-from pipeline.realtime import ModelError
-from pipeline.realtime import read as read_model
 from pipeline.run.reading import known_of, open_to_read, read_rows
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
@@ -72,7 +72,7 @@ def good(tmp_path_factory):
     nrrd.write(str(folder / "ball.nrrd"), ball, {"space directions": 2 * np.eye(3), "space origin": np.zeros(3),
                "space": "right-anterior-superior", "space units": ["mm"] * 3})  # fmt: skip
     dicoms.segmentation(folder / "ball.dcm", dicoms.frames(dicoms.values()))
-    write_random(folder / "box.epsm.nc")
+    write_random(folder / "box.epsm")
     store = Store(folder / "cases.sqlite")
     for key in PLAN.keys:
         store.put(Record(key, "ok", force=1.0))
@@ -131,8 +131,8 @@ def test_a_point_that_is_none_is_named(point):
 @given(data=st.data())
 @thrown(0.3)
 def test_models(good, thrown_at, data):
-    file = thrown_at / "box.epsm.nc"
-    file.write_bytes(data.draw(damaged((good / "box.epsm.nc").read_bytes())))
+    file = thrown_at / "box.epsm"
+    file.write_bytes(data.draw(damaged((good / "box.epsm").read_bytes())))
     try:
         read_model(file)
     except ModelError as refused:

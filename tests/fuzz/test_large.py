@@ -21,7 +21,7 @@ _READERS = {
     "step": "from pipeline.shapes.files.step import entities_of; entities_of(Path(sys.argv[1]).read_bytes())",
     "dataset": "from pipeline.report.read import read; read(Path(sys.argv[1]))",
     "store": "from pipeline.run.reading import read_rows; read_rows(Path(sys.argv[1]))",
-    "model": "from pipeline.realtime import read; read_study(sys.argv[1])",
+    "model": "from epsmesh_realtime import read; read(sys.argv[1])",
 }
 _READ = r"""
 import re, resource, sys
@@ -69,7 +69,7 @@ LARGE = {
     "zeros.toml": ("study", sparse(b""), "is larger than 1 MB"),
     "zeros.nc": ("dataset", sparse(b"\x89HDF\r\n\x1a\n"), "cannot be read as netCDF"),
     "zeros.sqlite": ("store", sparse(b"SQLite format 3\0"), "file is not a database"),
-    "zeros.epsm.nc": ("model", sparse(b"CDF\x02"), ""),
+    "zeros.epsm": ("model", sparse(b"epsmesh\0" + bytes([3, 0, 0, 0])), "is cut short"),
     "text.step": ("step", sparse(b"ISO-10303-21;\nDATA;\n#1=A('"), "is truncated"),
 }
 LONGER = {

@@ -1,6 +1,5 @@
-"""The same queries in C: the same numbers, the same refusals; sanitizers find nothing, and C++ takes it as well."""
+"""The evaluator in C by itself: C99 and C++, sanitizers, refusals of what C alone can be asked."""
 
-import ctypes
 import shutil
 import subprocess
 from math import nan
@@ -9,29 +8,43 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.realtime.synthetic import write_random
+from epsmesh_realtime import BuildError, Query
+from epsmesh_realtime import library as built
+from tests.realtime.synthetic import random_model, write_surface
 
 SOURCES = Path(__file__).parents[2] / "realtime"
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror")
-SHAPES = ("disc", "sphere", "cone", "blade", "disc")
+PARTS = sorted(SOURCES.glob("src/*.c"))
+_TIPS = """
+#include "epsmesh.h"
+#include "epsmesh_patch.h"
+#include <math.h>
+#include <stdio.h>
+static double bowl(double x, double y, void *user) { (void)user; return 30 * x * x + 120 * y * y; }
+static double dent(double x, double y, void *user) { (void)user; return sqrt(sqrt(x * x + y * y)); }
+int main(int count, char **words) {
+    static epsmesh_model model;
+    static epsmesh_patch patch;
+    static double data[1 << 15];
+    FILE *file = fopen(words[count - 1], "rb");
+    int i, k, seen = 0;
+    if (!file || epsmesh_load(&model, data, fread(data, 1, sizeof data, file)) != EPSMESH_OK) return 2;
+    fclose(file);
+    if (epsmesh_patch_make(&patch, dent, NULL, 1e-3) != EPSMESH_INPUT) return 3;
+    if (epsmesh_patch_make(&patch, NULL, NULL, 1e-3) != EPSMESH_INPUT) return 4;
+    if (epsmesh_patch_make(&patch, bowl, NULL, 4e-3) != EPSMESH_OK) return 5;
+    for (i = 0; i < 2000; i++) {
+        epsmesh_query q = epsmesh_ask(&model);
+        const double x = 1.1 * model.reach[0] * ((i * 7 % 41) / 20.0 - 1);
+        for (k = 0; k < 3; k++) q.at[k] = model.origin[k] + x * model.axes[0][k];
+        q.depth = i % 17 ? 1e-6 * (i % 500) : (i % 2 ? NAN : 1e300);
+        seen |= 1 << epsmesh_patch_touch(&patch, &model, &q, i % 19 ? 0.1 * i : HUGE_VAL).status;
+    }
+    return seen & 1 && seen & 2 ? 0 : 6;
+}
+"""
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
-
-
-class Query(ctypes.Structure):
-    _fields_ = (
-        ("shape", ctypes.c_int), ("radius", ctypes.c_double), ("angle", ctypes.c_double), ("at", ctypes.c_double * 3),
-        ("axis", ctypes.c_double * 3), ("depth", ctypes.c_double), ("young", ctypes.c_double),
-        ("poisson", ctypes.c_double), ("length", ctypes.c_double), ("width", ctypes.c_double),
-        ("along", ctypes.c_double * 3),
-    )  # fmt: skip
-
-
-class Touch(ctypes.Structure):
-    _fields_ = (
-        ("status", ctypes.c_int), ("force", ctypes.c_double * 3), ("force_error", ctypes.c_double),
-        ("stiffness", ctypes.c_double), ("contact_radius", ctypes.c_double),
-    )  # fmt: skip
 
 
 def compiled(*arguments: object) -> None:
@@ -39,124 +52,11 @@ def compiled(*arguments: object) -> None:
     assert found.returncode == 0, found.stderr
 
 
-def assert_same(found, expected, within):
-    """All numbers of two touches, of forces ``within`` that share of the whole one, of others of themselves."""
-    values, known = (
-        np.array([*touch.force, touch.force_error, touch.stiffness, touch.contact_radius])
-        for touch in (found, expected)
-    )
-    scale = np.array([*[np.linalg.norm(expected.force)] * 3, *known[3:]])
-    assert np.all((np.abs(values - known) <= within * scale) | np.isnan(known))
-    assert np.array_equal(np.isnan(values), np.isnan(known))
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory):
-    path = tmp_path_factory.mktemp("realtime") / "libepsmesh.so"
-    compiled("cc", *STRICT, "-fPIC", "-shared", SOURCES / "epsmesh.c", "-o", path, "-lm")
-    found = ctypes.CDLL(str(path))
-    found.epsmesh_touch_at.restype, found.epsmesh_word.restype = Touch, ctypes.c_char_p
-    return found
-
-
-@pytest.mark.parametrize(
-    "kind",
-    [
-        {},
-        {"is_round": True},
-        {"turned": True},
-        {"is_even": False},
-        {"curved": True, "turned": True},
-        {"curved": True, "is_round": True},
-    ],
-)
-def test_c_and_numpy_agree(library, tmp_path, kind):
-    model = write_random(tmp_path / "model.nc", **kind)
-    data, room = (tmp_path / "model.nc").read_bytes(), ctypes.create_string_buffer(1 << 20)
-    without = data.replace(b"bend_error", b"bend_other")
-    assert (library.epsmesh_load(room, without, ctypes.c_size_t(len(data))) == 0) != ("curved" in kind)
-    assert library.epsmesh_load(room, data, ctypes.c_size_t(len(data))) == 0
-    rng, seen = np.random.default_rng(7), set()
-    for number in range(600):
-        shape = number % 5
-        x, y = rng.uniform(-1.05, 1.05, 2) * model.table.reach
-        spot = model.face.at(model.table, x, y)
-        at = model.origin + np.array([x, y, spot.height]) @ model.axes
-        along = rng.standard_normal(3)
-        depth, radius = rng.uniform(-5e-5, 1e-3), (2e-3, 6e-3, 5e-3, 2e-3, 2e-3)[shape] * rng.uniform(0.5, 2)
-        young, poisson = rng.uniform(1e3, 1e5), rng.uniform(0.29, 0.5)
-        if number % 23 == 0:
-            depth, at[2] = (nan, at[2]) if number % 2 else (depth, at[2] + 1e-3)
-        asked = {"at": at, "depth": depth, "radius": radius, "angle": 1.1, "young": young, "poisson": poisson}
-        asked |= {"length": 2 * radius, "width": 1e-3, "along": along, "axis": -spot.normal @ model.axes}
-        asked |= {"contact": "bonded"} if shape == 4 else {}
-        expected = model.query(SHAPES[shape], **asked)
-        triple = ctypes.c_double * 3
-        query = Query(shape, radius, 1.1, triple(*at), triple(*asked["axis"]), depth, young, poisson)
-        query.length, query.width, query.along = 2 * radius, 1e-3, triple(*along)
-        found = library.epsmesh_touch_at(room, ctypes.byref(query))
-        assert library.epsmesh_word(found.status).decode() == expected.status
-        if expected.status == "ok":
-            place, below = triple(), ctypes.c_double()
-            tip = triple(*(at - depth * np.array(spot.normal) @ model.axes))
-            assert library.epsmesh_foot(room, tip, place, ctypes.byref(below)) == 0
-            np.testing.assert_allclose([*place, below.value], [*at, depth], rtol=1e-9, atol=1e-14)
-        assert_same(found, expected, 1e-12)
-        seen.add(expected.status)
-    assert seen >= {"ok", "lost", "outside", "poisson"}
-
-
-@pytest.mark.parametrize("kind", [{}, {"is_round": True}, {"turned": True}, {"curved": True}])
-def test_several_tools_are_those_of_numpy(library, tmp_path, kind):
-    model = write_random(tmp_path / "model.nc", **kind)
-    data, room = (tmp_path / "model.nc").read_bytes(), ctypes.create_string_buffer(1 << 20)
-    assert library.epsmesh_load(room, data, ctypes.c_size_t(len(data))) == 0
-    rng, seen, triple = np.random.default_rng(8), set(), ctypes.c_double * 3
-    for number in range(250):
-        count = int(rng.integers(1, 9)) if number % 2 else 2
-        young, poisson = rng.uniform(1e3, 1e5), rng.uniform(0.295, 0.49)
-        tools, queries = [], (Query * count)()
-        for query in queries:
-            shape = int(rng.integers(5))
-            x, y = rng.uniform(-1.0, 1.0, 2) * model.table.reach / (np.sqrt(2) if "is_round" in kind else 1)
-            at = model.origin + np.array([x, y, 0.0]) @ model.axes
-            depth, radius = rng.uniform(-5e-5, 4e-4), (1e-3, 4e-3, 5e-3, 1e-3, 1e-3)[shape] * rng.uniform(0.3, 1)
-            along, depth = rng.standard_normal(3), nan if rng.uniform() < 0.01 else depth
-            tool = {"tool": SHAPES[shape], "at": at, "depth": depth, "radius": radius, "angle": 1.1, "along": along}
-            tools.append(tool | {"length": 2 * radius, "width": 5e-4} | ({"contact": "bonded"} if shape == 4 else {}))
-            query.shape, query.radius, query.angle, query.at, query.depth = shape, radius, 1.1, triple(*at), depth
-            query.young, query.poisson, query.length, query.width = young, poisson, 2 * radius, 5e-4
-            query.along = triple(*along)
-        touches = (Touch * count)()
-        library.epsmesh_touch_all(room, count, queries, touches)
-        for found, expected in zip(touches, model.query_all(tools, young=young, poisson=poisson), strict=True):
-            assert library.epsmesh_word(found.status).decode() == expected.status
-            assert_same(found, expected, 1e-10)
-            seen.add(expected.status)
-    if "curved" in kind:
-        assert seen >= {"alone", "off"}
-        return
-    assert seen >= {"ok", "lost", "near", "others", "poisson", "input"}
-    good = list(queries)[:1] * 2
-    for name, other in (("young", 2e3), ("poisson", 0.35)):
-        queries = (Query * 2)(*good)
-        for query in queries:
-            query.young, query.poisson = 1e3, 0.4
-        setattr(queries[1], name, other)
-        touches = (Touch * 9)()
-        library.epsmesh_touch_all(room, 2, queries, touches)
-        assert [library.epsmesh_word(touch.status) for touch in touches[:2]] == [b"input", b"input"]
-    library.epsmesh_touch_all(room, 9, (Query * 9)(*[good[0]] * 9), touches)
-    assert {library.epsmesh_word(touch.status) for touch in touches} == {b"input"}
-
-
-@pytest.mark.nightly
-def test_a_damaged_file_breaks_nothing(tmp_path):
-    write_random(tmp_path / "model.nc")
-    program = tmp_path / "test_epsmesh"
-    sanitize = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-    compiled("cc", *STRICT, *sanitize, SOURCES / "epsmesh.c", SOURCES / "test_epsmesh.c", "-o", program, "-lm")
-    compiled(program, tmp_path / "model.nc")
+def test_parts_are_short_and_names_are_those_of_the_headers(tmp_path):
+    assert all(len(part.read_text().splitlines()) <= 400 for part in PARTS)
+    compiled("cc", *STRICT, "-fPIC", "-c", SOURCES / "epsmesh.c", "-o", tmp_path / "epsmesh.o")
+    listed = subprocess.run(["nm", "-g", "--defined-only", tmp_path / "epsmesh.o"], capture_output=True, check=True)
+    assert {line.split()[-1].split("_")[0] for line in listed.stdout.decode().splitlines()} == {"epsmesh"}
 
 
 @pytest.mark.skipif(shutil.which("c++") is None, reason="there is no C++ compiler")
@@ -164,3 +64,58 @@ def test_it_is_cpp_as_well(tmp_path):
     strict = ("-std=c++11", *STRICT[1:])
     for name in ("epsmesh.c", "test_epsmesh.c"):
         compiled("c++", *strict, "-x", "c++", "-c", SOURCES / name, "-o", tmp_path / f"{name}.o")
+
+
+def test_tools_at_once_are_of_one_tissue_and_not_too_many():
+    evaluator, asked = random_model().evaluator, {"tool": "disc", "radius": 1e-3, "depth": 1e-4}
+    places = [(x, 0.0, 0.0) for x in np.linspace(-0.025, 0.025, 17)]
+    queries = [Query(at=at, **asked).packed(1e3, 0.4) for at in places]
+    assert {touch.status for touch in evaluator.touch_all(queries)} == {"input"}
+    assert {touch.status for touch in evaluator.touch_all(queries[:2])} <= {"ok", "near"}
+    for other in ((2e3, 0.4), (1e3, 0.35)):
+        mixed = [queries[0], Query(at=places[9], **asked).packed(*other)]
+        assert [touch.status for touch in evaluator.touch_all(mixed)] == ["input", "input"]
+
+
+@pytest.mark.parametrize("kind", [{}, {"is_round": True}, {"curved": True, "turned": True}])
+def test_the_foot_of_a_tip_is_its_place_and_its_depth(kind):
+    model, rng = random_model(**kind), np.random.default_rng(7)
+    for _ in range(40):
+        x, y = 0.7 * rng.uniform(-1, 1, 2) * model.table.reach
+        spot, depth = model.spot(x, y), rng.uniform(1e-6, 1e-3)
+        at = model.origin + np.array([x, y, spot.height]) @ model.axes
+        status, place, below = model.foot(at - depth * spot.normal @ model.axes)
+        assert status == "ok"
+        np.testing.assert_allclose([*place, below], [*at, depth], rtol=1e-9, atol=1e-14)
+        assert model.foot(at + 1e-4 * spot.normal @ model.axes)[0] == "lost"
+    assert model.foot((nan, 0.0, 0.0))[0] == "input"
+    assert model.foot((0.0, 0.0))[0] == "input"
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("program", ["test_epsmesh.c", "tips.c"])
+def test_a_damaged_file_breaks_nothing(tmp_path, program):
+    write_surface(tmp_path / "model.epsm")
+    (tmp_path / "tips.c").write_text(_TIPS)
+    source = tmp_path / program if program == "tips.c" else SOURCES / program
+    sanitize = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    compiled("cc", *STRICT, *sanitize, "-I", SOURCES, SOURCES / "epsmesh.c", source, "-o", tmp_path / "main", "-lm")
+    compiled(tmp_path / "main", tmp_path / "model.epsm")
+
+
+@pytest.mark.parametrize(("compiler", "words"), [("", "there is no C compiler"), ("false", "does not compile")])
+def test_without_a_compiler_a_sentence_says_what_to_install(tmp_path, monkeypatch, compiler, words):
+    shutil.copy(SOURCES / "epsmesh.c", tmp_path)
+    monkeypatch.setattr(built, "_CHECKOUT", tmp_path)
+    monkeypatch.setattr(built, "_COMPILERS", ())
+    monkeypatch.delenv("CC", raising=False)
+    if compiler:
+        monkeypatch.setenv("CC", compiler)
+    built.library.cache_clear()
+    try:
+        with pytest.raises(BuildError, match=words):
+            built.library()
+        left = list((tmp_path / ".built" if compiler else tmp_path).iterdir())
+        assert [path.name for path in left] == ([] if compiler else ["epsmesh.c"])
+    finally:
+        built.library.cache_clear()

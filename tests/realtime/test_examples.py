@@ -51,8 +51,8 @@ def feel(plugin, tool, x, y, above):
 
 
 def test_a_loop_renders_the_model_and_no_more_than_the_device(plugin, tmp_path):
-    model = write_random(tmp_path / "model.nc")
-    tool = opened(plugin, tmp_path / "model.nc", most=0.004)
+    model = write_random(tmp_path / "model.epsm")
+    tool = opened(plugin, tmp_path / "model.epsm", most=0.004)
     assert feel(plugin, tool, 0.01, 0.005, 1e-3)[0].tolist() == [0, 0, 0]
     clamped = []
     for depth in np.linspace(1e-5, 6e-4, 30):
@@ -68,15 +68,15 @@ def test_a_loop_renders_the_model_and_no_more_than_the_device(plugin, tmp_path):
 
 @pytest.mark.parametrize("kind", [{}, {"is_round": True}])
 def test_a_loop_knows_a_curved_face_and_yields_no_work(plugin, tmp_path, kind):
-    model = write_random(tmp_path / "model.nc", curved=True, **kind)
-    tool = opened(plugin, tmp_path / "model.nc")
+    model = write_random(tmp_path / "model.epsm", curved=True, **kind)
+    tool = opened(plugin, tmp_path / "model.epsm")
     assert feel(plugin, tool, 0.01, 0.005, 0.02)[0].tolist() == [0, 0, 0]
     # A closed path at changing depth, within the face: no multiple of its normals.
     angles = 2 * np.pi * np.arange(64) / 64
     xy, forces = np.array([0.008, 0.003]) + 0.004 * np.stack([np.cos(angles), np.sin(angles)], axis=1), []
     depths, tips = 4e-4 + 2e-4 * np.sin(2 * angles + 1), []
     for at, depth in zip(xy, depths, strict=True):
-        spot = model.face.at(model.table, *at.tolist())
+        spot = model.spot(*at.tolist())
         place = np.array([*at, spot.height])
         tips.append(place - depth * np.array(spot.normal))
         force, status = feel(plugin, tool, *tips[-1])
@@ -92,9 +92,9 @@ def test_a_loop_knows_a_curved_face_and_yields_no_work(plugin, tmp_path, kind):
 
 
 def test_a_refusal_fades_and_returns_without_a_blow(plugin, tmp_path):
-    model = write_random(tmp_path / "model.nc")
+    model = write_random(tmp_path / "model.epsm")
     tool, inside, outside = (
-        opened(plugin, tmp_path / "model.nc"),
+        opened(plugin, tmp_path / "model.epsm"),
         model.table.reach[0] - 1e-9,
         model.table.reach[0] + 1e-3,
     )

@@ -8,8 +8,8 @@ import pytest
 from mpi4py import MPI
 from scipy.special import ellipe, ellipkm1
 
-from pipeline.realtime import ModelError, Patch, Tip
-from pipeline.realtime.table import Table
+from epsmesh_realtime import Model, ModelError, Patch, Tip
+from epsmesh_realtime.table import Table
 from tests.realtime.synthetic import random_model
 
 BALL = Tip(lambda x, y: 6e-3 - np.sqrt(np.maximum(36e-6 - x**2 - y**2, 0)), 3.6e-3)
@@ -107,7 +107,6 @@ def rounded():
     """The middle of a cylinder as a model, and F of a full solve with its bar."""
     from pipeline.export.compliance import Region, coarse_mesh, compliances
     from pipeline.export.scope import scope_of
-    from pipeline.realtime.model import Model
     from pipeline.verify.compare import solve
     from tests.export.test_export import BALL as UNILATERAL
     from tests.export.test_export import CYLINDER, SOFT, study

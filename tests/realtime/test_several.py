@@ -6,12 +6,11 @@ from math import asin, nan, pi
 import numpy as np
 import pytest
 
-from pipeline.realtime import ModelError
-from pipeline.realtime.file import model_of
-from pipeline.realtime.model import Model
-from pipeline.realtime.pairs import Pairs, read_pairs
-from pipeline.realtime.table import Table
-from tests.realtime.synthetic import random_model, write_random
+from epsmesh_realtime import ModelError
+from epsmesh_realtime.evaluator import Evaluator
+from epsmesh_realtime.model import Model, model_of
+from epsmesh_realtime.table import Pairs
+from tests.realtime.synthetic import of_place, random_model, write_random
 
 TOOLS = (
     {"tool": "disc", "radius": 1.5e-3},
@@ -22,15 +21,6 @@ TOOLS = (
 FIRST, SECOND = (-0.006, 0.004, 0.0), (0.009, -0.002, 0.0)
 
 
-def half_space(poisson: float = 0.4) -> Model:
-    """A body of which nothing is regular: what is left is the half-space's."""
-    one = np.full((1, 1, 1), 1 / 45.0)
-    table = Table(one, 0 * one, 45.0, (0.5, 0.5), False, (poisson, poisson))
-    pairs = Pairs(np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), 0.0, 0.0, table.reach, table.poisson)
-    none = (0.0, 0.0, 0.0, 0.0)
-    return Model(table, np.zeros(3), np.eye(3), (1.0, 1.0), 1.0, 1.0, poisson, 1.0, none, off=1e-9, pairs=pairs)
-
-
 def together(model: Model, *tools: dict, **more) -> list:
     touches = model.query_all(tools, **more)
     assert all(touch.status == "ok" for touch in touches), touches
@@ -39,7 +29,7 @@ def together(model: Model, *tools: dict, **more) -> list:
 
 @pytest.mark.parametrize("ratio", [4.0, 6.0, 20.0])
 def test_two_discs_on_a_half_space(ratio):
-    model, a = half_space(), 1e-3
+    model, a = of_place(0.0, 0.0, 0.4, pairs=True), 1e-3
     disc = {"tool": "disc", "radius": a, "depth": 1e-4}
     touches = together(model, disc | {"at": (0, 0, 0)}, disc | {"at": (0.6 * ratio * a, 0.8 * ratio * a, 0)})
     alone = model.query(**disc, at=(0, 0, 0)).force[2]
@@ -124,7 +114,7 @@ def test_two_tools_feel_each_other_alike():
 
 
 def test_a_tool_may_lose_the_face_to_another_one():
-    model = half_space()
+    model = of_place(0.0, 0.0, 0.4, pairs=True)
     light = {"tool": "sphere", "radius": 1e-3, "at": (8e-3, 0, 0), "depth": 2e-5}
     heavy = {"tool": "disc", "radius": 2e-3, "at": (0, 0, 0), "depth": 4e-4}
     assert model.query(**light).status == "ok"
@@ -139,7 +129,7 @@ def test_a_tool_may_lose_the_face_to_another_one():
 
 
 def test_where_a_force_lifts_the_face_a_tool_above_it_may_be_touched():
-    model = half_space()
+    model = of_place(0.0, 0.0, 0.4, pairs=True)
     lifting = replace(model.pairs, modes=np.ones((1, 1, 1)), links=np.full((1, 1, 1), -40.0))
     model = replace(model, pairs=lifting)
     near = {"tool": "disc", "radius": 2e-3, "at": (0, 0, 0), "depth": 4e-4}
@@ -216,13 +206,15 @@ def test_a_model_that_knows_one_tool_says_so(tmp_path):
     tools = [TOOLS[0] | {"at": FIRST, "depth": 1e-4}, TOOLS[0] | {"at": SECOND, "depth": 1e-4}]
     curved = random_model(curved=True)
     assert [touch.status for touch in curved.query_all(tools)] == ["alone", "alone"]
-    write_random(tmp_path / "model.nc")
-    data = (tmp_path / "model.nc").read_bytes()
+    write_random(tmp_path / "model.epsm")
+    data = (tmp_path / "model.epsm").read_bytes()
     older = model_of(data.replace(b"pair_", b"rope_"))
     assert [touch.status for touch in older.query_all(tools)] == ["alone", "alone"]
     assert older.query_all(tools)[0].message
     assert older.query_all(tools[:1])[0].status == "ok"
     assert model_of(data).query_all(tools)[0].status == "ok"
+    with pytest.raises(ValueError, match="at most 16"):
+        model_of(data).query_all(tools * 9)
     for name in (b"pair_modes", b"pair_links", b"pair_error", b"pair_aside"):
         with pytest.raises(ModelError, match=name.decode()):
             model_of(data.replace(name, b"rope_" + name[5:]))
@@ -241,13 +233,14 @@ def test_a_model_that_knows_one_tool_says_so(tmp_path):
     ],
 )
 def test_pairs_that_are_none_are_no_model(name, value):
-    pairs = random_model().pairs
-    found = {f"pair_{part}": np.array(getattr(pairs, part)) for part in ("modes", "links", "error", "aside")}
-    assert read_pairs(found, pairs.reach, pairs.poisson).error == pairs.error
+    model = random_model()
+    found = model.numbers()
+    assert Pairs.of(found).error == model.pairs.error
     with pytest.raises(ModelError, match="pair_"):
-        read_pairs(found | {f"pair_{name}": np.array(value(pairs))}, pairs.reach, pairs.poisson)
+        Evaluator.of(found | {f"pair_{name}": value(model.pairs)})
+    one = {each: found[each][:1] for each in ("reciprocal", "curvature")} | {"tensors": found["tensors"][:, :1]}
     with pytest.raises(ModelError, match="pair_links"):
-        read_pairs(found, pairs.reach, (0.4, 0.4))
+        Evaluator.of(found | one | {"poisson_range": (0.4, 0.4), "poisson": 0.4})
 
 
 def test_tables_that_make_no_sense_give_a_status():

@@ -1,4 +1,4 @@
-"""The page of a real-time model: numpy's numbers, a mouse that moves the tool, a server that serves nothing else."""
+"""The page of a real-time model: the numbers of C, a mouse that moves the tool, a server that serves nothing else."""
 
 import json
 import os
@@ -57,7 +57,7 @@ def queries(model, count):
     for number in range(count):
         tool = SHAPES[number % 5]
         x, y = rng.uniform(-1.05, 1.05, 2) * model.table.reach
-        at = model.origin + np.array([x, y, model.face.at(model.table, x, y).height]) @ model.axes
+        at = model.origin + np.array([x, y, model.spot(x, y).height]) @ model.axes
         turn, size = rng.uniform(0, 7), float(rng.uniform(0.5, 2))
         yield {
             "tool": "disc" if tool == "bonded" else tool,
@@ -76,7 +76,7 @@ def queries(model, count):
 
 @in_browser
 @pytest.mark.parametrize("kind", KINDS)
-def test_numbers_are_those_of_numpy(browser, tmp_path, kind):
+def test_numbers_are_those_of_c(browser, tmp_path, kind):
     surface, path = opened(browser, tmp_path, **kind)
     asked = list(queries(surface.model, 600))
     wild = [asked[0] | {name: value} for name in ("radius", "depth", "young", "poisson") for value in (0.0, -1.0, 1e9)]
@@ -120,7 +120,7 @@ def test_a_mouse_moves_the_tool_on_the_face_and_turns_the_body_beside_it(browser
     drag(browser, place, (place[0] + 40, place[1]))
     x, y = (browser.ask(f"document.querySelector('[name={name}]').valueAsNumber") for name in "xy")
     assert np.hypot(x, y) == pytest.approx(40 * browser.ask("page.stage.scale()"), rel=0.3)
-    spot = model.face.at(model.table, 1e-3 * x, 1e-3 * y)
+    spot = model.spot(1e-3 * x, 1e-3 * y)
     touch = model.query("disc", radius=2e-3, depth=3e-4, at=(1e-3 * x, 1e-3 * y, spot.height))
     force = float(told(browser, "force").removesuffix(" N"))
     assert force == pytest.approx(touch.force @ spot.normal, rel=6e-3)  # of three digits
@@ -187,12 +187,12 @@ def answer(server, path, host):
 
 
 def test_the_command_writes_a_file_and_says_what_is_no_model(epsmesh, tmp_path):
-    write_surface(tmp_path / "model.nc")
-    done = epsmesh("touch", tmp_path / "model.nc", "-o", tmp_path / "page.html")
+    write_surface(tmp_path / "model.epsm")
+    done = epsmesh("touch", tmp_path / "model.epsm", "-o", tmp_path / "page.html")
     assert done.exit_code == 0, done.output
     assert "<canvas" in (tmp_path / "page.html").read_text()
-    write_random(tmp_path / "bare.nc")
-    for path, word in (("bare.nc", "surface"), ("page.html", "netCDF"), ("none.nc", "No such file")):
+    write_random(tmp_path / "bare.epsm")
+    for path, word in (("bare.epsm", "surface"), ("page.html", "no real-time model"), ("none.epsm", "No such file")):
         wrong = epsmesh("touch", tmp_path / path, "-o", tmp_path / "x.html")
         assert wrong.exit_code == 2
         assert word in wrong.output
@@ -214,10 +214,10 @@ def test_the_command_opens_the_page_until_it_is_interrupted(epsmesh, tmp_path, m
     seen = []
     monkeypatch.setattr("webbrowser.open", seen.append)
     monkeypatch.setattr(PageServer, "serve_forever", interrupted)
-    write_surface(tmp_path / "model.nc")
-    done = epsmesh("touch", tmp_path / "model.nc")
+    write_surface(tmp_path / "model.epsm")
+    done = epsmesh("touch", tmp_path / "model.epsm")
     assert done.exit_code == 0, done.output
     assert seen[0] in done.output
     assert seen[0].startswith("http://127.0.0.1:")
-    assert epsmesh("touch", tmp_path / "model.nc", "--no-open").exit_code == 0
+    assert epsmesh("touch", tmp_path / "model.epsm", "--no-open").exit_code == 0
     assert len(seen) == 1

@@ -1,4 +1,4 @@
-// The forces of pipeline/realtime/, in the same order and under the same names; SI units, E = 1 within.
+// The forces of realtime/src/, in the same order and under the same names; SI units, E = 1 within.
 
 const LEAST = {
   TOUCHING: 1e-12, SMALLEST: 1e-6, STEPS: 60, SAME: 4e-16, TERMS: 40, NEGLIGIBLE: 1e-17, SLENDER: 0.02, SOFT: 1e-12, STICKS: 0.1,

@@ -1,4 +1,4 @@
-// What is seen next to a tool: pipeline/realtime/near.py.
+// What is seen next to a tool: realtime/src/surface.c.
 
 const MOMENTS = { disc: 2 / 3, sphere: 2 / 5, cone: 1 / 3 };
 const NEAR = { AXIS: 1e-6, NEXT: 4, STEEP: 1, OVER: 0.95, BOWED: 0.7, APART: 1.2, FEWEST: 4, MOST: 24 };

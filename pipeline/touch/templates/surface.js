@@ -1,4 +1,4 @@
-// What is seen of a touch: pipeline/realtime/surface.py, with triangles made smaller near the tool.
+// What is seen of a touch: realtime/src/surface.c, with triangles made smaller near the tool.
 
 // What is nearer to the face, in units of the thickness, lies on it. Edges near the tool are halved until they are
 // shorter than this share of the contact's radius and of the way to its axis.

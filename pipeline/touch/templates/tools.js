@@ -1,4 +1,4 @@
-// What tools do to a body: pipeline/realtime/contact.py, blade.py.
+// What tools do to a body: realtime/src/contact.c.
 
 function tangent(a, { c, h, plane }) {
   return 0.5 / (plane * a) + c + (a ** 2 / 3) * h - (2 / 45) * plane * h ** 2 * a ** 5;

@@ -1,0 +1,176 @@
+"""A model that answers queries of forces; outside its range it refuses with a status, and never extrapolates."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from epsmesh_realtime.evaluator import MOST_TOOLS, Array, Evaluator, Spot, words
+from epsmesh_realtime.file import unpack
+from epsmesh_realtime.query import Query
+from epsmesh_realtime.table import Face, Pairs, Table
+from epsmesh_realtime.touch import Touch
+
+# Numbers of a file that are fields of a model.
+_NUMBERS = ("thickness", "young", "poisson", "largest", "off", "aligned", "bend_error")
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A real-time model of a body's face. Sizes are in m, E in Pa.
+
+    - ``origin`` (3,), ``axes`` (3, 3): the middle of the face, and rows x, y and outward normal.
+    - ``sides``: half extents of the face; ``thickness``: depth of the support, or of other tissue.
+    - ``largest``: largest contact radius, in units of the distance to the nearest side or of the thickness.
+    - ``bar``: errors of c, of h's part, of higher orders, and of F.
+    - ``face``: height and curvature of a curved face; ``bend_error`` (1/m): error of its mean curvature.
+    - ``off`` (m), ``aligned`` (rad): tolerances of a query, distance from the face and angle to the normal.
+    - ``pairs``: interaction of several tools; without it, the model answers for one tool at a time.
+    """
+
+    table: Table
+    origin: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    sides: tuple[float, float]
+    thickness: float
+    young: float
+    poisson: float
+    largest: float
+    bar: tuple[float, float, float, float]
+    face: Face = field(default_factory=Face)
+    off: float = 1e-9
+    aligned: float = 1e-6
+    bend_error: float = 0.0
+    pairs: Pairs | None = None
+
+    def __repr__(self) -> str:
+        x, y = (2e3 * size for size in self.table.reach)
+        region = f"a region of {x:.3g} mm across" if self.table.is_round else f"a region of {x:.3g} × {y:.3g} mm"
+        tissue = f"{1e3 * self.thickness:.3g} mm of tissue, E = {self.young:.4g} Pa, ν = {self.poisson:.3g}"
+        low, high = self.table.poisson
+        return f"Model of {region}, {tissue}{f' ({low:.3g} to {high:.3g})' if high > low else ''}"
+
+    @cached_property
+    def evaluator(self) -> Evaluator:
+        """The model in C.
+
+        Raises:
+            ModelError: if the numbers are no model.
+        """
+        return Evaluator.of(self.numbers())
+
+    def query(self, tool: str, **asked: Any) -> Touch:
+        """Return the force on a ``tool``; ``asked`` are the fields of :class:`epsmesh_realtime.query.Query`.
+
+        A refused query raises no error: see ``status``.
+
+        Raises:
+            TypeError: if a keyword is unknown, or place or depth is missing.
+        """
+        return self.answer(Query(tool, **asked))
+
+    def answer(self, query: Query) -> Touch:
+        """Return the answer of a ``query``."""
+        return self.evaluator.touch(query.packed(self.young, self.poisson))
+
+    def answer_each(self, queries: Sequence[Query]) -> tuple[NDArray[np.str_], Array]:
+        """Return the statuses (n,) of queries, each by itself, and numbers (n, 6) in one call of C.
+
+        The numbers are the force (3), its error bar, the stiffness and the contact radius: see :class:`Touch`.
+        """
+        packed = b"".join([query.packed(self.young, self.poisson) for query in queries])
+        statuses, numbers = self.evaluator.touch_each(packed, len(queries))
+        return words()[statuses], numbers
+
+    def query_all(
+        self, tools: Sequence[Mapping[str, Any]], *, young: float | None = None, poisson: float | None = None
+    ) -> list[Touch]:
+        """Return the force on each of ``tools`` while all press at once; each has the keywords of a query but E and ν.
+
+        The forces derive from one energy of all places and depths. ``stiffness`` is for one tool at fixed depths of the
+        others. If one tool has no answer, the status of the others is "others". Refused queries raise no error.
+
+        Raises:
+            ValueError: if there are more than 16 tools.
+        """
+        if len(tools) > MOST_TOOLS:
+            raise ValueError(f"at most {MOST_TOOLS} tools press at once, not {len(tools)}")
+        asked = [Query(**tool, young=young, poisson=poisson) for tool in tools]
+        return self.evaluator.touch_all([query.packed(self.young, self.poisson) for query in asked])
+
+    def foot(self, tip: Sequence[float]) -> tuple[str, Array, float]:
+        """Return "ok", the place (3,) of the face for a tool's lowest point ``tip`` (m), and its depth (m) below it.
+
+        Otherwise "lost" above the face, "outside" beside the region of a curved face, or "deep" if the place is not
+        unique.
+        """
+        return self.evaluator.foot(tip)
+
+    def spot(self, x: float, y: float) -> Spot:
+        """Return the face at a place (m along its axes) of the region."""
+        return self.evaluator.spot(x, y)
+
+    def room(self, x: float, y: float) -> float:
+        """Return the distance (m) from a place to the nearest side, or to the bottom; NaN outside the region."""
+        return self.evaluator.room(x, y)
+
+    def holds(self, x: float, y: float) -> bool:
+        """Return whether a place (m along the face's axes) is in the region."""
+        return isfinite(self.room(x, y))
+
+    def numbers(self) -> dict[str, ArrayLike]:
+        """Return the arrays of the model's file, by name, without its surface."""
+        own = {name: getattr(self, name) for name in (*_NUMBERS, "sides", "origin", "axes", "bar")}
+        pairs = self.pairs.numbers() if self.pairs else {}
+        found = own | self.table.numbers() | self.face.numbers() | pairs
+        return {name: np.asarray(value, dtype=float) for name, value in found.items()}
+
+
+def read(path: str | Path) -> Model:
+    """Return the model at ``path``.
+
+    Raises:
+        ModelError: if it is no model, of another version, or damaged; OSError if it cannot be read.
+    """
+    return model_of(Path(path).read_bytes())
+
+
+def model_of(data: bytes) -> Model:
+    """Return the model in the bytes of a file.
+
+    Raises:
+        ModelError: if they are no model, of another version, or damaged.
+    """
+    return loaded(data, Evaluator(data))[0]
+
+
+def loaded(data: bytes, evaluator: Evaluator) -> tuple[Model, dict[str, NDArray[Any]]]:
+    """Return the model in the bytes of a file, which ``evaluator`` has loaded, and all arrays of the file.
+
+    Raises:
+        ModelError: if an array that no query needs is damaged.
+    """
+    found = unpack(data)
+    model = Model(
+        Table.of(found),
+        found["origin"],
+        found["axes"],
+        bar=tuple(found["bar"].tolist()),
+        sides=tuple(found["sides"].tolist()),
+        face=Face(found["height"], found["bend"]),
+        pairs=Pairs.of(found),
+        **{name: float(found[name]) for name in _NUMBERS if name in found},
+    )
+    vars(model)["evaluator"] = evaluator
+    return model, found
+
+
+def about(found: Mapping[str, NDArray[Any]]) -> dict[str, str]:
+    """Return the texts in a file's arrays: body, tools, version and study."""
+    return dict(json.loads(found["about"].tobytes())) if "about" in found else {}

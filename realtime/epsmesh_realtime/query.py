@@ -1,0 +1,74 @@
+"""A query of a model: tool, place, depth, and tissue if it is not the study's."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import nan
+from struct import Struct
+
+# Tools with their contacts, and their numbers in C.
+_SHAPES = {
+    ("disc", None): 0, ("disc", "frictionless"): 0, ("disc", "bonded"): 4,
+    ("sphere", None): 1, ("sphere", "unilateral"): 1,
+    ("cone", None): 2, ("cone", "unilateral"): 2,
+    ("blade", None): 3, ("blade", "frictionless"): 3,
+}  # fmt: skip
+_UNKNOWN, _NOWHERE, _NONE = -1, (nan, nan, nan), (0.0, 0.0, 0.0)
+_PACKED = Struct("@i16d")
+
+
+@dataclass(frozen=True)
+class Query:
+    """A ``tool`` with its sizes, pressed in by ``depth`` (m) along the inward normal ``at`` x, y, z (m).
+
+    - ``radius`` (m): of a disc, a sphere, or the end of a cone; ``angle`` (rad): a cone's half angle to its axis.
+    - ``length``, ``width`` (m): of a blade; ``along``: the direction of its edge, by default the face's x.
+    - ``axis``: the tool's direction; if given, it must be the inward normal.
+    - ``young`` (Pa), ``poisson``: by default the study's.
+    - ``contact``: "frictionless" for disc and blade, "unilateral" for sphere and cone, or "bonded" for a disc.
+    """
+
+    tool: str
+    at: Sequence[float]
+    depth: float
+    radius: float = nan
+    angle: float = nan
+    young: float | None = None
+    poisson: float | None = None
+    axis: Sequence[float] | None = None
+    length: float = nan
+    width: float = nan
+    along: Sequence[float] | None = None
+    contact: str | None = None
+
+    def packed(self, young: float, poisson: float) -> bytes:
+        """Return the query of C, with the study's E (Pa) and ν where it has none of its own."""
+        return _PACKED.pack(
+            _SHAPES.get((self.tool, self.contact), _UNKNOWN),
+            self.radius,
+            self.angle,
+            *(_triple(self.at)),
+            *_direction(self.axis),
+            self.depth,
+            young if self.young is None else self.young,
+            poisson if self.poisson is None else self.poisson,
+            self.length,
+            self.width,
+            *_direction(self.along),
+        )
+
+
+def _triple(given: Iterable[float]) -> tuple[float, float, float]:
+    """Return three numbers, NaN if ``given`` is something else: C then refuses the query."""
+    try:
+        x, y, z = given
+        return float(x), float(y), float(z)
+    except (TypeError, ValueError):
+        return _NOWHERE
+
+
+def _direction(given: Iterable[float] | None) -> tuple[float, float, float]:
+    """Return a direction; (0, 0, 0) is C's default, and a given direction without length is none."""
+    if given is None:
+        return _NONE
+    found = _triple(given)
+    return found if any(found) else _NOWHERE
