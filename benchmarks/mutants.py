@@ -20,7 +20,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("solve", "mesh", "scene", "shapes", "plan", "export", "realtime")
+ROOMS = ("solve", "mesh", "scene", "shapes", "plan", "export")
 _COPIED = ("pipeline", "tests", "realtime", "benchmarks", "studies", "meshes", "docs", "pyproject.toml")
 _SECONDS = 900  # a change whose tests take longer counts as hanging
 _SWAPS: dict[type, type] = {

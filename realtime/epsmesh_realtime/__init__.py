@@ -6,7 +6,7 @@ from epsmesh_realtime.model import Model, read
 from epsmesh_realtime.patch import Patch, Tip
 from epsmesh_realtime.query import Query
 from epsmesh_realtime.surface import Surface, read_surface
-from epsmesh_realtime.touch import Touch
+from epsmesh_realtime.touch import Touch, Touches
 
 __all__ = [
     "BuildError",
@@ -17,6 +17,7 @@ __all__ = [
     "Surface",
     "Tip",
     "Touch",
+    "Touches",
     "read",
     "read_surface",
     "source_files",

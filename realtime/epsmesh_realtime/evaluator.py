@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from epsmesh_realtime.file import VERSION, ModelError, pack
 from epsmesh_realtime.library import TOUCH_SIZE, library, size_of
-from epsmesh_realtime.touch import Touch
+from epsmesh_realtime.touch import Touch, Touches
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
@@ -109,11 +109,12 @@ class Evaluator:
         self._c.epsmesh_touch_each(self._model, 1, query, found)
         return touch_of(found)
 
-    def touch_each(self, queries: bytes, count: int) -> tuple[NDArray[np.int32], Array]:
-        """Return statuses (count,) and numbers (count, 6): force (3), error bar, stiffness and contact radius."""
-        found = np.zeros(count, [("status", np.int32), ("pad", np.int32), ("numbers", np.float64, 6)])
-        self._c.epsmesh_touch_each(self._model, count, queries, found.ctypes.data)
-        return found["status"], found["numbers"]
+    def touch_each(self, queries: NDArray[Any]) -> Touches:
+        """Return the answers of packed queries, each by itself."""
+        found = np.zeros(len(queries), [("status", np.int32), ("pad", np.int32), ("numbers", np.float64, 6)])
+        self._c.epsmesh_touch_each(self._model, len(queries), queries.ctypes.data, found.ctypes.data)
+        numbers = found["numbers"]
+        return Touches(words()[found["status"]], numbers[:, :3], *numbers[:, 3:].T)
 
     def touch_all(self, queries: Sequence[bytes]) -> list[Touch]:
         """Return the answers of tools that press at once."""

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from epsmesh_realtime.evaluator import MOST_TOOLS, Array, Evaluator, Spot, words
+from epsmesh_realtime.evaluator import MOST_TOOLS, Array, Evaluator, Spot
 from epsmesh_realtime.file import unpack
-from epsmesh_realtime.query import Query
+from epsmesh_realtime.query import Query, packed_each
 from epsmesh_realtime.table import Face, Pairs, Table
-from epsmesh_realtime.touch import Touch
+from epsmesh_realtime.touch import Touch, Touches
 
 # Numbers of a file that are fields of a model.
 _NUMBERS = ("thickness", "young", "poisson", "largest", "off", "aligned", "bend_error")
@@ -79,14 +79,15 @@ class Model:
         """Return the answer of a ``query``."""
         return self.evaluator.touch(query.packed(self.young, self.poisson))
 
-    def answer_each(self, queries: Sequence[Query]) -> tuple[NDArray[np.str_], Array]:
-        """Return the statuses (n,) of queries, each by itself, and numbers (n, 6) in one call of C.
+    def query_each(self, tool: str, **asked: Any) -> Touches:
+        """Return the force on a ``tool`` in n queries, each by itself, in one call of C.
 
-        The numbers are the force (3), its error bar, the stiffness and the contact radius: see :class:`Touch`.
+        ``asked`` are the keywords of a query; numbers may be arrays (n,), places and directions arrays (n, 3).
+
+        Raises:
+            TypeError: if a keyword is unknown, or place or depth is missing; ValueError: if shapes do not go together.
         """
-        packed = b"".join([query.packed(self.young, self.poisson) for query in queries])
-        statuses, numbers = self.evaluator.touch_each(packed, len(queries))
-        return words()[statuses], numbers
+        return self.evaluator.touch_each(packed_each(Query(tool, **asked), self.young, self.poisson))
 
     def query_all(
         self, tools: Sequence[Mapping[str, Any]], *, young: float | None = None, poisson: float | None = None

@@ -4,6 +4,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import nan
 from struct import Struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 # Tools with their contacts, and their numbers in C.
 _SHAPES = {
@@ -14,6 +18,16 @@ _SHAPES = {
 }  # fmt: skip
 _UNKNOWN, _NOWHERE, _NONE = -1, (nan, nan, nan), (0.0, 0.0, 0.0)
 _PACKED = Struct("@i16d")
+# The same for arrays of queries.
+_NUMBERS, _DIRECTIONS = ("radius", "angle", "depth", "length", "width"), ("axis", "along")
+_QUERY = np.dtype(
+    [
+        ("shape", np.int32), ("radius", float), ("angle", float), ("at", float, 3), ("axis", float, 3),
+        ("depth", float), ("young", float), ("poisson", float), ("length", float), ("width", float),
+        ("along", float, 3),
+    ],
+    align=True,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -55,6 +69,31 @@ class Query:
             self.width,
             *_direction(self.along),
         )
+
+
+def packed_each(query: Query, young: float, poisson: float) -> NDArray[Any]:
+    """Return the queries (n,) of C of a ``query`` whose numbers may be arrays (n,), and places and directions (n, 3).
+
+    Raises:
+        ValueError: if their shapes do not go together.
+    """
+    values = {name: np.asarray(getattr(query, name), dtype=float) for name in _NUMBERS}
+    for name, default in (("young", young), ("poisson", poisson)):
+        given = getattr(query, name)
+        values[name] = np.asarray(default if given is None else given, dtype=float)
+    vectors = {"at": np.asarray(query.at, dtype=float)}
+    for name in _DIRECTIONS:
+        if (given := getattr(query, name)) is not None:
+            direction = np.asarray(given, dtype=float)
+            vectors[name] = np.where(direction.any(axis=-1, keepdims=True), direction, nan)
+    shapes = (*(value.shape for value in values.values()), *(vector.shape[:-1] for vector in vectors.values()))
+    found = np.zeros(np.broadcast_shapes((1,), *shapes), _QUERY)
+    if found.ndim > 1 or any(vector.shape[-1:] != (3,) for vector in vectors.values()):
+        raise ValueError("numbers of queries have shape (n,), places and directions (n, 3)")
+    found["shape"] = _SHAPES.get((query.tool, query.contact), _UNKNOWN)
+    for name, value in (values | vectors).items():
+        found[name] = value
+    return found
 
 
 def _triple(given: Iterable[float]) -> tuple[float, float, float]:

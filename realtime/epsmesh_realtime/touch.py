@@ -53,8 +53,12 @@ class Touch:
         return SENTENCES[self.status]
 
 
-def refused(status: str) -> Touch:
-    """Return the answer of a refused query: NaN, or 0 if the tool does not touch."""
-    if status == "lost":
-        return Touch(status, np.zeros(3), 0.0, 0.0, 0.0)
-    return Touch(status, np.full(3, nan))
+@dataclass(frozen=True, eq=False)
+class Touches:
+    """The answers of n queries, as arrays: ``status`` (n,), ``force`` (n, 3), and the other numbers of a touch (n,)."""
+
+    status: NDArray[np.str_]
+    force: NDArray[np.float64]
+    force_error: NDArray[np.float64]
+    stiffness: NDArray[np.float64]
+    contact_radius: NDArray[np.float64]

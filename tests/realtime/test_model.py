@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipe, ellipk
 
-from epsmesh_realtime import Model, ModelError, Query
+from epsmesh_realtime import Model, ModelError
 from epsmesh_realtime.file import pack, unpack
 from epsmesh_realtime.model import about, model_of
 from pipeline.verify import known
@@ -280,15 +280,28 @@ def test_a_model_has_the_numbers_of_its_file(tmp_path):
             pack({name: values})
 
 
-def test_many_queries_in_one_call_are_those_of_many_calls():
-    model, rng = random_model(), np.random.default_rng(3)
-    places = np.column_stack([rng.uniform(-0.031, 0.031, (200, 2)) * (1, 0.8), np.zeros(200)])
-    queries = [
-        Query("sphere", at, depth, radius=5e-3) for at, depth in zip(places, rng.uniform(-1e-5, 4e-4, 200), strict=True)
-    ]
-    statuses, numbers = model.answer_each(queries)
-    assert set(statuses) >= {"ok", "lost"}
-    for status, values, query in zip(statuses, numbers, queries, strict=True):
-        touch = model.answer(query)
+@pytest.mark.parametrize(("name", "sizes"), TOOLS)
+def test_many_queries_in_one_call_are_those_of_many_calls(name, sizes):
+    model, rng, count = random_model(), np.random.default_rng(3), 60
+    places = np.column_stack([rng.uniform(-0.031, 0.031, (count, 2)) * (1, 0.8), np.zeros(count)])
+    varied = {
+        "at": places,
+        "depth": rng.uniform(-1e-5, 4e-4, count),
+        "axis": rng.integers(0, 2, (count, 3)) * (0, 0, -1),
+    }
+    asked = sizes | ({"along": rng.standard_normal((count, 3))} if name == "blade" else {})
+    touches = model.query_each(name, **varied, **asked, poisson=0.4)
+    assert set(touches.status) >= {"ok", "lost", "input"}
+    for number, status in enumerate(touches.status):
+        own = {key: np.asarray(value)[number] if np.ndim(value) else value for key, value in (varied | asked).items()}
+        touch = model.query(name, **own, poisson=0.4)
         assert touch.status == status
-        np.testing.assert_array_equal(values, [*touch.force, touch.force_error, touch.stiffness, touch.contact_radius])
+        np.testing.assert_array_equal(touches.force[number], touch.force)
+        for field in ("force_error", "stiffness", "contact_radius"):
+            np.testing.assert_array_equal(getattr(touches, field)[number], getattr(touch, field))
+
+
+def test_queries_whose_shapes_do_not_go_together_are_refused():
+    for at, depth in ((np.zeros((4, 3)), np.zeros(5)), (np.zeros((4, 2)), 1e-4), (np.zeros((2, 2, 3)), 1e-4)):
+        with pytest.raises(ValueError, match="shape"):
+            random_model().query_each("disc", at=at, depth=depth, radius=1e-3)
