@@ -29,9 +29,6 @@ typedef struct {
 /* Returns EPSMESH_OK, or EPSMESH_DAMAGED if the table is inconsistent there. */
 epsmesh_status epsmesh_place_at(const epsmesh_model *model, double x, double y, double poisson, epsmesh_place *found);
 
-/* A flat rectangle's stiffness, second moments and tilting stiffness: src/contact.c. */
-extern const double epsmesh_rectangle[5][8];
-
 /* Put the factors by which the tables of blades and bonded tools were divided at a place into `factors`. */
 void epsmesh_factors(const epsmesh_model *model, double x, double y, double factors[EPSMESH_TENSORS]);
 

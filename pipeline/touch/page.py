@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from epsmesh_realtime.evaluator import rectangle
+from epsmesh_realtime.file import pack
 from epsmesh_realtime.surface import Surface
 from epsmesh_realtime.touch import SENTENCES
 from pipeline.files import write_whole
@@ -15,7 +15,9 @@ from pipeline.view.page import render_scene
 
 _TEMPLATES = Path(__file__).parent / "templates"
 # Each knows those before it.
-_SCRIPTS = [_TEMPLATES / name for name in ("tools.js", "evaluate.js", "near.js", "surface.js", "touch.js")]
+_SCRIPTS = [_TEMPLATES / name for name in ("evaluator.js", "surface.js", "touch.js")]
+# The evaluator in C, by realtime/wasm/build.py.
+EVALUATOR = _TEMPLATES / "evaluator.wasm"
 _MM = 1e3
 # Of the way to the nearest side or to the bottom: the radius that the page begins with, and the depths that it offers.
 _RADIUS, _RADII, _DEPTH, _DEPTHS = 0.12, (0.02, 0.4), 0.04, (-0.02, 0.15)
@@ -87,23 +89,19 @@ def _sliders(surface: Surface) -> list[dict[str, Any]]:
 
 
 def _arrays(surface: Surface) -> dict[str, Any]:
-    table = surface.table
-    return {
-        "points": table.points.T.astype("<f4"),
-        "triangles": table.triangles.T.astype("<i4"),
-        "modes": table.modes.astype("<i2"),
-        "amounts": table.amounts.astype("<f4"),
-    }
+    """Return the evaluator and the file of the model, which it loads."""
+    model = pack(surface.model.numbers() | surface.table.numbers())
+    return {name: np.frombuffer(data, "u1") for name, data in (("evaluator", EVALUATOR.read_bytes()), ("model", model))}
 
 
 def _told(surface: Surface) -> dict[str, Any]:
     """Return what the script is told besides the arrays; the camera's lengths are in mm, along the face's axes."""
     model, table = surface.model, surface.table
     low, high = table.points.min(axis=0), table.points.max(axis=0)
-    numbers = {name: np.asarray(values).tolist() for name, values in model.numbers().items() if "pair_" not in name}
+    numbers = {name: np.asarray(getattr(model, name)).tolist() for name in ("origin", "axes", "young", "poisson")}
+    is_which = {"is_flat": model.face.is_flat, "is_round": model.table.is_round}
     return {
-        "model": {"tensors": [], "rectangle": rectangle().tolist()} | numbers,
-        "shape": table.amounts.shape,
+        "model": numbers | is_which | {"reach": list(model.table.reach)},
         "eye": (np.array([-0.5, -0.75, 0.55]) / hypot(0.5, 0.75, 0.55)).tolist(),
         "centre": (_MM * (low + high) / 2).tolist(),
         "radius": float(_MM * np.linalg.norm(high - low) / 2),

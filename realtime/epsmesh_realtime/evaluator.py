@@ -186,12 +186,6 @@ def word(status: int) -> str:
     return str(found.decode())
 
 
-def rectangle() -> Array:
-    """Return the coefficients (8, 5) of a flat rectangle's contact: `realtime/src/contact.c`."""
-    found = (ctypes.c_double * 40).in_dll(library(), "epsmesh_rectangle")
-    return np.array(found).reshape(5, 8).T
-
-
 def words() -> NDArray[np.str_]:
     """Return the names of all statuses, by number."""
     return np.array([word(status) for status in range(_STATUSES)])

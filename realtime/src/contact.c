@@ -116,7 +116,7 @@ static int press_round(const epsmesh_query *tool, const place *p, double most, c
  * polynomials of 1 - 2 log(w/l)/log(1/50): F/d in units of 2 sqrt(l w), <x^2>/l^2 and <y^2>/w^2 of its pressure, and moment
  * per tilt about its short and long axis in l^2.5 w^0.5 and l w^2. Fitted to boundary elements (A. E. H. Love's
  * rectangles, graded to the edges), within 1e-5. */
-const double epsmesh_rectangle[5][8] = {
+static const double RECTANGLE[5][8] = {
     {1.5467288, -0.5389724, 0.154788, -0.0121522, 0.0020102, -0.0001257, 6e-06, -1.4e-06},
     {0.4134192, 0.0443058, 0.0039289, -0.0011234, -0.0003526, 1.7e-06, 2.01e-05, 4.2e-06},
     {0.484368, -0.0181444, -0.0053293, -0.0007768, 1.19e-05, 3.22e-05, 7.5e-06, 8e-07},
@@ -132,7 +132,7 @@ static int press_blade(const epsmesh_query *q, const double edge[2], const place
     if (sqrt(big * big + small * small) > most) return 0;
     polynomials(1 - 2 * log(small / big) / log(SLENDER), 8, c8);
     for (i = 0; i < 5; i++)
-        for (j = 0; j < 8; j++) r[i] += epsmesh_rectangle[i][j] * c8[0][j];
+        for (j = 0; j < 8; j++) r[i] += RECTANGLE[i][j] * c8[0][j];
     for (i = 0; i < 2; i++) e[0][i] = edge[i];
     if (q->length < q->width) e[0][0] = -edge[1], e[0][1] = edge[0];
     e[1][0] = -e[0][1], e[1][1] = e[0][0];

@@ -60,7 +60,7 @@ static double moment(const epsmesh_query *q, double plane, double force, double 
     if (q->shape != EPSMESH_BLADE) return 2.0 / 3 * q->radius * q->radius;
     polynomials(1 - 2 * log(small / big) / log(SLENDER), 8, c8);
     for (i = 0; i < 2; i++)
-        for (j = 0; j < 8; j++) r[i] += epsmesh_rectangle[i + 1][j] * c8[0][j];
+        for (j = 0; j < 8; j++) r[i] += RECTANGLE[i + 1][j] * c8[0][j];
     return r[0] * big * big + r[1] * small * small;
 }
 
@@ -73,7 +73,7 @@ static void tensor(const epsmesh_query *q, const double edge[2], double t[2][2])
     if (q->shape != EPSMESH_BLADE) return;
     polynomials(1 - 2 * log(small / big) / log(SLENDER), 8, c8);
     for (i = 0; i < 2; i++)
-        for (j = 0; j < 8; j++) r[i] += epsmesh_rectangle[i + 1][j] * c8[0][j];
+        for (j = 0; j < 8; j++) r[i] += RECTANGLE[i + 1][j] * c8[0][j];
     e[0] = q->length < q->width ? -edge[1] : edge[0], e[1] = q->length < q->width ? edge[0] : edge[1];
     r[0] *= big * big, r[1] *= small * small, share = r[0] / (r[0] + r[1]);
     for (i = 0; i < 2; i++)

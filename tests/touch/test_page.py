@@ -92,7 +92,7 @@ def test_numbers_are_those_of_c(browser, tmp_path, kind):
         if status == "ok":
             known = [*touch.force, touch.force_error, touch.stiffness, touch.contact_radius]
             scale = [*[np.linalg.norm(touch.force)] * 3, *known[3:]]
-            assert np.all(np.abs(np.array(numbers) - known) <= 1e-10 * np.array(scale))
+            assert np.all(np.abs(np.array(numbers) - known) <= 1e-12 * np.array(scale))
     assert seen >= {"ok", "lost", "outside", "poisson", "large"}
     for query in [q for q in asked if surface.model.query(**q).status == "ok"][:7]:
         moved = browser.ask(

@@ -48,10 +48,10 @@ function arrow(length, error, thick) {
 }
 
 class Page {
-  constructor(told, arrays) {
+  constructor(told, { c }) {
     this.told = told;
-    this.model = new Model(told.model);
-    this.surface = new Surface(this.model, arrays, told.shape);
+    this.model = new Model(told.model, c);
+    this.surface = new Surface(this.model);
     this.made = new Vertices();
     this.largest = 0;
     this.size = told.radius;
@@ -98,11 +98,11 @@ class Page {
   onFace(event) {
     const hit = this.stage.under(event, this.stage.body)?.point;
     if (!hit || Math.abs(hit.z - this.heightAt(hit.x, hit.y)) > BESIDE * this.size) return null;
-    return this.model.isFlat || this.model.table.holds(hit.x / MM, hit.y / MM) ? [hit.x, hit.y] : null;
+    return this.model.is_flat || this.model.holds(hit.x / MM, hit.y / MM) ? [hit.x, hit.y] : null;
   }
   // The height (mm) of the face at x and y (mm), beyond the region that of its border.
   heightAt(x, y) {
-    return this.model.isFlat ? 0 : MM * this.model.spot(...this.inRegion(x, y)).height;
+    return this.model.is_flat ? 0 : MM * this.model.spot(...this.inRegion(x, y)).height;
   }
   // The nearest place (m) of the region, but for rounding.
   inRegion(x, y) {
@@ -188,7 +188,7 @@ class Page {
     made.size = 0;
     const count = pressed ? pressed.length : 3 * m;
     for (let i = 0; i < count; i++) {
-      const v = pressed ? pressed[i] : surface.triangles[(i % 3) * m + Math.floor(i / 3)];
+      const v = pressed ? pressed[i] : surface.triangles[i];
       const first = made.further();
       const { data } = made;
       let square = 0;
@@ -259,4 +259,4 @@ class Page {
   }
 }
 
-start(Page);
+start(Page, unpackModel);

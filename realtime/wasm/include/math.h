@@ -3,20 +3,20 @@
 #define EPSMESH_WASM_MATH_H
 
 #define NAN __builtin_nan("")
+#define HUGE_VAL __builtin_huge_val()
 #define isfinite(x) __builtin_isfinite(x)
 #define sqrt(x) __builtin_sqrt(x)
 #define fabs(x) __builtin_fabs(x)
-#define fmin(x, y) __builtin_fmin(x, y)
+#define ceil(x) __builtin_ceil(x)
 
-#define IMPORTED(name) __attribute__((import_module("math"), import_name(#name)))
-IMPORTED(pow) double pow(double x, double y);
-IMPORTED(log) double log(double x);
-IMPORTED(tan) double tan(double x);
-IMPORTED(exp) double exp(double x);
-IMPORTED(expm1) double expm1(double x);
-IMPORTED(sin) double sin(double x);
-IMPORTED(cos) double cos(double x);
-IMPORTED(atan2) double atan2(double y, double x);
-IMPORTED(asinh) double asinh(double x);
+double acosh(double x);
+double asin(double x);
+double cos(double x);
+double exp(double x);
+double expm1(double x);
+double log(double x);
+double pow(double x, double y);
+double sin(double x);
+double tan(double x);
 
 #endif
