@@ -2,6 +2,7 @@
  * and the compiler sees all of them at once. */
 #include "epsmesh.h"
 #include "epsmesh_patch.h"
+#include "epsmesh_relaxation.h"
 #include "epsmesh_surface.h"
 #include "epsmesh_values.h"
 
@@ -25,13 +26,14 @@ enum { STEPS = 60, TERMS = 40, FOOT_STEPS = 30, SETTLE_STEPS = 40 };
 #include "src/query.c"
 #include "src/several.c"
 #include "src/patch.c"
+#include "src/relaxation.c"
 #include "src/surface.c"
 #include "src/values.c"
 
 const char *epsmesh_word(epsmesh_status status) {
     static const char *const words[] = {"ok",      "lost",   "outside", "large", "deep",    "tool",
                                         "input",   "poisson", "tilted", "off",   "damaged", "no model",
-                                        "near",    "others", "alone"};
+                                        "near",    "others", "alone", "past"};
     return (int)status >= 0 && status < EPSMESH_STATUSES ? words[status] : "";
 }
 
@@ -40,7 +42,8 @@ epsmesh_flaw epsmesh_flaw_of(const epsmesh_model *m, const char **array) {
     return m->flaw;
 }
 
-void epsmesh_sizes(size_t sizes[4]) {
+void epsmesh_sizes(size_t sizes[6]) {
     sizes[0] = sizeof(epsmesh_model), sizes[1] = sizeof(epsmesh_query);
     sizes[2] = sizeof(epsmesh_touch), sizes[3] = sizeof(epsmesh_patch);
+    sizes[4] = sizeof(epsmesh_memory), sizes[5] = sizeof(epsmesh_moment);
 }

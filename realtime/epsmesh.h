@@ -14,7 +14,7 @@ extern "C" {
 #endif
 
 /* Largest numbers: of polynomials along a direction, of tools at once, of modes of the interaction and of the surface. */
-enum { EPSMESH_MOST = 64, EPSMESH_TENSORS = 7, EPSMESH_MOST_TOOLS = 16 };
+enum { EPSMESH_MOST = 64, EPSMESH_TENSORS = 7, EPSMESH_MOST_RELAXING = 6, EPSMESH_MOST_TOOLS = 16 };
 enum { EPSMESH_MOST_MODES = 96, EPSMESH_MOST_LINKS = 3, EPSMESH_MOST_SEEN = 512 };
 
 typedef enum {
@@ -33,6 +33,7 @@ typedef enum {
     EPSMESH_NEAR,     /* two contacts' middles are closer than twice the sum of their radii */
     EPSMESH_OTHERS,   /* another tool, on whose force this one depends, has no answer */
     EPSMESH_ALONE,    /* one tool at a time: the face is curved, or the file of an earlier version */
+    EPSMESH_PAST,     /* the force depends on a past that is not known: epsmesh_relaxation.h */
     EPSMESH_STATUSES
 } epsmesh_status;
 
@@ -65,6 +66,8 @@ typedef struct {
     const int16_t *surface_modes;
     double surface_error;
     int vertices, triangles, surface_counts[4]; /* modes, and polynomials of nu, y and x */
+    double share[EPSMESH_MOST_RELAXING], time[EPSMESH_MOST_RELAXING]; /* of all tissue: epsmesh_relaxation.h */
+    int relaxing;                                                     /* number of terms */
     epsmesh_flaw flaw;
     const char *flawed; /* the array with the flaw */
 } epsmesh_model;
@@ -117,8 +120,9 @@ const char *epsmesh_word(epsmesh_status status);
 /* Return why epsmesh_load failed, and the name of the array in question, "" if it is none. */
 epsmesh_flaw epsmesh_flaw_of(const epsmesh_model *model, const char **array);
 
-/* Put the sizes (bytes) of a model, a query, a touch and a patch (epsmesh_patch.h) into `sizes`, for other languages. */
-void epsmesh_sizes(size_t sizes[4]);
+/* Put the sizes (bytes) of a model, a query, a touch, a patch (epsmesh_patch.h), a memory and a moment
+ * (epsmesh_relaxation.h) into `sizes`, for other languages. */
+void epsmesh_sizes(size_t sizes[6]);
 
 #ifdef __cplusplus
 }

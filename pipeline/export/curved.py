@@ -86,6 +86,7 @@ def curved_model(
         max(_OFF * off, _LEAST_OFF * room),
         _ALIGNED,
         bend_error,
+        relaxation=scope.relaxation,
     )
     return model, error, len(known) * len(ratios)
 

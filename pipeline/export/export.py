@@ -166,6 +166,7 @@ def _flat(
         largest,
         bar,
         off=_OFF * region.thickness,
+        relaxation=scope.relaxation,
     )
     return model, error, len(solved)
 

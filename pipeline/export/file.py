@@ -25,6 +25,7 @@ _DIMENSIONS: Mapping[str, tuple[str, ...]] = {
     "origin": ("component",),
     "axes": ("row", "component"),
     "bar": ("term",),
+    **dict.fromkeys(("relaxation_share", "relaxation_time"), ("relaxing",)),
     **dict.fromkeys(("even", "reach", "sides", "poisson_range"), ("pair",)),
     "pair_modes": ("pair_mode", "pair_y", "pair_x"),
     "pair_links": ("pair_node", "pair_mode", "pair_other"),
@@ -39,6 +40,7 @@ _UNITS = {
     **dict.fromkeys(("check_x", "check_y", "check_radius", "check_depth"), "m"),
     **dict.fromkeys(("check_full", "check_force"), "N"),
     "young": "Pa",
+    "relaxation_time": "s",
     "aligned": "rad",
     "surface_amounts": "m/N Pa",
 }

@@ -39,6 +39,7 @@ _UNITS = {
 SHAPES = ("disc", "sphere", "cone", "blade", "bonded disc")
 STATUSES = (
     "ok", "lost", "outside", "large", "deep", "tool", "input", "poisson", "tilted", "off", "damaged", "no model",
+    "near", "others", "alone", "past",
 )  # fmt: skip
 
 

@@ -87,7 +87,7 @@ class Solver:
         Raises:
             RuntimeError: if a solve failed.
         """
-        own = {name: value for name, value in self.sections.items() if name in ("body", "material")}
+        own = {name: _at_once(value) for name, value in self.sections.items() if name in ("body", "material")}
         if poissons is not None:
             own["material"] = {"young": f"{self.young:.12g} Pa", "poisson": list(poissons)}
         place: dict[str, Any] = {"at": [_mm(x) for x in at], "depth": [_mm(depth) for depth in depths]}
@@ -102,6 +102,13 @@ class Solver:
             if not record.is_ok or not isfinite(record.force_error):
                 raise RuntimeError(f"a full solve of a {tool.name} at {place['at']} failed: {record.message}")
         return [Full(record.force, record.force_error, np.array(record.force_vector)) for record in found]
+
+
+def _at_once(section: Any) -> Any:
+    """Return a part of a study without relaxation: its tissue as it is at once."""
+    if isinstance(section, Mapping):
+        return {name: _at_once(value) for name, value in section.items() if name != "relaxation"}
+    return [_at_once(value) for value in section] if isinstance(section, list) else section
 
 
 def _mm(length: float) -> str:

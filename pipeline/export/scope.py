@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from epsmesh_realtime.evaluator import MOST_RELAXING
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.registry import PROBES
 from pipeline.shapes.support import Faces
@@ -12,6 +13,7 @@ from pipeline.shapes.tissue import Tissue
 from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.case import Case
 from pipeline.study.sweep import Study
+from pipeline.viscoelastic import Terms
 
 # Poisson's ratios that a model covers by default; the largest one before displacement elements lock.
 _USUAL, _MOST = (0.3, 0.49), 0.49
@@ -35,6 +37,11 @@ class Scope:
     poissons: tuple[float, float]
     sections: Mapping[str, Any]
     file: str
+
+    @property
+    def relaxation(self) -> Terms:
+        """Shares and times (s) of the relaxation of all tissue."""
+        return self.case.relaxations[-1]
 
     @property
     def is_flat(self) -> bool:
@@ -94,6 +101,10 @@ def _refusal(case: Case, first: Case) -> str:
         return "the study has several bodies, and a model has one: export a study of each"
     if reason := obstacle("real-time model", case):
         return reason
+    if case.relaxations != first.relaxations:
+        return "the study has several relaxations, and a model has one: export a study of each"
+    if (terms := len(case.relaxations[-1])) > MOST_RELAXING:
+        return f"material.relaxation has {terms} terms; a real-time model has at most {MOST_RELAXING}"
     if case.poisson > _MOST:
         return f"material.poisson = {case.poisson:g} is too close to 0.5 for a real-time model: at most {_MOST}"
     if isinstance(body, Layered):

@@ -20,8 +20,10 @@ Pair = tuple[float, float]
 MOST_TOOLS = 16
 # Largest numbers of modes of the interaction of several tools.
 MOST_MODES = 96
+# Largest number of terms of a relaxation.
+MOST_RELAXING = 6
 _TOUCH = Struct("@i6d")
-_STATUSES = 15
+_STATUSES = 16
 _FLAWS = (
     "",
     "this is no real-time model of epsmesh",

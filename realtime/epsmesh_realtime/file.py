@@ -25,6 +25,11 @@ All numbers that a query needs are doubles, in SI units, for a body with E = 1:
     largest                  largest contact radius, in units of the room: distance to the nearest side or ``thickness``
     bar                      (4,) b: error of c is (b0 + b2 (a/room)⁴)/room + b1 |h| <r²>; relative error of F, b3 more
 
+Relaxation of all tissue, optional:
+
+    relaxation_share         (relaxing,) shares of the modulus at once, of a Prony series,
+    relaxation_time          (relaxing,) and their times (s)
+
 Interaction of tools on a flat face, optional:
 
     pair_modes               (pair_mode, pair_y, pair_x) Chebyshev coefficients of φ (1) over x/X and y/Y

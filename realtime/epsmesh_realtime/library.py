@@ -26,7 +26,7 @@ class TouchInC(ctypes.Structure):
     _fields_ = (("status", c_int), ("numbers", c_double * 6))
 
 
-# Result and arguments of each function: epsmesh.h, epsmesh_patch.h, epsmesh_surface.h, epsmesh_values.h.
+# Result and arguments of each function of epsmesh*.h.
 _FUNCTIONS = {
     "epsmesh_load": (c_int, c_void_p, c_void_p, c_size_t),
     "epsmesh_flaw_of": (c_int, c_void_p, ctypes.POINTER(c_char_p)),
@@ -40,6 +40,8 @@ _FUNCTIONS = {
     "epsmesh_room_at": (c_double, c_void_p, *_PLACE),
     "epsmesh_place_at": (c_int, c_void_p, *_PLACE, c_double, c_void_p),
     "epsmesh_between": (None, c_void_p, c_double, c_size_t, c_void_p, c_size_t, c_void_p, c_void_p),
+    "epsmesh_memory_begin": (None, c_void_p, c_void_p, c_size_t),
+    "epsmesh_touch_after": (TouchInC, c_void_p, c_void_p, c_double, c_void_p),
     "epsmesh_surface_far": (None, c_void_p, *_PLACE, c_double, c_void_p),
     "epsmesh_surface_press": (TouchInC, c_void_p, c_void_p, c_void_p, c_void_p),
     "epsmesh_patch_make_of": (c_int, c_void_p, c_void_p, c_void_p, c_double),
@@ -63,7 +65,7 @@ def library() -> ctypes.CDLL:
     for name, (result, *arguments) in _FUNCTIONS.items():
         function = getattr(found, name)
         function.restype, function.argtypes = result, arguments
-    sizes = (c_size_t * 4)()
+    sizes = (c_size_t * 6)()
     found.epsmesh_sizes(sizes)
     if (sizes[1], sizes[2]) != (QUERY_SIZE, TOUCH_SIZE):
         raise BuildError("the evaluator in C is not the one of this package: install epsmesh-realtime again")
@@ -72,8 +74,8 @@ def library() -> ctypes.CDLL:
 
 @cache
 def size_of(number: int) -> int:
-    """Return the size (bytes) of a model (0) or a patch (3)."""
-    sizes = (c_size_t * 4)()
+    """Return the size (bytes) of a model (0), a patch (3), a memory (4) or a moment of it (5)."""
+    sizes = (c_size_t * 6)()
     library().epsmesh_sizes(sizes)
     return int(sizes[number])
 

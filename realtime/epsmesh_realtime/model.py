@@ -32,6 +32,8 @@ class Model:
     - ``face``: height and curvature of a curved face; ``bend_error`` (1/m): error of its mean curvature.
     - ``off`` (m), ``aligned`` (rad): tolerances of a query, distance from the face and angle to the normal.
     - ``pairs``: interaction of several tools; without it, the model answers for one tool at a time.
+    - ``relaxation``: shares of the modulus at once, and their times (s). A query is answered for a sudden touch;
+      for forces over time see :class:`epsmesh_realtime.history.History`.
     """
 
     table: Table
@@ -48,6 +50,7 @@ class Model:
     aligned: float = 1e-6
     bend_error: float = 0.0
     pairs: Pairs | None = None
+    relaxation: tuple[tuple[float, float], ...] = ()
 
     def __repr__(self) -> str:
         x, y = (2e3 * size for size in self.table.reach)
@@ -130,6 +133,10 @@ class Model:
         own = {name: getattr(self, name) for name in (*_NUMBERS, "sides", "origin", "axes", "bar")}
         pairs = self.pairs.numbers() if self.pairs else {}
         found = own | self.table.numbers() | self.face.numbers() | pairs
+        for name, terms in zip(
+            ("relaxation_share", "relaxation_time"), zip(*self.relaxation, strict=True), strict=False
+        ):
+            found[name] = terms
         return {name: np.asarray(value, dtype=float) for name, value in found.items()}
 
 
@@ -166,10 +173,19 @@ def loaded(data: bytes, evaluator: Evaluator) -> tuple[Model, dict[str, NDArray[
         sides=tuple(found["sides"].tolist()),
         face=Face(found["height"], found["bend"]),
         pairs=Pairs.of(found),
+        relaxation=_relaxation(found),
         **{name: float(found[name]) for name in _NUMBERS if name in found},
     )
     vars(model)["evaluator"] = evaluator
     return model, found
+
+
+def _relaxation(found: Mapping[str, NDArray[Any]]) -> tuple[tuple[float, float], ...]:
+    """Return shares and times (s) in a file's arrays."""
+    shares, times = (
+        found[f"relaxation_{kind}"].tolist() if "relaxation_share" in found else [] for kind in ("share", "time")
+    )
+    return tuple(zip(shares, times, strict=True))
 
 
 def about(found: Mapping[str, NDArray[Any]]) -> dict[str, str]:

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "epsmesh.h"
+#include "epsmesh_relaxation.h"
 
 #ifdef _WIN32
 #define EXPORTED __declspec(dllexport)
@@ -37,17 +38,22 @@ typedef enum { INSTANTIATED, INITIALIZING, STEPPING, TERMINATED } mode;
 /* The tool to start with: sizes in units of the way to the nearest side or the bottom; rad. */
 static const double OF_ROOM[] = {0.12, 0.3, 0.03}, START_ANGLE = 1.0;
 
+/* Steps in which the contact of a round tool in relaxing tissue may grow. */
+enum { ROOM = 8192 };
+
 /* All that a step changes: what a host saves and restores. */
 typedef struct {
-    double values[DOUBLES];
+    double values[DOUBLES], evaluated; /* s: time of the inputs that were evaluated last */
     int64_t shape, status;
     mode in;
+    epsmesh_memory memory;
+    epsmesh_moment moments[ROOM];
 } state;
 
 typedef struct {
     epsmesh_model model;
     void *data; /* the bytes of its file, into which it points */
-    state now, first;
+    state now;
     fmi3LogMessageCallback log;
     void *environment;
     bool tells;
@@ -79,8 +85,8 @@ static epsmesh_status loaded(unit *u, const char *folder) {
     return status;
 }
 
-/* Compute all outputs from the inputs of now. */
-static fmi3Status evaluate(unit *u) {
+/* Compute all outputs from the inputs at a `time` (s). */
+static fmi3Status evaluate(unit *u, double time) {
     double *v = u->now.values;
     epsmesh_query query = epsmesh_ask(&u->model);
     epsmesh_touch touch;
@@ -90,8 +96,13 @@ static fmi3Status evaluate(unit *u) {
     query.length = v[LENGTH], query.width = v[WIDTH], query.young = v[YOUNG], query.poisson = v[POISSON];
     for (i = 0; i < 3; i++) query.axis[i] = v[AXIS + i], query.along[i] = v[ALONG + i];
     touch.status = epsmesh_foot(&u->model, v + TIP, query.at, &query.depth);
+    if (touch.status == EPSMESH_LOST && u->now.memory.phase != EPSMESH_RESTED) {
+        /* Below a tool in the air, relaxing tissue recovers. */
+        memcpy(query.at, u->now.memory.query.at, sizeof query.at);
+        query.depth = 0, touch.status = EPSMESH_OK;
+    }
     if (touch.status == EPSMESH_OK) {
-        touch = epsmesh_touch_at(&u->model, &query);
+        touch = epsmesh_touch_after(&u->model, &query, time - u->now.evaluated, &u->now.memory);
     } else {
         double none = touch.status == EPSMESH_LOST ? 0 : (double)NAN;
         touch.force[0] = touch.force[1] = touch.force[2] = none;
@@ -100,19 +111,28 @@ static fmi3Status evaluate(unit *u) {
     for (i = 0; i < 3; i++) v[FORCE + i] = touch.force[i];
     v[FORCE_ERROR] = touch.force_error, v[STIFFNESS] = touch.stiffness;
     v[CONTACT_RADIUS] = touch.contact_radius, v[DEPTH] = query.depth, u->now.status = touch.status;
+    u->now.evaluated = time;
     if (touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) return fmi3OK;
     if (before != touch.status) say(u, fmi3Warning, "logStatusWarning", epsmesh_word(touch.status));
     return fmi3Warning;
 }
 
+/* Show the outputs before the first step; the tissue does not remember it. */
+static fmi3Status peek(unit *u) {
+    fmi3Status status = evaluate(u, u->now.evaluated);
+    epsmesh_memory_begin(&u->now.memory, u->now.moments, ROOM);
+    return status;
+}
+
 /* Set the values of modelDescription.xml. */
 static void begin(unit *u) {
     double *v = u->now.values, room = fmin(fmin(u->model.sides[0], u->model.sides[1]), u->model.thickness);
+    memset(&u->now, 0, sizeof u->now);
+    epsmesh_memory_begin(&u->now.memory, u->now.moments, ROOM);
     memcpy(v + TIP, u->model.origin, sizeof u->model.origin);
     v[YOUNG] = u->model.young, v[POISSON] = u->model.poisson, v[ANGLE] = START_ANGLE;
     v[RADIUS] = OF_ROOM[0] * room, v[LENGTH] = OF_ROOM[1] * room, v[WIDTH] = OF_ROOM[2] * room;
     u->now.shape = EPSMESH_SPHERE, u->now.status = EPSMESH_LOST;
-    u->first = u->now;
 }
 
 /* ---- common functions ---- */
@@ -165,7 +185,7 @@ EXPORTED fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, bool has_
     unit *u = (unit *)instance;
     (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
     if (u->now.in != INSTANTIATED) return fmi3Error;
-    u->now.in = INITIALIZING, u->now.values[TIME] = start;
+    u->now.in = INITIALIZING, u->now.values[TIME] = u->now.evaluated = start;
     return fmi3OK;
 }
 
@@ -173,7 +193,7 @@ EXPORTED fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
     unit *u = (unit *)instance;
     if (u->now.in != INITIALIZING) return fmi3Error;
     u->now.in = STEPPING;
-    return evaluate(u);
+    return peek(u);
 }
 
 EXPORTED fmi3Status fmi3Terminate(fmi3Instance instance) {
@@ -182,8 +202,7 @@ EXPORTED fmi3Status fmi3Terminate(fmi3Instance instance) {
 }
 
 EXPORTED fmi3Status fmi3Reset(fmi3Instance instance) {
-    unit *u = (unit *)instance;
-    u->now = u->first;
+    begin((unit *)instance);
     return fmi3OK;
 }
 
@@ -194,7 +213,7 @@ EXPORTED fmi3Status fmi3DoStep(fmi3Instance instance, double time, double step, 
     (void)never_back;
     *event = *ends = *early = false, *reached = time;
     if (u->now.in != STEPPING || !(step > 0)) return fmi3Error;
-    status = evaluate(u);
+    status = evaluate(u, time);
     u->now.values[TIME] = *reached = time + step;
     return status;
 }
@@ -206,7 +225,7 @@ EXPORTED fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReferen
     unit *u = (unit *)instance;
     size_t i;
     if (room < count) return fmi3Error;
-    if (u->now.in == INITIALIZING) evaluate(u);
+    if (u->now.in == INITIALIZING) peek(u);
     for (i = 0; i < count; i++) {
         if (of[i] >= DOUBLES) return fmi3Error;
         values[i] = u->now.values[of[i]];
@@ -231,7 +250,7 @@ EXPORTED fmi3Status fmi3GetInt64(fmi3Instance instance, const fmi3ValueReference
     unit *u = (unit *)instance;
     size_t i;
     if (room < count) return fmi3Error;
-    if (u->now.in == INITIALIZING) evaluate(u);
+    if (u->now.in == INITIALIZING) peek(u);
     for (i = 0; i < count; i++) {
         if (of[i] != SHAPE && of[i] != STATUS) return fmi3Error;
         values[i] = of[i] == SHAPE ? u->now.shape : u->now.status;
@@ -261,7 +280,9 @@ EXPORTED fmi3Status fmi3GetFMUState(fmi3Instance instance, void **saved) {
 }
 
 EXPORTED fmi3Status fmi3SetFMUState(fmi3Instance instance, void *saved) {
-    ((unit *)instance)->now = *(const state *)saved;
+    unit *u = (unit *)instance;
+    u->now = *(const state *)saved;
+    u->now.memory.moments = u->now.moments;
     return fmi3OK;
 }
 

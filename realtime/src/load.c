@@ -129,6 +129,23 @@ static void load_pairs(epsmesh_model *m, file *f) {
                          "pair_links");
 }
 
+/* The relaxation of all tissue, if it relaxes. */
+static void load_relaxation(epsmesh_model *m, file *f) {
+    uint32_t shape[4] = {0, 0, 0, 0}, i;
+    const double *shares, *times;
+    double rest = 1;
+    m->relaxing = 0;
+    if (f->flaw || !(has(f, "relaxation_share") || has(f, "relaxation_time"))) return;
+    shares = doubles(f, "relaxation_share", 1, shape), times = doubles(f, "relaxation_time", 1, shape);
+    wrong_if(f, shape[0] > EPSMESH_MOST_RELAXING, "relaxation_share");
+    for (i = 0; i < shape[0] && !f->flaw; i++) {
+        m->share[i] = shares[i], m->time[i] = times[i], rest -= shares[i];
+        wrong_if(f, !(shares[i] > 0), "relaxation_share"), wrong_if(f, !(times[i] > 0), "relaxation_time");
+    }
+    wrong_if(f, !(rest > 0), "relaxation_share");
+    m->relaxing = f->flaw ? 0 : (int)shape[0];
+}
+
 /* The deforming surface, for display: all of it, or none. */
 static void load_surface(epsmesh_model *m, file *f) {
     uint32_t points[4], corners[4], modes[4], amounts[4];
@@ -168,7 +185,8 @@ epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
     file f;
     memset(m, 0, sizeof *m);
     file_open(&f, data, size);
-    load_table(m, &f), load_body(m, &f), load_face(m, &f), load_pairs(m, &f), load_surface(m, &f);
+    load_table(m, &f), load_body(m, &f), load_face(m, &f), load_pairs(m, &f);
+    load_relaxation(m, &f), load_surface(m, &f);
     m->flaw = f.flaw, m->flawed = f.name, m->is_loaded = f.flaw == EPSMESH_SOUND;
     return m->is_loaded ? EPSMESH_OK : EPSMESH_NO_MODEL;
 }

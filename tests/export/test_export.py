@@ -13,7 +13,7 @@ from epsmesh_realtime.table import Table
 from pipeline.export.checks import Check, error_of_full, needed
 from pipeline.export.compliance import coarse_mesh, compliances
 from pipeline.export.curved import curved_model
-from pipeline.export.full import Full, Tool
+from pipeline.export.full import Full, Solver, Tool
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, scope_of
 from pipeline.export.tabulate import tabulate
@@ -31,6 +31,8 @@ TUMOUR = {"name": "tumour", "at": ["0 mm", "0 mm", "-10 mm"], "radius": "4 mm", 
 SKIN = {"name": "skin", "young": "40 kPa", "poisson": 0.45}
 BLADE = {"shape": "blade", "length": "6 mm", "width": "1 mm", "depth": "0.1 mm", "contact": "bonded"}
 SOFT = {"young": "10 kPa", "poisson": 0.45}
+TERM = {"share": 0.4, "time": "2 s"}
+RELAXING, RAMP = SOFT | {"relaxation": [TERM]}, DISC | {"history": {"ramp": "1 s", "hold": "2 s"}}
 
 
 def study(**sections):
@@ -128,6 +130,16 @@ def test_tables_of_tensors_know_their_images(shape):
         ),
         ({"body": [CYLINDER | {"name": "a"}, BOX | {"name": "b"}]}, "several"),
         ({"probe": BLADE | {"incision": "4 mm"}}, "press straight down"),
+        (
+            {
+                "body": BOX | {"inclusion": [TUMOUR | {"relaxation": [TERM | {"time": "3 s"}]}]},
+                "material": RELAXING,
+                "probe": RAMP,
+                "mesh": {"epsilon": "full", "fine": "2 mm", "coarse": "8 mm", "degree": 2},
+            },
+            "relaxes alike",
+        ),
+        ({"material": SOFT | {"relaxation": [TERM | {"share": 0.1}] * 7}, "probe": RAMP}, "at most 6"),
     ],
 )
 def test_what_has_no_model_yet_is_refused_by_name(sections, word):
@@ -137,6 +149,17 @@ def test_what_has_no_model_yet_is_refused_by_name(sections, word):
 
 def test_the_range_of_poissons_ratio_holds_that_of_the_study():
     assert scope_of(study(material=SOFT | {"poisson": [0.2, 0.4]})).poissons == (0.2, 0.49)
+
+
+def test_a_study_that_relaxes_makes_a_model_that_does_and_is_solved_as_it_is_at_once():
+    scope = scope_of(study(material=RELAXING, probe=RAMP, body=BOX | {"inclusion": [TUMOUR]}))
+    assert scope.relaxation == ((0.4, 2.0),)
+    sections = {"body": CYLINDER, "material": RELAXING, "probe": RAMP}
+    solved = [
+        Solver(own, "mine.toml", 10e3, 0.1).press(Tool("disc", radius=2e-3), (0.0, 0.0), 1e-4, None).force
+        for own in (sections, sections | {"material": SOFT})
+    ]
+    assert solved[0] == solved[1]
 
 
 def test_a_study_of_several_ratios_makes_a_model_of_their_range():

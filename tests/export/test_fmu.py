@@ -5,14 +5,17 @@ import re
 import shutil
 import subprocess
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 import pytest
 
+from epsmesh_realtime import History
+from pipeline.export.file import write_model
 from pipeline.export.fmu import STATUSES, library_place, write_fmu
-from tests.realtime.synthetic import write_random
+from tests.realtime.synthetic import random_model, write_random
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install epsmesh[fmi]")
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
@@ -107,6 +110,26 @@ def test_a_step_can_be_repeated_and_its_result_returns(made):
     host.terminate()
     host.freeInstance()
     shutil.rmtree(folder)
+
+
+def test_relaxing_tissue_remembers_from_step_to_step(tmp_path):
+    model = replace(random_model(), relaxation=((0.4, 0.05), (0.2, 2.0)))
+    write_model(tmp_path / "pad.epsm", model, {}, {})
+    write_fmu(tmp_path / "pad.epsm", tmp_path / "pad.fmu", "0")
+    depths = 4e-4 * np.interp(np.arange(300), (0, 100, 200, 250, 299), (-0.2, 1.0, 1.0, 0.0, -0.2))
+    inputs = np.zeros(300, [("time", float), ("tip.z", float)])
+    inputs["time"], inputs["tip.z"] = STEP * np.arange(300), -depths
+    found = fmpy.simulate_fmu(
+        str(tmp_path / "pad.fmu"), stop_time=0.3, step_size=STEP, output_interval=STEP, input=inputs, validate=False,
+        start_values={"shape": 1, "radius": RADIUS},
+    )  # fmt: skip
+    history = History(model)
+    for given, depth in zip(found[1:], depths.tolist(), strict=True):
+        touch = history.query(STEP, "sphere", radius=RADIUS, at=(0.0, 0.0, 0.0), depth=max(depth, 0.0))
+        assert STATUSES[int(given["status"])] == touch.status
+        assert given["force.z"] == pytest.approx(touch.force[2], rel=1e-10, abs=1e-15)
+    held = found["force.z"][101:201]
+    assert held[-1] < 0.8 * held[0]
 
 
 def test_its_sources_build_a_library_with_every_function_of_the_standard(made, tmp_path):

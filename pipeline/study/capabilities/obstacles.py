@@ -68,8 +68,8 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "friction": "probe.friction: real-time models have no friction. Omit it and export the frictionless force",
         "loads": "[load]: gravity and tractions have no real-time model",
         "large displacements": "material.law: large displacements have no real-time model",
-        "relaxation": "material.relaxation: real-time models are elastic, and have no time. Omit it and export the "
-        "instantaneous force",
+        "time steps": "material.relaxation: all tissue of a real-time model relaxes alike. Omit the relaxation of "
+        "layers and inclusions",
         "slit": f"probe.incision: {_PRESSED_ONLY}",
         "six motions": f'probe.motion = "all": {_PRESSED_ONLY}',
         "slice": f"probe.slice: {_PRESSED_ONLY}",
