@@ -27,11 +27,9 @@ def whole(epsmesh, tmp_path_factory):
     return folder / "out"
 
 
-def test_quick_study_end_to_end(spawn, tmp_path):
-    done = spawn("run", "studies/quick.toml", "--output", tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert {"quick.nc", "quick.png", "quick.svg", "cases.sqlite"} <= {path.name for path in tmp_path.iterdir()}
-    with xr.open_dataset(tmp_path / "quick.nc") as data:
+def test_a_run_writes_a_dataset_its_figure_and_its_store(whole):
+    assert {"small.nc", "small.png", "small.svg", "cases.sqlite"} <= {path.name for path in whole.iterdir()}
+    with xr.open_dataset(whole / "small.nc") as data:
         assert data["force"].dims == ("poisson", "epsilon", "outside")
         assert (data["status"] == 0).all()
         assert data["status"].attrs["flag_meanings"].split()[0] == "ok"
@@ -39,7 +37,7 @@ def test_quick_study_end_to_end(spawn, tmp_path):
         assert data["force"].attrs["units"] == "N"
         free = data["force_ratio"].sel(outside="free")
         assert (free.diff("epsilon") > 0).all()
-        assert (data["force_ratio"].sel(outside="coarse") >= 0.995).all()
+        assert (data["force_ratio"].sel(outside="coarse") >= 0.98).all()
         np.testing.assert_allclose(data["force_ratio"].sel(epsilon=np.inf), 1.0)
         np.testing.assert_allclose(data["speedup"].sel(epsilon=np.inf), 1.0)
         assert {
@@ -54,16 +52,13 @@ def test_quick_study_end_to_end(spawn, tmp_path):
         } <= set(data.attrs)
 
 
-def test_second_run_reads_back_and_two_ranks_agree(epsmesh, spawn, small, whole, tmp_path):
+def test_second_run_reads_back(epsmesh, small, whole, tmp_path):
     shutil.copytree(whole, tmp_path / "a")
     again = epsmesh("run", small, "--output", tmp_path / "a")
-    parallel = spawn("run", small, "--output", tmp_path / "b", ranks=2)
-    assert again.exit_code == parallel.returncode == 0, parallel.stderr
+    assert again.exit_code == 0
     assert "Stored cases are read, not computed again." in again.stdout
-    one, two = (read_file(tmp_path / folder / "small.nc") for folder in "ab")
+    one = read_file(tmp_path / "a" / "small.nc")
     assert {name.rpartition(", ")[::2] for name in np.unique(one["origin"])} == {("symmetric", "stored")}
-    np.testing.assert_allclose(one["force"], two["force"], rtol=1e-8)
-    assert parallel.stdout.count("wrote") == 1
 
 
 def test_bad_study_ends_with_2_and_writes_nothing(spawn, small, tmp_path):
@@ -110,7 +105,7 @@ def test_interrupted_run_leaves_what_is_done_and_goes_on(epsmesh, small, whole, 
         xr.testing.assert_allclose(resumed[name], undisturbed[name], rtol=1e-9)
 
 
-def test_interrupted_parallel_run_writes_what_is_done(epsmesh, small, tmp_path):
+def test_interrupted_parallel_run_writes_what_is_done_and_two_ranks_agree_with_one(spawn, small, whole, tmp_path):
     process = subprocess.Popen(
         command("run", small, "--output", tmp_path, ranks=2),
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True, cwd=ROOT, env=ENVIRONMENT,
@@ -123,9 +118,12 @@ def test_interrupted_parallel_run_writes_what_is_done(epsmesh, small, tmp_path):
     assert process.returncode != 0
     with open_to_read(tmp_path / "cases.sqlite") as records:
         assert len(records.rows()) >= 2  # F_exact of scenes among them
-    again = epsmesh("run", small, "--output", tmp_path)
-    assert again.exit_code == 0, again.stderr
-    assert (read_file(tmp_path / "small.nc")["status"] == "ok").all()
+    again = spawn("run", small, "--output", tmp_path, ranks=2)
+    assert again.returncode == 0, again.stderr
+    assert again.stdout.count("wrote") == 1
+    one, two = (read_file(folder / "small.nc") for folder in (whole, tmp_path))
+    assert (two["status"] == "ok").all()
+    np.testing.assert_allclose(two["force"], one["force"], rtol=1e-8)
 
 
 def test_run_killed_at_random_moments_yields_the_same_dataset(epsmesh, small, whole, tmp_path):
