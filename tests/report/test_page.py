@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.pages import json_in_page
+from pipeline.report import page
 from pipeline.report.dataset import write
 from pipeline.report.figures import choose, draw
 from pipeline.report.guide import USUAL_ACCURACY, guide, guide_if_any
@@ -71,6 +72,12 @@ def nasty():
     return render(data, "<name>")
 
 
+@pytest.fixture
+def without_figures(monkeypatch):
+    """For what the page says: drawing its figures takes seconds."""
+    monkeypatch.setattr(page, "_figures", lambda _: [])
+
+
 def test_what_comes_from_the_study_stays_text(nasty):
     read = Reader(nasty)
     scripts = [attributes for tag, attributes in read.tags if tag == "script"]
@@ -82,7 +89,7 @@ def test_what_comes_from_the_study_stays_text(nasty):
 
 
 def test_names_of_tables_stay_text_in_figures_and_table(tmp_path):
-    data = dataset(failed=1, probe=[{"name": NAME, **raw()["probe"]}, {"name": "blade", **BLADE}], **SWEEP)
+    data = dataset(failed=1, probe=[{"name": NAME, **raw()["probe"]}, {"name": "blade", **BLADE}], mesh=SWEEP["mesh"])
     found = render(data, NAME)
     read = Reader(found)
     assert [attributes for tag, attributes in read.tags if tag == "script"] == SCRIPTS
@@ -132,13 +139,14 @@ def test_failures_come_first_and_say_why():
     assert places[0] < text.index('id="guide"')  # settings are compared with F_max, since F_exact is not known
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_the_report_begins_with_the_answer_and_says_how_it_is_turned_round_unless_it_is():
     data, words = chosen.dataset(), "epsmesh report results/chosen.nc --scene answer"
-    page, section = render(data, "chosen"), guide_if_any(data)
-    seen = [text.strip() for text in Reader(page).texts if text.strip()]
+    found, section = render(data, "chosen"), guide_if_any(data)
+    seen = [text.strip() for text in Reader(found).texts if text.strip()]
     assert seen.index(section.sentence) < seen.index("cases")
     assert all(seen.index(detail) < seen.index("cases") for _, detail in section.details)
-    assert words in page
+    assert words in found
     assert words not in render(data, "chosen", "<p>a scene</p>")
 
 
@@ -241,6 +249,7 @@ def test_bad_input_is_told(arguments, words, tmp_path):
     assert words in done.stderr
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_a_warning_of_the_study_is_in_its_dataset_and_report_and_told_by_who_reads_it(tmp_path):
     """An error bar is the mesh's: what the model leaves out is said wherever the force is."""
     deep = chosen.dataset(chosen.TEXT.replace('depth = "0.2 mm"', 'depth = "1 mm"'))
