@@ -235,7 +235,7 @@ def test_commands_take_a_study_file(tmp_path):
         (["report", "pyproject.toml", "--output", "/nowhere"], "no such dataset"),
         (["report", "{bad}"], "cannot be read as netCDF"),
         (["report", "{other}", "--figures"], "not a study's dataset: it has no force"),
-        (["report", "{good}", "--figures", "--kind", "pie"], "no figure is called so; there are history"),
+        (["report", "{good}", "--figures", "--kind", "pie"], "no figure is called so; there are insertion, history"),
         (["report", "{good}", "--figures", "--kind", "map"], "needs a raster of places"),
     ],
 )
