@@ -61,6 +61,29 @@ def test_second_run_reads_back(epsmesh, small, whole, tmp_path):
     assert {name.rpartition(", ")[::2] for name in np.unique(one["origin"])} == {("symmetric", "stored")}
 
 
+def test_a_figure_is_drawn_again_if_it_is_not_there_or_shows_something_else(epsmesh, small, whole, tmp_path):
+    """Not if its dataset has the same numbers: one that is replaced is another file."""
+    shutil.copytree(whole, tmp_path / "out")
+    files = [tmp_path / "out" / f"small.{suffix}" for suffix in ("png", "svg")]
+
+    def replaced() -> bool:
+        before = [file.stat().st_ino if file.exists() else 0 for file in files]
+        assert epsmesh("run", small, "--output", tmp_path / "out", "--quiet").exit_code == 0
+        after = [file.stat().st_ino for file in files]
+        assert len({one == other for one, other in zip(before, after, strict=True)}) == 1
+        return before != after
+
+    assert not replaced()
+    files[1].unlink()
+    assert replaced()
+    assert not replaced()
+    files[0].write_bytes(files[0].read_bytes()[:100])
+    assert replaced()
+    small.write_text(SMALL.replace('title = "small"', 'title = "another"'))
+    assert replaced()
+    assert "another" in files[1].read_text()
+
+
 def test_bad_study_ends_with_2_and_writes_nothing(spawn, small, tmp_path):
     small.write_text(SMALL.replace('"2 mm"', "2").replace("0.4", "0.9"))
     done = spawn("run", small, "--output", tmp_path / "out", ranks=2)

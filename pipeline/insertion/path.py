@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
-from scipy.optimize import brentq
+import scipy  # which loads its parts when they are used: a run without an insertion uses none
 
 from pipeline.arrays import FloatArray
 from pipeline.insertion.cutting import Cutting, cuttings
@@ -131,8 +130,8 @@ class _Puncture:
     def between(cls, whole: _Whole, before: Cutting, after: Cutting) -> "_Puncture":
         """Return the puncture between two depths at which the energies of slits are known, with their slopes."""
         ends = np.array([before.depth, after.depth])
-        energy = CubicHermiteSpline(ends, [before.energy, after.energy], [before.slope, after.slope])
-        depth = float(brentq(lambda d: whole.energy(d) - float(energy(d)), *ends, xtol=1e-9))
+        energy = scipy.interpolate.CubicHermiteSpline(ends, [before.energy, after.energy], [before.slope, after.slope])
+        depth = float(scipy.optimize.brentq(lambda d: whole.energy(d) - float(energy(d)), *ends, xtol=1e-9))
         one = _between(before, after, depth)
         error = one.stored_error + whole.bar * depth**2 / 2 + _defect(before, after) * (after.depth - before.depth)
         return cls(depth, one, error / (whole.stiffness * depth - one.slope))
@@ -165,7 +164,9 @@ def _crossing(scene: Scene, whole: _Whole, low: float, high: float) -> float:
     def lacks(depth: float) -> float:
         return whole.energy(depth) - scene.blade.length * scene.tear(depth)
 
-    return float(brentq(lacks, max(low, _TINY * high), high)) if lacks(max(low, _TINY * high)) < 0 else low
+    return (
+        float(scipy.optimize.brentq(lacks, max(low, _TINY * high), high)) if lacks(max(low, _TINY * high)) < 0 else low
+    )
 
 
 def _between(before: Cutting, after: Cutting, depth: float) -> Cutting:
@@ -174,7 +175,7 @@ def _between(before: Cutting, after: Cutting, depth: float) -> Cutting:
     numbers = [name for name, value in vars(before).items() if isinstance(value, float)]
     mixed = {name: (1 - share) * getattr(before, name) + share * getattr(after, name) for name in numbers}
     ends = [before.depth, after.depth]
-    stored = CubicHermiteSpline(ends, [before.stored, after.stored], [before.elastic, after.elastic])
+    stored = scipy.interpolate.CubicHermiteSpline(ends, [before.stored, after.stored], [before.elastic, after.elastic])
     return replace(after, **(mixed | {"depth": depth, "stored": float(stored(depth))}))
 
 

@@ -3,9 +3,11 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from pipeline.files import result_files
 from pipeline.launcher import is_interrupt
 from pipeline.plan.plan import Plan
 from pipeline.report.dataset import build, write
+from pipeline.report.drawn import are_drawn, mark_of
 from pipeline.run.record import Record
 
 
@@ -23,17 +25,21 @@ class ResultsError(Exception):
 def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, str], output: Path) -> tuple[Path, ...]:
     """Write ``<study>.nc`` and its figure into ``output`` and return the files; ``attributes`` tell of the run.
 
+    A figure of the same numbers stays as it is.
+
     Raises:
         ResultsError: whatever keeps them from being made.
     """
     what = f"{output}: the results of {plan.study.file} cannot be"
-    path = output / f"{plan.study.name}.nc"
+    path, *figures = files = result_files(output, plan.study.name)
     try:
-        from pipeline.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)
-
         dataset = build(plan, records, attributes)
         write(dataset, path)
-        return (path, *draw(dataset, path.with_suffix("")))
+        if not are_drawn(figures, mark_of(dataset)):
+            from pipeline.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)
+
+            draw(dataset, path.with_suffix(""))
+        return tuple(files)
     except (OSError, RuntimeError) as error:  # of a full disk HDF5 tells the latter
         raise ResultsError(f"{what} written: {error}; all forces are on record", is_unwritable=True) from error
     except Exception as error:

@@ -1,0 +1,43 @@
+"""A figure's file names the numbers that it was drawn from: the same numbers are not drawn again."""
+
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+
+import xarray as xr
+
+from pipeline import __version__
+
+# What runs of the same records differ in, and no figure shows: when, where, and what was read back.
+_OF_THE_RUN = {"start", "end", "study_file", "study_folder", "reductions", "origin"}
+# PNG and SVG have their description within so many bytes of their beginning.
+_HEAD = 4096
+
+
+def mark_of(dataset: xr.Dataset) -> str:
+    """Return a hash of what figures of ``dataset`` show: its values and attributes, and the program's version."""
+    found = hashlib.sha256(repr((__version__, _shown(dataset.attrs))).encode())
+    for name in sorted(map(str, dataset.variables)):
+        if name not in _OF_THE_RUN:
+            variable = dataset.variables[name]
+            values = variable.values
+            found.update(repr((name, variable.dims, values.shape, str(values.dtype), _shown(variable.attrs))).encode())
+            found.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
+    return found.hexdigest()
+
+
+def are_drawn(files: Iterable[Path], mark: str) -> bool:
+    """Return whether all ``files`` are there, and were drawn from a dataset of this ``mark``."""
+    return all(_names(file, mark.encode()) for file in files)
+
+
+def _names(file: Path, mark: bytes) -> bool:
+    try:
+        with file.open("rb") as opened:
+            return mark in opened.read(_HEAD)
+    except OSError:
+        return False
+
+
+def _shown(attributes: dict[str, object]) -> list[tuple[str, object]]:
+    return sorted((str(name), value) for name, value in attributes.items() if name not in _OF_THE_RUN)
