@@ -148,6 +148,7 @@ FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
     "path_excess": ("path", path_excess),
     "retractor": ("retractor", of_kind("force")),
     "insertion": ("scalpel-path", of_kind("insertion")),
+    "insertion_epsilon": ("scalpel-epsilon", of_kind("insertion")),
     "deep": ("deep", deep),
     "large_depth": ("large_depth", of_kind("force")),
 }

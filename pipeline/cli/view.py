@@ -70,6 +70,11 @@ def view(
 
     Example: epsmesh view studies/figure3.toml 12 --export html
 
+    Of an insertion it writes a film of the path, <study>_<number>_path.gif, beside the dataset of a run: the deformed
+    section over depth, and F. With --export, or "stage=5 mm", one state is shown.
+
+    Example: epsmesh view studies/scalpel-path.toml
+
     A label map, before a study exists: a table of its labels, the section [body] of one, and a page with surfaces,
     slices and places to choose.
 
@@ -88,6 +93,13 @@ def view(
         fail(Fault(f"{option}: is for a label map; a study has it in [body]", key=option))
     (study,) = read_all([file])
     chosen = find_case(study, case or "0")
+    if study.is_insertion and not (mesh_only or export or "stage" in case):
+        from pipeline.cli.film import film
+
+        def solved(one: "Case", comm: "MPI.Comm") -> "Fields | None":
+            return fields_of(study, one, comm, mesh_only=False, export=None, meshes=meshes)
+
+        return film(study, chosen, output, solved)
     number = next(n for n, other in enumerate(study.cases()) if other.index == chosen.index)
     stem = output / f"{study.name}_{number}"
     missing = "" if export else _missing()

@@ -2,7 +2,7 @@
 
 At equal depth, the intact body stores U = k d² / 2. With a slit of area A in which the blade is, it stores U_slit.
 Tissue is pierced at the depth where U − U_slit = Γ A, at the slit for which that happens first: its front is where
-G = Γ, as in cutting. No threshold is fitted. Friction μ N acts on both flanks, N from the field without friction.
+G = Γ, as in cutting. No threshold is fitted. Friction acts on both flanks.
 """
 
 from dataclasses import dataclass, replace
@@ -13,6 +13,7 @@ import scipy  # which loads its parts when they are used: a run without an inser
 
 from pipeline.arrays import FloatArray
 from pipeline.insertion.cutting import Cutting, cuttings
+from pipeline.insertion.friction import rub
 from pipeline.insertion.states import Scene
 from pipeline.insertion.steps import CUTTING, INDENTATION, Step
 from pipeline.insertion.withdrawal import withdrawn
@@ -181,9 +182,9 @@ def _between(before: Cutting, after: Cutting, depth: float) -> Cutting:
 
 def _steps(scene: Scene, states: list[Cutting]) -> list[Step]:
     """Return the steps through ``states`` of cutting, the first of which is that after the puncture."""
-    friction = 2 * scene.blade.friction
     depths = np.array([one.depth for one in states])
-    rubs = np.array([friction * one.squeeze for one in states])
+    found = [rub(scene.blade, one.depth, one.squeeze, one.squeeze_error, inwards=True) for one in states]
+    rubs, uncertain = np.array(found).T
     rubbed = _sums(depths, rubs)
     worked = _work(scene, states)
     missed = [0.0 if _crosses(scene, *pair) else _defect(*pair) for pair in pairwise(states)]
@@ -195,7 +196,7 @@ def _steps(scene: Scene, states: list[Cutting]) -> list[Step]:
             elastic=one.elastic,
             cutting=one.cutting,
             friction=float(rubs[number]),
-            error=one.elastic_error + friction * one.squeeze_error + missed[number],
+            error=one.elastic_error + float(uncertain[number]) + missed[number],
             stored=one.stored,
             fracture=one.fracture,
             rubbed=float(rubbed[number]),

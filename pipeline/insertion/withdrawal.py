@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.insertion.cutting import Cutting
+from pipeline.insertion.friction import rub
 from pipeline.insertion.states import Scene
 from pipeline.insertion.steps import WITHDRAWAL, Step
 
@@ -21,7 +22,7 @@ _CHANGE_ERROR = 0.3
 
 @dataclass(frozen=True)
 class _Open:
-    """A blade at rest in a slit: ``ahead`` (m) of its tip, energy (J), and force (N) and normal force (N) with bars.
+    """A blade at rest in a slit: ``ahead`` (m) of its tip, energy (J), and force and friction (N) with bars.
 
     ``steady`` (N) is the force without that of the front at a fixed field.
     """
@@ -32,21 +33,21 @@ class _Open:
     steady: float
     elastic: float
     elastic_error: float
-    squeeze: float
-    squeeze_error: float
+    friction: float
+    friction_error: float
 
 
 def withdrawn(scene: Scene, states: list[Cutting], last: Step) -> list[Step]:
     """Return the steps of a withdrawal after the ``last`` step, through states of cutting from that depth up."""
     bends = np.gradient([state.field.bend for state in states], [state.depth for state in states])
     opened = [_open(scene, *each, last.crack_depth) for each in zip(states, bends.tolist(), strict=True)]
-    friction, length = 2 * scene.blade.friction, scene.blade.length
+    length = scene.blade.length
     work, rubbed, found = last.work, last.rubbed, []
     for number, one in enumerate(opened):
         if number:
             before = opened[number - 1]
             moved = before.state.depth - one.state.depth
-            rubs = friction * (one.squeeze + before.squeeze) / 2 * moved
+            rubs = (one.friction + before.friction) / 2 * moved
             released = sum(side.state.field.per_length(before.ahead, one.ahead) for side in (before, one)) / 2
             rubbed += rubs
             work += rubs - length * released - (one.steady + before.steady) / 2 * moved
@@ -55,8 +56,8 @@ def withdrawn(scene: Scene, states: list[Cutting], last: Step) -> list[Step]:
                 phase=WITHDRAWAL,
                 depth=one.state.depth,
                 elastic=one.elastic,
-                friction=-friction * one.squeeze,
-                error=one.elastic_error + friction * one.squeeze_error,
+                friction=-one.friction,
+                error=one.elastic_error + one.friction_error,
                 stored=one.stored,
                 fracture=last.fracture,
                 rubbed=rubbed,
@@ -73,6 +74,7 @@ def _open(scene: Scene, state: Cutting, bending: float, front: float) -> _Open:
     stored = state.stored - length * field.per_length(state.ahead, ahead)
     stored_error = state.stored_error + _FAR_ERROR * length * max(field.per_length(width, ahead), 0.0)
     pushed, changed = length * field.release(ahead), length * bending * field.by_bend(state.ahead, ahead)
+    friction = rub(scene.blade, state.depth, 2 * stored / width, 2 * stored_error / width, inwards=False)
     far_error = _FAR_ERROR * pushed if ahead > width else 0.0
     return _Open(
         state=state,
@@ -81,6 +83,6 @@ def _open(scene: Scene, state: Cutting, bending: float, front: float) -> _Open:
         steady=state.elastic + changed,
         elastic=state.elastic + changed + pushed,
         elastic_error=state.elastic_error + far_error + _CHANGE_ERROR * abs(changed),
-        squeeze=2 * stored / width,
-        squeeze_error=2 * stored_error / width,
+        friction=friction[0],
+        friction_error=friction[1],
     )

@@ -11,8 +11,8 @@ import numpy as np
 from pipeline.report.table import Table
 from pipeline.report.verdict import Verdict, choose, judge
 
-# The parameters of a scene that an answer is split by: how deep, and in what.
-DIMENSIONS = ("depth", "law")
+# The parameters of a scene that an answer is split by: how deep, and in what; of an insertion, what is judged.
+DIMENSIONS = ("depth", "law", "quantity")
 
 
 @dataclass(frozen=True)

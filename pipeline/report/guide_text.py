@@ -41,14 +41,15 @@ def answer(guide: Guideline) -> str:
         return _no_answer(guide)
     if not isfinite(guide.accuracy):
         return (
-            f"{_named(guide, chosen)} is the most accurate setting within {time(guide.budget)} a case: F is within "
-            f"{percent(chosen.error)} of {guide.reference}{_all(guide.scenes)}, {_bars(guide)}."
+            f"{_named(guide, chosen)} is the most accurate setting within {time(guide.budget)} a case: "
+            f"{_judged(guide)} within {percent(chosen.error)} of {_reference(guide)}{_all(guide.scenes)}, "
+            f"{_bars(guide)}."
         )
     smallest = "the smallest ε" if "epsilon" in chosen.labels else "the cheapest setting"
     allowed = " and ".join([percent(guide.accuracy), *([time(guide.budget)] if isfinite(guide.budget) else [])])
     return (
-        f"{_named(guide, chosen)} is {smallest} that suffices: F is within {percent(chosen.error)} of {guide.reference}"
-        f"{_all(guide.scenes)}, {_bars(guide)} ({allowed} allowed).{_untried(guide, chosen)}"
+        f"{_named(guide, chosen)} is {smallest} that suffices: {_judged(guide)} within {percent(chosen.error)} of "
+        f"{_reference(guide)}{_all(guide.scenes)}, {_bars(guide)} ({allowed} allowed).{_untried(guide, chosen)}"
     )
 
 
@@ -64,7 +65,8 @@ def _untried(guide: Guideline, chosen: Verdict) -> str:
 
 
 def _no_answer(guide: Guideline) -> str:
-    limits = [f"keeps F within {percent(guide.accuracy)} of {guide.reference}{_all(guide.scenes)}"]
+    what = "puncture and cutting" if _is_of_paths(guide) else "F"
+    limits = [f"keeps {what} within {percent(guide.accuracy)} of {_reference(guide)}{_all(guide.scenes)}"]
     limits = limits if isfinite(guide.accuracy) else []
     limits += [f"takes at most {time(guide.budget)} a case"] if isfinite(guide.budget) else []
     none = f"No mesh setting {' and '.join(limits)}"
@@ -97,9 +99,14 @@ def details(guide: Guideline) -> list[tuple[str, str]]:
     own = verdict.exact / verdict.force  # from a share of F_exact to one of F
     known = guide.reference == EXACT
     bars = (f" ± {percent(own * bar)}" if known else "" for bar in (verdict.force_bar, verdict.exact_bar))
-    force, exact = (f"{newton(f)}{bar}" for f, bar in zip((verdict.force, verdict.exact), bars, strict=True))
+    is_length = "depth" in str((verdict.limit or {}).get("quantity", ""))
+    write_one = millimetre if is_length else newton
+    force, exact = (f"{write_one(f)}{bar}" for f, bar in zip((verdict.force, verdict.exact), bars, strict=True))
+    found = (
+        f"{force}, {_reference(guide)} {exact}" if _is_of_paths(guide) else f"F = {force}, {guide.reference} = {exact}"
+    )
     return [
-        ("Worst case", f"F = {force}, {guide.reference} = {exact}{where}"),
+        ("Worst case", f"{found}{where}"),
         ("Cost", f"{cost(verdict)}, on {guide.timing}{' (times are doubtful)' if guide.doubts else ''}"),
         ("Mesh", elements(guide, verdict.mesh)),
     ]
@@ -165,7 +172,8 @@ def by_scene(guide: Guideline) -> list[str]:
         return []
     rows = [_by_scene_row(guide, part) for part in guide.parts]
     table = pd.DataFrame(rows).to_string(index=False).splitlines()
-    return [f"Smallest ε for F within {percent(guide.accuracy)} of {guide.reference}:", *table]
+    what = "what is judged" if _is_of_paths(guide) else "F"
+    return [f"Smallest ε for {what} within {percent(guide.accuracy)} of {_reference(guide)}:", *table]
 
 
 def _by_scene_row(guide: Guideline, part: Part) -> dict[str, str]:
@@ -273,6 +281,24 @@ def time(seconds: float) -> str:
 def newton(force: float) -> str:
     """Write a force in mN."""
     return f"{1e3 * force:.4g} mN"
+
+
+def millimetre(length: float) -> str:
+    """Write a length in mm."""
+    return f"{1e3 * length:.4g} mm"
+
+
+def _is_of_paths(guide: Guideline) -> bool:
+    """Tell whether paths of insertions are judged: by force and depth of the puncture, and by the last force."""
+    return "quantity" in guide.axes
+
+
+def _judged(guide: Guideline) -> str:
+    return "puncture and cutting are" if _is_of_paths(guide) else "F is"
+
+
+def _reference(guide: Guideline) -> str:
+    return "the full order" if _is_of_paths(guide) else guide.reference
 
 
 def _named(guide: Guideline, verdict: Verdict) -> str:

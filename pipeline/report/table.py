@@ -233,7 +233,8 @@ def _mesh(dataset: xr.Dataset, study: Study | None, labels: Labels) -> Labels:
         return dict(labels)
     mesh = case.mesh
     if mesh.accuracy is not None:
-        return {"accuracy": mesh.accuracy, "outside": mesh.outside}
+        own = {"epsilon": mesh.epsilon} if "epsilon" in labels else {}
+        return {"accuracy": mesh.accuracy, **own, "outside": mesh.outside}
     outside = {"outside": mesh.outside} if not isinf(mesh.epsilon) else {}
     return {
         "epsilon": mesh.epsilon,

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 # Tissue that must be left beside the path of the tip: widths of the blade.
 ROOM = 2.0
+# Largest coefficient of friction, whose reaction on the pressure is still a correction.
+_MOST_FRICTION = 1.0
 
 
 def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
@@ -33,6 +35,7 @@ def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
     if len(problems.errors) == before and isinstance(body, Layered):
         _check_end(body, blade, insertion, problems)
         _check_layers(body, blade, insertion, problems)
+        _warn_of_tougher_layers(body, blade, insertion, problems)
         if insertion.withdraw and body.layer:
             problems.error(
                 "probe.insertion.withdraw", True, "withdrawal is computed in a body of one material: omit it, or layers"
@@ -59,6 +62,13 @@ def _check_keys(probe: "Blade", problems: Problems) -> None:
         )
     if not isfinite(probe.friction):
         problems.error("probe.friction", STICK, "a blade that is inserted slides: give a coefficient, such as 0.2")
+    elif probe.friction > _MOST_FRICTION:
+        problems.error(
+            "probe.friction",
+            probe.friction,
+            f"must be at most {_MOST_FRICTION:g} for a blade that is inserted: beyond, its drag more than doubles the "
+            "pressure on its own flanks",
+        )
 
 
 def _check_end(body: Layered, probe: "Blade", insertion: Insertion, problems: Problems) -> None:
@@ -80,6 +90,21 @@ def _check_end(body: Layered, probe: "Blade", insertion: Insertion, problems: Pr
             f"leaves less than {in_mm(room)}, two widths of the blade, beside its ends: use a shorter blade, or a "
             "larger body",
         )
+
+
+def _warn_of_tougher_layers(body: Layered, probe: "Blade", insertion: Insertion, problems: Problems) -> None:
+    """Warn of layers that the tip reaches and that are tougher than those above: they would be indented first."""
+    top, own = body.heights[1], probe.toughness or 0.0
+    tough = [layer.toughness or own for layer in body.layer]
+    tough += [] if body.is_filled else [own]
+    for number, end in enumerate(body.interfaces, start=1):
+        if top - end < insertion.to and tough[number] > tough[number - 1]:
+            problems.warn(
+                "probe.insertion",
+                None,
+                f"at {in_mm(top - end)} the tissue below is tougher: it is cut where the tip reaches it, and the peak "
+                "of F by its own indentation is not computed",
+            )
 
 
 def _check_layers(body: Layered, probe: "Blade", insertion: Insertion, problems: Problems) -> None:

@@ -6,13 +6,16 @@ import sqlite3
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import pipeline
 from pipeline.files import STORE_NAME
+from pipeline.insertion.friction import reaction
 from pipeline.insertion.steps import PHASES
 from pipeline.plan.plan import make_plan
 from pipeline.report.read import read_file
 from pipeline.study.toml import to_toml
+from pipeline.view.film import frames_of
 
 STUDY = {
     "title": "A blade through a pad",
@@ -85,3 +88,29 @@ def test_plan_tells_what_the_path_costs(epsmesh, tmp_path):
     file.write_text(to_toml(STUDY, str(file)))
     found = json.loads(epsmesh("plan", file, "--output", tmp_path, "--json").stdout)
     assert (found["cases"], found["solves"]) == (1, 4) and found["seconds"] > 0
+
+
+def test_drag_presses_the_flanks_as_those_of_a_slit_that_sticks(tmp_path):
+    """κ is twice the ratio of two stiffnesses of a bonded slit: between opening and drag, and along the drag."""
+    blade = {key: STUDY["probe"][key] for key in ("shape", "length", "width")}
+    slit = {"contact": "bonded", "incision": "2.8 mm", "ahead": "0.8 mm", "depth": ["0.02 mm", "0.4 mm"]}
+    study = STUDY | {"probe": blade | slit, "solve": {"exact": False}}
+    force = pipeline.read(study).run(output=tmp_path)["force"]
+    along = float(force.diff("depth").item() / force["depth"].diff("depth").item())
+    opened = float(force[0]) - along * 0.02e-3
+    assert 2 * opened / (0.8e-3 * along) == pytest.approx(reaction(2e-3, 6e-3), rel=0.1)
+
+
+def test_view_writes_a_film_of_the_path(ran, epsmesh):
+    """Its frames are the steps, and both sides of the puncture; the last one stays."""
+    folder, _ = ran
+    done = epsmesh("view", folder / "pad.toml", "--output", folder)
+    assert done.exit_code == 0, done.stderr
+    with Image.open(folder / "pad_0_path.gif") as film:
+        assert film.n_frames >= 5
+        film.seek(3)
+        drawn = np.asarray(film.convert("L"))
+    assert drawn.std() > 20
+    read = read_file(folder / "pad.nc")
+    phases = [frame.phase for frame in frames_of(read)]
+    assert phases == ["indentation", "puncture", "cutting", "cutting", "cutting"]

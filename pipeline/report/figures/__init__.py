@@ -22,7 +22,7 @@ from pipeline.report.figures.map import force_map
 from pipeline.report.figures.ratio import ratio, ratio_facets
 from pipeline.report.figures.style import STYLE, add_note, save
 from pipeline.report.table import study_of, warnings_of
-from pipeline.report.values import at_peak, has_path
+from pipeline.report.values import at_peak, has_path, of_path
 from pipeline.report.words import is_numeric, without_shared
 from pipeline.states import FAILED, LOST, PARTIAL, PENDING, SKIPPED
 from pipeline.study.vocabulary import FIGURES
@@ -64,7 +64,7 @@ def choose(dataset: xr.Dataset) -> list[str]:
     if not _known(dataset, "force"):
         return ["nothing"]
     is_over_time, is_path = "time" in dataset.dims, has_path(dataset)
-    dataset = at_peak(dataset)
+    dataset = _still(dataset)
     is_of_depth = dataset.sizes.get("depth", 0) > 1
     suits = {
         "insertion": is_path,
@@ -74,7 +74,7 @@ def choose(dataset: xr.Dataset) -> list[str]:
         "error": is_meshed(dataset) and (_known(dataset, "force_exact_ratio") or _known(dataset, "force_ratio")),
         "map": all(dataset.sizes.get(name, 0) > 1 for name in ("x", "y")),
     }
-    kinds = [*(kind for kind, is_suited in suits.items() if is_suited), "force"]
+    kinds = [*(kind for kind, is_suited in suits.items() if is_suited), *([] if is_path else ["force"])]
     kinds += ["compliance"] if "ratio" in kinds and tool_dimension(dataset) else []
     study = study_of(dataset)
     asked = study.drawing.kind if study else "auto"
@@ -131,7 +131,7 @@ def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
     """Draw the figure of one ``kind``, with the study's title or without."""
     title = _plain(str(dataset.attrs.get("title", ""))) if titled else ""
     with mpl.rc_context(STYLE):
-        shown = dataset if kind in _OVER_TIME else at_peak(dataset)
+        shown = dataset if kind in _OVER_TIME else _still(dataset)
         missing = _missing(dataset)
         drawn = _DRAWN[kind](_with_short_names(shown), title, missing)
         if titled and (warnings := warnings_of(dataset)):
@@ -139,8 +139,13 @@ def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
     return drawn
 
 
+def _still(dataset: xr.Dataset) -> xr.Dataset:
+    """Return what figures without time show: the largest force; of an insertion, what its path is judged by."""
+    return of_path(dataset) if has_path(dataset) else at_peak(dataset)
+
+
 def _rest(dataset: xr.Dataset, kind: str) -> list[tuple[str, xr.Dataset]]:
-    dataset = at_peak(dataset)
+    dataset = _still(dataset)
     return list(rest(dataset, _FACETS[kind](dataset))) if kind in _FACETS else []
 
 

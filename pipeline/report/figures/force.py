@@ -34,7 +34,7 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     tells = "The force against each quantity that the study varies; bars are 95\N{NO-BREAK SPACE}% error bars."
     more = f"Not shown: against {', '.join(map(symbol, dims[_MOST_PANELS:]))}." if dims[_MOST_PANELS:] else ""
     quantities = ["force", *(name for name in _WITH_FORCE if _varies(dataset, name))]
-    return columns(dataset, shown, quantities, (title, tells, more, warning))
+    return _columns(dataset, shown, quantities, (title, tells, more, warning))
 
 
 def history(dataset: xr.Dataset, title: str, warning: str) -> Figure:
@@ -43,10 +43,10 @@ def history(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     tells = "The force over time; bars are 95\N{NO-BREAK SPACE}% error bars."
     names = ("status", *quantities)
     dataset = dataset.assign({name: by_case(dataset, name) for name in names})
-    return columns(dataset, ["time"], quantities, (title, tells, "", warning))
+    return _columns(dataset, ["time"], quantities, (title, tells, "", warning))
 
 
-def columns(dataset: xr.Dataset, shown: list[str], quantities: list[str], words: tuple[str, str, str, str]) -> Figure:
+def _columns(dataset: xr.Dataset, shown: list[str], quantities: list[str], words: tuple[str, str, str, str]) -> Figure:
     """Draw quantities against each dimension ``shown``; ``words`` are title, caption, what is not shown, warning."""
     title, tells, more, warning = words
     exact_bar = relative(dataset, "force_exact_error")

@@ -7,10 +7,10 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.report.figures.facets import swept
-from pipeline.report.figures.force import columns
-from pipeline.report.figures.style import COLOURS, GRID, LINE, WIDTH, finish, new_figure
-from pipeline.report.values import by_case
+from pipeline.report.figures.curves import BARS, grid, share
+from pipeline.report.figures.facets import arrange, swept
+from pipeline.report.figures.style import COLOURS, GRID, LINE, WIDTH, finish, look, new_figure
+from pipeline.report.words import choices
 
 _HEIGHT = 5.2  # inches
 _PARTS = ("force_cutting", "force_friction", "force_elastic")
@@ -20,7 +20,9 @@ _WIDE = 0.2
 # Share of the largest force below zero that is drawn.
 _LOW = 0.1
 _LABELS = ("cutting", "friction", "elastic")
-_OF_SEVERAL = "The force over depth, up to the last one that was solved; bars are 95\N{NO-BREAK SPACE}% error bars."
+_OF_SEVERAL = "The force over depth; markers are the punctures. Bands and bars are 95\N{NO-BREAK SPACE}% error bars."
+# Curves, columns and rows of a figure of several cases, and what is a curve first.
+_MOST, _CURVES = (6, 3, 1), ("epsilon", "friction", "toughness", "poisson", "law")
 _CAPTION = (
     "Parts of the force, and of the work, one on top of the other: what they do not fill is the error of the balance "
     "of energies. Grey band: 95 % error bar of F."
@@ -32,14 +34,12 @@ def insertion(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     back = dataset.isel(stroke=-1) if "stroke" in dataset.dims else None
     dataset = dataset if back is None else dataset.isel(stroke=0)
     if len(swept(dataset)) > 1:
-        names = ("status", "force", "force_exact_ratio", "force_exact_error")
-        dataset = dataset.assign({name: by_case(dataset, name) for name in names})
-        return columns(dataset, ["depth"], ["force"], (title, _OF_SEVERAL, "", warning))
+        return _several(dataset, title, warning)
     dataset = dataset.squeeze(list(dataset["status"].dims), drop=True)
     figure = new_figure(WIDTH, _HEIGHT)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-    depth = 1e3 * _along(dataset, "depth")
-    force, bar = (1e3 * _along(dataset, name) for name in ("force", "force_error"))
+    depth = 1e3 * along_path(dataset, "depth")
+    force, bar = (1e3 * along_path(dataset, name) for name in ("force", "force_error"))
     _stack(above, dataset, _PARTS, 1e3)
     above.fill_between(depth, force - bar, force + bar, color=GRID)
     above.plot(depth, force, color=LINE, label="F")
@@ -51,7 +51,7 @@ def insertion(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         above.axhline(0, color=LINE, linewidth=0.6)
     above.set_ylabel("force (mN)")
     _stack(below, dataset, _ENERGIES, 1e3)
-    below.plot(depth, 1e3 * _along(dataset, "work"), color=LINE, linestyle="--", label="work of the tool")
+    below.plot(depth, 1e3 * along_path(dataset, "work"), color=LINE, linestyle="--", label="work of the tool")
     below.set_ylabel("energy (mJ)")
     below.set_xlabel("depth of the tip (mm)")
     _name_phases(above, dataset)
@@ -59,7 +59,35 @@ def insertion(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     return figure
 
 
-def _along(dataset: xr.Dataset, name: str) -> np.ndarray:
+def _several(dataset: xr.Dataset, title: str, warning: str) -> Figure:
+    """Draw F over depth of several cases, with the puncture of each: curves, in columns."""
+    facets = arrange(dataset, ["force", "puncture_depth"], "depth", most=_MOST, first=_CURVES)
+    figure, panels = grid(dataset, facets, ["force"])
+    for panel in panels:
+        for position, curve in enumerate(facets.curves):
+            one = panel.data.sel(curve)
+            style = look(position)
+            depth, force, bar = (along_path(one, name) for name in ("depth", "force", "force_error"))
+            color, label = style["color"], choices(dataset, curve) or "F"
+            panel.ax.fill_between(1e3 * depth, 1e3 * (force - bar), 1e3 * (force + bar), color=color, alpha=0.15)
+            panel.ax.plot(1e3 * depth, 1e3 * force, **(style | {"marker": "none"}), label=label)
+            at = {name: 1e3 * float(one[f"puncture_{name}"]) for name in ("depth", "force")}
+            bars = {name: 1e3 * float(one[f"puncture_{name}_error"]) for name in at}
+            panel.ax.errorbar(
+                [at["depth"]],
+                [at["force"]],
+                [bars["force"]],
+                [bars["depth"]],
+                **(style | {"linestyle": "none"}),
+                **BARS,
+            )
+    share(panels, facets)
+    panels[0].ax.set_ylim(bottom=0)
+    finish(figure, title, f"{_OF_SEVERAL} {facets.note}".strip(), warning)
+    return figure
+
+
+def along_path(dataset: xr.Dataset, name: str) -> np.ndarray:
     """Return values along the path, with those of the first touch and of both sides of the puncture."""
     depths, at = dataset["depth"].values, float(dataset["puncture_depth"])
     own = np.full(2, at) if name == "depth" else dataset[f"{name}_at_puncture"].values
@@ -69,8 +97,8 @@ def _along(dataset: xr.Dataset, name: str) -> np.ndarray:
 
 
 def _stack(ax: Axes, dataset: xr.Dataset, names: Sequence[str], factor: float) -> None:
-    parts = [factor * _along(dataset, name) for name in names]
-    ax.stackplot(1e3 * _along(dataset, "depth"), parts, labels=_LABELS, colors=COLOURS[1:4], alpha=0.5, linewidth=0)
+    parts = [factor * along_path(dataset, name) for name in names]
+    ax.stackplot(1e3 * along_path(dataset, "depth"), parts, labels=_LABELS, colors=COLOURS[1:4], alpha=0.5, linewidth=0)
 
 
 def _name_phases(ax: Axes, dataset: xr.Dataset) -> None:
