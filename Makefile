@@ -118,7 +118,7 @@ plain-loop: setup ## compare a plain FEniCSx script of a study with this program
 realtime: setup ## build the real-time evaluator in C; test it in C, C++ and Python, and with sanitizers
 	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic -fPIC -shared realtime/epsmesh.c -o realtime/libepsmesh.so -lm
 	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic realtime/epsmesh.c realtime/latency.c -o realtime/latency -lm
-	$(PYTHON) -m pytest tests/realtime $(PYTEST_ARGS)
+	$(PYTHON) -m pytest tests/realtime realtime/tests $(PYTEST_ARGS)
 
 wasm: ## build the evaluator for the page of `epsmesh touch`, after a change of realtime/ (installs clang and lld)
 	@scripts/setup.sh clang lld

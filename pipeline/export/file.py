@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from epsmesh_realtime.evaluator import Evaluator
-from epsmesh_realtime.file import pack, unpack
+from epsmesh_realtime.file import ModelError, pack, unpack
 from epsmesh_realtime.model import Model, about
 from epsmesh_realtime.surface import SurfaceTable
 from pipeline.arrays import FloatArray
@@ -76,4 +76,7 @@ def open_model(path: Path) -> xr.Dataset:
     found.pop("about", None)
     dimensions = {name: ("check",) if name.startswith(_CHECK) else _DIMENSIONS.get(name, ()) for name in found}
     variables = {name: (dimensions[name], values, {"units": _UNITS.get(name, "1")}) for name, values in found.items()}
-    return xr.Dataset(variables, attrs=texts).copy(deep=True)
+    try:
+        return xr.Dataset(variables, attrs=texts).copy(deep=True)
+    except ValueError as problem:  # checks are read here alone
+        raise ModelError(f"the file is damaged: {problem}") from problem

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from epsmesh_realtime.evaluator import MOST_TOOLS, Array, Evaluator, Spot
-from epsmesh_realtime.file import unpack
+from epsmesh_realtime.file import ModelError, unpack
 from epsmesh_realtime.query import Query, packed_each
 from epsmesh_realtime.table import Face, Pairs, Table
 from epsmesh_realtime.touch import Touch, Touches
@@ -189,5 +189,17 @@ def _relaxation(found: Mapping[str, NDArray[Any]]) -> tuple[tuple[float, float],
 
 
 def about(found: Mapping[str, NDArray[Any]]) -> dict[str, str]:
-    """Return the texts in a file's arrays: body, tools, version and study."""
-    return dict(json.loads(found["about"].tobytes())) if "about" in found else {}
+    """Return the texts in a file's arrays: body, tools, version and study.
+
+    Raises:
+        ModelError: if they are no JSON object of texts.
+    """
+    if "about" not in found:
+        return {}
+    try:
+        texts = json.loads(found["about"].tobytes())
+    except (ValueError, RecursionError):
+        texts = None
+    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
+        raise ModelError("about is no JSON object of texts: the file is damaged")
+    return texts

@@ -33,12 +33,12 @@ static void file_open(file *f, const void *data, size_t size) {
     if (!data || size < sizeof head) return;
     memcpy(&head, data, sizeof head);
     if (memcmp(head.magic, "epsmesh", 8)) return;
+    f->flaw = EPSMESH_HEADER; /* a machine of the other byte order reads another number, too */
+    if (head.order != FILE_ORDER) return;
     f->flaw = EPSMESH_VERSION;
     if (head.version != FILE_VERSION) return;
     f->flaw = (uintptr_t)data % 8 ? EPSMESH_UNALIGNED : EPSMESH_CUT;
     if (f->flaw == EPSMESH_UNALIGNED || head.size != size || head.count > (size - sizeof head) / sizeof(file_array)) return;
-    f->flaw = EPSMESH_HEADER; /* a machine of the other byte order reads another number, too */
-    if (head.order != FILE_ORDER) return;
     f->count = head.count, f->flaw = EPSMESH_SOUND;
 }
 

@@ -14,6 +14,7 @@ from epsmesh_realtime import ModelError
 from epsmesh_realtime import read as read_model
 from pipeline.experiment.read import read_curve
 from pipeline.experiment.reading import ExperimentError, Reading
+from pipeline.export.file import open_model
 from pipeline.plan.plan import make_plan
 from pipeline.run.reading import known_of, open_to_read, read_rows
 from pipeline.run.record import Record
@@ -133,10 +134,11 @@ def test_a_point_that_is_none_is_named(point):
 def test_models(good, thrown_at, data):
     file = thrown_at / "box.epsm"
     file.write_bytes(data.draw(damaged((good / "box.epsm").read_bytes())))
-    try:
-        read_model(file)
-    except ModelError as refused:
-        readable(refused)
+    for reader in (read_model, open_model):
+        try:
+            reader(file)
+        except ModelError as refused:
+            readable(refused)
 
 
 @given(data=st.data())

@@ -5,13 +5,15 @@ from math import nan, pi, tan
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.special import ellipe, ellipk
 
+import pipeline
 from epsmesh_realtime import Model, ModelError
 from epsmesh_realtime.file import pack, unpack
 from epsmesh_realtime.model import about, model_of
 from pipeline.verify import known
-from tests.realtime.synthetic import of_place, random_model, write_random
+from tests.realtime.synthetic import of_place, random_model, write_random, write_surface
 
 TOOLS = (
     ("disc", {"radius": 2e-3}),
@@ -275,6 +277,9 @@ def test_a_model_has_the_numbers_of_its_file(tmp_path):
     for name, values in numbers.items():
         np.testing.assert_array_equal(values, found[name])
     assert about(found) == {"title": "random"}
+    for text in (b"[" * 100_000, b"[1]", b'{"title": 1}', b"\xff"):
+        with pytest.raises(ModelError, match="about"):
+            about({"about": np.frombuffer(text, np.uint8)})
     for name, values in (("a" * 32, 1.0), ("empty", np.zeros(0)), ("deep", np.zeros((1,) * 5))):
         with pytest.raises(ValueError, match=name):
             pack({name: values})
@@ -305,3 +310,21 @@ def test_queries_whose_shapes_do_not_go_together_are_refused():
     for at, depth in ((np.zeros((4, 3)), np.zeros(5)), (np.zeros((4, 2)), 1e-4), (np.zeros((2, 2, 3)), 1e-4)):
         with pytest.raises(ValueError, match="shape"):
             random_model().query_each("disc", at=at, depth=depth, radius=1e-3)
+
+
+@pytest.mark.parametrize("kind", [{}, {"is_round": True}, {"curved": True}])
+def test_a_model_is_a_dataset_too(tmp_path, kind):
+    path = tmp_path / "model.epsm"
+    surface = write_surface(path, **kind)
+    dataset = pipeline.open(path)
+    dataset.to_netcdf(tmp_path / "model.nc")
+    with xr.open_dataset(tmp_path / "model.nc") as again:
+        xr.testing.assert_equal(again.load(), dataset)
+    assert dataset.attrs["title"] == "random"
+    assert (dataset["young"].item(), dataset["young"].units) == (surface.model.young, "Pa")
+    assert dataset["reciprocal"].dims == ("poisson_node", "v", "u")
+    assert dataset["surface_modes"].dims == ("vertex", "component", "mode")
+    arrays = unpack(path.read_bytes())
+    path.write_bytes(pack(arrays | {"check_x": np.zeros(3), "check_y": np.zeros(4)}))
+    with pytest.raises(ModelError, match="damaged"):
+        pipeline.open(path)
