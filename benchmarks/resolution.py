@@ -22,7 +22,7 @@ from pipeline.api import RunnableStudy
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.report.figures import STYLE, save
 from pipeline.report.figures.style import WIDTH, finish, look, new_figure
-from pipeline.shapes.files.image import march
+from pipeline.shapes.files.label_surface import march
 from pipeline.shapes.files.shells import largest_shell
 from pipeline.shapes.triangles import enclosed
 from pipeline.study.problems import StudyError

@@ -16,7 +16,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.files import atomic
-from pipeline.shapes.files.image import surface_of
+from pipeline.shapes.files.label_surface import surface_of
 from pipeline.shapes.files.labels import LabelMap
 from pipeline.shapes.files.stl import written
 from pipeline.shapes.triangles import Triangles

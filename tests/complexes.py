@@ -6,6 +6,8 @@ import numpy as np
 
 from pipeline.shapes.complex import OUTSIDE, Complex
 from pipeline.shapes.files.labels import LabelMap
+from pipeline.shapes.files.loaded import Loaded
+from pipeline.shapes.files.partition import partition_of
 from pipeline.shapes.triangles import half_edges
 
 AXES = np.array([36.0, 27.0, 20.0])  # mm
@@ -23,6 +25,11 @@ def scene(spacing: tuple[float, float, float]) -> LabelMap:
     labels[(((x - CENTRE) / INNER) ** 2).sum(axis=-1) < 1] = 7
     labels[(labels == 1) & (x[..., 0] > 18)] = 5
     return LabelMap(labels, 1e-3 * np.column_stack([np.diag(steps), origin]))
+
+
+def parted(image: LabelMap, *labels: int, smooth: float | None = None, offset: float = 0.0) -> Loaded:
+    """Return the surfaces between labels, all with the same filter (m)."""
+    return partition_of(image, [(label, smooth) for label in labels], offset)
 
 
 def are_closed(facets, sides, regions) -> bool:

@@ -216,11 +216,19 @@ def _distance(point: Vector, unit: float) -> str:
 
 
 def _nearest(body: Body, piece: Embedded) -> tuple[Vector, float]:
-    """Return the point of an embedded region that is nearest to anything else, and its distance (m) from that."""
-    points = piece.surface.sample(_POINTS)
-    rooms: list[FloatArray] = [body.inside(points)]
+    """Return the point of an embedded region that is nearest to anything else, and its distance (m) from that.
+
+    Regions that may meet, and meet the body's surface, need no elements between them.
+    """
+    points, meeting = piece.surface.sample(_POINTS), body.meeting
+    meets = piece in meeting
+    rooms: list[FloatArray] = [np.full(len(points), body.extent)] if meets else [body.inside(points)]
     rooms += [np.abs(points[:, 2] - height) for height in body.interfaces]
-    rooms += [other.surface.distance(points) for other in body.embedded if other is not piece]
+    rooms += [
+        other.surface.distance(points)
+        for other in body.embedded
+        if other is not piece and not (meets and other in meeting)
+    ]
     room = np.min(rooms, axis=0)
     x, y, z = map(float, points[int(np.argmin(room))])
     return (x, y, z), float(room.min())

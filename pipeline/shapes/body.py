@@ -76,6 +76,11 @@ class Body(Section, ABC):
         return tuple(piece for piece in self.regions if isinstance(piece, Embedded))
 
     @property
+    def meeting(self) -> tuple[Embedded, ...]:
+        """Those of the embedded regions that may meet each other and the body's surface."""
+        return ()
+
+    @property
     def interfaces(self) -> tuple[float, ...]:
         """Heights z (m) of the interfaces between layers of different materials, from the top down."""
         return ()

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.shapes.triangles import Triangles, enclosed
+from pipeline.shapes.triangles import Triangles
 
 # Number of what is outside of the body, and of the body's own tissue; regions follow from 1.
 OUTSIDE, TISSUE = -1, 0
@@ -76,7 +76,14 @@ class Complex:
     @cached_property
     def skin(self) -> Triangles:
         """The body's surface."""
-        used, corners = np.unique(self.boundary(OUTSIDE)[:, ::-1], return_inverse=True)
+        return self._surface(self.boundary(OUTSIDE)[:, ::-1])
+
+    def surface(self, region: int) -> Triangles:
+        """Return the surface of a region."""
+        return self._surface(self.boundary(region))
+
+    def _surface(self, facets: IntArray) -> Triangles:
+        used, corners = np.unique(facets, return_inverse=True)
         return Triangles(self.points[used], corners.reshape(-1, 3))
 
     def walls(self) -> tuple[IntArray, IntArray]:
@@ -93,5 +100,4 @@ class Complex:
 
     def volume(self, region: int) -> float:
         """Return the volume (m³) of a region."""
-        used, corners = np.unique(self.boundary(region), return_inverse=True)
-        return enclosed(self.points[used], corners.reshape(-1, 3))
+        return self.surface(region).volume

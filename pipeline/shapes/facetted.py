@@ -13,6 +13,7 @@ from pipeline.shapes.closed import Closed
 from pipeline.shapes.complex import Complex
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.rays import nearest_point, pierce
+from pipeline.shapes.regions import Embedded
 from pipeline.shapes.section import in_mm
 from pipeline.shapes.shell import Shell
 from pipeline.shapes.skin import Skin
@@ -36,6 +37,13 @@ class Facetted(Body):
     def partition(self) -> Complex | None:
         """The surface with those between its regions (m), if regions meet it or each other."""
         return None
+
+    @property
+    def meeting(self) -> tuple[Embedded, ...]:
+        """The regions of its partition."""
+        numbers = () if self.partition is None else self.partition.regions.tolist()
+        found = (piece for number, piece in enumerate(self.regions, start=1) if number in numbers)
+        return tuple(piece for piece in found if isinstance(piece, Embedded))
 
     # ---- size -----------------------------------------------------------------------------------------
 

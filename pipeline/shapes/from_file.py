@@ -2,12 +2,13 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import PrivateAttr, ValidationInfo, field_serializer, field_validator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.complex import Complex
+from pipeline.shapes.complex import TISSUE, Complex
 from pipeline.shapes.facetted import Facetted
 from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.section import Words
@@ -16,6 +17,7 @@ from pipeline.shapes.triangles import SurfaceError, Triangles
 
 # Increase by hand when the same file gives another place, mesh or force: older records are then not used.
 _VERSION = 2
+_FEW = 32  # cached surfaces between regions
 
 
 class FromFile(Facetted):
@@ -94,9 +96,16 @@ class FromFile(Facetted):
     @property
     def partition(self) -> Complex | None:
         """The surface, and those between its regions, if they meet."""
-        return self._loaded.partition
+        partition = self._loaded.partition
+        labelled = [n for n, piece in enumerate(self.regions, start=1) if getattr(piece, "label", None) is not None]
+        return None if partition is None else _renumbered(partition, (TISSUE, *labelled))
 
     @property
     def notices(self) -> tuple[str, ...]:
         """Notices about changes to the surface, and to those of its regions, that the author should know."""
         return *self._loaded.notices, *super().notices
+
+
+@lru_cache(_FEW)
+def _renumbered(partition: Complex, numbers: tuple[int, ...]) -> Complex:
+    return partition.renumbered(numbers)

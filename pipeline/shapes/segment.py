@@ -94,9 +94,9 @@ class Segment(Embedded):
         if self.file is not None and self.unit is not None:
             self.load(_read(self.file, dict(self)))
 
-    def load(self, found: Loaded) -> None:
-        """Set its surface."""
-        self._loaded, self._surface = found, shell_of(found.triangles)
+    def load(self, found: Loaded, *, is_part: bool = False) -> None:
+        """Set its surface; it ``is_part`` of a body whose regions meet."""
+        self._loaded, self._surface = found, shell_of(found.triangles, is_part)
 
     @property
     def surface(self) -> Shell:
@@ -126,9 +126,9 @@ class Segment(Embedded):
 
 
 @lru_cache(_FEW)
-def shell_of(triangles: Triangles) -> Shell:
+def shell_of(triangles: Triangles, is_part: bool) -> Shell:
     """Return the surface with its search tree."""
-    return Shell(triangles)
+    return Shell(triangles, is_part=is_part)
 
 
 def _read(file: str, given: Mapping[str, Any]) -> Loaded:

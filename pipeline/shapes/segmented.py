@@ -31,7 +31,10 @@ class Segmented(FromFile):
     offset: Annotated[
         Coordinate,
         Field(exclude=True),
-        Words("Shift of the body's surface outward, inward if negative. Regions inside stay.", '"0.5 mm"'),
+        Words(
+            "Shift of the body's surface outward, inward if negative. Regions inside stay; labels there follow.",
+            '"0.5 mm"',
+        ),
     ] = 0.0
     boundary_uncertainty: Annotated[
         Annotated[str, AfterValidator(_half_range)] | None,

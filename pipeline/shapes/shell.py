@@ -14,6 +14,8 @@ from pipeline.shapes.triangles import Triangles, doubled_normals
 # Points at which the thickness is found. The tenth of the surface where it is thinnest counts as no thinner than the
 # rest: edges, tips and noise.
 _POINTS, _THIN = 4000, 0.1
+# The same for a region that meets others: along every junction it is a wedge.
+_THIN_PART = 0.4
 # Rounds in which a ball inside the surface shrinks until it contains no other point: three or four suffice for most.
 _ROUNDS = 30
 # A ball ends at points of which its centre sees the first one under a larger angle (cosine); nearer ones are noise.
@@ -28,12 +30,13 @@ _PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 class Shell(Closed):
-    """The closed surface of ``triangles``."""
+    """The closed surface of ``triangles``, which ``is_part`` of a body whose regions meet, or not."""
 
     LEAST: ClassVar[str] = "half of its thickness"
 
-    def __init__(self, triangles: Triangles):
+    def __init__(self, triangles: Triangles, *, is_part: bool = False):
         self.triangles = triangles
+        self._thin = _THIN_PART if is_part else _THIN
         self._skin = Skin(triangles)
 
     # ---- surface --------------------------------------------------------------------------------------
@@ -83,7 +86,7 @@ class Shell(Closed):
         """Points (n, 3) on it, and half of the thickness (n) inside it there, both in m.
 
         That is the radius of the largest ball inside that touches the surface there (J. Ma, S. Bae, S. Choi, The Visual
-        Computer 28, 2012), without those between neighbouring points. It is at least that of nine tenths of the points.
+        Computer 28, 2012), without those between neighbouring points. It is at least that of most of the points.
         """
         from scipy.spatial import cKDTree  # noqa: PLC0415 (only when a file is read)
 
@@ -107,7 +110,7 @@ class Shell(Closed):
             goes_on = shorter & (angle < _APART)
             shrinks = shrinks[goes_on]
             radius[shrinks] = smaller[goes_on]
-        return points, np.maximum(radius, np.quantile(radius, _THIN))
+        return points, np.maximum(radius, np.quantile(radius, self._thin))
 
     @cached_property
     def _normals(self) -> FloatArray:

@@ -12,6 +12,8 @@ from pipeline.arrays import FloatArray
 from pipeline.quantities import RESERVED
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.closed import Closed
+from pipeline.shapes.complex import OUTSIDE
+from pipeline.shapes.facetted import Facetted
 from pipeline.shapes.regions import Embedded, Inclusion
 from pipeline.shapes.section import Section, in_mm
 from pipeline.shapes.segment import Segment
@@ -163,7 +165,10 @@ def _check_room(body: Body, problems: Problems) -> None:
     """Report embedded regions without room for an element around them."""
     first = len(body.regions) - len(body.embedded)
     pieces = list(zip(body.embedded, body.places[first:], strict=True))
+    meeting = body.meeting
     for piece, place in pieces:
+        if piece in meeting:
+            continue
         surface, (key, found) = piece.surface, _place_of(piece, place)
         gap, why = GAP * surface.least, f"a tenth of {surface.LEAST}"
         if (room := body.room(surface)) < gap:
@@ -183,7 +188,10 @@ def _check_room(body: Body, problems: Problems) -> None:
                     f"{piece.name} must be at least {in_mm(gap)} ({why}) from the end of a layer, at z = "
                     f"{in_mm(height)}; {_distance(room)}",
                 )
+    _check_cavities(body, body.places, problems)
     for (one, first_place), (other, place) in itertools.combinations(pieces, 2):
+        if one in meeting and other in meeting:
+            continue
         thinner = min(one.surface, other.surface, key=lambda surface: surface.least)
         gap = GAP * thinner.least
         room, where = _apart(one.surface, other.surface)
@@ -195,6 +203,25 @@ def _check_room(body: Body, problems: Problems) -> None:
                 f"{other.name} must be at least {in_mm(gap)} (a tenth of {thinner.LEAST}) from {one.name}, "
                 f"{first_place}; {_distance(room)} at {where}",
             )
+
+
+def _check_cavities(body: Body, places: Sequence[str], problems: Problems) -> None:
+    """Report hollow regions that meet the body's surface, or each other: they are no cavities in tissue."""
+    if not isinstance(body, Facetted) or (parts := body.partition) is None:
+        return
+    hollow = {n: piece for n, piece in enumerate(body.regions, start=1) if isinstance(piece, Segment) and piece.hollow}
+    for number, piece in hollow.items():
+        for other in (OUTSIDE, *hollow):
+            walls = np.isin(parts.sides, (number, other)).all(axis=1) & (parts.sides[:, 0] != parts.sides[:, 1])
+            if other == number or not walls.any():
+                continue
+            what = "the body's surface" if other == OUTSIDE else hollow[other].name
+            at = _point(parts.points[parts.facets[walls][0]].mean(axis=0))
+            problems.error(
+                *_place_of(piece, places[number - 1]),
+                f"{piece.name} is hollow and meets {what} at {at}: it must be inside tissue",
+            )
+            break
 
 
 def _place_of(piece: Embedded, place: str) -> tuple[str, Any]:

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.shapes.files.image import march
 from pipeline.shapes.files.label_map import LabelMap
+from pipeline.shapes.files.label_surface import march
 from pipeline.shapes.triangles import SurfaceError, enclosed
 
 MOST_LABELS = 250

@@ -15,10 +15,9 @@ from pipeline.mesh.organ.volume import fill
 from pipeline.mesh.size import Sizes
 from pipeline.shapes.complex import OUTSIDE, Complex
 from pipeline.shapes.files.crossings import crossings
-from pipeline.shapes.files.partition import partition_of
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.skin import Skin
-from tests.complexes import are_closed, blocks, scene
+from tests.complexes import are_closed, blocks, parted, scene
 
 APART = np.array([[[1, 0, 1]]])
 LAYERS = np.array([[[0, 1, 2]]])
@@ -69,7 +68,7 @@ def test_surfaces_that_cross_are_not_filled():
 @pytest.fixture(scope="module")
 def organ():
     """Return an organ with a part inside it and another one that ends at its surface, and its coarse surfaces."""
-    parts, _ = partition_of(scene((3, 3, 3)), (1, 7, 5))
+    parts = parted(scene((3, 3, 3)), 1, 7, 5).partition
     made = base(parts, Skin(parts.skin), -8e-3, 10e-3)
     return parts, replace(made, sheet=untangled(made.sheet, np.empty(0, np.int64)))
 

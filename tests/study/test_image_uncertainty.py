@@ -165,15 +165,19 @@ def test_what_makes_no_sense_is_refused(image, keys, told):
         of(body(image, **keys))
 
 
-def test_surfaces_that_regions_share_with_the_body_are_not_shifted(image, tmp_path):
-    """A region that reaches the body's surface: to shift one of the two alone would be wrong."""
+def test_a_region_at_the_bodys_surface_moves_with_it(image, tmp_path):
     found = nibabel.load(image)
     values = (np.asarray(found.dataobj) > 0).astype(np.uint8)
     values[: len(values) // 3][values[: len(values) // 3] > 0] = 2
     nibabel.save(nibabel.Nifti1Image(values, found.affine, found.header), tmp_path / "cap.nii")
-    for keys in ({"offset": "0.5 mm"}, {"boundary_uncertainty": "0.5 voxel"}):
-        with pytest.raises(StudyError, match=r"must be inside the body|offset"):
-            of(body(tmp_path / "cap.nii", **keys))
+    whole, cap = [], []
+    for offset in ("-0.5 mm", "0.5 mm"):
+        moved = of(body(tmp_path / "cap.nii", offset=offset)).case(()).body
+        whole.append(moved.volume)
+        cap.append(moved.region[0].surface.volume)
+    assert 0.15 * (whole[1] - whole[0]) < cap[1] - cap[0] < 0.3 * (whole[1] - whole[0])
+    ends = make_plan(of(body(tmp_path / "cap.nii", boundary_uncertainty="0.5 voxel"))).ends
+    assert {end.unknown for end in ends} == {"boundary", "smoothing"}
 
 
 def test_a_surface_has_a_boundary_but_no_voxels_and_a_box_has_neither(tmp_path):

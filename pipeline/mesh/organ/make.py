@@ -36,6 +36,8 @@ _SAME = 1e-6
 # Points are projected back onto the file's surface, unless facets would turn over or cross. Those stay off it by less
 # than this share of the elements there, like chords over folds of the same size.
 _MOST_OFF = 0.25
+# The same at junctions, as a factor: facets meet there at all angles, and the image gives their place least exactly.
+_AT_JUNCTION = 4.0
 # Largest change of the body's volume. Chords of elements leave out half a per cent of an organ, which curved edges
 # restore; with folds as fine as elements it is more, and F is not that of the file.
 MOST_EXCESS = 0.03
@@ -143,7 +145,9 @@ def _deviation(sheet: Sheet, faces: Faces, field: Field) -> float:
         TangledError: if that exceeds the limit given by elements there.
     """
     distance = faces.distance(sheet)
-    far = distance > _MOST_OFF * field.at(sheet.points)
+    limit = _MOST_OFF * field.at(sheet.points)
+    limit[sheet.facets[np.isin(sheet.facets, sheet.junctions).any(axis=1)]] *= _AT_JUNCTION
+    far = distance > limit
     if far.any():
         what = f"the remeshed surface deviates from the file's by {1e3 * distance[far].max():.2g} mm"
         raise TangledError(sheet.points[far], distance[far], what)

@@ -1,6 +1,7 @@
 """A body segmented in a label map."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -8,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from pipeline.arrays import FloatArray
+from pipeline.shapes.complex import Complex
 from pipeline.shapes.files.loaded import UNITS, LengthUnit, Loaded
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
@@ -15,6 +17,7 @@ from pipeline.shapes.segmented import Segmented
 from pipeline.shapes.triangles import SurfaceError
 from pipeline.units import Travel
 
+_FEW = 32  # cached surfaces of regions
 # Range of the smoothing length, in its units.
 _NARROWEST, _WIDEST = 2 / 3, 4 / 3
 
@@ -70,19 +73,26 @@ class FromImage(Segmented, Scanned):
         from pipeline.shapes.files.image import read_image  # noqa: PLC0415 (only when a file is read)
 
         def surface(
-            label: int | str, smooth: float | None, inner: tuple[int | str, ...] = (), offset: float = 0.0
+            label: int | str,
+            smooth: float | None,
+            inner: tuple[tuple[int | str, float | None], ...] = (),
+            offset: float = 0.0,
         ) -> Loaded:
             unit = UNITS[given["unit"]] if given["unit"] else None
             return read_image(Path(file), label, unit, smooth, given["names"], inner, offset)
 
         labelled = {piece.label: piece for piece in given["region"] if piece.label is not None}
-        for label, piece in labelled.items():
+        smooth = {n: given["smooth"] if piece.smooth is None else piece.smooth for n, piece in labelled.items()}
+        whole = surface(given["label"], given["smooth"], tuple(smooth.items()), given["offset"])
+        for number, (label, piece) in enumerate(labelled.items(), start=1):
+            if whole.partition is not None:
+                piece.load(_part_of(whole.partition, number), is_part=True)
+                continue
             try:
-                piece.load(surface(label, given["smooth"] if piece.smooth is None else piece.smooth))
+                piece.load(surface(label, smooth[label]))
             except SurfaceError as error:
                 raise SurfaceError(f"{piece.name}, label {label}: {error}") from error
-        # The offset is that of one closed surface: surfaces that regions share with it would have to follow.
-        return surface(given["label"], given["smooth"], tuple(labelled), given["offset"])
+        return whole
 
     @property
     def _spacing(self) -> FloatArray:
@@ -99,7 +109,12 @@ class FromImage(Segmented, Scanned):
     @property
     def smoothing_range(self) -> tuple[float, float] | None:
         """Two thirds and four thirds of the smoothing length: 1 and 2 voxels of the default; None without smoothing."""
-        from pipeline.shapes.files.image import default_smooth  # noqa: PLC0415
+        from pipeline.shapes.files.label_surface import default_smooth  # noqa: PLC0415
 
         length = default_smooth(self._spacing) if self.smooth is None else self.smooth
         return (length * _NARROWEST, length * _WIDEST) if length else None
+
+
+@lru_cache(_FEW)
+def _part_of(partition: Complex, number: int) -> Loaded:
+    return Loaded(partition.surface(number), ())

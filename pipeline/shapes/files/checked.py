@@ -6,18 +6,20 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.files import atomic, cache_folder
 from pipeline.npz import read_npz
+from pipeline.shapes.complex import Complex
+from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.triangles import Triangles
 
 # Increase by hand when the same file gives another surface, or the checks change.
 _VERSION = 1
 # Smaller files (bytes) are not cached: their check takes no time.
 _SMALL = 1_000_000
-Whole = tuple[Triangles, tuple[str, ...]]
 
 
-def kept_whole(data: bytes, given: str, make: Callable[[], Whole]) -> Whole:
+def kept_whole(data: bytes, given: str, make: Callable[[], Loaded]) -> Loaded:
     """Return the surface in a file's ``data`` and its notices, from the cache or from ``make``.
 
     ``given`` is everything else that the surface depends on. Only surfaces that pass are cached.
@@ -27,7 +29,7 @@ def kept_whole(data: bytes, given: str, make: Callable[[], Whole]) -> Whole:
     return _kept(sha256(f"{_VERSION} {given}\n".encode() + data).hexdigest(), make)
 
 
-def kept_image(files: Iterable[Path], given: str, make: Callable[[], Whole]) -> Whole:
+def kept_image(files: Iterable[Path], given: str, make: Callable[[], Loaded]) -> Loaded:
     """Return the surface of an image's ``files``, whatever their size: see :func:`kept_whole`.
 
     Raises:
@@ -40,19 +42,29 @@ def kept_image(files: Iterable[Path], given: str, make: Callable[[], Whole]) -> 
     return _kept(key.hexdigest(), make)
 
 
-def _kept(key: str, make: Callable[[], Whole]) -> Whole:
+def _kept(key: str, make: Callable[[], Loaded]) -> Loaded:
     """Return the cached value of a key; if there is none, make and cache it."""
     path = cache_folder() / "surfaces" / f"{key[:32]}.npz"
     try:
         found = read_npz(path)
-        return Triangles(found["points"], found["facets"]), tuple(found["notices"].tolist())
+        return _loaded(found["points"], found["facets"], found.get("sides"), tuple(found["notices"].tolist()))
     except (OSError, KeyError, ValueError):
         pass  # missing, or truncated
-    triangles, notices = make()
+    made = make()
+    parts = made.partition or made.triangles
+    sides = {"sides": parts.sides} if isinstance(parts, Complex) else {}
+    notices = np.array(made.notices, dtype=str)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic(path) as temporary, temporary.open("wb") as file:
-            np.savez(file, points=triangles.points, facets=triangles.facets, notices=np.array(notices, dtype=str))
+            np.savez(file, points=parts.points, facets=parts.facets, notices=notices, **sides)
     except OSError:
         pass  # not writable: the check is repeated next time
-    return triangles, notices
+    return made
+
+
+def _loaded(points: FloatArray, facets: IntArray, sides: IntArray | None, notices: tuple[str, ...]) -> Loaded:
+    if sides is None:
+        return Loaded(Triangles(points, facets), notices)
+    partition = Complex(points, facets, sides)
+    return Loaded(partition.skin, notices, partition=partition)

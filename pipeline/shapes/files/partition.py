@@ -1,8 +1,8 @@
 """Surfaces between several labels of a label map, smoothed together: neighbours share them.
 
-The surface of the body, the union of all labels, is that of a single label (:mod:`pipeline.shapes.files.image`): labels
-within it do not dent it. Inside, the indicator of every label passes the same filter, and a point belongs to the label
-with the largest one, times a factor by which the label keeps its volume.
+The surface of the body, the union of all labels, is that of a single label (:mod:`.label_surface`): labels within it do
+not dent it. Inside, the indicator of every label passes a filter, and a point belongs to the label with the largest
+one, times a factor by which the label keeps its volume.
 """
 
 from collections.abc import Sequence
@@ -12,9 +12,18 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.shapes.complex import OUTSIDE, Complex
-from pipeline.shapes.files.image import REACH, default_smooth, filtered, one_piece
+from pipeline.shapes.complex import OUTSIDE, TISSUE, Complex
+from pipeline.shapes.files.edges import Edges
+from pipeline.shapes.files.label_surface import (
+    REACH,
+    check_offset,
+    default_smooth,
+    filtered,
+    one_piece,
+    shifted_level,
+)
 from pipeline.shapes.files.labels import LabelMap, of_label
+from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.files.marching import march
 from pipeline.shapes.triangles import SurfaceError, doubled_normals
 
@@ -24,52 +33,88 @@ _SAME_VOLUME, _STEPS, _LARGEST = 5e-4, 12, 0.5
 _LEAST_GAIN, _MOST_GAIN = 0.1, 3.0
 # A region must keep its volume within this share; parts below this number of voxels are left to their neighbours.
 MOST_VOLUME, CRUMB = 0.01, 8
+# Labels meet if there are at most so many voxels between them.
+_BETWEEN = 2
+# Neighbours of a voxel in the tetrahedra of :func:`march`.
+_BESIDE = np.array(
+    [[[1, 1, 0], [1, 1, 0], [0, 0, 0]], [[1, 1, 0], [1, 1, 1], [0, 1, 1]], [[0, 0, 0], [0, 1, 1], [0, 1, 1]]]
+)
 _TINY, _EVEN = 1e-6, 0.5
 
 
-def partition_of(
-    found: LabelMap, labels: Sequence[int | str], smooth: float | None = None
-) -> tuple[Complex, tuple[str, ...]]:
-    """Return the surfaces (m) between a body's label, those of its regions, and what is outside, and notices.
+def do_meet(found: LabelMap, labels: Sequence[int | str]) -> bool:
+    """Return whether labels of regions, those after the first, nearly meet each other or what is outside of all."""
+    from scipy import ndimage  # noqa: PLC0415
+
+    masks = [of_label(found, label) for label in labels]
+    others = np.where(masks[0], TISSUE, OUTSIDE)
+    for region, mask in enumerate(masks[1:], start=1):
+        others[mask] = region
+    for region, mask in enumerate(masks[1:], start=1):
+        own = ndimage.find_objects(mask.astype(np.int8))[0]
+        if found.sides(own):
+            return True
+        box = tuple(slice(max(s.start - _BETWEEN, 0), s.stop + _BETWEEN) for s in own)
+        near = ndimage.binary_dilation(mask[box], iterations=_BETWEEN)
+        if np.isin(others[box][near], (TISSUE, region), invert=True).any():
+            return True
+    return False
+
+
+def partition_of(found: LabelMap, labels: Sequence[tuple[int | str, float | None]], offset: float = 0.0) -> Loaded:
+    """Return the surface (m) of a body, and those between its label, those of its regions, and what is outside.
 
     The body, the union of all ``labels``, is one piece without hollows. The first label has the number 0, that of the
-    body's own tissue, the others 1 and so on. ``smooth`` (m) is the standard deviation of the filter.
+    body's own tissue, the others 1 and so on. Each has the standard deviation (m) of its filter, None for the default.
+    ``offset`` (m) shifts the body's surface outward; regions that it bounds follow.
 
     Raises:
-        SurfaceError: if a label has no voxels, or is thinner than the filter.
+        SurfaceError: if a label has no voxels, or is thinner than the filter, or that is too narrow for the offset.
     """
-    masks = [of_label(found, label) for label in labels]
+    names, lengths = [label for label, _ in labels], [length for _, length in labels]
+    masks = [of_label(found, label) for label in names]
     body, start, notices = one_piece(np.logical_or.reduce(masks), found)
     box = tuple(slice(s, s + n) for s, n in zip(start, body.shape, strict=True))
     number = np.where(body, 0, OUTSIDE)
     for region, mask in enumerate(masks[1:], start=1):
         number[mask[box] & body] = region
-    sigma = (default_smooth(found.spacing) if smooth is None else smooth) / found.spacing
-    margin = np.ceil(REACH * sigma).astype(int) + 2
+    default = default_smooth(found.spacing)
+    sigmas = [(default if length is None else length) / found.spacing for length in lengths]
+    check_offset(offset / found.spacing, sigmas[0])
+    margin = np.ceil(REACH * np.max(sigmas, axis=0)).astype(int) + 2
     number = np.pad(number, [(m, m) for m in margin], constant_values=OUTSIDE)
-    whole, width = filtered(number != OUTSIDE, sigma, may_narrow=smooth is None)
-    weights, said = _without_crumbs(whole, _weights(number, len(labels), sigma, may_narrow=smooth is None), labels)
-    points, facets, sides = _keeping_volumes(whole, weights, number, (width, sigma), labels)
+    whole, width = filtered(number != OUTSIDE, sigmas[0], may_narrow=lengths[0] is None)
+    weights, said = _without_crumbs(whole, _weights(number, sigmas, [length is None for length in lengths]), names)
+    points, facets, sides, level = _keeping_volumes(whole, weights, number, (width, sigmas[0]), names)
+    if offset:
+        shifted = np.float32(shifted_level(level, offset / found.spacing, width))
+        points, facets, sides = march(1 - whole / shifted, weights)
     places = (points + (start - margin)) @ found.affine[:, :3].T + found.affine[:, 3]
     if np.linalg.det(found.affine[:, :3]) < 0:  # a mirrored frame
         facets = np.ascontiguousarray(facets[:, ::-1])
-    return Complex(places, facets, sides), (*found.notices, *notices, *said)
+    partition = Complex(places, facets, sides)
+    if Edges(partition.skin.facets).shells[0] > 1:
+        raise SurfaceError("the body is thinner somewhere than the width of the filter: give a smaller `smooth`")
+    return Loaded(partition.skin, (*found.notices, *notices, *said), partition=partition)
 
 
-def _weights(number: IntArray, count: int, sigma: FloatArray, *, may_narrow: bool) -> FloatArray:
+def _weights(number: IntArray, sigmas: Sequence[FloatArray], may_narrow: Sequence[bool]) -> FloatArray:
     """Return the filtered indicators (count, nx, ny, nz) of the labels; their sum is 1.
 
     Labels are continued outside of the body, so that its surface does not bend those between them. A thin label, with
     its narrower filter, comes first; the others share what it leaves.
     """
-    if count > 1:
+    if len(sigmas) > 1:
         from scipy.ndimage import distance_transform_edt  # noqa: PLC0415
 
-        nearest = distance_transform_edt(number == OUTSIDE, 1 / sigma, return_distances=False, return_indices=True)
+        nearest = distance_transform_edt(number == OUTSIDE, return_distances=False, return_indices=True)
         number = number[tuple(nearest)]
-    passed = [filtered(number == label, sigma, may_narrow=may_narrow and label > 0) for label in range(count)]
+    passed = [
+        filtered(number == label, sigma, may_narrow=may and label > 0)
+        for label, (sigma, may) in enumerate(zip(sigmas, may_narrow, strict=True))
+    ]
     weights = np.stack([values for values, _ in passed])
-    wide = [width is sigma for _, width in passed]
+    wide = [width.max() >= sigmas[0].max() for _, width in passed]
     if not all(wide):
         left = np.maximum(1 - weights[np.logical_not(wide)].sum(axis=0), 0.0)
         weights[wide] *= left / np.maximum(weights[wide].sum(axis=0), _TINY)
@@ -84,7 +129,7 @@ def _without_crumbs(whole: Any, weights: FloatArray, labels: Sequence[int | str]
     from scipy import ndimage  # noqa: PLC0415
 
     def parts(mask: Any) -> tuple[Any, Any]:
-        part, _ = ndimage.label(mask, np.ones((3, 3, 3)))
+        part, _ = ndimage.label(mask, _BESIDE)
         sizes = np.bincount(part.ravel())
         sizes[0] = 0
         return part, sizes
@@ -112,8 +157,10 @@ def _keeping_volumes(
     number: IntArray,
     widths: tuple[FloatArray, FloatArray],
     labels: Sequence[int | str],
-) -> tuple[FloatArray, IntArray, IntArray]:
+) -> tuple[FloatArray, IntArray, IntArray, float]:
     """Return the surfaces (see :func:`march`) at which the body and all labels keep their volumes.
+
+    The weights are multiplied by the factors of the labels, in place. The last result is the level of the body.
 
     Newton's method: across a plane, the filtered indicator has the slope 1 / (√(2π) σ), so that the logarithm of a
     factor moves it by √(2π) σ / 4. The ``widths`` are σ of the body and of its labels, in voxels.
@@ -155,7 +202,8 @@ def _keeping_volumes(
             f"label {labels[worst]} is thinner than the width of the filter, which would change its volume by "
             f"{shares[worst] - 1:+.0%}: give a smaller `smooth`"
         )
-    return points, facets, sides
+    weights *= factors
+    return points, facets, sides, 1 / (1 + float(np.exp(of_body)))
 
 
 def _volumes(points: FloatArray, facets: IntArray, sides: IntArray, count: int) -> FloatArray:

@@ -65,7 +65,7 @@ def _load(
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
     ending = path.suffix.lower()
     given = f"{ending} {unit!r} {repair} {smooth!r}"
-    whole = Loaded(*kept_whole(data, given, lambda: made_whole(_parsed(data, ending), unit, repair, smooth)))
+    whole = kept_whole(data, given, lambda: Loaded(*made_whole(_parsed(data, ending), unit, repair, smooth)))
     return Loaded(shifted(whole.triangles, offset), whole.notices) if offset else whole
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.files.crossings import crossings
-from pipeline.shapes.files.image import default_smooth, read_image
+from pipeline.shapes.files.image import read_image
+from pipeline.shapes.files.label_surface import default_smooth
 from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals
 
 AXES = np.array([40.0, 30.0, 20.0])  # mm

@@ -7,16 +7,16 @@ from pipeline.shapes.complex import OUTSIDE
 from pipeline.shapes.files.crossings import crossings
 from pipeline.shapes.files.labels import LabelMap
 from pipeline.shapes.files.marching import march
-from pipeline.shapes.files.partition import partition_of
-from pipeline.shapes.triangles import SurfaceError
-from tests.complexes import AXES, CENTRE, INNER, are_closed, scene
+from pipeline.shapes.triangles import SurfaceError, doubled_normals
+from tests.complexes import AXES, CENTRE, INNER, are_closed, parted, scene
 
 
 @pytest.mark.parametrize("spacing", [(2, 2, 2), (3, 3, 3), (1.5, 1.5, 3)])
 def test_labels_share_accurate_surfaces_and_keep_their_volumes(spacing):
     image = scene(spacing)
-    body, notices = partition_of(image, (1, 7, 5))
-    assert not notices
+    found = parted(image, 1, 7, 5)
+    body = found.partition
+    assert not found.notices
     for region, label in enumerate((1, 7, 5)):
         wanted = (image.values == label).sum() * np.prod(image.spacing)
         assert body.volume(region) == pytest.approx(wanted, rel=1e-3)
@@ -31,10 +31,18 @@ def test_labels_share_accurate_surfaces_and_keep_their_volumes(spacing):
     assert np.abs(plane[inner, 0] - 18).max() < 0.5 * max(spacing) + 0.1
 
 
+def test_an_offset_moves_the_bodys_surface_and_regions_that_it_bounds():
+    inward, as_is, outward = (parted(scene((3, 3, 3)), 1, 7, 5, offset=offset).partition for offset in (-1e-3, 0, 1e-3))
+    moved = [(outward.volume(region) - inward.volume(region)) / 2e-3 for region in (0, 1, 2)]
+    areas = np.linalg.norm(doubled_normals(as_is.points, as_is.facets), axis=1) / 2
+    area = [areas[(as_is.sides == (region, OUTSIDE)).all(axis=1)].sum() for region in (0, 1, 2)]
+    np.testing.assert_allclose(moved, area, rtol=0.06)
+
+
 def test_two_labels_have_the_surface_of_one():
     image = scene((2, 2, 2))
-    alone, _ = partition_of(image, (1, 5))
-    whole, _ = partition_of(LabelMap(np.where(image.values == 5, 1, image.values), image.affine), (1,))
+    alone = parted(image, 1, 5).partition
+    whole = parted(LabelMap(np.where(image.values == 5, 1, image.values), image.affine), 1).partition
     assert alone.volume(0) + alone.volume(1) == pytest.approx(whole.volume(0), rel=1e-3)
     skin = alone.points[np.unique(alone.facets[alone.sides[:, 1] == OUTSIDE])]
     distance = np.array([np.linalg.norm(skin - point, axis=1).min() for point in whole.points[::20]])
@@ -58,9 +66,9 @@ def test_what_is_too_thin_or_too_small_is_told():
     sheet[:, values.shape[1] // 2] = True
     values[sheet & (values == 1)] = 3
     with pytest.raises(SurfaceError, match=r"label 3 is thinner than the width of the filter.*smaller `smooth`"):
-        partition_of(LabelMap(values, image.affine), (1, 7, 5, 3), 6e-3)
+        parted(LabelMap(values, image.affine), 1, 7, 5, 3, smooth=6e-3)
     values = image.values.copy()
     values[20, 20, 12] = 7
     assert values.shape > (20, 20, 12) and image.values[20, 20, 12] == 1
-    _, notices = partition_of(LabelMap(values, image.affine), (1, 7, 5), 0.8e-3)
+    notices = parted(LabelMap(values, image.affine), 1, 7, 5, smooth=0.8e-3).notices
     assert len(notices) == 1 and "label 7: parts of less than 8 voxels" in notices[0]

@@ -1,0 +1,96 @@
+"""Regions of an image that meet each other and the body's surface: meshes and forces of cases, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.mesh.generate import GeometryError
+from pipeline.mesh.of_case import mesh_arrays
+from pipeline.run import meshing
+from pipeline.shapes.files.labels import LabelMap
+from pipeline.study.problems import StudyError
+from tests.cases import solve, study
+from tests.complexes import scene
+
+nibabel = pytest.importorskip("nibabel")
+
+PROBE = {"shape": "disc", "radius": "4 mm", "depth": "0.1 mm", "at": ["-4 mm", "4 mm", "20 mm"]}
+MESH = {"epsilon": "full", "fine": "12 mm", "coarse": "12 mm", "rim": "1.5 mm", "growth": 1.0}
+TISSUE = {"young": "10 kPa", "poisson": 0.4}
+LOBE = {"name": "lobe", "label": 5} | TISSUE
+TUMOUR = {"name": "tumour", "label": 7} | TISSUE
+
+
+def write(path, labels: LabelMap):
+    image = nibabel.Nifti1Image(labels.values.astype(np.uint8), np.vstack([1e3 * labels.affine, [0, 0, 0, 1]]))
+    image.header.set_xyzt_units("mm")
+    nibabel.save(image, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def given(tmp_path_factory):
+    """Return a function from regions, and the place of the probe, to the sections of a study."""
+    image = scene((3, 3, 3))
+    path = write(tmp_path_factory.mktemp("image") / "scan.nii.gz", image)
+    whole = write(path.with_name("whole.nii.gz"), LabelMap((image.values > 0).astype(int), image.affine))
+
+    def sections(*regions, at=PROBE["at"], **more):
+        body = {"shape": "image", "file": str(path if regions else whole), "label": 1, "fixed": {"below": "-9 mm"}}
+        body |= {"region": list(regions)} if regions else {}
+        return {"body": body | more, "probe": PROBE | {"at": list(at)}, "mesh": MESH, "material": TISSUE}
+
+    return sections
+
+
+def volumes(mesh):
+    corners = mesh.points[mesh.cells[:, :4]]
+    return np.bincount(mesh.regions, np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6)
+
+
+def test_regions_that_meet_are_meshed_with_their_volumes_below_a_tool_on_one_of_them(given):
+    case = study(**given(TUMOUR, LOBE, at=("28 mm", "3 mm", "12 mm"))).case(())
+    parts, mesh = case.body.partition, mesh_arrays(case, ())
+    assert len(case.body.meeting) == 2
+    np.testing.assert_allclose(volumes(mesh), [parts.volume(region) for region in (0, 1, 2)], rtol=0.03)
+    centres = mesh.points[mesh.cells[:, :4]].mean(axis=1)
+    for number, piece in enumerate(case.body.region, start=1):
+        depth = -piece.surface.distance(centres)
+        clear = np.abs(depth) > 1.5e-3
+        np.testing.assert_array_equal((mesh.regions == number)[clear], (depth > 0)[clear])
+    below = np.unique(mesh.facets["probe"])
+    assert {*mesh.regions[np.isin(mesh.cells, below).any(axis=1)].tolist()} == {2}
+
+
+def test_parts_of_one_material_have_the_force_of_the_whole(given, monkeypatch):
+    made = []
+
+    def kept(case, mirrors, _cache):
+        made.append(mesh_arrays(case, mirrors))
+        return made[-1]
+
+    monkeypatch.setattr(meshing, "cached_arrays", kept)
+    parts, whole = (next(iter(solve(**given(*regions)).values())) for regions in ((TUMOUR, LOBE), ()))
+    assert made[0].regions is not None and made[1].regions is None
+    assert abs(parts.force - whole.force) < parts.force_error + whole.force_error
+    undivided = replace(made[0], regions=np.zeros_like(made[0].regions))
+    monkeypatch.setattr(meshing, "cached_arrays", lambda *_: undivided)
+    (same,) = solve(**given(TUMOUR, LOBE)).values()
+    assert parts.force == pytest.approx(same.force, rel=1e-6)
+
+
+def test_a_hollow_region_leaves_its_neighbours_alone(given):
+    hollow = {"name": "vessel", "label": 7, "hollow": True}
+    case = study(**given(hollow, LOBE)).case(())
+    parts, mesh = case.body.partition, mesh_arrays(case, ())
+    found = volumes(mesh)
+    np.testing.assert_allclose(found[[0, 2]], [parts.volume(0), parts.volume(2)], rtol=0.03)
+    assert found[1] == 0
+
+
+def test_what_cannot_be_is_refused_by_name_and_place(given):
+    with pytest.raises(GeometryError, match=r"two regions of the body meet at its surface at \(\d+.*move the probe"):
+        mesh_arrays(study(**given(TUMOUR, LOBE, at=("18 mm", "3 mm", "17 mm"))).case(()), ())
+    with pytest.raises(StudyError, match=r"lobe is hollow and meets the body's surface at x = .*inside tissue"):
+        study(**given(TUMOUR, {"name": "lobe", "label": 5, "hollow": True}))
