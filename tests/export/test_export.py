@@ -20,6 +20,7 @@ from pipeline.export.tabulate import tabulate
 from pipeline.solve.physics import MaterialLaw
 from pipeline.study.read import parse
 from pipeline.verify.compare import solve
+from tests.organs import sphere, write_stl
 from tests.realtime.synthetic import of_place
 
 DISC = {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "frictionless"}
@@ -145,6 +146,14 @@ def test_tables_of_tensors_know_their_images(shape):
 def test_what_has_no_model_yet_is_refused_by_name(sections, word):
     with pytest.raises(ExportError, match=word):
         scope_of(study(**sections))
+
+
+def test_a_flat_body_with_a_hollow_region_has_no_model(tmp_path):
+    points, facets = sphere(4)
+    file = write_stl(tmp_path / "ball.stl", 3e-3 * points - [0, 0, 9e-3], facets)
+    hollow = {"name": "cyst", "file": str(file), "unit": "mm", "hollow": True}
+    with pytest.raises(ExportError, match="hollow regions has no real-time model"):
+        scope_of(study(body=BOX | {"region": [hollow]}))
 
 
 def test_the_range_of_poissons_ratio_holds_that_of_the_study():
