@@ -133,7 +133,7 @@ def _flat_refusal(case: Case, first: Case, body: Layered) -> str:
     if body.cavities:
         return f'a {body.shape} with hollow regions has no real-time model: use shape = "surface", or omit them'
     if body.has_round_top and not body.is_round:
-        return f"a {body.shape} with an inclusion off its axis, or a region of any shape, has no real-time model: use a box"
+        return f"a {body.shape} with an inclusion off its axis, or a [[body.region]], has no real-time model: use a box"
     least = _SHALLOWEST * min(body.half_sides)
     if body.regions and body.depth_of_tissue < least:
         return (

@@ -128,6 +128,8 @@ def in_model(
             more += rounded_sizes(scene, sizes.growth)
             lifted = [] if scene.is_flat else rim_curves
             last = set_size_field(sizes, scene.probe, scene.frame, scene.scale, more, lifted)
+            if scene.body.region:
+                gmsh.model.geo.synchronize()  # points to which sizes refer
             gmsh.model.mesh.generate(dim)
         except Exception as error:  # gmsh raises bare Exception
             raise MeshError(f"gmsh: {reason(error)}") from error

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from math import inf
 from typing import Any, Protocol
@@ -27,6 +27,7 @@ _IN_LAYER = 0.5
 _STEP = 1.3
 # Sampling points on an embedded region, for the point nearest to anything else.
 _POINTS = 2000
+_MANY = 1000  # cached points
 
 
 # Largest element size along the probe's edge, in units of the size for a thin layer below it. At 4 some meshes have
@@ -201,9 +202,11 @@ def embedded_sizes(body: Body, growth: float, contact: Vector) -> tuple[Embedded
 
 
 def distance_field(points: FloatArray, kernel: Any) -> int:
-    """Add points (n, 3), in units of gmsh's current model, with its ``kernel``; return the field of the distance."""
+    """Add points (n, 3), in units of gmsh's current model, with its ``kernel``; return the field of the distance.
+
+    The kernel is to be synchronized before meshing.
+    """
     tags = [kernel.addPoint(*point) for point in points.tolist()]
-    kernel.synchronize()
     field = gmsh.model.mesh.field
     distance = int(field.add("Distance"))
     field.setNumbers(distance, "NodesList", tags)
@@ -215,6 +218,7 @@ def _distance(point: Vector, unit: float) -> str:
     return f"Sqrt({squares})"
 
 
+@lru_cache(_MANY)
 def _nearest(body: Body, piece: Embedded) -> tuple[Vector, float]:
     """Return the point of an embedded region that is nearest to anything else, and its distance (m) from that.
 

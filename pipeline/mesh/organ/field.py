@@ -43,6 +43,7 @@ class Field:
         """
         terms = self.sizes.terms(self.frame.point, self._rim_text(1 / scale, kernel), 1 / scale)
         set_background([*terms, *(term for part in self.local for term in part.terms(1 / scale, kernel))])
+        kernel.synchronize()
 
     def _to_rim(self, points: FloatArray) -> FloatArray:
         """Return distances (m) to the expected edge of contact."""
