@@ -20,7 +20,6 @@ tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --
 "$work/build/bin/python" -m pip install "${quiet[@]}" build
 rm -rf dist
 "$work/build/bin/python" -m build --outdir dist "$work/source" >"$work/log" 2>&1 || { tail -n 30 "$work/log" >&2; fail "cannot be built"; }
-"$work/build/bin/python" -m build --outdir dist "$work/source/realtime" >"$work/log" 2>&1 || { tail -n 30 "$work/log" >&2; fail "realtime/ cannot be built"; }
 version=$(sed -nE 's/^__version__ = "(.*)"$/\1/p' pipeline/__init__.py)
 [[ -f dist/epsmesh-$version.tar.gz && -f dist/epsmesh-$version-py3-none-any.whl ]] || fail "dist/ has $(ls dist), not version $version"
 
@@ -44,6 +43,8 @@ if missing := sorted({str(path) for path in files} - sent):
     sys.exit(f"release: the sdist lacks {', '.join(missing)}")
 print(f"release: {len(held)} files in the wheel, {len(sent)} in the sdist")
 PYTHON
+# Its own distribution, for the same machine as the one that builds it.
+"$work/build/bin/python" -m build --outdir dist "$work/source/realtime" >"$work/log" 2>&1 || { tail -n 30 "$work/log" >&2; fail "realtime/ cannot be built"; }
 
 # ---- install -------------------------------------------------------------------------------------------
 "$python" -m venv --system-site-packages "$work/venv"

@@ -48,7 +48,8 @@ static const char *hand_load(hand *h, const char *path, double radius, double mo
     h->data = data;
     if (status != EPSMESH_OK || !(radius > 0 && most > 0)) {
         hand_free(h);
-        return status == EPSMESH_OK ? "radius and largest force must be positive" : "the file is no model that this version reads";
+        if (status == EPSMESH_OK) return "radius and largest force must be positive";
+        return "the file is no model that this version reads";
     }
     h->tool = epsmesh_ask(&h->model);
     h->tool.shape = EPSMESH_SPHERE, h->tool.radius = radius;

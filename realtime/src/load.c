@@ -63,16 +63,12 @@ static void load_table(epsmesh_model *m, file *f) {
 
 static void load_body(epsmesh_model *m, file *f) {
     int i, j, k;
-    double frame[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0};
+    uint32_t shape[4] = {3, 3, 0, 0};
+    const double *frame = doubles(f, "axes", 2, shape);
     numbers(f, "origin", m->origin, 3), numbers(f, "sides", m->sides, 2), numbers(f, "thickness", &m->thickness, 0);
     numbers(f, "young", &m->young, 0), numbers(f, "largest", &m->largest, 0), numbers(f, "bar", m->bar, 4);
     numbers(f, "off", &m->off, 0), numbers(f, "aligned", &m->aligned, 0);
-    {
-        uint32_t shape[4] = {3, 3, 0, 0};
-        const double *values = doubles(f, "axes", 2, shape);
-        if (values) memcpy(frame, values, sizeof frame);
-    }
-    for (i = 0; i < 3; i++)
+    for (i = 0; i < 3 && frame; i++)
         for (j = 0; j < 3; j++) {
             double dot = i == j ? -1.0 : 0.0;
             m->axes[i][j] = frame[3 * i + j];
@@ -164,7 +160,8 @@ static void load_surface(epsmesh_model *m, file *f) {
         return;
     }
     if (f->flaw) return;
-    wrong_if(f, points[1] != 3 || points[0] > INT32_MAX / 3, "surface_points"), wrong_if(f, corners[1] != 3, "surface_triangles");
+    wrong_if(f, points[1] != 3 || points[0] > INT32_MAX / 3, "surface_points");
+    wrong_if(f, corners[1] != 3, "surface_triangles");
     wrong_if(f, modes[0] != points[0] || modes[1] != 3 || modes[2] != amounts[0], "surface_modes");
     wrong_if(f, amounts[0] > EPSMESH_MOST_SEEN || amounts[1] > EPSMESH_MOST, "surface_amounts");
     wrong_if(f, amounts[2] > EPSMESH_MOST || amounts[3] > EPSMESH_MOST, "surface_amounts");

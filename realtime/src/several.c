@@ -22,7 +22,8 @@ enum { TOOLS = EPSMESH_MOST_TOOLS };
 /* Of places i and j: G, its slope with x_i, the size of the Laplacian of R, a half-space's share of G, x_i - x_j over
  * the distance, and that; of a tool i at the place of j, w and its slope with x_i. */
 typedef struct {
-    double sinks[TOOLS][TOOLS], slopes[TOOLS][TOOLS][2], bends[TOOLS][TOOLS], near[TOOLS][TOOLS], away[TOOLS][TOOLS][2], apart[TOOLS][TOOLS];
+    double sinks[TOOLS][TOOLS], slopes[TOOLS][TOOLS][2], bends[TOOLS][TOOLS], near[TOOLS][TOOLS];
+    double away[TOOLS][TOOLS][2], apart[TOOLS][TOOLS];
     double bent[TOOLS][TOOLS], slope_bent[TOOLS][TOOLS][2];
 } influence;
 

@@ -216,7 +216,8 @@ epsmesh_status epsmesh_surface_move(const epsmesh_model *m, const epsmesh_query 
         for (i = 0; i < 3; i++)
             for (away[i] = 0, j = 0; j < 3; j++) away[i] += turn[i][j] * (points[j] - at[j]);
         field(&f, away, flat, own);
-        for (i = 0; i < 3; i++) moved[i] = force * (own[0] * turn[0][i] + own[1] * turn[1][i] + own[2] * turn[2][i] + regular[i]);
+        for (i = 0; i < 3; i++)
+            moved[i] = force * (own[0] * turn[0][i] + own[1] * turn[1][i] + own[2] * turn[2][i] + regular[i]);
         if (is_below(&f, away)) { /* the surface below the tool follows it */
             more = lifted(q, away) - q->depth - (moved[0] * turn[2][0] + moved[1] * turn[2][1] + moved[2] * turn[2][2]);
             for (i = 0; i < 3; i++) moved[i] += more * turn[2][i];
