@@ -12,7 +12,7 @@
 
 static const double PI = 3.14159265358979323846;
 static const double TOUCHING = 1e-12, SMALLEST = 1e-6, SLENDER = 0.02, SOFT = 1e-12, STICKS = 0.1;
-static const double BALL_LIMIT = 0.6, NEGLIGIBLE = 1e-17, SAME = 4e-16;
+static const double BALL_LIMIT = 0.6, NEGLIGIBLE = 1e-17, CLOSE = 1e-10;
 static const double FOOT_SAME = 1e-13; /* of the region */
 /* Of several tools: NEAR in units of both radii; see src/several.c for the others. */
 static const double NEAR = 2.0, SETTLED = 1e-8, FOURTH = 0.5, FOURTH_BLADE = 2.0, BENDS_BLADE = 2.0;

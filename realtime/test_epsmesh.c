@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "epsmesh_relaxation.h"
 #include "epsmesh_surface.h"
 
 enum { VERTICES = 2000, HEADER = 2400 }; /* bytes of a file's header and its table of arrays, about */
@@ -97,6 +98,30 @@ static void ask_several(const epsmesh_model *model, int times) {
     }
 }
 
+/* Press at random into relaxing tissue: an answer is finite, a refusal is not, and no force pulls. */
+static void ask_after(const epsmesh_model *model, int times) {
+    static epsmesh_moment moments[8];
+    epsmesh_model relaxing = *model;
+    epsmesh_memory memory;
+    epsmesh_touch touch;
+    int i, j, k;
+    relaxing.relaxing = 2;
+    for (i = 0; i < 2; i++) relaxing.share[i] = within(0, 0.5), relaxing.time[i] = within(1e-3, 1);
+    for (i = 0; i < times; i++) {
+        epsmesh_query query = epsmesh_ask(model);
+        query.shape = (epsmesh_shape)(i % 5), query.radius = 1e-3, query.angle = 1.2, query.length = 3e-3, query.width = 5e-4;
+        for (j = 0; j < 3; j++) query.at[j] = model->origin[j];
+        epsmesh_memory_begin(&memory, moments, 8);
+        for (k = 0; k < 12; k++) {
+            query.depth = within(-1e-5, 2e-4);
+            touch = epsmesh_touch_after(&relaxing, &query, k % 4 ? within(0, 0.1) : 0, &memory);
+            expect((touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) == (isfinite(touch.force[2]) != 0),
+                   "an answer after others is finite, a refusal is not");
+            expect(touch.status != EPSMESH_OK || touch.force_error >= 0, "a bar after others is none of less than nothing");
+        }
+    }
+}
+
 /* Put numbers in the place of counts: those that products overflow with, or limits are missed by one. */
 static void miscount(unsigned char *part, size_t size) {
     static const unsigned long numbers[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 63, 64, 65, 95, 96, 97, 255, 256, 257, 4096, 4097,
@@ -122,6 +147,7 @@ int main(int count, char **words) {
     ask_around(&model, 3000);
     ask_several(&model, 2000);
     ask_surface(&model, 200);
+    ask_after(&model, 2000);
     expect(model.vertices > 0, "the model has a surface");
     expect(epsmesh_load(&damaged, NULL, 0) == EPSMESH_NO_MODEL, "nothing is no model");
     memset(&query, 0, sizeof query);

@@ -61,7 +61,9 @@ def _facts(surface: Surface) -> list[str]:
     )
     friction = "without friction; the bonded disc sticks" if "bonded disc" in _tools(surface) else "without friction"
     along = "straight down" if model.face.is_flat else "along the surface's normal"
+    at_once = ["The tissue relaxes: forces are those of a sudden touch."] if model.relaxation else []
     return [
+        *at_once,
         f"Valid within the grey line: {region}. Tools move {along}, {friction}.",
         "Drag on the body's face to move the tool, beside it to turn the body; scroll to zoom.",
     ]

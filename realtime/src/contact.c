@@ -96,8 +96,11 @@ static int press_round(const epsmesh_query *tool, const place *p, double most, c
         found = press_to(a, tool, p);
         if (found.depth < depth) low = a; else high = a;
         step = found.slope > 0 ? a - (found.depth - depth) / found.slope : low;
+        if (low <= step && step <= high && fabs(step - a) <= CLOSE * a) {
+            a = step; /* Newton's error is the square of this step; rounding may put it onto the bracket's end */
+            break;
+        }
         if (!(low < step && step < high)) step = 0.5 * (low + high);
-        if (fabs(step - a) <= SAME * a) break;
         a = step;
     }
     found = press_to(a, tool, p);

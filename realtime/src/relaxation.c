@@ -146,11 +146,14 @@ static int shrunk(const epsmesh_model *m, epsmesh_memory *memory, double whole, 
         if (off > 0) high = at;
         else low = at;
         next = slope > 0 ? at - off / slope : low;
+        if (fabs(next - at) <= CLOSE) {
+            at = next;
+            break;
+        }
         if (!(low <= next && next <= high)) next = 0.5 * (low + high);
-        if (fabs(next - at) <= SAME) break;
         at = next;
     }
-    *share = at;
+    *share = at < 0 ? 0 : at > 1 ? 1 : at;
     return 1;
 }
 
