@@ -1,8 +1,11 @@
 """Glue for simulators: what compiles, what a loop of it renders, and that a refusal is no blow."""
 
 import ctypes
+import runpy
 import shutil
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +25,65 @@ def test_examples_are_what_a_compiler_takes(name):
         pytest.skip("there is no C++ compiler")
     compiler = ("c++", "-std=c++17") if name.endswith(".cpp") else ("cc", "-std=c99")
     compiled(*compiler, *STRICT[2:], "-fsyntax-only", "-I", STANDINS, EXAMPLES / name)
+
+
+class Slicer(SimpleNamespace):
+    """What the example calls of 3D Slicer and VTK, as a stand-in: one transform, one line, one corner of the view."""
+
+    def __init__(self):
+        super().__init__(matrix=np.eye(4), points=[[0.0] * 3] * 2, text="", seen=[])
+        self.util = SimpleNamespace(getNode=lambda _: self)
+        self.mrmlScene = SimpleNamespace(AddNewNodeByClass=lambda *_: self)
+        self.vtkMRMLTransformNode = SimpleNamespace(TransformModifiedEvent=1)
+        view = SimpleNamespace(cornerAnnotation=lambda: self, scheduleRender=lambda: None)
+        self.app = SimpleNamespace(
+            layoutManager=lambda: SimpleNamespace(threeDWidget=lambda _: SimpleNamespace(threeDView=lambda: view))
+        )
+
+    def AddControlPointWorld(self, *_):
+        pass
+
+    def AddObserver(self, _, heard):
+        self.seen.append(heard)
+        return len(self.seen)
+
+    def RemoveObserver(self, tag):
+        del self.seen[tag - 1]
+
+    def GetMatrixTransformToWorld(self, into):
+        into.GetElement = lambda row, column: float(self.matrix[row, column])
+
+    def SetNthControlPointPositionWorld(self, number, *place):
+        self.points[number] = list(place)
+
+    def SetText(self, _, text):
+        self.text = text
+
+    def move(self, centre):
+        self.matrix[:3, 3] = 1e3 * np.asarray(centre)
+        self.seen[0]()
+
+
+@pytest.mark.parametrize("kind", [{}, {"curved": True, "turned": True}])
+def test_slicer_shows_the_force_on_a_ball_that_follows_a_transform(tmp_path, monkeypatch, kind):
+    model = write_random(tmp_path / "pad.epsm", **kind)
+    slicer = Slicer()
+    monkeypatch.setitem(sys.modules, "slicer", slicer)
+    corner = SimpleNamespace(UpperRight=0)
+    monkeypatch.setitem(sys.modules, "vtk", SimpleNamespace(vtkMatrix4x4=SimpleNamespace, vtkCornerAnnotation=corner))
+    tool = runpy.run_path(str(EXAMPLES / "epsmesh_slicer.py"))["Tool"](tmp_path / "pad.epsm", "ToolToWorld", RADIUS)
+    spot = model.spot(0.004, 0.003)
+    at, normal = model.origin + np.array([0.004, 0.003, spot.height]) @ model.axes, spot.normal @ model.axes
+    slicer.move(at + (RADIUS - 4e-4) * normal)
+    touch = model.query("sphere", radius=RADIUS, at=at, depth=4e-4)
+    np.testing.assert_allclose(tool.force.force, touch.force, rtol=1e-3, atol=1e-3 * np.linalg.norm(touch.force))
+    drawn = np.diff(slicer.points, axis=0)[0]
+    np.testing.assert_allclose(drawn, 50 * tool.force.force, rtol=1e-9, atol=1e-9)
+    assert slicer.text.startswith(f"F = {np.linalg.norm(tool.force.force):.3g} N ±")
+    slicer.move(at + 2 * RADIUS * normal)
+    assert slicer.text == "The tool does not touch."
+    tool.stop()
+    assert not slicer.seen
 
 
 @pytest.fixture(scope="module")
