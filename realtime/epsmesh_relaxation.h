@@ -16,6 +16,7 @@ extern "C" {
 typedef struct {
     double time, depth, force[3], error; /* s, m, N, relative */
     double of_depth[EPSMESH_MOST_RELAXING], of_force[EPSMESH_MOST_RELAXING][3];
+    double doubt[EPSMESH_MOST_RELAXING]; /* N: error of of_force, where steps are long */
 } epsmesh_moment;
 
 typedef enum { EPSMESH_RESTED, EPSMESH_GROWING, EPSMESH_SHRINKING, EPSMESH_FREE, EPSMESH_UNKNOWN } epsmesh_phase;

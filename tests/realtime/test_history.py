@@ -65,6 +65,25 @@ def test_contact_that_grows_and_shrinks_is_that_of_lee_radok_and_ting(tool, expo
     assert touches[-2].status == "lost"  # before the tool is back
 
 
+@pytest.mark.parametrize("tool", [BALL, CONE])
+@pytest.mark.parametrize("terms", [((0.3, 0.03), (0.3, 1.0)), ((0.7, 0.2),)])
+def test_the_bar_holds_what_long_steps_miss(tool, terms):
+    def over(count):
+        times = np.linspace(0, 2, count + 1)[1:]
+        history = History(replace(relaxing(terms), bar=(0.0,) * 4))  # without the error of the elastic force
+        depths = np.interp(times, (0, 0.8, 1.2, 2.0), (0, 4e-4, 4e-4, 1e-4))
+        touches = [history.query(2 / count, **tool, depth=depth) for depth in depths.tolist()]
+        return forces(touches)[:, 2], np.array([touch.force_error for touch in touches])
+
+    fine, _ = over(4000)
+    for count in (5, 20, 50):
+        force, bar = over(count)
+        known = fine[4000 // count - 1 :: 4000 // count]
+        held = known > 0.02 * known.max()
+        assert np.all(np.abs(force - known)[held] <= bar[held] * known[held] + 1e-6 * known.max())
+        assert bar[held].max() < 0.05
+
+
 @pytest.mark.parametrize("tool", [*SAME, BALL, CONE])
 def test_closed_loops_dissipate(tool):
     """The work of the tool, by quadrature between the corners of random motions, in units of what is stored at most."""
