@@ -189,7 +189,7 @@ def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:
     thickness = body.thickness(probe.frame_on(body))
     if probe.deepest >= thickness:
         problems.error(
-            "probe.depth",
+            "probe.insertion.to" if getattr(probe, "insertion", None) else "probe.depth",
             in_mm(probe.deepest),
             f"must be below {in_mm(thickness)}, the thickness of the tissue under the tool, along its axis",
         )

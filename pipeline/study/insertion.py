@@ -49,7 +49,8 @@ def check_same_path(probes: Sequence[Probe], problems: Problems) -> None:
         problems.error(
             "probe.insertion",
             None,
-            "must be the same in all [[probe]] tables, since the depths are one dimension of the dataset",
+            "must be one for all tools, since its depths are one dimension of the dataset: no lists in "
+            "[probe.insertion], and the same table in every [[probe]]",
         )
 
 

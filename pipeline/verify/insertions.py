@@ -50,7 +50,7 @@ def insertion_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
         max(before.error, after.error) / force,
         message=path.message,
     )
-    near, far = _fronts(comm, plan)
+    near, far = _fronts(comm, plan, records)
     field = NearTip.through(strength(20e3, 0.3, 0.4e-3), _FAR, far.release)
     yield Row(
         "front near a blade's tip, ν = 0.3: energy release",
@@ -73,11 +73,12 @@ def _solved(comm: MPI.Comm, plan: Plan) -> dict[str, Record]:
     return records
 
 
-def _fronts(comm: MPI.Comm, plan: Plan) -> list[Cut]:
-    """Return the solved slits with a near and a far front."""
+def _fronts(comm: MPI.Comm, plan: Plan, records: dict[str, Record]) -> list[Cut]:
+    """Return the solved slits with a near front, and with that of a stage, whose ``records`` are known."""
     places = [(_DEPTH, _NEAR), (_DEPTH, _FAR)]
-    ((scene, states),) = scenes(plan, {})
+    ((scene, states),) = scenes(plan, records)
     scene.cuts(places)
-    records = {key: record for own in states.further.values() for key, record in compute(own, comm).items()}
+    for own in states.further.values():
+        records |= compute(own, comm)
     ((scene, _),) = scenes(plan, records)
     return [cut for cut in scene.cuts(places).values() if isinstance(cut, Cut)]

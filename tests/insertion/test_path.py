@@ -125,6 +125,11 @@ def test_a_state_that_fails_ends_the_path_there_and_earlier_ones_are_kept():
     ("probe", "key", "allowed"),
     [
         ({"toughness": "200"}, "probe.toughness", "the unit is missing"),
+        ({"toughness": "5 N"}, "probe.toughness", "`N` is no unit of a toughness"),
+        ({"insertion": {"to": "60 mm"}}, "probe.insertion.to", "must be below 20 mm"),
+        ({"insertion": {"to": ["5 mm", "6 mm"]}}, "probe.insertion", "no lists in [probe.insertion]"),
+        ({"width": "8 mm"}, "probe.insertion.to", "must be at most 4 mm"),
+        ({"width": "50 mm"}, "probe.at", "must be inside the top face"),
         ({"toughness": None}, "probe.toughness", "is required for an insertion"),
         ({"insertion": None, "depth": "1 mm"}, "probe.toughness", "add [probe.insertion]"),
         ({"insertion": {"to": "19.5 mm"}}, "probe.insertion.to", "must be at most 19.2 mm"),
@@ -195,7 +200,7 @@ def test_the_guide_answers_for_puncture_and_cutting():
 
 def test_tools_with_different_depths_are_refused():
     probes = [BLADE | {"name": "a"}, BLADE | {"name": "b", "insertion": {"to": "5 mm", "steps": 12}}]
-    with pytest.raises(StudyError, match="must be the same in all"):
+    with pytest.raises(StudyError, match="must be one for all tools"):
         read_mapping(SCENE | {"probe": probes}, "blades")
 
 
