@@ -69,6 +69,16 @@ class Path:
         return OK if not self.message else PARTIAL if self.steps else FAILED
 
 
+def needed(scene: Scene) -> tuple[float, ...]:
+    """Return the depths (m) at which the path needs a slit: all of them until the intact body is solved."""
+    pressed = scene.stiffness()
+    if isinstance(pressed, str):
+        return scene.depths if scene.is_pending else ()
+    first = _first(scene, _Whole(*pressed))
+    through_all = scene.insertion.withdraw and np.isfinite(first)  # after the tissue is cut
+    return tuple(depth for depth in scene.depths if through_all or depth >= first)
+
+
 def follow(scene: Scene) -> Path:
     """Return the path of a scene, as far as its states are solved."""
     path = _follow(scene)
@@ -80,10 +90,8 @@ def _follow(scene: Scene) -> Path:
     if isinstance(pressed, str):
         return Path(message=pressed)
     whole = _Whole(*pressed)
-    # No slit is cheaper than its work of fracture alone: before, the tissue is whole.
-    first = next((depth for depth in depths if whole.energy(depth) >= scene.blade.length * scene.tear(depth)), np.inf)
-    withdraws = scene.insertion.withdraw and np.isfinite(first)  # through all depths, after the tissue is cut
-    found, message = cuttings(scene, (depths if withdraws else depths[depths >= first]).tolist())
+    first = _first(scene, whole)
+    found, message = cuttings(scene, list(needed(scene)))
     pierced = (number for number, one in enumerate(found) if whole.energy(one.depth) >= one.energy)
     count = next(pierced, len(found))
     intact, cut = found[:count], found[count:]
@@ -97,11 +105,21 @@ def _follow(scene: Scene) -> Path:
         step for step in after if step.depth in scene.depths
     ]
     back: list[Step] = []
-    if withdraws:
+    if scene.insertion.withdraw:
         above = [one for one in found if one.depth < pierced_at.depth]
         back = [step for step in withdrawn(scene, [*above, *states][::-1], after[-1]) if step.depth in scene.depths]
     puncture = Puncture(whole.step(pierced_at.depth), after[0], *pierced_at.errors(whole))
     return Path(tuple(steps), puncture, message, tuple(back[::-1]))
+
+
+def _first(scene: Scene, whole: "_Whole") -> float:
+    """Return the first depth (m) at which tissue may be torn, infinite if there is none.
+
+    No slit is cheaper than its work of fracture alone: before the intact body stores that, the tissue is whole.
+    """
+    least = (1 - _TINY) * scene.blade.length
+    may = (depth for depth in scene.depths if whole.energy(depth) >= least * scene.tear(depth))
+    return next(may, np.inf)
 
 
 @dataclass(frozen=True)

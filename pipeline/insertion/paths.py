@@ -4,10 +4,13 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol, Self, TypeVar, cast
 
-from pipeline.insertion.path import Path, follow
+import numpy as np
+
+from pipeline.insertion.path import Path, follow, needed
 from pipeline.insertion.states import Scene, Solved
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.steps import Solve
+from pipeline.states import SKIPPED
 from pipeline.study.axis import Axis
 from pipeline.study.case import Case, Scale
 from pipeline.study.insertion_stages import in_slit
@@ -60,7 +63,9 @@ class CaseStates:
     def slit(self, depth: float, ahead: float) -> Solved | None:
         """Return the record of a slit: that of a stage, or of a slit that is solved besides."""
         if (number := self._stages.get((canonical(depth), ahead))) is not None:
-            return self._of_stage(number)
+            found = self._of_stage(number)
+            if found is None or found.status != SKIPPED:
+                return found
         case = replace(self.cases[0], probe=in_slit(self.blade, depth, ahead))
         own = make_plan(_alone(self.plan.study, case))
         (key,) = own.keys
@@ -87,6 +92,19 @@ def _alone(study: Study, case: Case) -> Study:
 def paths(plan: Plan, records: Records) -> list[Path]:
     """Return the path of each case of a plan's study, in the order of the dataset; none for studies without."""
     return [path for path, _ in _followed(plan, records)]
+
+
+def needs(plan: Plan, index: tuple[int, ...], find: Callable[[str], Scalable | None]) -> bool:
+    """Return whether a path needs its stage at ``index``: no slit where the tissue is whole, by the intact body."""
+    study = plan.study
+    stage = next(number for number, axis in enumerate(study.axes) if axis.is_stage)
+    if index[stage] == 0:
+        return True
+    first = tuple(0 if number == stage else place for number, place in enumerate(index))
+    case, key = study.case(first), plan.keys[int(np.ravel_multi_index(first, study.shape))]
+    record = find(key)
+    states = CaseStates(plan, {key: record} if record else {}, [case], [key])
+    return study.step_depths[index[stage] - 1] in needed(_scene(states))
 
 
 def lacking(plan: Plan, records: Records) -> Plan | None:
@@ -126,5 +144,9 @@ def scenes(plan: Plan, records: Records) -> Iterator[tuple[Scene, CaseStates]]:
         return
     for cases, keys in zip(study.by_case(list(study.cases())), study.by_case(plan.keys), strict=True):
         states = CaseStates(plan, records, cases, keys)
-        body, material = cast("Layered", cases[0].body), cases[0].material
-        yield Scene(states.blade, body, material, depths=study.step_depths, states=states), states
+        yield _scene(states), states
+
+
+def _scene(states: CaseStates) -> Scene:
+    case, depths = states.cases[0], states.plan.study.step_depths
+    return Scene(states.blade, cast("Layered", case.body), case.material, depths=depths, states=states)

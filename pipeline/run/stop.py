@@ -1,4 +1,4 @@
-"""Early stop along ε: once F stays close to F_exact, larger ε are skipped."""
+"""What is skipped once others are solved: larger ε near F_exact, and slits in tissue that is whole."""
 
 from collections.abc import Callable, Collection, Mapping
 from math import inf
@@ -17,7 +17,13 @@ _IN_A_ROW = 2
 
 
 def waves(plan: Plan, todo: Collection[Solve]) -> list[tuple[Solve, ...]]:
-    """Return the solves in groups, each of which needs the earlier ones: one group, or F_exact first and then by ε."""
+    """Return the solves in groups, each of which needs the earlier ones: one group, or F_exact first and then by ε.
+
+    Of insertions, intact bodies are first.
+    """
+    if plan.study.is_insertion:
+        slits = tuple(solve for solve in todo if solve.case.probe.slit)
+        return [tuple(solve for solve in todo if not solve.case.probe.slit), slits]
     if plan.study.planning.stop_near_exact is None:
         return [tuple(todo)]
     exact = tuple(solve for solve in todo if solve.is_reference)
@@ -31,6 +37,11 @@ def reason_to_skip(plan: Plan, solve: Solve, find: Callable[[str], Record | None
 
     The full order belongs to every `outside`, and is solved if one of them needs it.
     """
+    if plan.study.is_insertion:
+        from pipeline.insertion.paths import needs  # noqa: PLC0415 (it loads scipy)
+
+        is_needed = not solve.serves or any(needs(plan, index, find) for index in solve.serves)
+        return "" if is_needed else "the intact body stores less than the work of fracture of a slit"
     limit = plan.study.planning.stop_near_exact
     if limit is None or solve.is_reference or not plan.reference_keys:
         return ""

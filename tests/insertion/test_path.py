@@ -12,6 +12,7 @@ from pipeline.insertion.steps import PHASES
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.report.guide import guide
+from pipeline.run.stop import reason_to_skip, waves
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_mapping
 from tests.insertion.scenes import BLADE, FIELD, LENGTH, SCENE, STIFFNESS, elastic, solved, stored
@@ -162,6 +163,21 @@ def test_tissue_that_the_blade_would_split_has_no_path():
     found = _path(_study(toughness="1 mJ/m^2"))
     assert found["status"] == "failed" and "0.5 mm: the slit would run too far ahead" in str(found["message"].values)
     assert np.isnan(found["force"]).all()
+
+
+def test_slits_in_tissue_that_is_whole_are_not_solved():
+    """The intact body is solved first: it says at which depths its energy could pay for a slit."""
+    study = _study(toughness="20 J/m^2")
+    plan = make_plan(study)
+    first, second = waves(plan, plan.solves)
+    assert [solve.case.probe.slit for solve in first] == [None] and len(second) == 12
+    _, records = solved(study)
+    skipped = [solve for solve in second if reason_to_skip(plan, solve, records.get)]
+    assert 0 < len(skipped) < 12
+    kept = {key: one for key, one in records.items() if key not in {solve.key for solve in skipped}}
+    for name in ("force", "phase", "puncture_depth"):
+        np.testing.assert_array_equal(build(plan, kept)[name], build(plan, records)[name])
+    assert not any(reason_to_skip(plan, solve, {}.get) for solve in second)
 
 
 def test_toughness_and_friction_are_swept_without_a_solve():
