@@ -253,6 +253,7 @@ epsmesh_touch epsmesh_touch_after(const epsmesh_model *m, const epsmesh_query *q
     if (memory->phase == EPSMESH_UNKNOWN || !isfinite(q->depth) || !is_same(m, q, &memory->query))
         return forgotten(memory, isfinite(q->depth) ? EPSMESH_PAST : EPSMESH_INPUT);
     asked = memory->query, asked.depth = q->depth;
+    memcpy(asked.axis, q->axis, sizeof asked.axis);
     if (memory->phase == EPSMESH_RESTED && q->depth <= TOUCHING) return epsmesh_touch_at(m, &asked);
     return grows(q) ? after_growing(m, &asked, step, memory) : after_same(m, &asked, step, memory);
 }

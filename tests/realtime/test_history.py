@@ -151,6 +151,9 @@ def test_contact_that_grows_again_has_used_up_its_room_or_was_refused_has_no_for
         history = History(relaxing())
         assert [history.query(0.1, **BALL, depth=d).status for d in (1e-4, depth, 1e-4)] == ["ok", status, "past"]
     assert History(relaxing()).query(-1.0, **BALL, depth=1e-4).status == "input"
+    history = History(relaxing())
+    axes = ((0.0, 0.0, -1.0), (0.5, 0.0, -1.0), (0.0, 0.0, -1.0))
+    assert [history.query(0.1, **BALL, depth=1e-4, axis=axis).status for axis in axes] == ["ok", "tilted", "past"]
 
 
 def test_tissue_that_does_not_relax_has_no_history():
@@ -164,6 +167,9 @@ def test_tissue_that_does_not_relax_has_no_history():
 def test_a_file_has_the_relaxation_and_none_that_gains_modulus(tmp_path):
     write_model(tmp_path / "model.epsm", relaxing(), {}, {})
     assert read(tmp_path / "model.epsm").relaxation == TERMS
+    data = pipeline.open(tmp_path / "model.epsm")
+    assert list(zip(data["relaxation_share"].values, data["relaxation_time"].values, strict=True)) == [*TERMS]
+    assert data["relaxation_time"].attrs["units"] == "s"
     for wrong in (((0.6, 1.0), (0.5, 2.0)), ((-0.1, 1.0),), ((0.1, 0.0),), ((0.01, 1.0),) * 7):
         write_model(tmp_path / "model.epsm", replace(random_model(), relaxation=wrong), {}, {})
         with pytest.raises(ModelError, match="relaxation"):

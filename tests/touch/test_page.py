@@ -3,13 +3,14 @@
 import json
 import os
 import threading
+from dataclasses import replace
 from http.client import HTTPConnection
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from pipeline.touch.page import write_touch_page
+from pipeline.touch.page import render, write_touch_page
 from pipeline.touch.server import HOST, PageServer
 from tests.realtime.synthetic import random_surface, write_random, write_surface
 from tests.report.browser import CHROMIUM, Browser
@@ -162,6 +163,13 @@ def test_the_dent_is_seen_and_outside_the_region_no_number_is(browser, tmp_path)
         sizes = [browser.ask(f"document.querySelector('[name={name}]').parentElement.hidden") for name in SIZES]
         assert sizes == [tool == "blade", tool != "cone", tool != "blade", tool != "blade"]
     assert browser.messages == []
+
+
+def test_the_page_of_relaxing_tissue_says_that_it_shows_a_sudden_touch():
+    surface = random_surface()
+    assert "sudden touch" not in render(surface, "")
+    model = replace(surface.model, relaxation=((0.4, 2.0),))
+    assert "sudden touch" in render(replace(surface, model=model), "")
 
 
 @in_browser

@@ -7,11 +7,21 @@ const SPOT_NUMBERS = 22;
 
 const inner = (a, b) => a.reduce((sum, value, i) => sum + value * b[i], 0);
 
+async function started(evaluator) {
+  try {
+    return (await WebAssembly.instantiate(evaluator, { env: Math })).instance;
+  } catch (problem) {
+    const trouble = document.getElementById("trouble");
+    trouble.textContent = `This browser does not run the evaluator (WebAssembly): ${problem.message}`;
+    trouble.hidden = false;
+    throw problem;
+  }
+}
+
 // Read the arrays of the page, and start the evaluator with the model.
 async function unpackModel(layout) {
   const { evaluator, model } = await unpack(layout);
-  const { instance } = await WebAssembly.instantiate(evaluator, { env: Math });
-  const { exports: c } = instance;
+  const { exports: c } = await started(evaluator);
   const at = c.page_room(model.length);
   new Uint8Array(c.memory.buffer, at, model.length).set(model);
   const status = c.page_load(at, model.length);
