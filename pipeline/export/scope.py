@@ -99,6 +99,8 @@ def _refusal(case: Case, first: Case) -> str:
     body, probe = case.body, case.probe
     if body != first.body:
         return "the study has several bodies, and a model has one: export a study of each"
+    if any(axis.path == "probe.insertion" for axis in case.axes):
+        return "probe.insertion: a path has no real-time model: give a depth instead"
     if reason := obstacle("real-time model", case):
         return reason
     if case.relaxations != first.relaxations:

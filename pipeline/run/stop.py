@@ -40,7 +40,7 @@ def reason_to_skip(plan: Plan, solve: Solve, find: Callable[[str], Record | None
     if plan.study.is_insertion:
         from pipeline.insertion.paths import needs  # noqa: PLC0415 (it loads scipy)
 
-        is_needed = not solve.serves or any(needs(plan, index, find) for index in solve.serves)
+        is_needed = solve.case.probe.slit is None or any(needs(plan, index, find) for index in solve.serves)
         return "" if is_needed else "the intact body stores less than the work of fracture of a slit"
     limit = plan.study.planning.stop_near_exact
     if limit is None or solve.is_reference or not plan.reference_keys:
