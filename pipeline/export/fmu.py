@@ -3,6 +3,7 @@
 The unit has one tool, whose kind and sizes are parameters. A step evaluates the inputs at its beginning.
 """
 
+import os
 import platform
 import shlex
 import shutil
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import zipfile
 from dataclasses import dataclass, field
+from functools import cache
 from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -199,14 +201,28 @@ def compiler() -> list[str]:
     Raises:
         NoCompilerError: if there is none.
     """
-    import os  # noqa: PLC0415
-
     command = shlex.split(os.environ.get("CC", "")) or ["cc"]
     if shutil.which(command[0]) is None:
         raise NoCompilerError(
             f"a unit contains a compiled library, and there is no C compiler {command[0]!r}: install gcc, or set CC"
         )
     return command
+
+
+@cache
+def _library(command: tuple[str, ...]) -> bytes:
+    """Return the compiled evaluator with the functions of the standard.
+
+    Raises:
+        NoCompilerError: if it does not compile.
+    """
+    with TemporaryDirectory() as folder:
+        made, code = Path(folder) / NAME, [str(sources() / each) for each in _COMPILED]
+        options = [*_FLAGS, f"-I{sources()}", *code, "-o", str(made), "-lm"]
+        done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise NoCompilerError(f"{command[0]} failed: {done.stderr.strip()[-500:]}")
+        return made.read_bytes()
 
 
 def write_fmu(model_file: Path, path: Path, version: str) -> None:
@@ -217,23 +233,13 @@ def write_fmu(model_file: Path, path: Path, version: str) -> None:
         ModelError: if ``model_file`` is no model; OSError if a file cannot be read or written.
     """
     data = model_file.read_bytes()
-    model, place, command = model_of(data), library_place(), compiler()
+    model, place, library = model_of(data), library_place(), _library(tuple(compiler()))
     name = model_file.name.removesuffix(MODEL_ENDING)
-    with TemporaryDirectory() as folder:
-        library, code = Path(folder) / NAME, [str(sources() / each) for each in _COMPILED]
-        done = subprocess.run(
-            [*command, *_FLAGS, f"-I{sources()}", *code, "-o", str(library), "-lm"],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if done.returncode:
-            raise NoCompilerError(f"{command[0]} failed: {done.stderr.strip()[-500:]}")
-        with atomic(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as unit:
-            unit.writestr("modelDescription.xml", describe(model, name, version))
-            unit.writestr("sources/buildDescription.xml", build_description())
-            unit.writestr(f"resources/{MODEL_FILE}", data)
-            unit.write(library, place)
-            for each in source_files():
-                if str(each) in _COMPILED or each.match("epsmesh*.h") or each.parent.name == "src":
-                    unit.write(sources() / each, f"sources/{str(each).removeprefix('fmu/')}")
+    with atomic(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as unit:
+        unit.writestr("modelDescription.xml", describe(model, name, version))
+        unit.writestr("sources/buildDescription.xml", build_description())
+        unit.writestr(f"resources/{MODEL_FILE}", data)
+        unit.writestr(place, library)
+        for each in source_files():
+            if str(each) in _COMPILED or each.match("epsmesh*.h") or each.parent.name == "src":
+                unit.write(sources() / each, f"sources/{str(each).removeprefix('fmu/')}")
