@@ -162,7 +162,7 @@ def _cases(dataset: xr.Dataset, name: str, *, alike: bool) -> list[_Place]:
         return [_Place(one, ", ".join(f"{k} = {v}" for k, v in one.items()), index) for one, index in places]
     if {axis.name: len(axis) for axis in study.axes if not axis.is_stage} != sizes:
         raise DatasetError(f"{name} is part of a dataset, or of another study than it says: compare whole ones")
-    return [_Place(parameters_of(case), str(case), index) for index, case in study.whole_cases()]
+    return [_Place(parameters_of(case), case.whole, index) for index, case in study.whole_cases()]
 
 
 def _differences(scene: list[tuple[str, Any, Any]]) -> str:

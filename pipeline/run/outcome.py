@@ -73,7 +73,7 @@ def failures(plan: Plan, records: Mapping[str, Record]) -> tuple[tuple[str, str]
     if plan.study.is_insertion:
         whole = [case for _, case in plan.study.whole_cases()]
         ended = zip(whole, _paths(plan, records), strict=True)
-        return tuple((_without_stage(case), path.message) for case, path in ended if path.status in FAILURES)
+        return tuple((case.whole, path.message) for case, path in ended if path.status in FAILURES)
     exact = {key: records[key].message for key in plan.reference_keys if key in records and not records[key].is_ok}
     return (*failed, *((f"F_exact ({key[:6]})", message) for key, message in exact.items()))
 
@@ -82,11 +82,6 @@ def _paths(plan: Plan, records: Mapping[str, Record]) -> "list[Path]":
     from pipeline.insertion.paths import paths  # noqa: PLC0415 (it loads scipy)
 
     return paths(plan, records)
-
-
-def _without_stage(case: Case) -> str:
-    words = {name: text for name, text in case.words.items() if name != "stage"}
-    return ", ".join(f"{name} = {text}" for name, text in words.items()) or "the one case"
 
 
 def _status(record: Record | None) -> str:

@@ -221,5 +221,14 @@ class Case:
         """Whether its law or friction makes a load path of steps necessary, which the meridian follows, too."""
         return self.material.is_large or self.probe.friction > 0
 
+    @property
+    def whole(self) -> str:
+        """Its name in the dataset: that of all of its stages."""
+        return _named({axis.name: self.words[axis.name] for axis in self.axes if not axis.is_stage})
+
     def __str__(self) -> str:
-        return ", ".join(f"{name} = {text}" for name, text in self.words.items()) or "the one case"
+        return _named(self.words)
+
+
+def _named(words: dict[str, str]) -> str:
+    return ", ".join(f"{name} = {text}" for name, text in words.items()) or "the one case"
