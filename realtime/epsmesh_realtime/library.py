@@ -88,8 +88,8 @@ def sources() -> Path:
 def source_files() -> list[Path]:
     """Return the files in that folder, relative to it, without tests."""
     patterns, folder = ("*.[ch]", "src/*.c", "examples/*", "fmu/*.c"), sources()
-    found = (path.relative_to(folder) for pattern in patterns for path in sorted(folder.glob(pattern)))
-    return [path for path in found if not path.name.startswith("test_")]
+    found = (path for pattern in patterns for path in sorted(folder.glob(pattern)))
+    return [path.relative_to(folder) for path in found if path.is_file() and not path.name.startswith("test_")]
 
 
 def _is_checkout() -> bool:
