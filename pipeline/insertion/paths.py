@@ -6,14 +6,17 @@ from typing import TYPE_CHECKING, Protocol, Self, TypeVar, cast
 
 import numpy as np
 
+from pipeline.insertion.needle import NeedleScene, SolvedNeedle
 from pipeline.insertion.path import Path, follow, needed
 from pipeline.insertion.states import Scene, Solved
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.steps import Solve
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.states import SKIPPED
 from pipeline.study.axis import Axis
 from pipeline.study.case import Case, Scale
-from pipeline.study.insertion_stages import in_slit
+from pipeline.study.insertion_stages import in_slit, pressed
 from pipeline.study.sweep import Study
 from pipeline.units import canonical
 
@@ -22,7 +25,7 @@ if TYPE_CHECKING:
     from pipeline.shapes.probes.blade import Blade
 
 
-class Scalable(Solved, Protocol):
+class Scalable(SolvedNeedle, Protocol):
     """A record of a solved state."""
 
     def scaled(self, scale: Scale) -> Self:
@@ -52,9 +55,9 @@ class CaseStates:
         self._stages = {(canonical(slit.tip), slit.ahead): n for n, slit in enumerate(slits) if slit}
 
     @property
-    def blade(self) -> "Blade":
-        """The blade that is inserted."""
-        return cast("Blade", self.plan.study.tool(self.cases[0]))
+    def tool(self) -> "Blade | RoundIndenter":
+        """The tool that is inserted."""
+        return cast("Blade | RoundIndenter", self.plan.study.tool(self.cases[0]))
 
     def intact(self) -> Solved | None:
         """Return the record of the blade on the intact body."""
@@ -66,13 +69,24 @@ class CaseStates:
             found = self._of_stage(number)
             if found is None or found.status != SKIPPED:
                 return found
-        case = replace(self.cases[0], probe=in_slit(self.blade, depth, ahead))
+        return self._besides(in_slit(cast("Blade", self.tool), depth, ahead))
+
+    def cutting(self) -> Scalable | None:
+        """Return the record of a needle deep in tissue that it cuts."""
+        return self._of_stage(0)
+
+    def pressed(self, depth: float) -> Scalable | None:
+        """Return the record of a needle at a depth (m) on the intact body, which is solved besides the stages."""
+        return self._besides(pressed(cast("RoundIndenter", self.tool), depth))
+
+    def _besides(self, probe: Probe) -> Scalable | None:
+        case = replace(self.cases[0], probe=probe)
         own = make_plan(_alone(self.plan.study, case))
         (key,) = own.keys
         self.further[key] = own
         return _scaled(self.records.get(key), own, next(own.study.cases()))
 
-    def _of_stage(self, number: int) -> Solved | None:
+    def _of_stage(self, number: int) -> Scalable | None:
         return _scaled(self.records.get(self.keys[number]), self.plan, self.cases[number])
 
 
@@ -104,7 +118,8 @@ def needs(plan: Plan, index: tuple[int, ...], find: Callable[[str], Scalable | N
     case, key = study.case(first), plan.keys[int(np.ravel_multi_index(first, study.shape))]
     record = find(key)
     states = CaseStates(plan, {key: record} if record else {}, [case], [key])
-    return study.step_depths[index[stage] - 1] in needed(_scene(states))
+    scene = _scene(states)
+    return isinstance(scene, NeedleScene) or study.step_depths[index[stage] - 1] in needed(scene)
 
 
 def lacking(plan: Plan, records: Records) -> Plan | None:
@@ -134,10 +149,11 @@ def complete(
 
 
 def _followed(plan: Plan, records: Records) -> Iterator[tuple[Path, CaseStates]]:
-    return ((follow(scene), states) for scene, states in scenes(plan, records))
+    for scene, states in scenes(plan, records):
+        yield scene.follow() if isinstance(scene, NeedleScene) else follow(scene), states
 
 
-def scenes(plan: Plan, records: Records) -> Iterator[tuple[Scene, CaseStates]]:
+def scenes(plan: Plan, records: Records) -> Iterator[tuple[Scene | NeedleScene, CaseStates]]:
     """Yield the scene of each case of a plan's study, and its states; none for studies without insertions."""
     study = plan.study
     if not study.is_insertion:
@@ -147,6 +163,8 @@ def scenes(plan: Plan, records: Records) -> Iterator[tuple[Scene, CaseStates]]:
         yield _scene(states), states
 
 
-def _scene(states: CaseStates) -> Scene:
-    case, depths = states.cases[0], states.plan.study.step_depths
-    return Scene(states.blade, cast("Layered", case.body), case.material, depths=depths, states=states)
+def _scene(states: CaseStates) -> Scene | NeedleScene:
+    case, depths, tool = states.cases[0], states.plan.study.step_depths, states.tool
+    if isinstance(tool, RoundIndenter):
+        return NeedleScene(tool, depths=depths, states=states)
+    return Scene(tool, cast("Layered", case.body), case.material, depths=depths, states=states)

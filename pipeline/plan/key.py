@@ -24,6 +24,7 @@ PHYSICS_VERSION = 6
 
 # Keys of a probe without effect on the force of a case: action is a label, and an insertion has cases of its own.
 _UNPHYSICAL = ("action", "toughness", "insertion")
+_UNPHYSICAL_OF_CUTTING = ("action", "insertion")
 _MANY = 200_000  # sections of a large study
 # Keys of what follows from the elastic force without a solve: pipeline/report/history.py.
 _OF_TIME = ("history", "relaxation")
@@ -40,7 +41,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
         str(PHYSICS_VERSION),
         _body_text(case.body, case.scale.stress if scaled else 1.0),
         _material_text(case.material, scaled=scaled),
-        text_of(case.probe, (*_UNPHYSICAL, *(case.moves_in_proportion if scaled else ()))),
+        text_of(case.probe, (*_unphysical(case.probe), *(case.moves_in_proportion if scaled else ()))),
         _ratios_text(case.probe) if scaled else "",
         _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, case.element),
         text_of(case.solve, ("timing", "repeats", "exact")),
@@ -53,6 +54,11 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     if case.solve.timing:
         parts += [str(case.labels), str(case.solve.repeats)]
     return digest("\n".join(parts))
+
+
+def _unphysical(probe: Probe) -> tuple[str, ...]:
+    """Return the keys without effect on the force of a case; that of a needle that cuts follows from the toughness."""
+    return _UNPHYSICAL_OF_CUTTING if probe.is_cutting else _UNPHYSICAL
 
 
 def _output_text(output: Output) -> str:

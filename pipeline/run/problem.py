@@ -33,6 +33,7 @@ from pipeline.solve.meridian.punch import RoundTool
 from pipeline.solve.movement import FarField, Movement, Place
 from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import MaterialLaw, Parameters
+from pipeline.solve.plane.needle import NeedleSolver
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Spaces
@@ -54,7 +55,12 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
     """Return the problem on the mesh of ``case``, with its elements; collective.
 
     The mesh was made for ``case``, whose probe gives the tool's place. ``condense``: many depths follow.
+
+    Raises:
+        CaseFailure: if it is a needle that cuts: only the meridian has it.
     """
+    if case.probe.is_cutting:
+        raise CaseFailure("a needle that is inserted needs a round scene, about its axis")
     tool = tool_of(case) if case.probe.is_unilateral else None
     degree, conditions = case.mesh.degree, conditions_of(case)
     return QuasiStaticProblem(spaces, degree, conditions, case.element, tool=tool, reuse=reuse, condense=condense)
@@ -78,6 +84,8 @@ def memory_of_basis(case: Case, dofs: int) -> float:
 
 def meridian_problem(case: Case) -> Problem:
     """Return the problem of an axisymmetric ``case`` without loads, on its meridian."""
+    if case.probe.is_cutting:
+        return _needle_of(case)
     if case.probe.is_unilateral and case.has_load_steps:
         how = {} if case.mesh.accuracy is None else {"accuracy": case.mesh.accuracy / 2}
         return LargeMeridianContact(meridian_of(case), round_tool_of(case), **how)
@@ -86,6 +94,13 @@ def meridian_problem(case: Case) -> Problem:
     if case.probe.is_unilateral:
         return MeridianContact(meridian_of(case), round_tool_of(case))
     return MeridianProblem(meridian_of(case), conditions_of(case))
+
+
+def _needle_of(case: Case) -> NeedleSolver:
+    probe = case.probe
+    assert isinstance(probe, RoundIndenter)
+    assert probe.toughness is not None
+    return NeedleSolver(probe.limit, probe.toughness)
 
 
 def conditions_of(case: Case) -> Conditions:

@@ -177,6 +177,11 @@ class Probe(Section, ABC):
         return None
 
     @property
+    def is_cutting(self) -> bool:
+        """Whether it is a needle deep in tissue that it cuts: a state of its insertion."""
+        return False
+
+    @property
     def proportional_to(self) -> tuple[str, ...]:
         """Keys to which F is proportional: none if the contact area grows with the depth.
 

@@ -1,4 +1,4 @@
-"""Whether a blade can be inserted as a study says: sound keys, room above the support, layers thicker than a step."""
+"""Whether a tool can be inserted as a study says: sound keys, room above the support, layers thicker than a step."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -11,10 +11,11 @@ from pipeline.shapes.section import in_mm
 from pipeline.study.problems import Problems
 
 if TYPE_CHECKING:
+    from pipeline.shapes.probes._round import RoundIndenter
     from pipeline.shapes.probes.blade import Blade
 
-# Tissue that must be left beside the path of the tip: widths of the blade.
-ROOM = 2.0
+    Tool = Blade | RoundIndenter
+
 # Largest coefficient of friction, whose reaction on the pressure is still a correction.
 _MOST_FRICTION = 1.0
 
@@ -23,19 +24,17 @@ def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
     """Report an insertion for which keys are missing, or for which the body has no room."""
     if "insertion" not in type(probe).model_fields:
         return
-    blade, before = cast("Blade", probe), len(problems.errors)
-    insertion = blade.insertion
+    tool, before = cast("Tool", probe), len(problems.errors)
+    insertion = tool.insertion
     if insertion is None:
-        if blade.toughness is not None:
-            problems.error(
-                "probe.toughness", f"{blade.toughness:g} J/m^2", "is for an insertion: add [probe.insertion]"
-            )
+        if tool.toughness is not None:
+            problems.error("probe.toughness", f"{tool.toughness:g} J/m^2", "is for an insertion: add [probe.insertion]")
         return
-    _check_keys(blade, problems)
+    _check_keys(tool, problems)
     if len(problems.errors) == before and isinstance(body, Layered):
-        _check_end(body, blade, insertion, problems)
-        _check_layers(body, blade, insertion, problems)
-        _warn_of_tougher_layers(body, blade, insertion, problems)
+        _check_end(body, tool, insertion, problems)
+        _check_layers(body, tool, insertion, problems)
+        _warn_of_tougher_layers(body, tool, insertion, problems)
         if insertion.withdraw and body.layer:
             problems.error(
                 "probe.insertion.withdraw", True, "withdrawal is computed in a body of one material: omit it, or layers"
@@ -54,46 +53,46 @@ def check_same_path(probes: Sequence[Probe], problems: Problems) -> None:
         )
 
 
-def _check_keys(probe: "Blade", problems: Problems) -> None:
+def _check_keys(probe: "Tool", problems: Problems) -> None:
     if probe.toughness is None:
         problems.error("probe.toughness", None, 'is required for an insertion, such as toughness = "200 J/m^2"')
     if not probe.is_unilateral:
         problems.error(
-            "probe.contact", probe.contact, 'tissue slides along a blade that is inserted: use contact = "unilateral"'
+            "probe.contact", probe.contact, 'tissue slides along a tool that is inserted: use contact = "unilateral"'
         )
     if not isfinite(probe.friction):
-        problems.error("probe.friction", STICK, "a blade that is inserted slides: give a coefficient, such as 0.2")
+        problems.error("probe.friction", STICK, "a tool that is inserted slides: give a coefficient, such as 0.2")
     elif probe.friction > _MOST_FRICTION:
         problems.error(
             "probe.friction",
             probe.friction,
-            f"must be at most {_MOST_FRICTION:g} for a blade that is inserted: beyond, its drag more than doubles the "
+            f"must be at most {_MOST_FRICTION:g} for a tool that is inserted: beyond, its drag more than doubles the "
             "pressure on its own flanks",
         )
 
 
-def _check_end(body: Layered, probe: "Blade", insertion: Insertion, problems: Problems) -> None:
+def _check_end(body: Layered, probe: "Tool", insertion: Insertion, problems: Problems) -> None:
     """Report a path through the bottom or the support, and one whose slit leaves the top."""
     low, top = body.heights
     end = min(top - low, *(top - level for level in body.support.edges()), top - low)
-    room = ROOM * probe.width
+    room, words = probe.insertion_room
     if insertion.to + room > end:
         problems.error(
             "probe.insertion.to",
             in_mm(insertion.to),
-            f"leaves less than {in_mm(room)}, two widths of the blade, above the bottom or the support: must be at "
+            f"leaves less than {in_mm(room)}, {words}, above the bottom or the support: must be at "
             f"most {in_mm(max(end - room, 0.0))}",
         )
     if probe.gap(body, probe.frame_on(body)) < room:
+        key = "length" if "length" in type(probe).model_fields else "radius"
         problems.error(
-            "probe.length",
-            in_mm(probe.length),
-            f"leaves less than {in_mm(room)}, two widths of the blade, beside its ends: use a shorter blade, or a "
-            "larger body",
+            f"probe.{key}",
+            in_mm(getattr(probe, key)),
+            f"leaves less than {in_mm(room)}, {words}, beside the path: use a smaller tool, or a larger body",
         )
 
 
-def _warn_of_tougher_layers(body: Layered, probe: "Blade", insertion: Insertion, problems: Problems) -> None:
+def _warn_of_tougher_layers(body: Layered, probe: "Tool", insertion: Insertion, problems: Problems) -> None:
     """Warn of layers that the tip reaches and that are tougher than those above: they would be indented first."""
     top, own = body.heights[1], probe.toughness or 0.0
     tough = [layer.toughness or own for layer in body.layer]
@@ -108,18 +107,19 @@ def _warn_of_tougher_layers(body: Layered, probe: "Blade", insertion: Insertion,
             )
 
 
-def _check_layers(body: Layered, probe: "Blade", insertion: Insertion, problems: Problems) -> None:
-    """Report layers that are thinner than a step, or than the blade is wide."""
+def _check_layers(body: Layered, probe: "Tool", insertion: Insertion, problems: Problems) -> None:
+    """Report layers that are thinner than a step, or than what a tool needs."""
     _, upper = body.heights
     step = insertion.to / insertion.steps
-    least = max(step, ROOM * probe.width)
+    room, words = probe.insertion_room
+    least = max(step, room)
     for number, (layer, end) in enumerate(zip(body.layer, body.interfaces, strict=False), start=1):
         if upper - end < least:
-            what = "a step" if least == step else "two widths of the blade"
+            what = "a step" if least == step else words
             problems.error(
                 f"body.layer[{number}].thickness",
                 in_mm(upper - end),
-                f"{layer.name} is thinner than {what}, {in_mm(least)}: use more steps, a thinner blade or a thicker "
+                f"{layer.name} is thinner than {what}, {in_mm(least)}: use more steps, a thinner tool or a thicker "
                 "layer",
             )
         upper = end

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from pipeline.insertion.near_tip import EXTENSION_ERROR, NearTip, strength
 from pipeline.insertion.paths import lacking, paths, scenes
-from pipeline.insertion.states import Cut
+from pipeline.insertion.states import Cut, Scene
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
@@ -77,8 +77,10 @@ def _fronts(comm: MPI.Comm, plan: Plan, records: dict[str, Record]) -> list[Cut]
     """Return the solved slits with a near front, and with that of a stage, whose ``records`` are known."""
     places = [(_DEPTH, _NEAR), (_DEPTH, _FAR)]
     ((scene, states),) = scenes(plan, records)
+    assert isinstance(scene, Scene)
     scene.cuts(places)
     for own in states.further.values():
         records |= compute(own, comm)
     ((scene, _),) = scenes(plan, records)
+    assert isinstance(scene, Scene)
     return [cut for cut in scene.cuts(places).values() if isinstance(cut, Cut)]

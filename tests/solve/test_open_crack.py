@@ -30,6 +30,10 @@ def test_the_pressure_does_the_work_that_is_stored(opened):
     assert work == pytest.approx(steps * (exponents[1:] + exponents[:-1]) / 2, rel=0.01)
 
 
+def test_what_holds_the_tissue_ahead_of_the_tips_carries_the_thrust(opened):
+    assert opened.balance < 1e-6
+
+
 def test_a_tougher_tissue_has_a_shorter_crack_and_needs_more_energy(opened):
     toughness = np.array([0.02, 0.1, 0.3])
     ratios = np.array([opened.ratio(each) for each in toughness])
@@ -41,7 +45,7 @@ def test_a_tougher_tissue_has_a_shorter_crack_and_needs_more_energy(opened):
 def test_the_crack_at_the_toughness_needs_the_least_energy():
     """With f = ρ³ the least of 2γ/ρ + f/ρ² is at ρ² = 2γ."""
     ratios = np.array([0.1, 0.5, 1.0, 3.0])
-    power = Opening(ratios, ratios**3, 3 * ratios**2, np.zeros(4))
+    power = Opening(ratios, ratios**3, 3 * ratios**2, np.zeros(4), np.zeros(4))
     assert power.ratio(0.5) == pytest.approx(1.0)
     around = np.linspace(0.8, 1.2, 5)
     needed = [2 * 0.5 / r + power.energy(r) / r**2 for r in around]
@@ -50,6 +54,6 @@ def test_the_crack_at_the_toughness_needs_the_least_energy():
 
 
 def test_a_toughness_beyond_the_solved_states_is_refused():
-    power = Opening(np.array([0.1, 1.0]), np.array([1e-3, 1.0]), np.array([0.03, 3.0]), np.zeros(2))
+    power = Opening(np.array([0.1, 1.0]), np.array([1e-3, 1.0]), np.array([0.03, 3.0]), np.zeros(2), np.zeros(2))
     with pytest.raises(ValueError, match=r"0\.005 to 0\.5 is solved"):
         power.ratio(0.6)

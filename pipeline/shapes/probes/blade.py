@@ -10,18 +10,18 @@ from pydantic import Field
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.insertion import Insertion
+from pipeline.shapes.insertion import Inserted
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes._edge import Edge
 from pipeline.shapes.punch import Punch
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.shapes.slit import Slit, to_rectangle
-from pipeline.units import Length, Toughness, Travel
+from pipeline.units import Length, Travel
 
 _CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 
-class Blade(Punch):
+class Blade(Inserted, Punch):
     """A flat rectangular punch with its length along ``direction``. With an ``incision`` it is in a slit."""
 
     is_round: ClassVar[bool] = False
@@ -64,22 +64,6 @@ class Blade(Punch):
             '"blade"',
         ),
     ] = "blade"
-    toughness: Annotated[
-        Toughness | None,
-        Words(
-            "Toughness of the tissue: energy per area of a cut. An insertion needs it. Layers may have their own.",
-            '"200 J/m^2"',
-            default="none: tissue is not cut",
-        ),
-    ] = None
-    insertion: Annotated[
-        Insertion | None,
-        Words(
-            "Insertion through the surface, as a table: [probe.insertion].",
-            '{to = "15 mm", steps = 30}',
-            default="none: the tissue stays whole",
-        ),
-    ] = None
 
     @classmethod
     def below(cls, tool: Probe, direction: Vector, length: float, width: float) -> "Blade":
@@ -93,6 +77,16 @@ class Blade(Punch):
             at=tool.at,
             axis=tool.axis,
         )
+
+    @property
+    def insertion_room(self) -> tuple[float, str]:
+        """Tissue (m) that an insertion leaves beside the tip's path, and what it is: two widths."""
+        return 2 * self.width, "two widths of the blade"
+
+    @property
+    def insertion_clearance(self) -> float:
+        """Least distance (m) of the tip's steps from interfaces of layers: half a width."""
+        return self.width / 2
 
     @property
     def is_rounded(self) -> bool:

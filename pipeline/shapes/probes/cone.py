@@ -10,7 +10,7 @@ from pipeline.units import Angle, Length, Rounding
 
 
 class Cone(RoundIndenter):
-    """A needle's tip: a cone, sharp or rounded, on a shaft. Friction along the shaft is not computed."""
+    """A needle's tip: a cone, sharp or rounded, on a shaft. Friction along the shaft is that of an insertion."""
 
     REALTIME = ("unilateral",)
 
@@ -54,7 +54,7 @@ class Cone(RoundIndenter):
                 f"leaves no cone: the rounding would extend to {in_mm(self.section.tangent)} "
                 f"from the axis, but the shaft has radius {in_mm(self.radius)}; use a smaller tip, or a sphere",
             )
-        elif self.section.reach(depth := max(self.depth, self.depths[1])) >= self.radius:
+        elif not self.is_inserted and self.section.reach(depth := max(self.depth, self.depths[1])) >= self.radius:
             problems.error(
                 "probe.depth",
                 in_mm(depth),

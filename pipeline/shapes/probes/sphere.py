@@ -9,7 +9,7 @@ from pipeline.units import Length
 
 
 class Sphere(RoundIndenter):
-    """A ball, such as the tip of a palpating probe."""
+    """A ball, such as the tip of a palpating probe; inserted, it is the end of a needle with a shaft of its radius."""
 
     REALTIME = ("unilateral",)
     # 3/2 (H. Hertz), while contact is small compared with the ball.
@@ -35,7 +35,7 @@ class Sphere(RoundIndenter):
 
     def check(self, problems: Problems) -> None:
         """Report a ball pressed in past its equator."""
-        if (depth := max(self.depth, self.depths[1])) > self.radius:
+        if (depth := max(self.depth, self.depths[1])) > self.radius and not self.is_inserted:
             problems.error(
                 "probe.depth",
                 in_mm(depth),

@@ -7,7 +7,8 @@ that are still closed would have normals along them. Then the radius grows, at a
 Lengths are in units of half the crack's length b, stresses in units of μ.
 """
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from pipeline.mesh.meridian import meridian_mesh
 from pipeline.shapes.distance import Distance
 from pipeline.solve import SolveError
 from pipeline.solve.contact.contact_steps import ContactPath, Stage, press
-from pipeline.solve.contact.deformed import PlacedTool
+from pipeline.solve.contact.deformed import ContactSolution, PlacedTool
 from pipeline.solve.meridian.forms import MeridianForms
 from pipeline.solve.meridian.system import FreeSystem
 from pipeline.solve.meridian.tissue import MeridianTissue
@@ -48,8 +49,8 @@ def open_crack(law: MaterialLaw, toughness: float, grading: CrackGrading) -> Ope
         mesh = meridian_mesh(cracked_quarter(_EXTENT * _LARGEST, grading))
     tissue = _tissue(mesh, law)
     path, message = ContactPath(Stage(0.0, np.zeros_like(tissue.state))), ""
-    found: list[tuple[float, float, float, float]] = []
-    ratio = _FIRST
+    found: list[_State] = []
+    ahead, ratio, balance = tissue.system.forms.on(AHEAD)[0][:, 1], _FIRST, 0.0
     while ratio < _LARGEST:
         try:
             for share in _LENS if not found else (1.0,):
@@ -59,19 +60,41 @@ def open_crack(law: MaterialLaw, toughness: float, grading: CrackGrading) -> Ope
             break
         tissue.state, touched = path.last.state, path.last.touched
         assert touched is not None
-        energy, thrust = tissue.system.forms.energy(tissue.state), -float(touched.forces[:, 1].sum())
-        found.append((ratio, _QUARTERS * energy, _QUARTERS * float(touched.pressed.sum()), 2 * thrust))
+        found.append(_state(tissue, touched, ratio))
+        holds = -2 * float(tissue.residual()[ahead].sum())
+        balance = max(balance, abs(holds / found[-1].thrust - 1))
         if len(found) > 1 and _opening(found[-2:]).released[1] >= toughness:
             break
         ratio *= _FACTOR
     if len(found) < 2:
         raise SolveError(f"a crack that a cylinder opens: {message}")
-    return _opening(found, message)
+    return replace(_opening(found), balance=balance, message=message)
 
 
-def _opening(found: list[tuple[float, float, float, float]], message: str = "") -> Opening:
-    ratios, energies, slopes, thrusts = np.array(found).T
-    return Opening(ratios, energies, slopes, thrusts, message)
+class _State(NamedTuple):
+    """One state of the crack: what an opening has of it."""
+
+    ratio: float
+    energy: float
+    slope: float
+    thrust: float
+    angle: float
+
+
+def _state(tissue: MeridianTissue, touched: ContactSolution, ratio: float) -> _State:
+    x, z = tissue.positions()[np.flatnonzero(touched.active)[-1]]
+    return _State(
+        ratio=ratio,
+        energy=_QUARTERS * tissue.system.forms.energy(tissue.state),
+        slope=_QUARTERS * float(touched.pressed.sum()),
+        thrust=-2 * float(touched.forces[:, 1].sum()),
+        angle=float(np.arctan2(x, -z)),
+    )
+
+
+def _opening(found: list[_State]) -> Opening:
+    ratios, energies, slopes, thrusts, angles = np.array(found).T
+    return Opening(ratios, energies, slopes, thrusts, angles)
 
 
 def _tissue(mesh: tuple[Any, dict[str, Int32Array]], law: MaterialLaw) -> MeridianTissue:

@@ -21,14 +21,18 @@ from pipeline.arrays import FloatArray
 class Opening:
     """Energies f (n,), in units of μ b², and their derivatives f' (n,) by the ratio, at rising ``ratios`` (n,) R/b.
 
-    ``thrusts`` (n,), in units of μ b per length, hold each face away from the line of the crack. Between the ratios,
-    ln f is a smooth function of ln ρ, beyond them a straight line. ``message`` says why no larger ratio was solved.
+    ``thrusts`` (n,), in units of μ b per length, hold each face away from the line of the crack; ``angles`` (n,) are
+    those of the cylinder's surface, from the middle of a face, up to which it touches. Between the ratios, ln f is a
+    smooth function of ln ρ, beyond them a straight line. ``balance`` is the largest relative difference of the thrust
+    and what holds the tissue ahead of the tips. ``message`` says why no larger ratio was solved.
     """
 
     ratios: FloatArray
     energies: FloatArray
     slopes: FloatArray
     thrusts: FloatArray
+    angles: FloatArray
+    balance: float = 0.0
     message: str = ""
 
     @cached_property
@@ -56,6 +60,10 @@ class Opening:
         """Return G/(μ R) at a ratio."""
         energy, exponent = self._power(ratio)
         return energy * (exponent / 2 - 1) / ratio
+
+    def angle(self, ratio: float) -> float:
+        """Return the angle of contact (rad) at a ratio."""
+        return float(np.interp(ratio, self.ratios, self.angles))
 
     @property
     def released(self) -> tuple[float, float]:

@@ -107,6 +107,10 @@ def _coefficient(friction: float) -> float | str:
     return STICK if friction == inf else friction
 
 
+def _is_inserted(scene: Scene) -> bool:
+    return getattr(scene.probe, "insertion", None) is not None
+
+
 def _is_loaded(scene: Scene) -> bool:
     return scene.load.acts or bool(scene.body.pressures)
 
@@ -155,9 +159,13 @@ FEATURES: dict[str, Feature] = {
     "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),
     "open slit": Feature("probe.ends", lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
     "oblique slit": Feature("probe.direction", _is_oblique, ("body",), list),
-    "insertion": Feature(
-        "probe.insertion", lambda s: getattr(s.probe, "insertion", None) is not None, write=lambda one: in_mm(one.to)
-    ),
+    "insertion": Feature("probe.insertion", _is_inserted, write=lambda one: in_mm(one.to)),
+    "inserted blade": Feature("probe.insertion", lambda s: _is_inserted(s) and not isinstance(s.probe, Indenter)),
+    "inserted needle": Feature("probe.insertion", lambda s: _is_inserted(s) and isinstance(s.probe, Indenter)),
+    "needle that cuts": Feature("probe.toughness", lambda s: s.probe.is_cutting),
+    "linear law": Feature("material.law", lambda s: not s.material.is_large),
+    "model in three dimensions": Feature("mesh.model", lambda s: s.mesh.model == "3d"),
+    "no round scene": Feature("probe.at", lambda s: s.body.half_plane() is None or any(s.probe.at), PLACE, list),
     "six motions": Feature("probe.motion", lambda s: s.probe.motion == "all"),
     "range of depths": Feature(
         "probe.depth_range",

@@ -36,6 +36,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "outputs": "outputs need the solution of each case",
     },
     "scaling": {
+        "needle that cuts": "its crack depends on the toughness over the modulus",
         "loads": "their force is not proportional to modulus and depth",
         "outputs": "outputs of a function need the solution of each case",
     },

@@ -145,7 +145,14 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         "insertion", "no flat top", "needs the flat top of a box or a cylinder, and a blade that goes straight down"
     ),
-    Refusal("insertion", "large displacements", f"{_LINEAR}: cuts at large displacements are not computed"),
+    Refusal("inserted blade", "large displacements", f"{_LINEAR}: a blade's cut is that of small strains"),
+    Refusal("inserted needle", "linear law", "needs a law of large displacements: strains are above 1"),
+    Refusal("inserted needle", "fibres", "its crack is computed in isotropic tissue: use another law"),
+    Refusal("inserted needle", "layers", "its crack is computed in one material: omit the layers, or use a blade"),
+    Refusal("inserted needle", "column", "its crack is computed in the whole body: omit epsilon"),
+    Refusal("inserted needle", "range of depths", "its depths have meshes of their own: omit it"),
+    Refusal("inserted needle", "model in three dimensions", "is computed on the meridian: omit model"),
+    Refusal("inserted needle", "no round scene", "needs a cylinder, and the needle on its axis"),
     Refusal("insertion", "inclusion", "needs a body of layers: cuts through inclusions are not computed"),
     Refusal("insertion", "region", "needs a body of layers: cuts through regions are not computed"),
     Refusal("insertion", "loads", "cuts in tissue under loads are not computed: omit [load]"),
