@@ -149,6 +149,7 @@ FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
     "retractor": ("retractor", of_kind("force")),
     "insertion": ("scalpel-path", of_kind("insertion")),
     "insertion_epsilon": ("scalpel-epsilon", of_kind("insertion")),
+    "needle_path": ("needle-path", of_kind("insertion")),
     "deep": ("deep", deep),
     "large_depth": ("large_depth", of_kind("force")),
 }

@@ -87,6 +87,18 @@ def _insertion(study: Study) -> None:
     del study["probe"]["depth"]
 
 
+def _needle(study: Study) -> None:
+    """Change what is left of the base study to a round scene, and to a law that a needle needs."""
+    if study["body"] == BASE["body"]:
+        study["body"] = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm", "fixed": "bottom"}
+    if study["mesh"] == BASE["mesh"]:
+        study["mesh"] = {"epsilon": "full", "fine": "3 mm", "coarse": "8 mm", "rim": "0.1 mm", "outside": "coarse"}
+    study["material"].setdefault("law", "neo-hookean")
+    _probe(shape="sphere", contact="unilateral", toughness="5 J/m^2", insertion={"to": "2 mm", "steps": 2})(study)
+    study["probe"]["radius"] = "0.5 mm"
+    del study["probe"]["depth"]
+
+
 def _indenter(**keys: Any) -> Callable[[Study], None]:
     """Return the change to a tool that finds its contact, whose edge asks for smaller elements."""
 
@@ -214,6 +226,7 @@ FEATURES = (
     Feature("cut", "probe", _probe(**_CUT)),
     Feature("slit", "probe", _probe(**_SLIT)),
     Feature("insertion", "probe", _insertion),
+    Feature("needle", "probe", _needle),
     Feature("frictionless", "contact", _update("probe", contact="frictionless")),
     Feature("unilateral", "contact", _update("probe", contact="unilateral")),
     Feature("friction", "contact", _update("probe", contact="unilateral", friction=0.3)),

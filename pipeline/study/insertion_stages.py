@@ -116,4 +116,4 @@ def _without_friction(blade: "Blade", **changes: float) -> "Blade":
 def _with(tool: Tool, **changes: Any) -> Tool:
     """Return a tool with other values; a copy would keep what is cached."""
     own: dict[str, Any] = {name: getattr(tool, name) for name in type(tool).model_fields}
-    return type(tool).model_construct(tool.model_fields_set | changes.keys(), **(own | changes))
+    return cast("Tool", type(tool).model_construct(tool.model_fields_set | changes.keys(), **(own | changes)))

@@ -1,0 +1,157 @@
+"""Insertion of a round needle: paths through states with closed forms, and what is refused."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from pipeline.insertion.paths import lacking, paths
+from pipeline.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL
+from pipeline.plan.plan import make_plan
+from pipeline.run.record import Record
+from pipeline.solve.movement import Movement
+from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.plane import needle
+from pipeline.solve.plane.opening import Opening
+from pipeline.solve.solution import Request
+from pipeline.states import OK, PARTIAL
+from pipeline.study.problems import StudyError
+from pipeline.study.read import parse
+
+RADIUS, FRICTION, STORED, TORN, SQUEEZE, STIFFNESS = 0.5e-3, 0.25, 6e-3, 3e-3, 30.0, 2e4  # m, 1, N, N, N/m, N/m²
+POWER = SQUEEZE * RADIUS / (STORED + TORN)
+NEEDLE = {
+    "shape": "sphere",
+    "radius": "0.5 mm",
+    "contact": "unilateral",
+    "friction": FRICTION,
+    "toughness": "5 J/m^2",
+    "insertion": {"to": "6 mm", "steps": 24, "withdraw": True},
+}
+SCENE = {
+    "body": {"shape": "cylinder", "radius": "30 mm", "height": "40 mm"},
+    "material": {"young": "30 kPa", "poisson": 0.49, "law": "neo-hookean"},
+    "probe": NEEDLE,
+    "mesh": {"accuracy": "2 %"},
+}
+
+
+def scene(**probe):
+    return parse(SCENE | {"probe": NEEDLE | probe})
+
+
+def record(solve):
+    """Return a record: F = K d² on the intact body, and energies per depth in the cut one."""
+    probe = solve.case.probe
+    scale = {"young": solve.case.scale.stress, "depth": solve.case.scale.length, "force_error": 1e-3}
+    if probe.is_cutting:
+        assert (probe.depth, probe.friction) == (RADIUS, 1.0)
+        energies = {"energy": STORED * RADIUS, "friction_force": SQUEEZE * RADIUS}
+        return Record(solve.key, OK, force=STORED + TORN, **energies, **scale)
+    force = STIFFNESS * probe.depth**2
+    return Record(solve.key, OK, force=force, energy=force * probe.depth / 3, **scale)
+
+
+def path_of(study, fails=lambda solve: False):
+    plan = further = make_plan(study)
+    records = {}
+    while further:
+        for solve in further.solves:
+            failed = Record(solve.key, "failed", "tissue is turned inside out")
+            records[solve.key] = failed if fails(solve) else record(solve)
+        further = lacking(plan, records)
+    (path,) = paths(plan, records)
+    return path
+
+
+def energy(depth, power=POWER):
+    """Return the sections' energies down to a depth (m), over that of the shaft's: those of a ball, then of a shaft."""
+    end = min(depth, RADIUS)
+    tip, _ = quad(lambda height: (2 * height / RADIUS - (height / RADIUS) ** 2) ** (power / 2), 0, end)
+    return tip + max(depth - RADIUS, 0.0)
+
+
+@pytest.fixture(scope="module")
+def path():
+    return path_of(scene())
+
+
+def test_tissue_is_pierced_where_the_intact_body_has_the_energy_of_the_cut_one(path):
+    depth = brentq(lambda d: STIFFNESS * d**3 / 3 - (STORED + TORN) * energy(d), 0.4e-3, 3e-3)
+    assert path.status == OK
+    assert path.puncture.depth == pytest.approx(depth, rel=1e-4)
+    assert path.puncture.force == pytest.approx(STIFFNESS * depth**2, rel=1e-4)
+    assert path.puncture.after.force < path.puncture.force
+    assert {step.phase for step in path.steps if step.depth < depth} == {INDENTATION}
+
+
+def test_the_shaft_cuts_at_a_constant_force_and_its_friction_grows(path):
+    cut = [step for step in path.steps if step.phase == CUTTING]
+    for step in cut:
+        assert step.elastic + step.cutting == pytest.approx(STORED + TORN)
+        assert step.friction == pytest.approx(FRICTION * SQUEEZE * energy(step.depth, POWER - 1), rel=2e-3)
+    assert cut[-1].error < cut[0].error < 2 * cut[0].force
+    assert all(abs(step.balance) < 0.02 for step in path.steps)
+
+
+def test_withdrawal_cuts_nothing_and_friction_is_reversed(path):
+    assert [step.depth for step in path.withdrawal] == [step.depth for step in path.steps]
+    last = path.steps[-1]
+    for step in path.withdrawal:
+        assert (step.phase, step.cutting, step.fracture) == (WITHDRAWAL, 0.0, last.fracture)
+        assert step.friction < 0
+        assert abs(step.balance) < 0.02
+    assert path.withdrawal[-1].friction == -last.friction
+    assert path.withdrawal[0].stored < last.stored
+    assert path.withdrawal[0].rubbed > last.rubbed
+
+
+def test_a_needle_that_cannot_be_pressed_deep_enough_leaves_what_is_solved():
+    path = path_of(scene(), fails=lambda solve: not solve.case.probe.is_cutting and solve.case.probe.depth > 0.6e-3)
+    assert path.status == PARTIAL and path.puncture is None
+    assert [step.depth for step in path.steps] == pytest.approx([0.25e-3, 0.5e-3])
+    assert path.message == "1 mm: tissue is turned inside out"
+
+
+def test_friction_is_no_input_of_the_states_and_toughness_is_one():
+    first, rough, tough = (make_plan(scene(**more)) for more in ({}, {"friction": 0.5}, {"toughness": "6 J/m^2"}))
+    assert first.keys == rough.keys
+    assert set(first.keys).isdisjoint(tough.keys)
+
+
+def test_twice_the_modulus_and_the_toughness_needs_twice_the_force(monkeypatch):
+    ratios = np.array([0.1, 1.0, 10.0])
+    power = Opening(ratios, ratios**3, 3 * ratios**2, ratios, np.full(3, pi / 4))
+    monkeypatch.setattr(needle, "open_crack", lambda *_: power)
+
+    def answer(young, toughness):
+        law, movement = MaterialLaw.of_moduli(young, 0.5, "neo-hookean"), Movement.along((0.0, 0.0, -RADIUS))
+        return needle.NeedleSolver(RADIUS, toughness).answer(Request(law, movement))
+
+    # μ = 10 kPa; f = ρ³ and Γ = μ R/2 give ρ = 1 and e = 2 μ R².
+    soft, stiff = answer(30e3, 2.5), answer(60e3, 5.0)
+    assert soft.reaction[2] == pytest.approx(2 * 10e3 * RADIUS**2)
+    assert soft.energy == pytest.approx(10e3 * RADIUS**3)
+    assert soft.contact.friction_force == pytest.approx(3 * 10e3 * RADIUS**2)
+    assert stiff.reaction[2] == pytest.approx(2 * soft.reaction[2])
+
+
+@pytest.mark.parametrize(
+    ("section", "keys", "told"),
+    [
+        ("material", {"law": "linear"}, "strains are above 1"),
+        ("body", {"shape": "box", "size": ["60 mm", "60 mm", "40 mm"]}, "needs a cylinder, and the needle on its axis"),
+        ("probe", {"at": ["3 mm", "0 mm"]}, "needs a cylinder, and the needle on its axis"),
+        ("probe", {"insertion": {"to": "38 mm"}}, "leaves less than 5 mm, ten radii of the needle"),
+        ("probe", {"toughness": None}, "is required for an insertion"),
+    ],
+)
+def test_what_is_not_computed_is_refused_by_name(section, keys, told):
+    own = SCENE[section] | keys
+    if "size" in own:
+        own = keys
+    own = {key: value for key, value in own.items() if value is not None}
+    with pytest.raises(StudyError, match=told):
+        parse(SCENE | {section: own})
