@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pipeline.study.sweep import Study
     from pipeline.view.fields import Fields
 
-_HOWTO = "docs/howto/insertion.md"
+_HOWTO, _NEEDLE = "docs/howto/insertion.md", "docs/howto/needle.md"
 
 
 def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, MPI.Comm], Fields | None]") -> None:
@@ -26,6 +26,8 @@ def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, 
 
     ``solved`` returns the fields of a state on the first rank; collective.
     """
+    if chosen.probe.is_cutting:
+        fail(of_file(study.file, "the film of an insertion is that of a blade: a needle has none yet", _NEEDLE))
     stages, position = _stages(study, chosen)
     file = output / f"{study.name}_{position}_path.gif"
     check_output(file)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, cast
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.insertion import Insertion
 from pipeline.shapes.probe import STICK, Probe
+from pipeline.shapes.punch import Punch
 from pipeline.shapes.section import in_mm
 from pipeline.study.problems import Problems
 
@@ -84,11 +85,11 @@ def _check_end(body: Layered, probe: "Tool", insertion: Insertion, problems: Pro
             f"most {in_mm(max(end - room, 0.0))}",
         )
     if probe.gap(body, probe.frame_on(body)) < room:
-        key = "length" if "length" in type(probe).model_fields else "radius"
+        key, smaller = ("length", "shorter blade") if isinstance(probe, Punch) else ("radius", "thinner needle")
         problems.error(
             f"probe.{key}",
             in_mm(getattr(probe, key)),
-            f"leaves less than {in_mm(room)}, {words}, beside the path: use a smaller tool, or a larger body",
+            f"leaves less than {in_mm(room)}, {words}, beside the path: use a {smaller}, or a larger body",
         )
 
 
