@@ -90,10 +90,11 @@ def _insertion(study: Study) -> None:
 def _needle(study: Study) -> None:
     """Change what is left of the base study to a round scene, and to a law that a needle needs."""
     if study["body"] == BASE["body"]:
-        study["body"] = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm", "fixed": "bottom"}
+        study["body"] = {"shape": "cylinder", "radius": "21 mm", "height": "20 mm", "fixed": "bottom"}
     if study["mesh"] == BASE["mesh"]:
         study["mesh"] = {"epsilon": "full", "fine": "3 mm", "coarse": "8 mm", "rim": "0.1 mm", "outside": "coarse"}
-    study["material"].setdefault("law", "neo-hookean")
+    if "law" not in study["material"]:
+        study["material"].update(law="gent", limit=4.0)
     _probe(shape="sphere", contact="unilateral", toughness="5 J/m^2", insertion={"to": "2 mm", "steps": 2})(study)
     study["probe"]["radius"] = "0.5 mm"
     del study["probe"]["depth"]

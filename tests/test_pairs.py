@@ -30,7 +30,7 @@ def folder(tmp_path_factory):
 _OF_SCHEMA = (
     "has no layer",
     "has no region",
-    "a blade that is inserted",
+    "a tool that is inserted",
     "excludes [probe.insertion]",
     "would touch the body",
     'must be "unilateral"',
