@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import inf
 from typing import Any
@@ -36,24 +36,46 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     ``folded`` replaces every ε beyond the body by the full order; ``scaled`` leaves out the inputs that the force is
     proportional to. Each timed case has a key of its own.
     """
-    scaled = scaled and not obstacle("scaling", case)
+    head, tail, poisson = _scene_texts(_Scene(case.body, case.material, case.probe, case.load, case), scaled)
+    element = case.mesh.element_for(poisson, is_large=case.material.is_large)
     parts = [
+        *head,
+        _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, element),
+        text_of(case.solve, ("timing", "repeats", "exact")),
+        *tail,
+        *map(_output_text, case.outputs),
+    ]
+    if case.solve.timing:
+        parts += [str(case.labels), str(case.solve.repeats)]
+    return digest("\n".join(parts))
+
+
+@dataclass(frozen=True, slots=True)
+class _Scene:
+    """What cases have in common that differ in the mesh only; ``case`` is one of them."""
+
+    body: Body
+    material: Material
+    probe: Probe
+    load: Load
+    case: Case = field(compare=False)
+
+
+@lru_cache(_MANY)
+def _scene_texts(scene: _Scene, scaled: bool) -> tuple[tuple[str, ...], tuple[str, ...], float]:
+    """Return the parts of a key before and after the mesh, and the largest Poisson's ratio."""
+    case = scene.case
+    scaled = scaled and not obstacle("scaling", case)
+    head = (
         str(PHYSICS_VERSION),
         _body_text(case.body, case.scale.stress if scaled else 1.0),
         _material_text(case.material, scaled=scaled),
         text_of(case.probe, (*_unphysical(case.probe), *(case.moves_in_proportion if scaled else ()))),
         _ratios_text(case.probe) if scaled else "",
-        _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, case.element),
-        text_of(case.solve, ("timing", "repeats", "exact")),
-    ]
-    if case.load.acts:
-        parts.append(_load_text(case.load, case.densities))
-    if case.is_stepped:
-        parts.append(_time_text(case))
-    parts += [_output_text(output) for output in case.outputs]
-    if case.solve.timing:
-        parts += [str(case.labels), str(case.solve.repeats)]
-    return digest("\n".join(parts))
+    )
+    tail = [_load_text(case.load, case.densities)] if case.load.acts else []
+    tail += [_time_text(case)] if case.is_stepped else []
+    return head, tuple(tail), case.poisson
 
 
 def _unphysical(probe: Probe) -> tuple[str, ...]:

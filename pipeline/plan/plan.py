@@ -1,7 +1,7 @@
 """The plan of a study: the steps that compute its cases, and what each reduction struck out, and why."""
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Hashable
 from dataclasses import replace
 
 from pipeline.plan.key import case_key, normalised, reference_key
@@ -90,11 +90,17 @@ def ask_for_exact(plan: Plan) -> Plan:
     found: dict[str, Solve] = {}
     unasked: dict[str, Solve] = {}
     keys, without = [], Counter[str]()
+    # Meshes of a scene share what keeps F_exact from it, and its key.
+    reasons: dict[Hashable, str] = {}
+    of_scene: dict[Hashable, str] = {}
     for case in plan.study.cases():
         if case.lost_contact:
             keys.append(NO_RECORD)
             continue
-        if reason := obstacle("F_exact", case):
+        scene = case.body, case.material, case.probe, case.load
+        if scene not in reasons:
+            reasons[scene] = obstacle("F_exact", case)
+        if reason := reasons[scene]:
             keys.append(NO_RECORD)
             without[reason] += 1
             continue
@@ -103,7 +109,10 @@ def ask_for_exact(plan: Plan) -> Plan:
         if deeper := plan.proportional.get(case.index):
             case = plan.study.case(deeper.of)  # noqa: PLW2901
         enough = max(accuracy, EXACT_OF_SLIT) if case.probe.slit else accuracy
-        key = reference_key(case, enough)
+        scene = case.body, case.material, case.probe, case.load
+        if scene not in of_scene:
+            of_scene[scene] = reference_key(case, enough)
+        key = of_scene[scene]
         is_wanted = is_asked or case.mesh.accuracy is None
         wanted = found if is_wanted else unasked
         keys.append(key if is_wanted else NO_RECORD)

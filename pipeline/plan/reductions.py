@@ -26,7 +26,10 @@ _LONE_DEPTHS = (
 
 def strike_past_body(plan: Plan) -> Plan:
     """If ε extends beyond the body, the case is the full order, for every `outside`."""
-    return _rekeyed(plan, "full", strike_past_body, lambda case: case_key(case, folded=True))
+    solves = [
+        replace(solve, key=case_key(solve.case, folded=True)) if solve.case.is_full else solve for solve in plan.solves
+    ]
+    return _merged(plan.with_solves(solves), "full", reason_of(strike_past_body))
 
 
 def strike_duplicates(plan: Plan) -> Plan:
@@ -51,7 +54,9 @@ def strike_scaled(plan: Plan) -> Plan:
         text = depth_key(case)
         return case_key(first[text] if text else case, folded=True, scaled=True)
 
-    return _rekeyed(replace(plan, proportional=deeper), "scaling", strike_scaled, key)
+    plan = replace(plan, proportional=deeper)
+    plan = plan.with_solves([replace(solve, key=key(solve.case)) for solve in plan.solves])
+    return _merged(plan, "scaling", reason_of(strike_scaled))
 
 
 def strike_images(plan: Plan) -> Plan:
@@ -231,12 +236,6 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
     "reduced": use_reduced_basis,
     "condensed": condense_sweeps,
 }
-
-
-def _rekeyed(plan: Plan, name: str, reduction: Callable[[Plan], Plan], key: Callable[..., str]) -> Plan:
-    """Give every solve a new key, and merge solves with equal keys."""
-    plan = plan.with_solves([replace(solve, key=key(solve.case)) for solve in plan.solves])
-    return _merged(plan, name, reason_of(reduction))
 
 
 def _merged(plan: Plan, name: str, reason: str) -> Plan:

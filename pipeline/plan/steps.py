@@ -16,7 +16,7 @@ FEWEST_DEPTHS = 10
 MOST_DOFS = 40_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Solve:
     """One case to solve, and the indices of the study's cases that use its record.
 

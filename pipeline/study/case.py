@@ -30,7 +30,7 @@ class Scale:
     length: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Case:
     """One scene with one mesh setting: yields one force.
 

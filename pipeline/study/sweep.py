@@ -135,28 +135,36 @@ class Study:
 
     def case(self, index: tuple[int, ...]) -> Case:
         """Return the case at ``index``, one number for each axis."""
-        chosen: list[Any] = []
-        for variants, own in self._layout:
+        places: dict[str, int] = {}
+        for name, own in self._layout.items():
             flat = 0
             for position, length in own:
                 flat = flat * length + index[position]
-            chosen.append(variants[flat])
-        return Case(index, self.axes, *_with_material_in_use(*chosen), outputs=self.outputs)  # type: ignore[misc]
+            places[name] = flat
+        chosen: Any = {name: self.sections[name][flat] for name, flat in places.items()}
+        together = places["body"], places["material"], places["load"]
+        if together not in self._in_use:
+            self._in_use[together] = _in_use(chosen["body"], chosen["material"], chosen["load"])
+        return Case(index, self.axes, outputs=self.outputs, **chosen | self._in_use[together])
 
     @cached_property
-    def _layout(self) -> tuple[tuple[tuple[Section, ...], tuple[tuple[int, int], ...]], ...]:
-        """For each part of a case, its variants, and position and length of the axes that choose among them."""
-        return tuple(
-            (self.sections[name], tuple((i, len(axis)) for i, axis in enumerate(self.axes) if axis.section == name))
-            for name in _PARTS
-        )
+    def _in_use(self) -> dict[tuple[int, int, int], dict[str, Section]]:
+        """What cases have of body, material and load, by the numbers of the three; most cases share it."""
+        return {}
+
+    @cached_property
+    def _layout(self) -> dict[str, tuple[tuple[int, int], ...]]:
+        """For each part of a case, position and length of the axes that choose among its variants."""
+        return {
+            name: tuple((i, len(axis)) for i, axis in enumerate(self.axes) if axis.section == name) for name in _PARTS
+        }
 
 
-def _with_material_in_use(body: Body, material: Material, *others: Any) -> tuple[Any, ...]:
-    """Return the parts of a case: a body that layers fill has the first one's material, not the section's.
+def _in_use(body: Body, material: Material, load: Load) -> dict[str, Section]:
+    """Return the parts of a case that depend on each other.
 
-    Regions without a law have that of the material. Pressures in hollow regions are tractions of the load.
+    A body that layers fill has the first one's material, not the section's. Regions without a law have that of the
+    material. Pressures in hollow regions are tractions of the load.
     """
     material = material_of(body.regions[0]) if body.is_filled else material
-    others = tuple(part.with_pressures(body.pressures) if isinstance(part, Load) else part for part in others)
-    return body.with_law_of(material), material, *others
+    return {"body": body.with_law_of(material), "material": material, "load": load.with_pressures(body.pressures)}
