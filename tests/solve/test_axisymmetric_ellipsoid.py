@@ -47,7 +47,7 @@ def test_half_space(bonded, poisson):
     assert found.bar < 1e-5
 
 
-@sampled("name, bonded, poisson", [(name, *of) for name in SCENES for of in ((True, 0.3), (False, 0.5))], by_day=4)
+@sampled("name, bonded, poisson", [(name, *of) for name in SCENES for of in ((True, 0.3), (False, 0.5))], by_day=2)
 def test_error_bar_holds_the_truth(name, bonded, poisson, monkeypatch):
     """The bar of a coarse mesh covers the result of a fine one of higher degree, which has a bar of 1e-5."""
     exact = solve(SCENES[name], poisson, bonded)

@@ -114,7 +114,7 @@ def test_ranks_agree(changes):
 # ---- a far field ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize("degree", [2, pytest.param(3, marks=pytest.mark.nightly)])
 def test_half_ball_that_a_half_space_closes_is_hertz(degree):
     found = record(mesh=BALL | {"degree": degree})
     assert found.force == pytest.approx(half_space_ball(10e3, 0.3, 10e-3, 0.1e-3), rel=found.force_error)
@@ -165,7 +165,7 @@ def test_flat_tool_over_a_half_ball_is_the_prescribed_one():
     assert found.energy == pytest.approx(held.energy, rel=1e-6)
 
 
-@pytest.mark.parametrize("poisson", [0.49, 0.5])
+@pytest.mark.parametrize("poisson", [pytest.param(0.49, marks=pytest.mark.nightly), 0.5])
 def test_mixed_elements_take_a_far_field(poisson):
     found = record(mesh=BALL, material={"poisson": poisson})
     hertz = half_space_ball(10e3, poisson, 10e-3, 0.1e-3)

@@ -98,7 +98,7 @@ def test_laws_are_linear_at_small_strains(law):
     elements.close()
 
 
-@pytest.mark.parametrize("poisson", [0.45, 0.5])
+@pytest.mark.parametrize("poisson", [pytest.param(0.45, marks=pytest.mark.nightly), 0.5])
 def test_small_depths_are_linear(poisson):
     """F tends to that of linear mixed elements on the same mesh, linearly in the depth."""
     ratios = []
@@ -125,7 +125,7 @@ def test_agrees_with_displacement_elements():
         assert apart < 0.03 * mixed.force
 
 
-@pytest.mark.parametrize("poisson", [0.2, 0.4])
+@pytest.mark.parametrize("poisson", [pytest.param(0.2, marks=pytest.mark.nightly), 0.4])
 def test_layers_agree_with_displacement_elements(poisson):
     """Each region has a split of its own, and pressures jump between regions."""
     layers = {"layer": [{"name": "skin", "thickness": "3 mm", "young": "40 kPa", "poisson": poisson}]}

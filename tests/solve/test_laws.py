@@ -20,6 +20,7 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.study.schema import Material
 from pipeline.verify.laws import FURTHER, YOUNG, Cube, Stress
 from tests.cases import solve, study
+from tests.sampling import sampled
 
 LARGE = tuple(FURTHER)
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}
@@ -106,7 +107,7 @@ def test_inverted_tissue_has_no_finite_energy(law):
     assert not np.isfinite(Cube(law).energy(np.diag([-0.5, 1.2, 1.1])))
 
 
-@pytest.mark.parametrize("law", LAWS)
+@sampled("law", LAWS, by_day=3)
 def test_laws_are_linear_at_small_strains(law):
     """The tangent at zero displacement is the stiffness of linear elasticity."""
     (planned,) = make_plan(study()).solves

@@ -39,7 +39,9 @@ def pressed(tool, depth, of, friction, body=BODY, **how):
     return LargeMeridianContact(body, tool, **how).solve(of, Movement.along((0.0, 0.0, -depth)))
 
 
-@pytest.mark.parametrize("of", LAWS, ids=["linear", "neo-hookean"])
+@pytest.mark.parametrize(
+    "of", [pytest.param(LAWS[0], marks=pytest.mark.nightly), LAWS[1]], ids=["linear", "neo-hookean"]
+)
 def test_little_friction_is_none_and_much_sticks(of):
     none, little, some, much, sticks = (pressed(BALL, 0.1, of, mu) for mu in (0.0, 1e-9, 0.2, 30.0, inf))
     assert little.reaction[2] == pytest.approx(none.reaction[2], rel=1e-6)
@@ -54,7 +56,9 @@ def test_little_friction_is_none_and_much_sticks(of):
     assert some.contact.torque == 0
 
 
-@pytest.mark.parametrize(("tool", "power"), [(BALL, 2), (SHARP, 1)], ids=["ball", "cone"])
+@pytest.mark.parametrize(
+    ("tool", "power"), [(BALL, 2), pytest.param(SHARP, 1, marks=pytest.mark.nightly)], ids=["ball", "cone"]
+)
 def test_sticking_tools_have_their_closed_forms(tool, power):
     """On a body of 200 radii of contact, whose ratio to the frictionless force is that of a half-space."""
     depth = 0.01 if power == 2 else 0.008

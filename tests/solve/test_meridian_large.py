@@ -19,6 +19,7 @@ from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.verify.laws import FURTHER
 from tests.cases import study
+from tests.sampling import sampled
 
 BODY, BONDED = Meridian(20 / 3, 20 / 3, 1.0), Conditions(bonded=True)
 
@@ -39,7 +40,7 @@ def linear(poisson, body=BODY):
     return MeridianProblem(body, BONDED).solve(MaterialLaw.of_moduli(1.0, poisson), Movement.along((0.0, 0.0, -1.0)))
 
 
-@pytest.mark.parametrize("law", sorted({*LAWS} - {"linear", "holzapfel"}))
+@sampled("law", sorted({*LAWS} - {"linear", "holzapfel"}), by_day=2)
 def test_the_tangent_at_rest_is_linear_elasticity(law):
     meshes = meshes_of(BODY.mesh(Grading(0.3)))
     shape = {name: 0.0 if name.startswith("share") else 2.0 for name in LAWS[law].parameters}
@@ -62,7 +63,7 @@ def _stiffness(system):
     return float(moved @ (rows @ moved))
 
 
-@pytest.mark.parametrize(("poisson", "depth", "ratio"), [(0.3, 0.1, 0.988), (0.49, 0.2, 0.985), (0.5, 0.2, 0.9857)])
+@sampled("poisson, depth, ratio", [(0.3, 0.1, 0.988), (0.49, 0.2, 0.985), (0.5, 0.2, 0.9857)], by_day=2)
 def test_force_is_that_of_other_elements(poisson, depth, ratio):
     """F over F of linear elasticity, from elements of constant change of volume and another split of λ (verify)."""
     found = pressed(MaterialLaw.of_moduli(1.0, poisson, "neo-hookean"), depth)

@@ -97,7 +97,7 @@ def on_half_space(poisson):
     return solution.stiffness / unit, solution.bars / unit
 
 
-@pytest.mark.parametrize("poisson", [0.0, 0.3])
+@pytest.mark.parametrize("poisson", [pytest.param(0.0, marks=pytest.mark.nightly), 0.3])
 def test_bonded_disc_on_half_space(poisson):
     """Closed forms: torsion 16/3, whatever the material (E. Reissner and H. F. Sagoci 1944), and D. A. Spence's press
     (1968). The finite body of 60 a is stiffer by 1 % in the latter.

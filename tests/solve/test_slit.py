@@ -68,7 +68,7 @@ LOADS = {
 }
 
 
-@pytest.mark.parametrize("kind", ["displacement", "mixed"])
+@pytest.mark.parametrize("kind", [pytest.param("displacement", marks=pytest.mark.nightly), "mixed"])
 def test_change_of_energy_under_loads(kind):
     """The release is the loss of potential energy of blade and loads, as nodes move with the front or the tip.
 

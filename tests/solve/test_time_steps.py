@@ -86,7 +86,7 @@ def test_a_law_of_large_displacements_begins_and_ends_elastic():
     assert found.forces[-1, 2] == pytest.approx(0.4 * force, rel=1e-6)
 
 
-@pytest.mark.parametrize("material", [LINEAR, LARGE])
+@pytest.mark.parametrize("material", [pytest.param(LINEAR, marks=pytest.mark.nightly), LARGE])
 def test_regions_that_relax_differently_end_as_a_body_of_their_long_term_moduli(material):
     """At once the moduli are those of the regions, after a long time what is left of each."""
     changes = {"material": material, "body": SKIN, "probe": {"depth": "0.4 mm"}}
