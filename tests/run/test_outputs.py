@@ -97,7 +97,7 @@ def test_what_has_no_bar_or_no_value_is_told_and_the_force_is_kept(tmp_path):
         {"name": "skin", "region": "body", "of": "von_mises"},
         {"name": "air", "at": ["0 mm", "0 mm", "1 mm"], "of": "von_mises"},
         {"name": "broken", "function": "outputs.py:broken"},
-        {"name": "work", "function": "outputs.py:energy", "unit": "J"},
+        {"name": "energy_of_tissue", "function": "outputs.py:energy", "unit": "J"},
     ]
     (record,) = records(outputs, file=tmp_path / "study.toml")
     assert record.is_ok
@@ -108,17 +108,17 @@ def test_what_has_no_bar_or_no_value_is_told_and_the_force_is_kept(tmp_path):
     assert "skin: no error bar" in message
     assert "air: there is no tissue there" in message
     assert "broken: ZeroDivisionError" in message
-    assert found["work"] == pytest.approx(record.energy, rel=1e-4)
-    assert 0 < found["work_error"] < 0.1 * found["work"]
+    assert found["energy_of_tissue"] == pytest.approx(record.energy, rel=1e-4)
+    assert 0 < found["energy_of_tissue_error"] < 0.1 * found["energy_of_tissue"]
 
 
 def test_dataset_has_the_outputs_and_a_changed_function_is_computed_again(tmp_path):
     (tmp_path / "outputs.py").write_text(CODE)
-    outputs = [OUTPUTS[0], {"name": "work", "function": "outputs.py:energy", "unit": "J"}]
+    outputs = [OUTPUTS[0], {"name": "energy_of_tissue", "function": "outputs.py:energy", "unit": "J"}]
     text = raw(material={"poisson": [0.3, 0.4]}) | {"output": outputs}
     study = pipeline.read(text, folder=tmp_path)
     data = study.run(MPI.COMM_SELF, output=tmp_path / "out")
-    assert (data.lift.units, data.work_error.units, data.lift.dims) == ("m", "J", ("poisson",))
+    assert (data.lift.units, data.energy_of_tissue_error.units, data.lift.dims) == ("m", "J", ("poisson",))
     assert data.lift.attrs["ancillary_variables"] == "lift_error"
     assert np.isfinite(data.epsmesh.relative("lift_error")).all()
     assert not study.plan(store=tmp_path / "out" / "cases.sqlite").solves
