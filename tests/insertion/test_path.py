@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 from pipeline.insertion.friction import reaction
 from pipeline.insertion.near_tip import NearTip
+from pipeline.insertion.paths import complete, lacking
 from pipeline.insertion.steps import PHASES
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
@@ -178,6 +179,15 @@ def test_slits_in_tissue_that_is_whole_are_not_solved():
     for name in ("force", "phase", "puncture_depth"):
         np.testing.assert_array_equal(build(plan, kept)[name], build(plan, records)[name])
     assert not any(reason_to_skip(plan, solve, {}.get) for solve in second)
+
+
+def test_slits_with_a_farther_front_are_found_in_the_store_again():
+    """Soft tissue needs them besides the stages: which ones follows from what is solved."""
+    plan, records = solved(_study(toughness="0.5 J/m^2"))
+    stages = {key: records[key] for key in plan.keys}
+    assert lacking(plan, stages) is not None and build(plan, stages)["status"] == "pending"
+    assert complete(plan, stages, lambda keys: {key: records[key] for key in keys if key in records}) is None
+    assert stages.keys() == records.keys() and build(plan, stages)["status"] == "ok"
 
 
 def test_toughness_and_friction_are_swept_without_a_solve():
