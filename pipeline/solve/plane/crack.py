@@ -61,7 +61,7 @@ def open_crack(law: MaterialLaw, toughness: float, grading: CrackGrading) -> Ope
         tissue.state, touched = path.last.state, path.last.touched
         assert touched is not None
         found.append(_state(tissue, touched, ratio))
-        holds = -2 * float(tissue.residual()[ahead].sum())
+        holds = 2 * float(tissue.residual()[ahead].sum())
         balance = max(balance, abs(holds / found[-1].thrust - 1))
         if len(found) > 1 and _opening(found[-2:]).released[1] >= toughness:
             break

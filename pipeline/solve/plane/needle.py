@@ -7,6 +7,7 @@ crack: G = Γ (O. A. Shergold and N. A. Fleck, Proc. R. Soc. Lond. A 460, 3037, 
 from math import nan
 
 from pipeline.solve import SolveError
+from pipeline.solve.balance import check_balance
 from pipeline.solve.meridian.problem import Answer, MeridianSolver
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.plane.crack import LEVELS, open_crack
@@ -29,10 +30,11 @@ class NeedleSolver(MeridianSolver):
         """Return the answer on the finer mesh; its error bar is the largest difference to the coarser one.
 
         Raises:
-            SolveError: if the crack cannot be opened so far.
+            SolveError: if the crack cannot be opened so far, or the thrust on its faces is not balanced.
         """
         toughness = self._toughness / (law.lame_mu[0] * self._radius)
         coarse, fine = (open_crack(law, toughness, level) for level in LEVELS)
+        check_balance(max(coarse.balance, fine.balance))
         found = [_per_length(each, toughness) for each in (coarse, fine)]
         cut, stored, pressed, angle = found[1]
         # Per length, forces are in units of μ R, energies of μ R².
