@@ -54,8 +54,8 @@ HAVING = {
 }
 
 
-def test_a_plain_press_has_no_feature():
-    assert study().case(()).features == frozenset()
+def test_a_plain_press_has_no_feature_but_its_linear_law_and_its_box():
+    assert study().case(()).features == {"linear law", "no round scene"}
 
 
 def _scene(found):

@@ -175,7 +175,6 @@ FEATURES: dict[str, Feature] = {
     "curved or inclined surface": Feature("probe.axis", lambda s: not _is_flat(s), ("body",)),
     "no flat top": Feature("body.shape", lambda s: not (isinstance(s.body, Layered) and _is_level(s)), ("probe",)),
     "surface or image": Feature("body.shape", lambda s: isinstance(s.body, FromFile) and not s.body.HAS_NAMES),
-    "CAD solid": Feature("body.shape", lambda s: isinstance(s.body, FromFile) and s.body.HAS_NAMES),
     "fixed sides": Feature("body.fixed", lambda s: s.body.support.gap(0.0) == 0.0),
     "only sides fixed": Feature("body.fixed", lambda s: not s.body.support.holds_column()),
     "free column": Feature("mesh.outside", lambda s: s.mesh.outside == "free" and isfinite(s.mesh.epsilon)),
