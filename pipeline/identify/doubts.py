@@ -11,7 +11,6 @@ from pipeline.identify.parts import CurveFit, Measured, Unknown
 from pipeline.report.identified import engineering
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
-from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.study.case import Case
 from pipeline.study.check import warn_of_depth
 from pipeline.study.problems import Problems
@@ -43,8 +42,8 @@ def _of_curve(curve: Curve, case: Case) -> Iterator[str]:
 
 def _size(probe: Probe) -> float:
     """Return half the width or length (m) of a tool, whatever its depth."""
-    if isinstance(probe, RoundIndenter):
-        return probe.limit
+    if probe.revolved:
+        return probe.revolved.limit
     return (probe.half_length if isinstance(probe, Indenter) else 0.0) or probe.half_width
 
 

@@ -8,7 +8,6 @@ from pipeline.arrays import FloatArray
 from pipeline.identify.model import ALWAYS, OF_CURVE, Model, Space
 from pipeline.identify.parts import Estimate, Measured, Values
 from pipeline.identify.start import start
-from pipeline.shapes.probes.sphere import Sphere
 from pipeline.study.case import Case
 
 _SOUGHT = {"young", *OF_CURVE}
@@ -42,11 +41,11 @@ def hertz_young(case: Case, measured: Measured, found: Estimate) -> float | None
     """
     probe = case.probe
     names = {unknown.name for unknown in found.unknowns}
-    if not (isinstance(probe, Sphere) and probe.is_unilateral and probe.friction == 0):
+    if (radius := probe.hertz_radius) is None or not probe.is_unilateral or probe.friction:
         return None
     if not {"young", *ALWAYS} <= names <= _SOUGHT or measured.machine_compliance is None:
         return None
-    as_hertz = replace(measured, forward=Paraboloid(probe.radius, case.material.poisson), hidden=())
+    as_hertz = replace(measured, forward=Paraboloid(radius, case.material.poisson), hidden=())
     model = Model([as_hertz], Space(found.unknowns))
     place = found.place("young")
     return float(model.space.value(place, start(model)[place]))

@@ -151,7 +151,8 @@ def round_tool_of(case: Case) -> RoundTool:
         CaseFailure: if the scene is not axisymmetric.
     """
     probe, body = case.probe, case.body.half_plane()
-    if body is None or not probe.is_round:
+    section = probe.revolved
+    if body is None or section is None:
         raise CaseFailure("the scene is not axisymmetric")
 
     def gap(radii: FloatArray) -> FloatArray:
@@ -161,11 +162,11 @@ def round_tool_of(case: Case) -> RoundTool:
         assert isinstance(probe, Indenter)
         return probe.distance(points + np.array([0.0, 0.0, depth]))
 
-    if isinstance(probe, RoundIndenter):
-        # On a curved body, contact may end below the flat face.
-        flat = 0.0 if body.is_curved else probe.section.flat
-        return RoundTool(gap, probe.limit, probe.kinks, distance, flat, probe.friction)
-    return RoundTool(gap, probe.circumradius, friction=probe.friction)
+    if section.is_flat:
+        return RoundTool(gap, section.limit, friction=probe.friction)
+    # On a curved body, contact may end below the flat face.
+    flat = 0.0 if body.is_curved else section.flat
+    return RoundTool(gap, section.limit, section.kinks, distance, flat, probe.friction)
 
 
 def movement_of(case: Case, meshed: Case | None = None) -> Movement:

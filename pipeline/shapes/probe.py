@@ -235,6 +235,11 @@ class Probe(Section, ABC):
         """The section of a tool that is round about its axis; None for any other."""
         return None
 
+    @property
+    def hertz_radius(self) -> float | None:
+        """Radius (m) of H. Hertz's paraboloid, which it is at small depths; None for any other tool."""
+        return None
+
     @abstractmethod
     def is_mirrored(self, along: float, across: float) -> bool:
         """Return whether the footprint has mirror symmetry in the line through its centre normal to (along, across)."""

@@ -29,6 +29,11 @@ class Sphere(RoundIndenter):
         return 8 / 15 * self.contact_width**2
 
     @property
+    def hertz_radius(self) -> float:
+        """The radius (m)."""
+        return self.radius
+
+    @property
     def limit(self) -> float:
         """The radius (m): contact ends below the equator."""
         return self.radius
