@@ -3,41 +3,21 @@
 Forces do not depend on these sections: they neither sweep nor change cases.
 """
 
-from collections.abc import Callable
 from math import inf
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
 from pipeline.experiment.reading import UNITS, Reading, Segment, Window
 from pipeline.shapes.section import Section, Words
-from pipeline.units import parse_quantity, unit_factor
+from pipeline.study.columns import Columns, ColumnUnits, Sign, refused
+from pipeline.units import parse_quantity
 
 Stiffness = float | tuple[float, float] | Literal["unknown"]
 Hidden = Literal["layer", "base", "strain"]
 
 _RIGID = "rigid"
-
-
-def _refused(allowed: str) -> PydanticCustomError:
-    return PydanticCustomError("not_supported", "{allowed}", {"allowed": f"must be {allowed}"})
-
-
-def _column(value: Any) -> str | int:
-    """Return the header of a column, or its number."""
-    is_number = isinstance(value, int) and not isinstance(value, bool) and value > 0
-    if not is_number and not (isinstance(value, str) and value):
-        raise _refused('the header of a column as text, such as "depth (mm)", or its number from 1')
-    found: str | int = value
-    return found
-
-
-Column = Annotated[
-    str | int,
-    BeforeValidator(_column),
-    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "integer", "minimum": 1}]}),
-]
 
 
 def _window(value: Any) -> Window | None:
@@ -46,16 +26,16 @@ def _window(value: Any) -> Window | None:
     if value == "auto":
         return None
     if not (isinstance(value, tuple) and len(value) == 2):
-        raise _refused(allowed)
+        raise refused(allowed)
     for unit in ("m", "s"):
         try:
             low, high = (parse_quantity(end, unit) for end in value)
         except PydanticCustomError:
             continue
         if low >= high:
-            raise _refused(f"{allowed}; its first end is not below its second")
+            raise refused(f"{allowed}; its first end is not below its second")
         return Window(low, high, "m" if unit == "m" else "s")
-    raise _refused(allowed)
+    raise refused(allowed)
 
 
 def _stiffness(value: Any) -> Stiffness:
@@ -67,96 +47,14 @@ def _stiffness(value: Any) -> Stiffness:
         if isinstance(value, tuple) and len(value) == 2:
             low, high = (parse_quantity(end, "N/m") for end in value)
             if not 0 < low < high:
-                raise _refused(f"{allowed}; a range rises, and is above 0")
+                raise refused(f"{allowed}; a range rises, and is above 0")
             return low, high
         stiffness = parse_quantity(value, "N/m")
     except PydanticCustomError as error:
-        raise error if error.type == "not_supported" else _refused(f"{allowed}: {error.message()}") from None
+        raise error if error.type == "not_supported" else refused(f"{allowed}: {error.message()}") from None
     if stiffness <= 0:
-        raise _refused(f"{allowed}; it is above 0")
+        raise refused(f"{allowed}; it is above 0")
     return stiffness
-
-
-def _unit(kind: str) -> Callable[[str], str]:
-    """Return the check of a unit of the same kind as the SI unit ``kind``."""
-
-    def check(text: str) -> str:
-        unit_factor(text, kind)
-        return text
-
-    return check
-
-
-def _spring(value: Any) -> float:
-    return parse_quantity(value, "N/m")
-
-
-class Columns(BaseModel):
-    """Names or numbers of the columns of a file."""
-
-    model_config = Section.model_config
-
-    depth: Annotated[
-        Column | None,
-        Words(
-            "Column of the depth: its header, or its number from 1.", '"indentation / nm"', default="found, and told"
-        ),
-    ] = None
-    force: Annotated[Column | None, Words("Column of the force.", '"load (µN)"', default="found, and told")] = None
-    time: Annotated[Column | None, Words("Column of the time.", '"time [s]"', default="found, and told")] = None
-    piezo: Annotated[
-        Column | None,
-        Words(
-            "Column of the way of the piezo, instead of the depth, which is this way less the deflection.",
-            '"Z / nm"',
-            default="none",
-        ),
-    ] = None
-    deflection: Annotated[
-        Column | None,
-        Words("Column of the deflection of a spring, instead of the force.", '"deflection / nm"', default="none"),
-    ] = None
-    spring: Annotated[
-        Annotated[float, Field(gt=0, json_schema_extra={"unit": "N/m"})] | None,
-        BeforeValidator(lambda value: None if value is None else _spring(value)),
-        Words("Stiffness of this spring: the force is stiffness times deflection.", '"0.02 N/m"', default="none"),
-    ] = None
-
-    @model_validator(mode="after")
-    def _of_one_kind(self) -> "Columns":
-        of_spring = {"piezo", "deflection", "spring"} & self.model_fields_set
-        if of_spring and len(of_spring) < 3:
-            raise PydanticCustomError("not_supported", "must have piezo, deflection and spring together")
-        if of_spring and {"depth", "force"} & self.model_fields_set:
-            raise PydanticCustomError("not_supported", "must have depth and force, or piezo, deflection and spring")
-        return self
-
-
-LengthUnit = Annotated[str, AfterValidator(_unit("m"))]
-ForceUnit = Annotated[str, AfterValidator(_unit("N"))]
-TimeUnit = Annotated[str, AfterValidator(_unit("s"))]
-_OF_HEADER = "that of the header"
-
-
-class ColumnUnits(BaseModel):
-    """Units of columns whose headers have none."""
-
-    model_config = Section.model_config
-
-    depth: Annotated[LengthUnit | None, Words("Unit of the depth.", '"mm"', default=_OF_HEADER)] = None
-    force: Annotated[ForceUnit | None, Words("Unit of the force.", '"mN"', default=_OF_HEADER)] = None
-    time: Annotated[TimeUnit | None, Words("Unit of the time.", '"s"', default=_OF_HEADER)] = None
-    piezo: Annotated[LengthUnit | None, Words("Unit of the way of the piezo.", '"nm"', default=_OF_HEADER)] = None
-    deflection: Annotated[LengthUnit | None, Words("Unit of the deflection.", '"nm"', default=_OF_HEADER)] = None
-
-
-class Sign(BaseModel):
-    """Signs of recorded values: 1 as they are, -1 if deeper or pressed is negative."""
-
-    model_config = Section.model_config
-
-    depth: Annotated[Literal[1, -1] | None, Words("-1 if the recorded depth falls as the tool advances.", "-1")] = None
-    force: Annotated[Literal[1, -1] | None, Words("-1 if the recorded force is negative under pressure.", "-1")] = None
 
 
 _TABLE = WithJsonSchema({"type": "object"})

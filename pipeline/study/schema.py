@@ -17,8 +17,9 @@ from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.segment import Segment
 from pipeline.shapes.tissue import LAWS, Fibres, Relaxation, Term, Tissue
+from pipeline.study.columns import Columns, ColumnUnits, Sign
 from pipeline.study.loads import Load, Traction
-from pipeline.study.measurement import Columns, ColumnUnits, Identify, Measurement, Sensitivity, Sign
+from pipeline.study.measurement import Identify, Measurement, Sensitivity
 from pipeline.study.output import Output
 from pipeline.study.path import Path
 from pipeline.study.vocabulary import FIGURES, REDUCTIONS
