@@ -11,6 +11,7 @@ from pipeline.mesh.of_case import mesh_arrays
 from tests.cases import solve, study
 from tests.mesh.test_mesh import area
 from tests.mesh.test_regions import volumes
+from tests.sampling import sampled
 
 TILT = radians(10)
 AXIS = [sin(TILT), 0.0, -cos(TILT)]
@@ -26,6 +27,7 @@ RADIUS = 9e-3
 # A box with a hollow from side to side, between two plates.
 _DRAW = """
 import sys, gmsh
+from tests.sampling import sampled
 gmsh.initialize(); gmsh.option.setNumber("General.Terminal", 0); occ = gmsh.model.occ
 occ.cut([(3, occ.addBox(-20, -20, -20, 40, 40, 20))], [(3, occ.addBox(-15, -20, -14, 30, 40, 6))])
 occ.synchronize(); gmsh.write(sys.argv[1])
@@ -49,7 +51,7 @@ def test_a_column_of_a_curved_body_ends_at_its_surface():
     assert volume(**SCENES["on a curved body"]) == pytest.approx(exact, rel=2e-4)
 
 
-@pytest.mark.parametrize("name", SCENES)
+@sampled("name", SCENES, by_day=2)
 def test_a_free_column_is_softer_than_the_body_and_a_fixed_one_stiffer(name):
     """The removed tissue stored energy, fixed tissue stores none. Wider columns are closer to the whole body."""
     sizes = {"epsilon": ["9 mm", "14 mm", "full"], "outside": ["free", "fixed"]}
