@@ -18,6 +18,7 @@ from pipeline.mesh.organ.junctions import coarsened
 from pipeline.mesh.organ.prepare import cut, level_line, merged, sharp_edges
 from pipeline.mesh.organ.remesh import release, remesh
 from pipeline.mesh.organ.sheet import Sheet, TangledError
+from pipeline.mesh.organ.untangle import crossing_facets
 from pipeline.mesh.size import EDGES_PER_RADIUS
 from pipeline.shapes.complex import OUTSIDE, Complex
 from pipeline.shapes.frame import Vector
@@ -198,13 +199,16 @@ def put_back(sheet: Sheet, faces: Faces, known: IntArray | None = None, places: 
 
 
 def settled(sheet: Sheet, moved: FloatArray) -> Sheet:
-    """Move the points of a sheet, except those whose facets would turn over."""
+    """Move the points of a sheet, except those whose facets would turn over, or in a divided sheet cross others."""
     before, points = sheet.normals, moved.copy()
+    already = int(crossing_facets(sheet).sum()) if sheet.is_divided else 0
     for _ in range(_ROUNDS):
         after = Sheet(points, sheet.facets, sheet.group, sheet.sharp)
-        turned = (before * after.normals).sum(axis=1) < _TURNED
-        if not turned.any():
+        bad = (before * after.normals).sum(axis=1) < _TURNED
+        if sheet.is_divided and not bad.any() and (crossing := crossing_facets(after)).sum() > already:
+            bad = crossing
+        if not bad.any():
             return after
-        back = np.unique(sheet.facets[turned])
+        back = np.unique(sheet.facets[bad])
         points[back] = sheet.points[back]
     return sheet

@@ -10,10 +10,12 @@ from heapq import heapify, heappop, heappush
 from math import dist
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.organ.remesh import remesh
 from pipeline.mesh.organ.sheet import Sheet, compact
+from pipeline.mesh.organ.untangle import crossing_facets
 
 # An edge is contracted below this length, in units of elements, if its curve moves by at most the second.
 _SHORT, _MOVES = 0.7, 0.15
@@ -21,6 +23,8 @@ _SHORT, _MOVES = 0.7, 0.15
 _TINY = 0.2
 # Largest turn of a facet by a contraction (cosine), and its least height as a share of its longest edge.
 _TURN, _HEIGHT = 0.3, 0.02
+# Attempts, in which more and more points stay around facets that would cross others.
+_TRIES = 4
 # Sizes of the first remeshing, in units of the facets', and their growth from each one to the next.
 _FIRST, _FASTER = 2.0, 2.5
 
@@ -47,11 +51,27 @@ def coarsened(
 def contracted(sheet: Sheet, size: FloatArray, stay: IntArray) -> Sheet:
     """Return the sheet with short edges of its junctions contracted; ``size`` (n), in m, is that of elements.
 
-    Ends of junctions, points where they meet other edges to be kept, and the points ``stay`` remain.
+    Ends of junctions, points where they meet other edges to be kept, and the points ``stay`` remain. So do all points
+    around facets that would then cross others.
     """
     junctions = sheet.junctions
     if not len(junctions):
         return sheet
+    on_curve = np.unique(junctions)
+    points = cKDTree(sheet.points[on_curve])
+    already = int(crossing_facets(sheet).sum())
+    for number in range(1, _TRIES + 1):
+        made = _contracted(sheet, junctions, size, stay)
+        crossing = crossing_facets(made)
+        if crossing.sum() <= already or number == _TRIES:
+            break
+        reach = number * made.extents[crossing] / 2
+        near = points.query_ball_point(made.centres[crossing], reach)
+        stay = np.union1d(stay, on_curve[np.concatenate(near).astype(int)])
+    return made
+
+
+def _contracted(sheet: Sheet, junctions: IntArray, size: FloatArray, stay: IntArray) -> Sheet:
     edges, sides, _ = sheet.neighbours()
     kept = np.unique(np.vstack([junctions, edges[np.diff(sheet.group[sides], axis=1)[:, 0] != 0]]), axis=0)
     fixed = np.bincount(np.vstack([kept, np.sort(sheet.sharp, axis=1)]).ravel(), minlength=len(sheet.points)) != 2

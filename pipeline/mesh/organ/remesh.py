@@ -10,10 +10,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ.sheet import Sheet, compact
+from pipeline.mesh.organ.untangle import crossing_facets
 from pipeline.shapes.triangles import half_edges
 from pipeline.stages import stage
 
@@ -24,6 +26,8 @@ _OPTIONS = ("-v", "-1", "-nr", "-hgrad", "-1")
 _LONGEST = 600  # seconds
 # Factor by which elements may be smaller or larger than any given size.
 _ROOM = 3.0
+# Attempts at a divided sheet, in which more and more facets stay around those that would cross others.
+_TRIES = 4
 
 
 def program() -> Path:
@@ -57,11 +61,29 @@ def remesh(
     """Return the surface with elements of the given ``size`` (n) at its points, all in m.
 
     It stays within ``deviation`` (m) of the input. Edges between groups stay, with their points, and so do the ``kept``
-    edges (k, 2) and the facets marked ``as_is`` (m).
+    edges (k, 2) and the facets marked ``as_is`` (m). In a divided sheet, facets also stay where new ones would cross.
 
     Raises:
         MeshError: if the remesher fails; with its message.
     """
+    made = _remeshed(sheet, size, deviation, kept, as_is)
+    if not sheet.is_divided:
+        return made
+    as_is = np.zeros(len(sheet.facets), dtype=bool) if as_is is None else as_is.copy()
+    already, centres = int(crossing_facets(sheet).sum()), cKDTree(sheet.centres)
+    for number in range(1, _TRIES):
+        crossing = crossing_facets(made)
+        if crossing.sum() <= already:
+            break
+        near = centres.query_ball_point(made.centres[crossing], number * made.extents[crossing])
+        as_is[np.concatenate(near).astype(int)] = True
+        made = _remeshed(sheet, size, deviation, kept, as_is)
+    return made
+
+
+def _remeshed(
+    sheet: Sheet, size: FloatArray, deviation: float, kept: IntArray | None, as_is: BoolArray | None
+) -> Sheet:
     with TemporaryDirectory(prefix="surface-") as folder:
         source, result = Path(folder, "in.mesh"), Path(folder, "out.mesh")
         source.write_text(_mesh_text(sheet, _NO_EDGES if kept is None else kept, as_is))

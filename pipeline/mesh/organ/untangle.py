@@ -21,10 +21,11 @@ _ROUNDS, _WIDER = 12, 4
 
 def bad_facets(sheet: Sheet) -> BoolArray:
     """Return a mask of facets that cross others, are slivers, or are folded onto a neighbour."""
-    return _crossing(sheet) | _misshapen(sheet, _FOLDED, _THIN)
+    return crossing_facets(sheet) | _misshapen(sheet, _FOLDED, _THIN)
 
 
-def _crossing(sheet: Sheet) -> BoolArray:
+def crossing_facets(sheet: Sheet) -> BoolArray:
+    """Return a mask of facets that cross others."""
     found = np.zeros(len(sheet.facets), dtype=bool)
     found[crossings(sheet.points, sheet.facets)] = True
     return found
@@ -58,7 +59,7 @@ def untangled(sheet: Sheet, stay: IntArray) -> Sheet:
     share = beside.sum(axis=1)
     fillable: Sheet | None = None
     for number in range(_ROUNDS):
-        crossing = _crossing(sheet)
+        crossing = crossing_facets(sheet)
         bad = crossing | _misshapen(sheet, _FOLDED, _THIN)
         if not bad.any():
             return sheet

@@ -184,5 +184,5 @@ def _balanced(values: FloatArray) -> FloatArray:
 def _inside(shares: FloatArray, axis: int = 1) -> FloatArray:
     """Return barycentric coordinates, along an axis, clipped to the inside."""
     shares = shares / shares.sum(axis=axis, keepdims=True)
-    shares = np.maximum(shares, _AWAY)
+    shares = np.clip(shares, _AWAY, 1.0)
     return np.asarray(shares / shares.sum(axis=axis, keepdims=True))
