@@ -151,8 +151,8 @@ def test_an_output_of_the_study_is_one_of_them():
 
 def test_an_output_of_a_function_is_refused(tmp_path):
     (tmp_path / "own.py").write_text("def work(solution):\n    return 1.0\n", encoding="utf-8")
-    own = {"name": "work", "function": "own.py:work"}
-    varied = {"poisson": [0.2, 0.5], "outputs": ["work"]}
+    own = {"name": "own", "function": "own.py:work"}
+    varied = {"poisson": [0.2, 0.5], "outputs": ["own"]}
     with pytest.raises(StudyError, match="is a function: use an output at a point"):
         read_mapping(PUNCH | {"output": [own], "sensitivity": varied}, "punch", tmp_path)
 
