@@ -7,6 +7,7 @@ from typing import Any
 
 from epsmesh_realtime.evaluator import MOST_RELAXING
 from pipeline.shapes.body import Body, Layered
+from pipeline.shapes.facetted import Facetted
 from pipeline.shapes.registry import PROBES
 from pipeline.shapes.support import Faces
 from pipeline.shapes.tissue import Tissue
@@ -113,6 +114,8 @@ def _refusal(case: Case, first: Case) -> str:
         return _flat_refusal(case, first, body)
     if not body.is_smooth:
         return f'body.shape = "{body.shape}" has no real-time model: boxes, cylinders, ellipsoids and surfaces have one'
+    if isinstance(body, Facetted) and body.partition is not None and body.partition.has_divided_skin:
+        return "a body.region meets the surface: a real-time model has one tissue there"
     if not _is_same_but_for_poisson(case, first):
         return "the study has several materials, and a curved body's model has one: export a study of each"
     if (probe.shape, probe.contact) != ("disc", "frictionless"):

@@ -78,6 +78,11 @@ class Complex:
         """The body's surface."""
         return self._surface(self.boundary(OUTSIDE)[:, ::-1])
 
+    @property
+    def has_divided_skin(self) -> bool:
+        """Whether several regions meet what is outside."""
+        return len(np.unique(self.sides[self.sides[:, 1] == OUTSIDE, 0])) > 1
+
     def surface(self, region: int) -> Triangles:
         """Return the surface of a region."""
         return self._surface(self.boundary(region))

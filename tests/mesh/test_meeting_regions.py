@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.export.scope import ExportError, scope_of
 from pipeline.mesh.generate import GeometryError
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.run import meshing
@@ -92,5 +93,8 @@ def test_a_hollow_region_leaves_its_neighbours_alone(given):
 def test_what_cannot_be_is_refused_by_name_and_place(given):
     with pytest.raises(GeometryError, match=r"two regions of the body meet at its surface at \(\d+.*move the probe"):
         mesh_arrays(study(**given(TUMOUR, LOBE, at=("18 mm", "3 mm", "17 mm"))).case(()), ())
+    disc = {"probe": PROBE | {"contact": "frictionless", "at": ["-4 mm", "4 mm"]}}
+    with pytest.raises(ExportError, match=r"body\.region meets the surface"):
+        scope_of(study(**given(TUMOUR, LOBE) | disc))
     with pytest.raises(StudyError, match=r"lobe is hollow and meets the body's surface at x = .*inside tissue"):
         study(**given(TUMOUR, {"name": "lobe", "label": 5, "hollow": True}))
