@@ -12,7 +12,7 @@ from tests import cases
 MESH = {"epsilon": ["6 mm", "full"], "outside": ["coarse", "fixed"], "rim": "0.3 mm", "growth": 0.6}
 
 
-@pytest.mark.parametrize("contact", ["bonded", "frictionless"])
+@pytest.mark.parametrize("contact", ["bonded", pytest.param("frictionless", marks=pytest.mark.nightly)])
 def test_plain_forces_are_the_programs(contact):
     probe = {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm", "contact": contact}
     study = cases.study(mesh=MESH, probe=probe)

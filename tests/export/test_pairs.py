@@ -23,7 +23,10 @@ def fields(body: dict, poissons: tuple[float, float], margin: float) -> FarField
 
 @pytest.mark.parametrize(
     ("body", "most"),
-    [(CYLINDER, 0.004), (CYLINDER | {"layer": [SKIN | {"thickness": "6 mm"}]}, 0.012)],
+    [
+        pytest.param(CYLINDER, 0.004, marks=pytest.mark.nightly),
+        (CYLINDER | {"layer": [SKIN | {"thickness": "6 mm"}]}, 0.012),
+    ],
 )
 def test_a_table_of_two_places_is_reciprocal_and_knows_each_by_itself(body, most, monkeypatch):
     monkeypatch.setattr(tabulate, "_POISSONS", 2)
