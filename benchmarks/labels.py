@@ -23,7 +23,7 @@ from pipeline.study.read import parse
 # Semi-axes of the bodies in voxels, sizes of voxels in mm, and lengths of the fields' waves in voxels.
 _AXES, _VOXELS, _WAVES = (6.0, 10.0), (1.0, 3.0), (3.0, 5.0)
 _ROUGH, _LEAST, _MARGIN = 0.12, 0.01, 3
-_BORDER = "two regions of the body meet at its surface"
+_BORDER = "meet at the body's surface"
 
 
 def labels_of(random: np.random.Generator) -> IntArray:

@@ -66,6 +66,11 @@ class Body(Section, ABC):
         return tuple(piece for found in self.pieces.values() for piece in found)
 
     @property
+    def region_names(self) -> tuple[str, ...]:
+        """Names of the rest of the body and of its regions, in the order of their numbers."""
+        return "tissue", *(piece.name for piece in self.regions)
+
+    @property
     def places(self) -> tuple[str, ...]:
         """Places of its regions in a study, such as inclusion[2], in their order."""
         return tuple(f"{key}[{n}]" for key, found in self.pieces.items() for n in range(1, len(found) + 1))

@@ -100,7 +100,7 @@ class Case:
     @property
     def region_names(self) -> tuple[str, ...]:
         """Names of the regions of the mesh, in the order of their numbers: those of tissues, then of linear parts."""
-        names = "tissue", *(region.name for region in self.body.regions)
+        names = self.body.region_names
         return (*names, *(f"{name}, linear" for name in names)) if self.is_linear_beyond else names
 
     @property

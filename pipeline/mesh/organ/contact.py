@@ -3,7 +3,7 @@
 The points of the footprint's edge are then on its true curve, at the distance of the elements there.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import gmsh
@@ -76,13 +76,16 @@ def _legs(outline: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
     return [(outline[k], outline[k + 1]) for k in range(len(outline) - 1)]
 
 
-def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -> Contact:
+def set_in(
+    sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift, *, names: Sequence[str] = ("tissue",)
+) -> Contact:
     """Return the sheet with the footprint's surroundings meshed to ``sizes``, and its edge as edges of the mesh.
 
-    ``lift`` projects points (n, 2) of the probe's plane along its axis onto the true surface.
+    ``lift`` projects points (n, 2) of the probe's plane along its axis onto the true surface. ``names`` are those of
+    the body's regions, by number.
 
     Raises:
-        GeometryError: if a part of the footprint has no tissue below it.
+        GeometryError: if a part of the footprint has no tissue below it, or two regions.
         FoldedError: if facets around it reach over a fold.
     """
     rim = rim_points(probe, sizes)
@@ -98,7 +101,7 @@ def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -
             break
     else:
         if len(np.unique(skin.sides[patch], axis=0)) > 1:
-            raise _over_two_regions(skin, patch, frame)
+            raise _over_two_regions(skin, patch, frame, names)
         raise FoldedError(f"{_FOLDED}; for a rough surface, set `smooth` to the length of its bumps")
     if (skin.kind[patch] == FIXED).any():
         raise GeometryError("the footprint is on, or next to, the fixed part of the body")
@@ -106,14 +109,16 @@ def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -
     return _joined(sheet, patch, plane, lift, lifted, followed)
 
 
-def _over_two_regions(skin: Sheet, patch: IntArray, frame: Frame) -> GeometryError:
+def _over_two_regions(skin: Sheet, patch: IntArray, frame: Frame, names: Sequence[str]) -> GeometryError:
     """Return the error for a contact at a border between regions, with the nearest place of that."""
-    border = np.unique(skin.border_of_regions())
-    points = skin.points[np.intersect1d(border, skin.facets[patch])]
-    x, y, z = 1e3 * points[np.linalg.norm(points - np.array(frame.point), axis=1).argmin()]
+    edges, sides = skin.border_of_regions()
+    near = np.isin(edges, skin.facets[patch]).any(axis=1)
+    middles = skin.points[edges[near]].mean(axis=1)
+    nearest = np.linalg.norm(middles - np.array(frame.point), axis=1).argmin()
+    (x, y, z), (one, other) = 1e3 * middles[nearest], sorted(sides[near][nearest])
     return GeometryError(
-        f"two regions of the body meet at its surface at ({x:.4g}, {y:.4g}, {z:.4g}) mm, below the footprint or next "
-        "to it: move the probe, or make it smaller"
+        f"{names[one]} and {names[other]} meet at the body's surface at ({x:.4g}, {y:.4g}, {z:.4g}) mm, below the "
+        "footprint or next to it: move the probe, or make it smaller"
     )
 
 

@@ -20,6 +20,7 @@ from pipeline.mesh.organ.untangle import untangled
 from pipeline.mesh.regions import embedded_sizes
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import FREE, Scene
+from pipeline.shapes.body import Body
 from pipeline.shapes.complex import Complex
 from pipeline.shapes.scanned import Scanned
 
@@ -94,11 +95,11 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     def lift(points: FloatArray) -> FloatArray:
         return scene.body.lift(scene.frame, points)[0]
 
-    contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift)
+    contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift, names=scene.body.region_names)
     field = Field(sizes, scene.frame, contact.edge, embedded_sizes(scene.body, sizes.growth, scene.frame.point))
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
     sheet = untangled(sheet, np.unique(sheet.facets[sheet.kind == PROBE]))
-    _check_whole(sheet, far.faces, scene.body.volume)
+    _check_whole(sheet, far.faces, scene.body)
     deviation = _deviation(sheet, far.faces, field)
     parts = Complex(sheet.points, sheet.facets, sheet.sides)
     filled = fill_regions(parts, scene.body, field)
@@ -117,14 +118,14 @@ def _check(scene: Scene) -> None:
         raise GeometryError(f"a {scene.body.shape} has no mirror symmetry")
 
 
-def _check_whole(sheet: Sheet, faces: Faces, volume: float) -> None:
-    """Check that a surface is that of the file, whose ``volume`` is in m³, and that all regions have theirs.
+def _check_whole(sheet: Sheet, faces: Faces, body: Body) -> None:
+    """Check that a surface is that of the file, and that all regions have theirs.
 
     Raises:
         MeshError: if it is open, or encloses much more or less.
     """
     edges_of(sheet.skin.facets)
-    if abs(excess := sheet.volume / volume - 1) > MOST_EXCESS:
+    if abs(excess := sheet.volume / body.volume - 1) > MOST_EXCESS:
         amount = "much" if excess > 0 else "little"
         raise MeshError(
             f"the remeshed surface encloses {abs(excess):.2g} times the body's volume too {amount}: "
@@ -135,7 +136,8 @@ def _check_whole(sheet: Sheet, faces: Faces, volume: float) -> None:
     made = Complex(sheet.points, sheet.facets, sheet.sides)
     for region in walls.regions:
         if region not in made.regions or abs(excess := made.volume(region) / walls.volume(region) - 1) > MOST_OF_REGION:
-            raise MeshError(f"the remeshed surface of region {region} has lost its shape: use a smaller `fine`")
+            name = body.region_names[region]
+            raise MeshError(f"the remeshed surface of {name} has lost its shape: use a smaller `fine`")
 
 
 def _deviation(sheet: Sheet, faces: Faces, field: Field) -> float:
