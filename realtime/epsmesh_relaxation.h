@@ -1,7 +1,8 @@
 /* Forces on tools in relaxing tissue, from step to step. C99; no allocation, locks, input or output.
  *
  * All tissue of the body relaxes alike: E(t) = E (g + sum of share_i exp(-t / time_i)), g = 1 - sum of share_i, at constant
- * Poisson's ratio. E of a query is the modulus at once. The depth is linear in time from call to call.
+ * Poisson's ratio. E of a query is the modulus at once. The depth is linear in time from call to call; a tool that was above
+ * tissue at rest touches it from the call before on.
  */
 #ifndef EPSMESH_RELAXATION_H
 #define EPSMESH_RELAXATION_H

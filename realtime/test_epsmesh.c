@@ -174,6 +174,12 @@ int main(int count, char **words) {
             ask_surface(&damaged, 1);
         }
     }
+    for (i = 0; i < *((const uint32_t *)data + 4); i++) { /* each array in turn, of a kind that there is not */
+        static const uint32_t unknown[2] = {5, 0};
+        memcpy(part, data, size);
+        memcpy(part + 32 + 64 * i + 32, unknown, sizeof unknown);
+        epsmesh_load(&damaged, part, size);
+    }
     free(part);
     printf("%s\n", failures ? "failed" : "passed");
     return failures ? 1 : 0;

@@ -100,6 +100,10 @@ class Evaluator:
         """
         return Evaluator(pack(arrays))
 
+    def __reduce__(self) -> tuple[type["Evaluator"], tuple[bytes]]:
+        """Copies, also in other processes, load the file's bytes again: C's model points into them."""
+        return Evaluator, (self._data.tobytes(),)
+
     @property
     def pointer(self) -> Any:
         """The model in C, for functions that are not here."""

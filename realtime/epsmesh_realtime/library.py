@@ -3,18 +3,24 @@
 import ctypes
 import hashlib
 import os
+import platform
 import shlex
 import shutil
 import subprocess
+import sysconfig
+from contextlib import suppress
 from ctypes import c_char_p, c_double, c_int, c_size_t, c_void_p
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import time
 
 _PACKAGE = Path(__file__).resolve().parent
 _CHECKOUT = _PACKAGE.parent
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
 _COMPILERS = ("cc", "gcc", "clang")
+# s: another process may be about to load a younger library of other sources.
+_KEPT = 86400.0
 # Sizes (bytes) of a query and of a touch, as `query.py` and `evaluator.py` pack them.
 QUERY_SIZE, TOUCH_SIZE = 136, 56
 _PLACE = (c_double, c_double)
@@ -59,9 +65,13 @@ def library() -> ctypes.CDLL:
     """Return the evaluator with the types of its functions; a checkout's is compiled if its sources are new.
 
     Raises:
-        BuildError: if there is neither a library nor a compiler, or if compilation fails.
+        BuildError: if there is neither a library nor a compiler, or if compiling or loading fails.
     """
-    found = ctypes.CDLL(str(_installed() or _built()))
+    path = _installed() or _built()
+    try:
+        found = ctypes.CDLL(str(path))
+    except OSError as problem:
+        raise BuildError(f"the evaluator in C cannot be loaded: {problem}") from problem
     for name, (result, *arguments) in _FUNCTIONS.items():
         function = getattr(found, name)
         function.restype, function.argtypes = result, arguments
@@ -109,10 +119,21 @@ def _built() -> Path:
     compiler = _compiler()
     texts = b"\0".join([file.read_bytes() for file in files])
     name = hashlib.sha256(texts + repr((_FLAGS, compiler)).encode()).hexdigest()[:16]
-    path = _CHECKOUT / ".built" / f"epsmesh-{name}.so"
+    # Several machines, and systems in containers, may share a checkout.
+    machine = "-".join(filter(None, [sysconfig.get_platform(), *platform.libc_ver()]))
+    path = _CHECKOUT / ".built" / f"epsmesh-{machine}-{name}.so"
     if not path.exists():
         _compile(compiler, path)
+        _remove_old(path.parent, f"epsmesh-{machine}-*.so")
     return path
+
+
+def _remove_old(folder: Path, pattern: str) -> None:
+    """Remove what earlier sources left; processes that have loaded such a library keep it."""
+    for path in folder.glob(pattern):
+        with suppress(OSError):
+            if time() - path.stat().st_mtime > _KEPT:
+                path.unlink()
 
 
 def _compiler() -> list[str]:

@@ -3,7 +3,7 @@
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import pi
+from math import nan, pi
 from typing import Any
 
 import numpy as np
@@ -56,6 +56,7 @@ class Tip:
     def _put(self, count: int, x: Any, y: Any, z: Any, _: Any) -> None:
         """Put the heights of C's places where C expects them."""
         along, across, found = (np.ctypeslib.as_array(each, (count,)) for each in (x, y, z))
+        found[:] = nan  # if the height raises an error, which cannot pass through C
         found[:] = self.height(along, across)
 
 

@@ -105,6 +105,11 @@ static fmi3Status evaluate(unit *u, double time) {
         touch = epsmesh_touch_after(&u->model, &query, time - u->now.evaluated, &u->now.memory);
     } else {
         double none = touch.status == EPSMESH_LOST ? 0 : (double)NAN;
+        /* After a place that is not known, the past is not known; a tool beside the region of a face at rest is no touch. */
+        if (touch.status != EPSMESH_LOST && (touch.status != EPSMESH_OUTSIDE || u->now.memory.phase != EPSMESH_RESTED)) {
+            query.depth = (double)NAN;
+            epsmesh_touch_after(&u->model, &query, time - u->now.evaluated, &u->now.memory);
+        }
         touch.force[0] = touch.force[1] = touch.force[2] = none;
         touch.force_error = touch.stiffness = touch.contact_radius = query.depth = none;
     }

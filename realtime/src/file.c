@@ -56,7 +56,7 @@ static const void *file_find(file *f, const char *name, uint32_t kind, uint32_t 
     }
     if (i >= f->count || f->flaw) return NULL;
     f->name = name, f->flaw = EPSMESH_SHAPE;
-    if (array.kind != kind || array.rank != rank) return NULL;
+    if (kind >= KINDS || array.kind != kind || array.rank != rank) return NULL;
     for (bytes = width[kind], i = 0; i < 4; i++) {
         shape[i] = array.shape[i];
         if (!shape[i] || bytes > f->size / shape[i] || (i >= rank && shape[i] != 1)) return NULL;

@@ -249,9 +249,9 @@ epsmesh_touch epsmesh_touch_after(const epsmesh_model *m, const epsmesh_query *q
     if (!m->is_loaded) return all(EPSMESH_NO_MODEL, (double)NAN);
     if (!m->relaxing) return epsmesh_touch_at(m, q);
     if (!(isfinite(step) && step >= 0)) return forgotten(memory, EPSMESH_INPUT);
+    if (!isfinite(q->depth)) return forgotten(memory, EPSMESH_INPUT);
     if (memory->phase == EPSMESH_RESTED) memory->query = *q;
-    if (memory->phase == EPSMESH_UNKNOWN || !isfinite(q->depth) || !is_same(m, q, &memory->query))
-        return forgotten(memory, isfinite(q->depth) ? EPSMESH_PAST : EPSMESH_INPUT);
+    else if (memory->phase == EPSMESH_UNKNOWN || !is_same(m, q, &memory->query)) return forgotten(memory, EPSMESH_PAST);
     asked = memory->query, asked.depth = q->depth;
     memcpy(asked.axis, q->axis, sizeof asked.axis);
     if (memory->phase == EPSMESH_RESTED && q->depth <= TOUCHING) return epsmesh_touch_at(m, &asked);

@@ -119,10 +119,14 @@ def test_relaxing_tissue_remembers_from_step_to_step(tmp_path):
     depths = 4e-4 * np.interp(np.arange(300), (0, 100, 200, 250, 299), (-0.2, 1.0, 1.0, 0.0, -0.2))
     inputs = np.zeros(300, [("time", float), ("tip.z", float)])
     inputs["time"], inputs["tip.z"] = STEP * np.arange(300), -depths
-    found = fmpy.simulate_fmu(
-        str(tmp_path / "pad.fmu"), stop_time=0.3, step_size=STEP, output_interval=STEP, input=inputs, validate=False,
-        start_values={"shape": 1, "radius": RADIUS},
-    )  # fmt: skip
+
+    def simulated():
+        return fmpy.simulate_fmu(
+            str(tmp_path / "pad.fmu"), stop_time=0.3, step_size=STEP, output_interval=STEP, input=inputs,
+            validate=False, start_values={"shape": 1, "radius": RADIUS},
+        )  # fmt: skip
+
+    found = simulated()
     history = History(model)
     for given, depth in zip(found[1:], depths.tolist(), strict=True):
         touch = history.query(STEP, "sphere", radius=RADIUS, at=(0.0, 0.0, 0.0), depth=max(depth, 0.0))
@@ -130,6 +134,11 @@ def test_relaxing_tissue_remembers_from_step_to_step(tmp_path):
         assert given["force.z"] == pytest.approx(touch.force[2], rel=1e-10, abs=1e-15)
     held = found["force.z"][101:201]
     assert held[-1] < 0.8 * held[0]
+    inputs["tip.z"][150] = np.nan  # where was the tool?
+    statuses = [STATUSES[int(status)] for status in simulated()["status"]]
+    assert "ok" in statuses[:150]
+    assert statuses[151] == "input"
+    assert {*statuses[153:]} == {"past"}
 
 
 def test_its_sources_build_a_library_with_every_function_of_the_standard(made, tmp_path):

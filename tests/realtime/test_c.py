@@ -1,5 +1,6 @@
 """The evaluator in C by itself: C99 and C++, sanitizers, refusals of what C alone can be asked."""
 
+import os
 import shutil
 import subprocess
 from math import nan
@@ -119,3 +120,19 @@ def test_without_a_compiler_a_sentence_says_what_to_install(tmp_path, monkeypatc
         assert [path.name for path in left] == ([] if compiler else ["epsmesh.c"])
     finally:
         built.library.cache_clear()
+
+
+def test_libraries_of_earlier_sources_are_removed_after_a_day(tmp_path, monkeypatch):
+    (tmp_path / "epsmesh.c").write_text("int one(void) { return 1; }\n")
+    monkeypatch.setattr(built, "_CHECKOUT", tmp_path)
+    first = built._built()
+    (tmp_path / "epsmesh.c").write_text("int one(void) { return 2; }\n")
+    second = built._built()
+    assert first.exists()
+    os.utime(first, (0, 0))
+    of_other = second.with_name("epsmesh-other-machine-0.so")
+    shutil.copy(first, of_other)
+    os.utime(of_other, (0, 0))
+    (tmp_path / "epsmesh.c").write_text("int one(void) { return 3; }\n")
+    third = built._built()
+    assert {*second.parent.iterdir()} == {third, second, of_other}

@@ -1,5 +1,6 @@
 """Relaxing tissue under a tool: closed forms, contact that grows and shrinks, energy, and what is refused."""
 
+from copy import deepcopy
 from dataclasses import replace
 from functools import cache
 
@@ -154,6 +155,23 @@ def test_contact_that_grows_again_has_used_up_its_room_or_was_refused_has_no_for
     history = History(relaxing())
     axes = ((0.0, 0.0, -1.0), (0.5, 0.0, -1.0), (0.0, 0.0, -1.0))
     assert [history.query(0.1, **BALL, depth=1e-4, axis=axis).status for axis in axes] == ["ok", "tilted", "past"]
+
+
+def test_a_wrong_query_says_what_is_wrong_and_one_above_the_tissue_is_no_past():
+    for wrong, status in (
+        ({"radius": np.nan}, "tool"),
+        ({"at": (np.nan, 0.0, 0.0)}, "input"),
+        ({"young": -1.0}, "input"),
+    ):
+        history = History(relaxing())
+        assert history.query(0.1, **BALL | wrong, depth=-1e-4).status == status
+        assert history.query(0.1, **BALL, depth=1e-4).status == "ok"
+        assert History(relaxing()).query(0.1, **BALL | wrong, depth=1e-4).status == status
+
+
+def test_a_history_is_not_copied():
+    with pytest.raises(TypeError, match="begin a new one"):
+        deepcopy(History(relaxing()))
 
 
 def test_tissue_that_does_not_relax_has_no_history():

@@ -1,5 +1,6 @@
 """Forces in real time, held against quadrature and against mechanics; what a model does not know it refuses."""
 
+import pickle
 from dataclasses import replace
 from math import nan, pi, tan
 
@@ -261,6 +262,14 @@ def test_a_model_and_a_touch_print_what_they_are_in_a_line():
     assert f"E = {model.young:.4g} Pa" in repr(model)
     touch = model.query("disc", at=(1e3, 0.0, 0.0), depth=1e-4, radius=1e-3)
     assert touch.message in repr(touch)
+
+
+def test_a_model_can_be_sent_to_another_process(tmp_path):
+    surface, asked = write_surface(tmp_path / "model.epsm"), {"at": AT, "depth": 1e-4, "radius": 1e-3}
+    touch, moved = surface.press("disc", **asked)
+    sent = pickle.loads(pickle.dumps(surface))
+    assert np.array_equal(sent.model.query("disc", **asked).force, touch.force)
+    assert np.array_equal(sent.press("disc", **asked)[1], moved)
 
 
 def test_a_query_with_a_word_that_there_is_not_is_refused():

@@ -158,3 +158,20 @@ def test_what_is_no_convex_tip_is_refused(height, word):
 def test_a_face_that_is_not_flat_has_no_patch():
     with pytest.raises(ModelError, match="flat"):
         Patch(random_model(curved=True), LONG)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_tip_whose_height_fails_has_no_force():
+    known = {"fails": False}
+
+    def height(x, y):
+        if known["fails"]:
+            raise ArithmeticError
+        return 30 * x**2 + 120 * y**2
+
+    patch = Patch(random_model(), Tip(height, 4e-3))
+    assert patch.query(at=AT, depth=1e-4).status == "ok"
+    known["fails"] = True
+    touch = patch.query(at=AT, depth=1e-4)
+    assert touch.status == "large"
+    assert np.isnan(touch.force).all()
