@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pipeline.study.sweep import Study
     from pipeline.view.fields import Fields
 
-_HOWTO, _NEEDLE = "docs/howto/insertion.md", "docs/howto/needle.md"
+_HOWTO = "docs/howto/insertion.md"
 
 
 def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, MPI.Comm], Fields | None]") -> None:
@@ -26,8 +26,6 @@ def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, 
 
     ``solved`` returns the fields of a state on the first rank; collective.
     """
-    if chosen.probe.is_cutting:
-        fail(of_file(study.file, "the film of an insertion is that of a blade: a needle has none yet", _NEEDLE))
     stages, position = _stages(study, chosen)
     file = output / f"{study.name}_{position}_path.gif"
     check_output(file)
@@ -39,10 +37,12 @@ def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, 
 
     comm, sections = world(), dict[float, Section]()
     load_solvers()
-    deepest = float(path["depth"][-1])
+    pierced, deepest = float(path["puncture_depth"]), float(path["depth"][-1])
+    # A blade that is pulled out passes all slits. Without a puncture there are none.
+    first = 0.0 if "stroke" in path.dims and pierced > 0 else pierced
     with abort_on_exception(comm), ended_soon():
         for depth, case in zip((0.0, *study.step_depths), stages, strict=True):
-            if depth and not float(path["puncture_depth"]) <= depth <= deepest and "stroke" not in path.dims:
+            if depth and not first <= depth <= deepest:
                 continue
             fields = solved(case, comm)
             if fields is not None:

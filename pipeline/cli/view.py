@@ -7,7 +7,7 @@ import typer
 
 from pipeline.cli.cases import find_case
 from pipeline.cli.console import error, say
-from pipeline.cli.faults import SOME_FAILED, Fault, fail
+from pipeline.cli.faults import SOME_FAILED, Fault, fail, of_file
 from pipeline.cli.view_image import Given, view_image
 from pipeline.cli.words import (
     DEFAULT_MESHES,
@@ -70,8 +70,8 @@ def view(
 
     Example: epsmesh view studies/figure3.toml 12 --export html
 
-    Of an insertion it writes a film of the path, <study>_<number>_path.gif, beside the dataset of a run: the deformed
-    section over depth, and F. With --export, or "stage=5 mm", one state is shown.
+    Of a blade's insertion it writes a film of the path, <study>_<number>_path.gif, beside the dataset of a run: the
+    deformed section over depth, and F. With --export, or "stage=5 mm", one state is shown.
 
     Example: epsmesh view studies/scalpel-path.toml
 
@@ -93,6 +93,9 @@ def view(
         fail(Fault(f"{option}: is for a label map; a study has it in [body]", key=option))
     (study,) = read_all([file])
     chosen = find_case(study, case or "0")
+    if chosen.probe.is_cutting:
+        why = "a needle that is inserted is computed in a plane section, which is not drawn; films are those of blades"
+        fail(of_file(study.file, why, "docs/howto/needle.md"))
     if study.is_insertion and not (mesh_only or export or "stage" in case):
         from pipeline.cli.film import film
 

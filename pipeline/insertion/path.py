@@ -153,7 +153,8 @@ class _Puncture:
         depth = float(scipy.optimize.brentq(lambda d: whole.energy(d) - float(energy(d)), *ends, xtol=1e-9))
         one = _between(before, after, depth)
         error = one.stored_error + whole.bar * depth**2 / 2 + _defect(before, after) * (after.depth - before.depth)
-        return cls(depth, one, error / (whole.stiffness * depth - one.slope))
+        force = whole.stiffness * depth
+        return cls(depth, one, error / max(force - one.slope, _TINY * force))
 
     @classmethod
     def at_touch(cls, first: Cutting) -> "_Puncture":

@@ -39,7 +39,7 @@ Record = TypeVar("Record", bound=Scalable)
 
 @dataclass
 class CaseStates:
-    """The solved states of one case of a study with insertions: the records of its stages, and of further slits.
+    """The solved states of one case of a study with insertions: the records of its stages, and of further states.
 
     ``further`` are the plans of those, by key.
     """
@@ -123,9 +123,9 @@ def needs(plan: Plan, index: tuple[int, ...], find: Callable[[str], Scalable | N
 
 
 def lacking(plan: Plan, records: Records) -> Plan | None:
-    """Return the plan of slits that paths need besides their stages, and that have no record; None if there are none.
+    """Return the plan of states that paths need besides their stages, and that have no record; None if there are none.
 
-    The fronts of these were found to be farther ahead than those of the stages.
+    The fronts of these slits were found to be farther ahead than those of the stages; needles need the intact body.
     """
     plans = [plan, *(one for end in plan.ends for one in (end.low, end.high) if one)]
     states = [one for each in plans for _, one in _followed(each, records)]

@@ -57,10 +57,10 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
     The mesh was made for ``case``, whose probe gives the tool's place. ``condense``: many depths follow.
 
     Raises:
-        CaseFailure: if it is a needle that cuts: only the meridian has it.
+        CaseFailure: if it is a needle that cuts, which has no body: it is solved in a plane section.
     """
     if case.probe.is_cutting:
-        raise CaseFailure("a needle that is inserted needs a round scene, about its axis")
+        raise CaseFailure("a needle that is inserted is solved in a plane section, in a round scene only")
     tool = tool_of(case) if case.probe.is_unilateral else None
     degree, conditions = case.mesh.degree, conditions_of(case)
     return QuasiStaticProblem(spaces, degree, conditions, case.element, tool=tool, reuse=reuse, condense=condense)

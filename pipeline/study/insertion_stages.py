@@ -1,6 +1,7 @@
-"""Stages of an insertion: the intact body under the blade, and slits in which the blade is, at the depths of its steps.
+"""Stages of an insertion: of a blade, the intact body and slits in which it is, at the depths of its steps.
 
-They are cases like any other, without friction: toughness and friction follow from them without a solve.
+They are cases like any other, without friction: a blade's toughness and friction follow from them without a solve. Of a
+needle, each stage is the same state: deep in the tissue that it cuts.
 """
 
 from collections.abc import Sequence
@@ -32,9 +33,9 @@ def has_insertion(probes: Sequence[Section]) -> bool:
 
 
 def with_steps(sections: Sections, axes: tuple[Axis, ...]) -> tuple[Sections, tuple[Axis, ...]]:
-    """Return sections and axes in which each blade has the stages of its insertion; ``tool`` keeps it as it is given.
+    """Return sections and axes in which each tool has the stages of its insertion; ``tool`` keeps it as it is given.
 
-    There is no F_exact of a path. All blades have the same depths, so that one dimension holds them.
+    There is no F_exact of a path. All tools have the same depths, so that one dimension holds them.
     """
     if not has_insertion(sections["probe"]):
         return sections, axes

@@ -51,9 +51,10 @@ def _each(tables: Any, change: Callable[[dict[str, Any]], dict[str, Any]]) -> An
 
 
 def _pressed(probe: dict[str, Any]) -> dict[str, Any]:
-    """Return a probe with a depth: that of a table of a history is its own."""
+    """Return a probe with a depth: those of a table of a history, and of an insertion, are their own."""
     history = probe.get("history")
-    return probe if isinstance(history, dict) and "table" in history else {"depth": _SHALLOW} | probe
+    has_depth = "insertion" in probe or (isinstance(history, dict) and "table" in history)
+    return probe if has_depth else {"depth": _SHALLOW} | probe
 
 
 def _with_pieces(body: dict[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:

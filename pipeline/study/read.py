@@ -15,7 +15,7 @@ from pipeline.study.check import check_sense, check_steps
 from pipeline.study.check_loads import check_loads
 from pipeline.study.identification import Identification, check_shared, read_identify, read_measurements
 from pipeline.study.identified import with_identified
-from pipeline.study.insertion_stages import with_steps
+from pipeline.study.insertion_stages import has_insertion, with_steps
 from pipeline.study.loads import Load
 from pipeline.study.measured import MESH, completed
 from pipeline.study.measurement import Measurement
@@ -32,6 +32,9 @@ from pipeline.study.sweep import Study
 from pipeline.study.tables import MOST_CASES, read_section
 from pipeline.study.text import check_text, read_toml, toml_of
 from pipeline.study.toml import to_toml
+
+# Sections that are of one force of a case.
+_OF_ONE_FORCE = {"measurement", "identify", "sensitivity"}
 
 
 def read_study(path: str | Path) -> Study:
@@ -94,6 +97,9 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene:
         )
     if all(problem.key != "study" for problem in problems.errors):
         _check_together(sections, tuple(axes), problems)
+    if has_insertion(sections["probe"]) and (is_scene or _OF_ONE_FORCE & given.keys()):
+        told = "has no place in [[measurement]], [identify] and [sensitivity], which are of one force: omit it, or them"
+        problems.error("probe.insertion", None, told)
     measurements, identification = _read_experiment(given, sections, file, problems)
     outputs = _read_outputs(given, sections, axes, Path(file).parent, problems)
     spread = _read_spread(given, sections, outputs, problems)

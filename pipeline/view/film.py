@@ -62,8 +62,8 @@ def _frame(step: xr.Dataset, phase: str) -> Frame:
 def write_film(path: xr.Dataset, blade: Blade, sections: Mapping[float, Section], file: Path, title: str) -> Path:
     """Write the film of one case as a GIF, and return the file.
 
-    ``sections`` has the solved slits by the depth of the tip (m), and the intact body at 0, with the tool at its last
-    depth, to which the displacement is proportional. At the puncture the nearest slit is shown.
+    ``sections`` has the solved slits by the depth of the tip (m), and the intact body at 0, with the ``blade`` at its
+    last depth, to which the displacement is proportional. At the puncture the nearest slit is shown.
     """
     frames, last = list(frames_of(path)), float(path["depth"][-1])
     pressed = max((frame.depth for frame in frames if frame.phase == "indentation"), default=0.0)
@@ -82,7 +82,7 @@ def write_film(path: xr.Dataset, blade: Blade, sections: Mapping[float, Section]
         for frame in [*frames, *[frames[-1]] * _LAST]:
             intact = frame.phase == "indentation"
             key = 0.0 if intact else float(solved[np.argmin(abs(solved - frame.depth))])
-            share = frame.depth / last if intact else 1.0
+            share = frame.depth / blade.depth if intact else 1.0  # the path may end above the blade's last depth
             _draw_section(left, sections[key], frame, blade, share=share, largest=largest)
             left.set(xlim=np.multiply(_MM * last, (-_SIDE, _SIDE)), ylim=np.multiply(_MM * last, (-_BELOW, _ABOVE)))
             dot.set_data([_MM * frame.depth], [_MM * frame.force])

@@ -146,10 +146,11 @@ def test_twice_the_modulus_and_the_toughness_needs_twice_the_force(monkeypatch):
         ("probe", {"at": ["3 mm", "0 mm"]}, "needs a cylinder, and the needle on its axis"),
         ("probe", {"insertion": {"to": "38 mm"}}, "leaves less than 5 mm, ten radii of the needle"),
         ("probe", {"toughness": None}, "is required for an insertion"),
+        ("sensitivity", {"young": ["10 kPa", "20 kPa"]}, r"are of one force: omit it, or them"),
     ],
 )
 def test_what_is_not_computed_is_refused_by_name(section, keys, told):
-    own = SCENE[section] | keys
+    own = SCENE.get(section, {}) | keys
     if "size" in own:
         own = keys
     own = {key: value for key, value in own.items() if value is not None}

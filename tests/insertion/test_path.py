@@ -230,6 +230,12 @@ def test_tools_with_different_depths_are_refused():
         read_mapping(SCENE | {"probe": probes}, "blades")
 
 
+def test_what_is_of_one_force_is_refused():
+    measured = {"measurement": [{"name": "push", "file": "push.csv"}]}
+    with pytest.raises(StudyError, match=r"probe\.insertion: has no place in \[\[measurement\]\]"):
+        read_mapping(SCENE | measured, "blade")
+
+
 def test_withdrawal_reverses_friction_and_tears_nothing():
     found = _path(_study(insertion={"to": "6 mm", "steps": 12, "withdraw": True}))
     into, out = found.sel(stroke="insertion"), found.sel(stroke="withdrawal")

@@ -137,7 +137,7 @@ REFUSALS: tuple[Refusal, ...] = (
         "accuracy",
         "needs given element sizes: with `accuracy`, each depth has a mesh of its own. Omit one of the two",
     ),
-    # A blade that is inserted.
+    # A tool that is inserted.
     Refusal("slit", "insertion", "a blade that is inserted makes its own slit: omit `incision`"),
     Refusal("slice", "insertion", "a blade that is inserted moves along its axis: omit it"),
     Refusal("history", "insertion", "an insertion has no time: omit one of the two"),
