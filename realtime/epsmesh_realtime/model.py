@@ -74,7 +74,7 @@ class Model:
         A refused query raises no error: see ``status``.
 
         Raises:
-            TypeError: if a keyword is unknown, or place or depth is missing.
+            TypeError: if a keyword is unknown, place or depth is missing, or a size, the depth, E or ν is no number.
         """
         return self.answer(Query(tool, **asked))
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import nan
-from struct import Struct
+from struct import Struct, error
 from typing import Any
 
 import numpy as np
@@ -55,8 +55,12 @@ class Query:
     contact: str | None = None
 
     def packed(self, young: float, poisson: float) -> bytes:
-        """Return the query of C, with the study's E (Pa) and ν where it has none of its own."""
-        return _PACKED.pack(
+        """Return the query of C, with the study's E (Pa) and ν where it has none of its own.
+
+        Raises:
+            TypeError: if a size, the depth, E or ν is no number.
+        """
+        numbers = (
             _SHAPES.get((self.tool, self.contact), _UNKNOWN),
             self.radius,
             self.angle,
@@ -69,6 +73,10 @@ class Query:
             self.width,
             *_direction(self.along),
         )
+        try:
+            return _PACKED.pack(*numbers)
+        except error:
+            raise TypeError(f"sizes, depth, E and ν of a query are numbers, in SI units: {self}") from None
 
 
 def packed_each(query: Query, young: float, poisson: float) -> NDArray[Any]:

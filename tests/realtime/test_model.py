@@ -275,6 +275,9 @@ def test_a_model_can_be_sent_to_another_process(tmp_path):
 def test_a_query_with_a_word_that_there_is_not_is_refused():
     with pytest.raises(TypeError, match="raduis"):
         random_model().query("disc", at=(0.0, 0.0, 0.0), depth=1e-4, raduis=1e-3)
+    for wrong in ({"radius": "2 mm"}, {"depth": None}, {"young": "10 kPa"}):
+        with pytest.raises(TypeError, match=f"SI units.*{next(iter(wrong.values()))}"):
+            random_model().query("disc", **({"at": AT, "depth": 1e-4, "radius": 1e-3} | wrong))
 
 
 def test_a_model_has_the_numbers_of_its_file(tmp_path):
