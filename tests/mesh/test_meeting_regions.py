@@ -98,3 +98,8 @@ def test_what_cannot_be_is_refused_by_name_and_place(given):
         scope_of(study(**given(TUMOUR, LOBE) | disc))
     with pytest.raises(StudyError, match=r"lobe is hollow and meets the body's surface at x = .*inside tissue"):
         study(**given(TUMOUR, {"name": "lobe", "label": 5, "hollow": True}))
+    under = {"name": "vessel", "label": 7, "hollow": True, "pressure": "1 kPa"}
+    sections = given(under, LOBE | {"relaxation": [{"share": 0.4, "time": "2 s"}]})
+    sections["probe"] |= {"history": {"ramp": "1 s", "hold": "10 s", "steps": 4}}
+    with pytest.raises(StudyError, match=r"under the loads before: omit \[load\], and pressure in hollow regions"):
+        study(**sections)

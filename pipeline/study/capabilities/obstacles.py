@@ -67,7 +67,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     "real-time model": {
         "rounded edge": "probe.edge: real-time models have sharp edges. Omit it",
         "friction": "probe.friction: real-time models have no friction. Omit it and export the frictionless force",
-        "loads": "[load]: gravity and tractions have no real-time model",
+        "loads": "[load]: gravity, tractions and pressure in hollow regions have no real-time model",
         "large displacements": "material.law: large displacements have no real-time model",
         "time steps": "material.relaxation: all tissue of a real-time model relaxes alike. Omit the relaxation of "
         "layers and inclusions",

@@ -30,6 +30,7 @@ _PRESSES = f"the far field is known only for a tool that presses: {_COARSE}"
 _HOLDS = 'a tool that slides along the tissue has no lateral stiffness: use contact = "bonded"'
 _STATIC = "omit [probe.history] and relaxation"
 _IN_STEPS = "with this law or relaxation the force over time is computed in time steps"
+_NO_LOADS = "omit [load], and pressure in hollow regions"
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
 _OF_LAW = "with a law of large displacements"
 
@@ -155,7 +156,7 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("inserted needle", "no round scene", "needs a cylinder, and the needle on its axis"),
     Refusal("insertion", "inclusion", "needs a body of layers: cuts through inclusions are not computed"),
     Refusal("insertion", "region", "needs a body of layers: cuts through regions are not computed"),
-    Refusal("insertion", "loads", "cuts in tissue under loads are not computed: omit [load]"),
+    Refusal("insertion", "loads", f"cuts in tissue under loads are not computed: {_NO_LOADS}"),
     # Loads.
     Refusal(
         "truncated body",
@@ -180,7 +181,7 @@ REFUSALS: tuple[Refusal, ...] = (
         f"the opening of the slit has no history, and the energy release rate depends on the front's speed: {_STATIC}",
     ),
     Refusal("time steps", "six motions", f'{_IN_STEPS}, of one movement: use motion = "press"'),
-    Refusal("time steps", "loads", f"{_IN_STEPS}, and the tissue has crept under the loads before: omit [load]"),
+    Refusal("time steps", "loads", f"{_IN_STEPS}, and the tissue has crept under the loads before: {_NO_LOADS}"),
     Refusal("time steps", "accuracy", f"{_IN_STEPS}, which meshes for an accuracy do not cover: give sizes"),
     Refusal("time steps", "half ball", f"{_IN_STEPS}, and the far field has none: {_COARSE}"),
     # Large strains.
