@@ -105,7 +105,7 @@ def _alone(study: Study, case: Case) -> Study:
 
 def paths(plan: Plan, records: Records) -> list[Path]:
     """Return the path of each case of a plan's study, in the order of the dataset; none for studies without."""
-    return [path for path, _ in _followed(plan, records)]
+    return [path for path, _ in followed(plan, records)]
 
 
 def needs(plan: Plan, index: tuple[int, ...], find: Callable[[str], Scalable | None]) -> bool:
@@ -128,7 +128,7 @@ def lacking(plan: Plan, records: Records) -> Plan | None:
     The fronts of these slits were found to be farther ahead than those of the stages; needles need the intact body.
     """
     plans = [plan, *(one for end in plan.ends for one in (end.low, end.high) if one)]
-    states = [one for each in plans for _, one in _followed(each, records)]
+    states = [one for each in plans for _, one in followed(each, records)]
     further = [own for one in states for key, own in one.further.items() if key not in records]
     if not further:
         return None
@@ -148,7 +148,8 @@ def complete(
     return None
 
 
-def _followed(plan: Plan, records: Records) -> Iterator[tuple[Path, CaseStates]]:
+def followed(plan: Plan, records: Records) -> Iterator[tuple[Path, CaseStates]]:
+    """Yield the path of each case of a plan's study, and the states through which it was followed."""
     for scene, states in scenes(plan, records):
         yield scene.follow() if isinstance(scene, NeedleScene) else follow(scene), states
 

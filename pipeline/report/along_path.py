@@ -7,12 +7,13 @@ import numpy as np
 import xarray as xr
 
 from pipeline.insertion.path import Path
-from pipeline.insertion.paths import paths
+from pipeline.insertion.paths import followed
 from pipeline.insertion.steps import ENDED, PHASES, Step
 from pipeline.plan.plan import Plan
 from pipeline.quantities import RUN, attributes
 from pipeline.report.history import last_stage
 from pipeline.run.record import Record
+from pipeline.states import OK
 
 # What has a value at each depth, in the order of ``_of``.
 STEPS = (
@@ -31,6 +32,10 @@ STEPS = (
 # What both sides of the puncture have.
 AT_PUNCTURE = STEPS[:-1]
 _PUNCTURE = ("puncture_depth", "puncture_depth_error", "puncture_force", "puncture_force_error")
+_TIMES, _COUNTS = (
+    ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total"),
+    ("dofs", "cells", "iterations"),
+)
 # What a case has besides, of the variables of other studies: where it is, what it cost, and what became of it.
 _KEPT = (
     "status", "message", "body_message", "axis", "at_x", "at_y", "at_z", "surface_deviation", "force_exact",
@@ -47,13 +52,17 @@ def along_path(dataset: xr.Dataset, plan: Plan, records: Mapping[str, Record]) -
     study = plan.study
     if not study.is_insertion:
         return dataset
-    found, depths, withdraws = paths(plan, records), study.step_depths, study.insertion.withdraw
+    along = list(followed(plan, records))
+    found, depths, withdraws = [path for path, _ in along], study.step_depths, study.insertion.withdraw
     axes = [axis for axis in study.axes if not axis.is_stage]
     dims, shape = tuple(axis.name for axis in axes), tuple(len(axis) for axis in axes)
     more = ("stroke", "depth") if withdraws else ("depth",)
     strokes = [(path.steps, path.withdrawal) if withdraws else (path.steps,) for path in found]
     dataset = last_stage(dataset)
     whole = dataset[[name for name in _KEPT if name in dataset]]
+    # Stages may share a solve, and a path may need more than its stages.
+    solves = [[records[key] for key in {*own.keys, *own.further} if key in records] for _, own in along]
+    whole = whole.assign({name: _costs(whole[name], solves) for name in (*_TIMES, *_COUNTS) if name in whole})
 
     def variable(name: str, values: Any, *own: str, **texts: Any) -> Any:
         array = np.array(values)
@@ -79,6 +88,17 @@ def along_path(dataset: xr.Dataset, plan: Plan, records: Mapping[str, Record]) -
     if withdraws:
         coordinates["stroke"] = ("stroke", ["insertion", "withdrawal"], attributes("stroke"))
     return whole.assign(variables).assign_coords(coordinates)
+
+
+def _costs(like: xr.DataArray, solves: Sequence[Sequence[Record]]) -> xr.DataArray:
+    """Return what the distinct solves of each case cost: sums of seconds and iterations, and the largest sizes."""
+    name = str(like.name)
+    if name in _TIMES:
+        found = [np.nansum([getattr(one, name) for one in own]) for own in solves]
+    else:
+        counts = [[getattr(one, name) for one in own if one.status == OK] for own in solves]
+        found = [(sum if name == "iterations" else max)(own) if own else -1 for own in counts]
+    return like.copy(data=np.array(found, dtype=like.dtype).reshape(like.shape))
 
 
 def _of(step: Step) -> tuple[float, ...]:

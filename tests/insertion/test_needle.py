@@ -1,5 +1,6 @@
 """Insertion of a round needle: paths through states with closed forms, and what is refused."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.optimize import brentq
 from pipeline.insertion.paths import lacking, paths
 from pipeline.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL
 from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
 from pipeline.run.record import Record
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
@@ -54,7 +56,7 @@ def record(solve):
     return Record(solve.key, OK, force=force, energy=force * probe.depth / 3, **scale)
 
 
-def path_of(study, fails=lambda solve: False):
+def solved(study, fails=lambda solve: False):
     plan = further = make_plan(study)
     records = {}
     while further:
@@ -62,7 +64,11 @@ def path_of(study, fails=lambda solve: False):
             failed = Record(solve.key, "failed", "tissue is turned inside out")
             records[solve.key] = failed if fails(solve) else record(solve)
         further = lacking(plan, records)
-    (path,) = paths(plan, records)
+    return plan, records
+
+
+def path_of(study, **how):
+    (path,) = paths(*solved(study, **how))
     return path
 
 
@@ -113,6 +119,16 @@ def test_a_needle_that_cannot_be_pressed_deep_enough_leaves_what_is_solved():
     assert path.status == PARTIAL and path.puncture is None
     assert [step.depth for step in path.steps] == pytest.approx([0.25e-3, 0.5e-3])
     assert path.message == "1 mm: tissue is turned inside out"
+
+
+def test_a_path_costs_each_of_its_solves_once():
+    plan, records = solved(scene())
+    cost = dict.fromkeys(("time_mesh", "time_assemble", "time_setup", "time_solve"), 0.25)
+    found = build(
+        plan, {key: replace(one, cells=n, iterations=2, **cost) for n, (key, one) in enumerate(records.items())}
+    )
+    assert float(found["time_total"]) == len(records) > 2
+    assert int(found["cells"]) == len(records) - 1 and int(found["iterations"]) == 2 * len(records)
 
 
 def test_friction_is_no_input_of_the_states_and_toughness_is_one():
