@@ -43,6 +43,11 @@ def are_closed(facets, sides, regions) -> bool:
     return True
 
 
+def neighbours(body: Complex) -> set[tuple[int, int]]:
+    """Return the pairs of regions that meet, lower first."""
+    return {(min(pair), max(pair)) for pair in body.sides.tolist()}
+
+
 def blocks(labels: np.ndarray, size: float = 10e-3) -> Complex:
     """Return cubes (m) whose region numbers are ``labels`` (nx, ny, nz), by the faces between different ones."""
     around = np.pad(labels, 1, constant_values=OUTSIDE)

@@ -36,7 +36,8 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     ``folded`` replaces every ε beyond the body by the full order; ``scaled`` leaves out the inputs that the force is
     proportional to. Each timed case has a key of its own.
     """
-    head, tail, poisson = _scene_texts(_Scene(case.body, case.material, case.probe, case.load, case), scaled)
+    scene = _Scene(case.body, case.material, case.probe, case.load, bool(case.outputs), case)
+    head, tail, poisson = _scene_texts(scene, scaled)
     element = case.mesh.element_for(poisson, is_large=case.material.is_large)
     parts = [
         *head,
@@ -58,6 +59,7 @@ class _Scene:
     material: Material
     probe: Probe
     load: Load
+    has_outputs: bool
     case: Case = field(compare=False)
 
 

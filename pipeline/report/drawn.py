@@ -2,11 +2,11 @@
 
 import hashlib
 from collections.abc import Iterable
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 
 import xarray as xr
-
-from pipeline import __version__
 
 # What runs of the same records differ in, and no figure shows: when, where, and what was read back.
 _OF_THE_RUN = {"start", "end", "study_file", "study_folder", "reductions", "origin"}
@@ -15,8 +15,9 @@ _HEAD = 4096
 
 
 def mark_of(dataset: xr.Dataset) -> str:
-    """Return a hash of what figures of ``dataset`` show: its values and attributes, and the program's version."""
-    found = hashlib.sha256(repr((__version__, _shown(dataset.attrs))).encode())
+    """Return a hash of what figures of ``dataset`` show, its values and attributes, and of the code that draws them."""
+    code = code_in(Path(__file__).parent), version("matplotlib")
+    found = hashlib.sha256(repr((code, _shown(dataset.attrs))).encode())
     for name in sorted(map(str, dataset.variables)):
         if name not in _OF_THE_RUN:
             variable = dataset.variables[name]
@@ -29,6 +30,15 @@ def mark_of(dataset: xr.Dataset) -> str:
 def are_drawn(files: Iterable[Path], mark: str) -> bool:
     """Return whether all ``files`` are there, and were drawn from a dataset of this ``mark``."""
     return all(_names(file, mark.encode()) for file in files)
+
+
+@cache
+def code_in(folder: Path) -> str:
+    """Return a hash of the modules in a folder and those below."""
+    found = hashlib.sha256()
+    for module in sorted(folder.rglob("*.py")):
+        found.update(f"{module.relative_to(folder)}\n".encode() + module.read_bytes())
+    return found.hexdigest()
 
 
 def _names(file: Path, mark: bytes) -> bool:

@@ -91,13 +91,6 @@ class Complex:
         used, corners = np.unique(facets, return_inverse=True)
         return Triangles(self.points[used], corners.reshape(-1, 3))
 
-    def walls(self) -> tuple[IntArray, IntArray]:
-        """Return the pairs of neighbours (k, 2), lower first, in order of appearance, and that of each facet (m)."""
-        pairs = np.sort(self.sides, axis=1)
-        walls, first, number = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
-        order = np.argsort(first)
-        return walls[order], np.argsort(order)[number.ravel()]
-
     def boundary(self, region: int) -> IntArray:
         """Return the facets (k, 3) around a region, counterclockwise seen from outside of it."""
         behind, before = (self.sides == region).T

@@ -105,12 +105,12 @@ def _check_segments(body: Body, problems: Problems) -> None:
         if piece.hollow and piece.name in (FREE, *body.surfaces()):
             problems.error(f"{key}.name", piece.name, "is the name of a part of the body's boundary: give another one")
         if (piece.file is None) == (piece.label is None):
-            problems.error(key, None, "needs either `file` (a closed surface) or `label` (of the body's image)")
+            problems.error(key, None, "needs either `file` (a surface or solid) or `label` (of the body's image)")
         elif piece.label is None:
             if piece.unit is None:
-                problems.error(f"{key}.unit", None, 'is required, since surface files have none: unit = "mm"')
+                problems.error(f"{key}.unit", None, 'is required, the unit of length of its file: unit = "mm"')
         elif label is None:
-            problems.error(f"{key}.label", piece.label, "needs a body from an image: give `file`, a closed surface")
+            problems.error(f"{key}.label", piece.label, "needs a body from an image: give `file`")
         else:
             for name in sorted(piece.model_fields_set & {"unit", "repair"}):
                 problems.error(f"{key}.{name}", getattr(piece, name), "is for `file`; a label has the body's image")

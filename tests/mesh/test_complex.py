@@ -17,7 +17,7 @@ from pipeline.shapes.complex import OUTSIDE, Complex
 from pipeline.shapes.files.crossings import crossings
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.skin import Skin
-from tests.complexes import are_closed, blocks, parted, scene
+from tests.complexes import are_closed, blocks, neighbours, parted, scene
 
 APART = np.array([[[1, 0, 1]]])
 LAYERS = np.array([[[0, 1, 2]]])
@@ -55,7 +55,7 @@ def test_regions_that_touch_are_filled_up_to_their_common_facets(labels):
 def test_the_volume_of_a_region_is_that_of_the_facets_around_it():
     body = blocks(QUARTERS)
     assert [body.volume(region) for region in body.regions] == pytest.approx([1e-6] * 4)
-    assert len(body.walls()[0]) == 4 + 4
+    assert len(neighbours(body)) == 4 + 4
 
 
 def test_surfaces_that_cross_are_not_filled():
@@ -82,7 +82,7 @@ def test_surfaces_between_regions_are_meshed_together_with_the_bodys(organ):
     assert not len(crossings(coarse.points, coarse.facets))
     for region in parts.regions:
         assert coarse.volume(region) == pytest.approx(parts.volume(region), rel=0.03)
-    assert {*map(tuple, coarse.walls()[0].tolist())} == {*map(tuple, parts.walls()[0].tolist())}
+    assert neighbours(coarse) == neighbours(parts)
     distance = made.faces.distance(sheet)
     assert np.quantile(distance, 0.95) < 1e-9 and distance.max() < 0.5e-3
     edges = sheet.points[sheet.junctions]

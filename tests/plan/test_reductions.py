@@ -185,3 +185,10 @@ def test_exact_force_is_the_same_whatever_motions_are_asked_for(at):
         (exact,) = (solve for solve in plan.solves if solve.is_reference)
         found.append((exact.key, exact.case.travel, exact.mirrors))
     assert found[0] == found[1]
+
+
+def test_a_study_with_outputs_has_a_solve_of_each_modulus_though_one_without_was_planned_before():
+    two = {"material": {"young": ["1 kPa", "2 kPa"], "poisson": 0.3}}
+    output = {"name": "u", "of": "displacement", "at": ["0 mm", "0 mm", "-5 mm"]}
+    for more, count in (({}, 1), ({"output": [output]}, 2), ({}, 1)):
+        assert len(make_plan(study(**two, **more)).solves) == count
