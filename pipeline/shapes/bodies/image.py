@@ -71,6 +71,7 @@ class FromImage(Segmented, Scanned):
     def read(cls, file: str, given: Mapping[str, Any]) -> Loaded:
         """Return the surface of the label, together with the labels of its regions."""
         from pipeline.shapes.files.image import read_image  # noqa: PLC0415 (only when a file is read)
+        from pipeline.shapes.files.label_map import NoVoxelError  # noqa: PLC0415
 
         def surface(
             label: int | str,
@@ -83,7 +84,12 @@ class FromImage(Segmented, Scanned):
 
         labelled = {piece.label: piece for piece in given["region"] if piece.label is not None}
         smooth = {n: given["smooth"] if piece.smooth is None else piece.smooth for n, piece in labelled.items()}
-        whole = surface(given["label"], given["smooth"], tuple(smooth.items()), given["offset"])
+        try:
+            whole = surface(given["label"], given["smooth"], tuple(smooth.items()), given["offset"])
+        except NoVoxelError as error:
+            if piece := labelled.get(error.label):
+                raise SurfaceError(f"{piece.name}, label {error.label}: {error}") from error
+            raise
         for number, (label, piece) in enumerate(labelled.items(), start=1):
             if whole.partition is not None:
                 piece.load(_part_of(whole.partition, number), is_part=True)

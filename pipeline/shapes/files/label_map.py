@@ -104,19 +104,28 @@ def _listed(values: Sequence[Any]) -> str:
     return ", ".join(map(str, values[:_SHOWN])) + (f", … ({len(values)} in all)" if len(values) > _SHOWN else "")
 
 
+class NoVoxelError(SurfaceError):
+    """No voxel has a ``label``."""
+
+    def __init__(self, label: int | str, what: str):
+        super().__init__(what)
+        self.label = label
+
+
 def of_label(found: LabelMap, label: int | str) -> Any:
     """Return a mask of the voxels with a label, given by number or name.
 
     Raises:
-        SurfaceError: if there are none; the message names the labels that exist.
+        SurfaceError: if there are none, or no such name; the message names the labels that exist.
     """
     number = found.number(label)
     mask = found.values == number
     if not mask.any():
         labels = [found.written(one) for one in found.labels]
-        raise SurfaceError(
+        raise NoVoxelError(
+            label,
             f"no voxel has label {found.written(number)}; "
-            + (f"labels are {_listed(labels)}" if labels else "all are 0: it is empty")
+            + (f"labels are {_listed(labels)}" if labels else "all are 0: it is empty"),
         )
     return mask
 
