@@ -88,9 +88,10 @@ def check_contact(body: Body, probe: Probe, frame: Frame) -> None:
     rings = np.concatenate([share * rim for share in _WITHIN] + [rim])
     points, normals = body.lift(frame, rings)
     if (missed := np.isnan(points).any(axis=1)).any():
+        steps = " and from steps; `smooth` removes those of voxels" if "smooth" in type(body).model_fields else ""
         raise PlaceError(
             f"{missed.mean():.0%} of the footprint of the {probe.shape} misses the body: the whole footprint must be "
-            "on the surface, away from its edge"
+            f"on the surface, away from its edge{steps}"
         )
     inclined = _angles(normals, np.array(frame.outward))
     if inclined > MOST_INCLINED:

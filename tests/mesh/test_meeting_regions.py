@@ -103,3 +103,5 @@ def test_what_cannot_be_is_refused_by_name_and_place(given):
     sections["probe"] |= {"history": {"ramp": "1 s", "hold": "10 s", "steps": 4}}
     with pytest.raises(StudyError, match=r"under the loads before: omit \[load\], and pressure in hollow regions"):
         study(**sections)
+    with pytest.raises(StudyError, match=r"footprint of the disc misses.*`smooth` removes those of voxels"):
+        study(**given(TUMOUR, LOBE, smooth="0 mm"))
