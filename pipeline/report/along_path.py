@@ -32,10 +32,8 @@ STEPS = (
 # What both sides of the puncture have.
 AT_PUNCTURE = STEPS[:-1]
 _PUNCTURE = ("puncture_depth", "puncture_depth_error", "puncture_force", "puncture_force_error")
-_TIMES, _COUNTS = (
-    ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total"),
-    ("dofs", "cells", "iterations"),
-)
+_TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total")
+_COUNTS = ("dofs", "cells", "iterations")
 # What a case has besides, of the variables of other studies: where it is, what it cost, and what became of it.
 _KEPT = (
     "status", "message", "body_message", "axis", "at_x", "at_y", "at_z", "surface_deviation", "force_exact",

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from pipeline.files import atomic
 from pipeline.insertion.steps import PHASES
-from pipeline.report.figures.insertion import along_path
+from pipeline.report.figures.insertion import with_puncture
 from pipeline.report.figures.style import COLOURS, DEFAULTS, GRID, LINE
 from pipeline.shapes.probes.blade import Blade
 from pipeline.view.palette import TOOL
@@ -93,7 +93,7 @@ def write_film(path: xr.Dataset, blade: Blade, sections: Mapping[float, Section]
 
 def _draw_force(ax: Axes, path: xr.Dataset) -> None:
     into = path.isel(stroke=0) if "stroke" in path.dims else path
-    ax.plot(_MM * along_path(into, "depth"), _MM * along_path(into, "force"), color=LINE)
+    ax.plot(_MM * with_puncture(into, "depth"), _MM * with_puncture(into, "force"), color=LINE)
     if "stroke" in path.dims:
         back = path.isel(stroke=1)
         ax.plot(_MM * back["depth"], _MM * back["force"], color=COLOURS[4])

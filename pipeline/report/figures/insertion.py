@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.figures.curves import BARS, grid, share
 from pipeline.report.figures.facets import arrange, swept
-from pipeline.report.figures.style import COLOURS, GRID, LINE, WIDTH, finish, look, new_figure
+from pipeline.report.figures.style import COLOURS, LINE, WIDTH, finish, look, new_figure
 from pipeline.report.words import choices
 
 _HEIGHT = 5.2  # inches
@@ -19,6 +19,8 @@ _ENERGIES = ("energy_fracture", "energy_friction", "energy_stored")
 _WIDE = 0.2
 # Share of the largest force below zero that is drawn.
 _LOW = 0.1
+# Parts of the force are seen through its error bar.
+_BAND = {"color": LINE, "alpha": 0.15, "linewidth": 0}
 _LABELS = ("cutting", "friction", "elastic")
 _OF_SEVERAL = "The force over depth; markers are the punctures. Bands and bars are 95\N{NO-BREAK SPACE}% error bars."
 # Curves, columns and rows of a figure of several cases, and what is a curve first.
@@ -38,20 +40,20 @@ def insertion(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     dataset = dataset.squeeze(list(dataset["status"].dims), drop=True)
     figure = new_figure(WIDTH, _HEIGHT)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-    depth = 1e3 * along_path(dataset, "depth")
-    force, bar = (1e3 * along_path(dataset, name) for name in ("force", "force_error"))
+    depth = 1e3 * with_puncture(dataset, "depth")
+    force, bar = (1e3 * with_puncture(dataset, name) for name in ("force", "force_error"))
     _stack(above, dataset, _PARTS, 1e3)
-    above.fill_between(depth, force - bar, force + bar, color=GRID)
+    above.fill_between(depth, force - bar, force + bar, **_BAND)
     above.plot(depth, force, color=LINE, label="F")
     if back is not None:
         back = back.squeeze(list(back["status"].dims), drop=True)
         away, pulled, own = (1e3 * back[name].values for name in ("depth", "force", "force_error"))
-        above.fill_between(away, pulled - own, pulled + own, color=GRID)
+        above.fill_between(away, pulled - own, pulled + own, **_BAND)
         above.plot(away, pulled, color=COLOURS[4], label="F of the withdrawal")
         above.axhline(0, color=LINE, linewidth=0.6)
     above.set_ylabel("force (mN)")
     _stack(below, dataset, _ENERGIES, 1e3)
-    below.plot(depth, 1e3 * along_path(dataset, "work"), color=LINE, linestyle="--", label="work of the tool")
+    below.plot(depth, 1e3 * with_puncture(dataset, "work"), color=LINE, linestyle="--", label="work of the tool")
     below.set_ylabel("energy (mJ)")
     below.set_xlabel("depth of the tip (mm)")
     _name_phases(above, dataset)
@@ -67,7 +69,7 @@ def _several(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         for position, curve in enumerate(facets.curves):
             one = panel.data.sel(curve)
             style = look(position)
-            depth, force, bar = (along_path(one, name) for name in ("depth", "force", "force_error"))
+            depth, force, bar = (with_puncture(one, name) for name in ("depth", "force", "force_error"))
             color, label = style["color"], choices(dataset, curve) or "F"
             panel.ax.fill_between(1e3 * depth, 1e3 * (force - bar), 1e3 * (force + bar), color=color, alpha=0.15)
             panel.ax.plot(1e3 * depth, 1e3 * force, **(style | {"marker": "none"}), label=label)
@@ -87,7 +89,7 @@ def _several(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     return figure
 
 
-def along_path(dataset: xr.Dataset, name: str) -> np.ndarray:
+def with_puncture(dataset: xr.Dataset, name: str) -> np.ndarray:
     """Return values along the path, with those of the first touch and of both sides of the puncture."""
     depths, at = dataset["depth"].values, float(dataset["puncture_depth"])
     own = np.full(2, at) if name == "depth" else dataset[f"{name}_at_puncture"].values
@@ -97,8 +99,9 @@ def along_path(dataset: xr.Dataset, name: str) -> np.ndarray:
 
 
 def _stack(ax: Axes, dataset: xr.Dataset, names: Sequence[str], factor: float) -> None:
-    parts = [factor * along_path(dataset, name) for name in names]
-    ax.stackplot(1e3 * along_path(dataset, "depth"), parts, labels=_LABELS, colors=COLOURS[1:4], alpha=0.5, linewidth=0)
+    depth, *parts = (with_puncture(dataset, name) for name in ("depth", *names))
+    parts = [factor * part for part in parts]
+    ax.stackplot(1e3 * depth, parts, labels=_LABELS, colors=COLOURS[1:4], alpha=0.5, linewidth=0)
 
 
 def _name_phases(ax: Axes, dataset: xr.Dataset) -> None:
