@@ -88,7 +88,7 @@ def test_an_ellipsoid_as_axes_and_as_surface_has_one_force(folder, body):
 def test_a_region_of_the_same_tissue_changes_nothing(folder):
     same = force(held(folder, BOX, REGION | {"young": "10 kPa"}))
     without = force(BOX)
-    assert abs(same.force / without.force - 1) < 0.005 < same.force_error + without.force_error < 0.12
+    assert abs(same.force / without.force - 1) < 0.01 < same.force_error + without.force_error < 0.12
 
 
 @pytest.mark.parametrize(
