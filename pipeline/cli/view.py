@@ -93,7 +93,7 @@ def view(
         fail(Fault(f"{option}: is for a label map; a study has it in [body]", key=option))
     (study,) = read_all([file])
     chosen = find_case(study, case or "0")
-    if chosen.probe.is_cutting:
+    if chosen.probe.crack:
         why = "a needle that is inserted is computed in a plane section, which is not drawn; films are those of blades"
         fail(of_file(study.file, why, "docs/howto/needle.md"))
     if study.is_insertion and not (mesh_only or export or "stage" in case):

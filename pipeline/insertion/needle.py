@@ -10,60 +10,42 @@ Sections are those of an endless needle. What the surface and the tip change is 
 radius of depth takes, and that of the force falls with the square of the depth.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from pipeline.arrays import FloatArray
-from pipeline.insertion.path import Path, Puncture
-from pipeline.insertion.states import Solved
-from pipeline.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL, Step
-from pipeline.states import OK
+from pipeline.insertion.states import InsertionScene, Solved
+from pipeline.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL, Path, Puncture, Step, with_work
+from pipeline.shapes.insertion import Needle
 
-if TYPE_CHECKING:
-    from pipeline.shapes.probes._round import RoundIndenter
-
-# Depths at which the needle is pressed on the intact body, in radii: the first, and the factor to the next one.
+# Depths at which the needle is pressed on the intact body, in half widths: the first, and the factor to the next one.
 _FIRST, _FACTOR = 0.5, 2.0
 _TINY = 1e-6
 
 
-class SolvedNeedle(Solved, Protocol):
-    """A solved state of a needle, with the sum of its tangential forces (N)."""
-
-    @property
-    def friction_force(self) -> float: ...  # noqa: D102
-
-
-class NeedleStates(Protocol):
-    """What has the solved states of a needle: None for one that is still to be solved."""
-
-    def cutting(self) -> SolvedNeedle | None:
-        """Return the needle deep in tissue that it cuts, over a depth of one radius, with a coefficient of 1."""
-        ...
-
-    def pressed(self, depth: float) -> Solved | None:
-        """Return the needle at a depth (m) on the intact body."""
-        ...
-
-
 @dataclass(frozen=True)
 class _Cut:
-    """The cut of a needle: per depth, energies ``stored`` and ``torn`` (N), and pressure ``squeeze`` (N/m).
+    """The cut of a needle: per depth of its shaft, energies ``stored`` and ``torn`` (N), and pressure (N/m).
 
-    ``bar`` is the relative 95 % bar of each.
+    The pressure is the change of both energies with the half width of the shaft, and Coulomb's friction for a
+    coefficient of 1: ``squeeze``. ``bar`` is the relative 95 % bar of each.
     """
 
-    needle: "RoundIndenter"
+    needle: Needle
     stored: float
     torn: float
     squeeze: float
     bar: float
+
+    @classmethod
+    def of(cls, needle: Needle, deep: Solved) -> "_Cut":
+        """Return the cut of a needle that was solved ``deep`` in tissue, over a depth of half its width."""
+        stored = deep.energy / needle.limit
+        return cls(needle, stored, deep.force - stored, deep.friction_force / needle.limit, deep.force_error)
 
     @property
     def force(self) -> float:
@@ -152,30 +134,18 @@ class _Intact:
         return Step(INDENTATION, depth, force, error=self.bar * force, stored=energy, work=energy)
 
 
-class NeedleScene:
-    """A needle that is inserted, the depths (m) of its steps, and its solved states.
+class NeedleScene(InsertionScene[Needle]):
+    """A needle that is inserted, and its body."""
 
-    ``is_pending`` tells whether a state was asked for that is still to be solved.
-    """
-
-    def __init__(self, needle: "RoundIndenter", *, depths: Sequence[float], states: NeedleStates):
-        assert needle.insertion is not None
-        self.needle, self.insertion, self.depths, self._states = needle, needle.insertion, tuple(depths), states
-        self.is_pending = False
-
-    def follow(self) -> Path:
-        """Return the path, as far as its states are solved."""
-        path = self._follow()
-        return replace(path, is_pending=True) if self.is_pending else path
+    def needed(self) -> tuple[float, ...]:
+        """Return all depths: the stages of a needle are one state."""
+        return self.depths
 
     def _follow(self) -> Path:
-        solved = self._states.cutting()
-        if why := self._why_not(solved):
-            return Path(message=f"the needle deep in tissue: {why}")
-        assert solved is not None
-        radius = self.needle.limit
-        stored = solved.energy / radius
-        cut = _Cut(self.needle, stored, solved.force - stored, solved.friction_force / radius, solved.force_error)
+        deep = self.solved(self.tool.cutting())
+        if isinstance(deep, str):
+            return Path(message=f"the needle deep in tissue: {deep}")
+        cut, radius = _Cut.of(self.tool, deep), self.tool.limit
         whole, message = self._intact(cut)
         if whole is None:
             return Path(message=message)
@@ -190,14 +160,13 @@ class NeedleScene:
     def _intact(self, cut: _Cut) -> tuple[_Intact | None, str]:
         """Return the intact body up to where the cut has less energy, or as deep as it is solved, and why no deeper."""
         found: list[tuple[float, Solved]] = []
-        depth, message = _FIRST * self.needle.limit, ""
+        depth, message = _FIRST * self.tool.limit, ""
         while True:
             depth = min(depth, self.insertion.to)
-            solved = self._states.pressed(depth)
-            if why := self._why_not(solved):
-                message = f"{1e3 * depth:.4g} mm: {why}"
+            solved = self.solved(self.tool.pressed_to(depth))
+            if isinstance(solved, str):
+                message = f"{1e3 * depth:.4g} mm: {solved}"
                 break
-            assert solved is not None
             found.append((depth, solved))
             if solved.energy >= cut.energy(depth) or depth >= self.insertion.to:
                 break
@@ -210,35 +179,16 @@ class NeedleScene:
     def _pierced(self, cut: _Cut, whole: _Intact, depth: float) -> Path:
         before, after = whole.step(depth), cut.step(depth)
         deeper = [cut.step(each) for each in self.depths if each > depth]
-        worked = _with_work([replace(after, work=before.work), *deeper])
+        worked = with_work([replace(after, work=before.work), *deeper])
         back: list[Step] = []
         if self.insertion.withdraw:
             last = worked[-1]
             steps = [cut.step(each, WITHDRAWAL) for each in reversed(self.depths)]
             first = replace(steps[0], work=last.work, rubbed=last.rubbed)
-            back = [replace(one, fracture=last.fracture) for one in _with_work([first, *steps[1:]])][::-1]
+            back = [replace(one, fracture=last.fracture) for one in with_work([first, *steps[1:]])][::-1]
         error = cut.energy_error(depth) + whole.bar * before.stored
         depth_error = error / max(before.force - after.elastic - after.cutting, _TINY * before.force)
         slope = before.force / depth  # at least; the force grows faster than the depth
         force_error = whole.bar * before.force + slope * depth_error
         steps = [*(whole.step(each) for each in self.depths if each <= depth), *worked[1:]]
         return Path(tuple(steps), Puncture(before, worked[0], depth_error, force_error), "", tuple(back))
-
-    def _why_not(self, found: Solved | None) -> str:
-        """Return why a state has no force, "" if it has."""
-        if found is None:
-            self.is_pending = True
-            return "not yet solved"
-        return "" if found.status == OK else found.message or found.status
-
-
-def _with_work(steps: list[Step]) -> list[Step]:
-    """Return steps with the work of the tool (J) and that of friction, from those of the first on."""
-    found = steps[:1]
-    for step in steps[1:]:
-        before = found[-1]
-        moved = (step.depth - before.depth) / 2
-        work = before.work + moved * (step.force + before.force)
-        rubbed = before.rubbed + moved * (step.friction + before.friction)
-        found.append(replace(step, work=work, rubbed=rubbed))
-    return found

@@ -11,66 +11,29 @@ from itertools import pairwise
 import numpy as np
 import scipy  # which loads its parts when they are used: a run without an insertion uses none
 
-from pipeline.arrays import FloatArray
 from pipeline.insertion.cutting import Cutting, cuttings
 from pipeline.insertion.friction import rub
 from pipeline.insertion.states import Scene
-from pipeline.insertion.steps import CUTTING, INDENTATION, Step
+from pipeline.insertion.steps import CUTTING, INDENTATION, Path, Puncture, Step, with_work
 from pipeline.insertion.withdrawal import withdrawn
-from pipeline.states import FAILED, OK, PARTIAL, PENDING
 
 # The least depth at which a slit is solved, in widths of the blade.
 _LEAST = 0.25
 _TINY = 1e-9
 
 
-@dataclass(frozen=True)
-class Puncture:
-    """The puncture: the step ``before`` it, the peak, and the one ``after`` it, at the same depth (m).
+class BladeScene(Scene):
+    """The scene of a blade, which follows its path."""
 
-    Error bars are those of the depth (m), and of the force (N) before.
-    """
+    def needed(self) -> tuple[float, ...]:
+        """Return the depths (m) at which the path needs a slit: all of them until the intact body is solved."""
+        return _needed(self)
 
-    before: Step
-    after: Step
-    depth_error: float
-    force_error: float
-
-    @property
-    def depth(self) -> float:
-        """Depth (m) of the tip."""
-        return self.before.depth
-
-    @property
-    def force(self) -> float:
-        """The largest force (N) of the indentation."""
-        return self.before.force
+    def _follow(self) -> Path:
+        return _follow(self)
 
 
-@dataclass(frozen=True)
-class Path:
-    """Steps of an insertion, at the depths of its scene up to where it ended, and the puncture between them.
-
-    Without a puncture the tissue stays whole. The ``withdrawal``, if any, has steps at the same depths. ``message``
-    says at which depth the path ended early, and why; ``is_pending`` that states are still to be solved.
-    """
-
-    steps: tuple[Step, ...] = ()
-    puncture: Puncture | None = None
-    message: str = ""
-    withdrawal: tuple[Step, ...] = ()
-    is_pending: bool = False
-
-    @property
-    def status(self) -> str:
-        """The state of the case: "partial" if its path ended early."""
-        if self.is_pending:
-            return PENDING
-        return OK if not self.message else PARTIAL if self.steps else FAILED
-
-
-def needed(scene: Scene) -> tuple[float, ...]:
-    """Return the depths (m) at which the path needs a slit: all of them until the intact body is solved."""
+def _needed(scene: Scene) -> tuple[float, ...]:
     pressed = scene.stiffness()
     if isinstance(pressed, str):
         return scene.depths if scene.is_pending else ()
@@ -79,19 +42,13 @@ def needed(scene: Scene) -> tuple[float, ...]:
     return tuple(depth for depth in scene.depths if through_all or depth >= first)
 
 
-def follow(scene: Scene) -> Path:
-    """Return the path of a scene, as far as its states are solved."""
-    path = _follow(scene)
-    return replace(path, is_pending=True) if scene.is_pending else path
-
-
 def _follow(scene: Scene) -> Path:
     pressed, depths = scene.stiffness(), np.array(scene.depths)
     if isinstance(pressed, str):
         return Path(message=pressed)
     whole = _Whole(*pressed)
     first = _first(scene, whole)
-    found, message = cuttings(scene, list(needed(scene)))
+    found, message = cuttings(scene, list(_needed(scene)))
     pierced = (number for number, one in enumerate(found) if whole.energy(one.depth) >= one.energy)
     count = next(pierced, len(found))
     intact, cut = found[:count], found[count:]
@@ -201,40 +158,25 @@ def _between(before: Cutting, after: Cutting, depth: float) -> Cutting:
 
 def _steps(scene: Scene, states: list[Cutting]) -> list[Step]:
     """Return the steps through ``states`` of cutting, the first of which is that after the puncture."""
-    depths = np.array([one.depth for one in states])
     found = [rub(scene.blade, one.depth, one.squeeze, one.squeeze_error, inwards=True) for one in states]
-    rubs, uncertain = np.array(found).T
-    rubbed = _sums(depths, rubs)
-    worked = _work(scene, states)
     missed = [0.0 if _crosses(scene, *pair) else _defect(*pair) for pair in pairwise(states)]
     missed = [max(pair) for pair in pairwise([0.0, *missed, 0.0])]
-    return [
+    steps = [
         Step(
             phase=CUTTING,
             depth=one.depth,
             elastic=one.elastic,
             cutting=one.cutting,
-            friction=float(rubs[number]),
-            error=one.elastic_error + float(uncertain[number]) + missed[number],
+            friction=rubs,
+            error=one.elastic_error + uncertain + missed[number],
             stored=one.stored,
             fracture=one.fracture,
-            rubbed=float(rubbed[number]),
-            work=states[0].energy + float(worked[number] + rubbed[number]),
+            work=one.energy,
             crack_depth=one.crack_depth,
         )
-        for number, one in enumerate(states)
+        for number, (one, (rubs, uncertain)) in enumerate(zip(states, found, strict=True))
     ]
-
-
-def _work(scene: Scene, states: list[Cutting]) -> FloatArray:
-    """Return the work (J), but that of friction, since the first state; across an interface, the change of energies."""
-    found = [0.0]
-    for before, after in pairwise(states):
-        if _crosses(scene, before, after):
-            found.append(after.energy - before.energy)
-        else:
-            found.append((before.slope + after.slope) / 2 * (after.depth - before.depth))
-    return np.cumsum(found)
+    return with_work(steps, scene.interfaces)
 
 
 def _crosses(scene: Scene, before: Cutting, after: Cutting) -> bool:
@@ -244,8 +186,3 @@ def _crosses(scene: Scene, before: Cutting, after: Cutting) -> bool:
 def _defect(before: Cutting, after: Cutting) -> float:
     """Return by how much the mean force (N) between two depths differs from the change of the energies."""
     return abs((after.energy - before.energy) / (after.depth - before.depth) - (after.slope + before.slope) / 2)
-
-
-def _sums(depths: FloatArray, forces: FloatArray) -> FloatArray:
-    """Return the work (J) of forces (N) at depths (m) since the first, by the rule of trapezoids."""
-    return np.concatenate([[0.0], np.cumsum(np.diff(depths) * (forces[1:] + forces[:-1]) / 2)])

@@ -2,30 +2,31 @@
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Protocol, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar, cast
 
 import numpy as np
 
-from pipeline.insertion.needle import NeedleScene, SolvedNeedle
-from pipeline.insertion.path import Path, follow, needed
-from pipeline.insertion.states import Scene, Solved
+from pipeline.insertion.needle import NeedleScene
+from pipeline.insertion.path import BladeScene
+from pipeline.insertion.states import InsertionScene, Solved
+from pipeline.insertion.steps import Path
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.steps import Solve
+from pipeline.shapes.insertion import Inserted
 from pipeline.shapes.probe import Probe
-from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.states import SKIPPED
 from pipeline.study.axis import Axis
 from pipeline.study.case import Case, Scale
-from pipeline.study.insertion_stages import in_slit, pressed
 from pipeline.study.sweep import Study
-from pipeline.units import canonical
 
 if TYPE_CHECKING:
     from pipeline.shapes.body import Layered
-    from pipeline.shapes.probes.blade import Blade
+
+# By how a tool cuts.
+_SCENES: dict[str, type[InsertionScene[Any]]] = {"slit": BladeScene, "crack": NeedleScene}
 
 
-class Scalable(SolvedNeedle, Protocol):
+class Scalable(Solved, Protocol):
     """A record of a solved state."""
 
     def scaled(self, scale: Scale) -> Self:
@@ -51,36 +52,15 @@ class CaseStates:
     further: dict[str, Plan] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        slits = [case.probe.slit for case in self.cases]
-        self._stages = {(canonical(slit.tip), slit.ahead): n for n, slit in enumerate(slits) if slit}
+        self._stages: dict[Probe, int] = {case.probe: number for number, case in enumerate(self.cases)}
 
-    @property
-    def tool(self) -> "Blade | RoundIndenter":
-        """The tool that is inserted."""
-        return cast("Blade | RoundIndenter", self.plan.study.tool(self.cases[0]))
-
-    def intact(self) -> Solved | None:
-        """Return the record of the blade on the intact body."""
-        return self._of_stage(0)
-
-    def slit(self, depth: float, ahead: float) -> Solved | None:
-        """Return the record of a slit: that of a stage, or of a slit that is solved besides."""
-        if (number := self._stages.get((canonical(depth), ahead))) is not None:
+    def of(self, state: Inserted) -> Scalable | None:
+        """Return the record of a state of the tool: that of a stage, or of a case that is solved besides."""
+        if (number := self._stages.get(state)) is not None:
             found = self._of_stage(number)
             if found is None or found.status != SKIPPED:
                 return found
-        return self._besides(in_slit(cast("Blade", self.tool), depth, ahead))
-
-    def cutting(self) -> Scalable | None:
-        """Return the record of a needle deep in tissue that it cuts."""
-        return self._of_stage(0)
-
-    def pressed(self, depth: float) -> Scalable | None:
-        """Return the record of a needle at a depth (m) on the intact body, which is solved besides the stages."""
-        return self._besides(pressed(cast("RoundIndenter", self.tool), depth))
-
-    def _besides(self, probe: Probe) -> Scalable | None:
-        case = replace(self.cases[0], probe=probe)
+        case = replace(self.cases[0], probe=state)
         own = make_plan(_alone(self.plan.study, case))
         (key,) = own.keys
         self.further[key] = own
@@ -118,8 +98,7 @@ def needs(plan: Plan, index: tuple[int, ...], find: Callable[[str], Scalable | N
     case, key = study.case(first), plan.keys[int(np.ravel_multi_index(first, study.shape))]
     record = find(key)
     states = CaseStates(plan, {key: record} if record else {}, [case], [key])
-    scene = _scene(states)
-    return isinstance(scene, NeedleScene) or study.step_depths[index[stage] - 1] in needed(scene)
+    return study.step_depths[index[stage] - 1] in _scene(states).needed()
 
 
 def lacking(plan: Plan, records: Records) -> Plan | None:
@@ -148,13 +127,19 @@ def complete(
     return None
 
 
-def followed(plan: Plan, records: Records) -> Iterator[tuple[Path, CaseStates]]:
-    """Yield the path of each case of a plan's study, and the states through which it was followed."""
-    for scene, states in scenes(plan, records):
-        yield scene.follow() if isinstance(scene, NeedleScene) else follow(scene), states
+def followed(plan: Plan, records: Records) -> list[tuple[Path, CaseStates]]:
+    """Return the path of each case of a plan's study, and the states through which it was followed.
+
+    Paths are kept with the plan, and are followed again if records have changed.
+    """
+    known, found = plan.kept.get("paths", ({}, None))
+    if found is None or len(known) != len(records) or any(known.get(key) is not one for key, one in records.items()):
+        found = [(scene.follow(), states) for scene, states in scenes(plan, records)]
+        plan.kept["paths"] = dict(records), found
+    return cast("list[tuple[Path, CaseStates]]", found)
 
 
-def scenes(plan: Plan, records: Records) -> Iterator[tuple[Scene | NeedleScene, CaseStates]]:
+def scenes(plan: Plan, records: Records) -> Iterator[tuple[InsertionScene[Any], CaseStates]]:
     """Yield the scene of each case of a plan's study, and its states; none for studies without insertions."""
     study = plan.study
     if not study.is_insertion:
@@ -164,8 +149,7 @@ def scenes(plan: Plan, records: Records) -> Iterator[tuple[Scene | NeedleScene, 
         yield _scene(states), states
 
 
-def _scene(states: CaseStates) -> Scene | NeedleScene:
-    case, depths, tool = states.cases[0], states.plan.study.step_depths, states.tool
-    if isinstance(tool, RoundIndenter):
-        return NeedleScene(tool, depths=depths, states=states)
-    return Scene(tool, cast("Layered", case.body), case.material, depths=depths, states=states)
+def _scene(states: CaseStates) -> InsertionScene[Any]:
+    case, study = states.cases[0], states.plan.study
+    tool, body = cast("Inserted", study.tool(case)), cast("Layered", case.body)
+    return _SCENES[tool.CUTS](tool, body, case.material, depths=study.step_depths, states=states)

@@ -1,25 +1,33 @@
-"""The body and the blade of an insertion, and its solved states: intact, and with a slit in which the blade is."""
+"""The body and the tool of an insertion, and its solved states; those of a blade: intact, and with a slit."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from pipeline.insertion.steps import Path
+from pipeline.shapes.insertion import Inserted
+from pipeline.shapes.probes.blade import SHORT, Blade
 from pipeline.states import OK
-from pipeline.study.insertion_stages import SHORT, clear, first_ahead, interfaces
+from pipeline.study.insertion_stages import clear, interfaces
 
 if TYPE_CHECKING:
     from pipeline.shapes.body import Layered
     from pipeline.shapes.insertion import Insertion
-    from pipeline.shapes.probes.blade import Blade
     from pipeline.study.schema import Material
 
-__all__ = ["SHORT", "Cut", "Scene", "Solved", "States", "Tissue"]
+__all__ = ["SHORT", "Cut", "InsertionScene", "Scene", "Solved", "States", "Tissue"]
+
+Tool = TypeVar("Tool", bound=Inserted)
 
 
 class Solved(Protocol):
-    """A solved state: energy (J), force (N), energy release rate (J/m²); bars are relative half widths, of 95 %."""
+    """A solved state: energy (J), force and sum of tangential forces (N), energy release rate (J/m²).
+
+    Bars are relative half widths, of 95 %.
+    """
 
     @property
     def status(self) -> str: ...  # noqa: D102
@@ -32,20 +40,18 @@ class Solved(Protocol):
     @property
     def force_error(self) -> float: ...  # noqa: D102
     @property
+    def friction_force(self) -> float: ...  # noqa: D102
+    @property
     def energy_release(self) -> float: ...  # noqa: D102
     @property
     def energy_release_error(self) -> float: ...  # noqa: D102
 
 
 class States(Protocol):
-    """What has the solved states of a scene: None for one that is still to be solved."""
+    """What has the solved states of a scene."""
 
-    def intact(self) -> Solved | None:
-        """Return the blade at its last depth on the intact body."""
-        ...
-
-    def slit(self, depth: float, ahead: float) -> Solved | None:
-        """Return the blade with its tip at a depth (m), in a slit whose front is ``ahead`` (m) of it."""
+    def of(self, state: Inserted) -> Solved | None:
+        """Return the tool in a state of its insertion; None if that is still to be solved."""
         ...
 
 
@@ -77,20 +83,18 @@ class Cut:
     drive_error: float
 
 
-class Scene:
-    """A body, a blade that is inserted, the depths (m) of its steps, and its solved states.
+class InsertionScene(ABC, Generic[Tool]):
+    """A body, a tool that is inserted, the depths (m) of its steps, and its solved states.
 
     ``is_pending`` tells whether a state was asked for that is still to be solved.
     """
 
-    def __init__(
-        self, blade: "Blade", body: "Layered", material: "Material", *, depths: Sequence[float], states: States
-    ):
-        assert blade.insertion is not None
-        assert blade.toughness is not None
-        self.blade, self.depths, self._states = blade, tuple(depths), states
-        self.insertion: Insertion = blade.insertion
-        self.toughness, self.is_pending = blade.toughness, False
+    def __init__(self, tool: Tool, body: "Layered", material: "Material", *, depths: Sequence[float], states: States):
+        assert tool.insertion is not None
+        assert tool.toughness is not None
+        self.tool, self.depths, self._states = tool, tuple(depths), states
+        self.insertion: Insertion = tool.insertion
+        self.toughness, self.is_pending = tool.toughness, False
         top = body.heights[1]
         self.interfaces = interfaces([body])
         self.bottom = min(top - level for level in (body.heights[0], *body.support.edges()))
@@ -117,22 +121,53 @@ class Scene:
         """Return the integral of the toughness (J/m) from the surface to a depth (m)."""
         return sum(one.toughness * thickness for one, thickness in self.above(depth))
 
+    # ---- its path -------------------------------------------------------------------------------------
+
+    def follow(self) -> Path:
+        """Return the path, as far as its states are solved."""
+        path = self._follow()
+        return replace(path, is_pending=True) if self.is_pending else path
+
+    @abstractmethod
+    def _follow(self) -> Path:
+        """Return the path, up to the first state that is not solved."""
+
+    @abstractmethod
+    def needed(self) -> Collection[float]:
+        """Return the depths (m) at which the path needs the stage of its tool."""
+
+    def solved(self, state: Tool) -> Solved | str:
+        """Return the tool in a state, or why there is no force of it."""
+        found = self._states.of(state)
+        if found is None:
+            self.is_pending = True
+            return "not yet solved"
+        return found if found.status == OK else found.message or found.status
+
+
+class Scene(InsertionScene[Blade]):
+    """A body, and a blade that is inserted."""
+
+    @property
+    def blade(self) -> Blade:
+        """The blade."""
+        return self.tool
+
     def clear(self, depth: float) -> float:
         """Return the depth (m) nearest to ``depth`` at which the tip is half a width or more away from interfaces."""
         return clear(depth, self.interfaces, self.blade.width / 2)
 
     def ahead(self, depth: float) -> float:
         """Return the distance (m) of the front of the slit that is solved first, for a tip at a depth (m)."""
-        return first_ahead(self.blade, depth, self.interfaces)
+        return self.blade.first_ahead(depth, self.interfaces)
 
     # ---- solved states --------------------------------------------------------------------------------
 
     def stiffness(self) -> tuple[float, float] | str:
         """Return force over depth (N/m) of the blade on the intact surface, and its error bar; or why there is none."""
-        found = self._states.intact()
-        if why := self._why_not(found):
-            return f"the intact body: {why}"
-        assert found is not None
+        found = self.solved(self.blade.on_intact())
+        if isinstance(found, str):
+            return f"the intact body: {found}"
         return found.force / self.insertion.to, found.force * found.force_error / self.insertion.to
 
     def cuts(self, places: Sequence[tuple[float, float]]) -> dict[tuple[float, float], Cut | str]:
@@ -140,18 +175,10 @@ class Scene:
         return {place: self._cut(*place) for place in places}
 
     def _cut(self, depth: float, ahead: float) -> Cut | str:
-        found = self._states.slit(depth, ahead)
-        if why := self._why_not(found):
-            return why
-        assert found is not None
+        found = self.solved(self.blade.in_slit(depth, ahead))
+        if isinstance(found, str):
+            return found
         # The bar on the force contains that on the energy.
         energy, drive, error, release = found.energy, found.force, found.force_error, found.energy_release
         release_error = found.energy_release_error * release
         return Cut(depth, ahead, energy, error * energy, release, release_error, drive, error * abs(drive))
-
-    def _why_not(self, found: Solved | None) -> str:
-        """Return why a state has no force, "" if it has."""
-        if found is None:
-            self.is_pending = True
-            return "not yet solved"
-        return "" if found.status == OK else found.message or found.status

@@ -1,6 +1,9 @@
-"""Steps of an insertion: forces and energies at one depth."""
+"""Steps of an insertion, forces and energies at one depth; its puncture, and the whole path."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from pipeline.states import FAILED, OK, PARTIAL, PENDING
 
 # "ended": the path ended before this depth.
 INDENTATION, CUTTING, WITHDRAWAL, ENDED = "indentation", "cutting", "withdrawal", "ended"
@@ -32,3 +35,68 @@ class Step:
     def balance(self) -> float:
         """Work less stored energy, work of fracture and friction, relative to the work."""
         return (self.work - self.stored - self.fracture - self.rubbed) / self.work
+
+
+@dataclass(frozen=True)
+class Puncture:
+    """The puncture: the step ``before`` it, the peak, and the one ``after`` it, at the same depth (m).
+
+    Error bars are those of the depth (m), and of the force (N) before.
+    """
+
+    before: Step
+    after: Step
+    depth_error: float
+    force_error: float
+
+    @property
+    def depth(self) -> float:
+        """Depth (m) of the tip."""
+        return self.before.depth
+
+    @property
+    def force(self) -> float:
+        """The largest force (N) of the indentation."""
+        return self.before.force
+
+
+@dataclass(frozen=True)
+class Path:
+    """Steps of an insertion, at the depths of its scene up to where it ended, and the puncture between them.
+
+    Without a puncture the tissue stays whole. The ``withdrawal``, if any, has steps at the same depths. ``message``
+    says at which depth the path ended early, and why; ``is_pending`` that states are still to be solved.
+    """
+
+    steps: tuple[Step, ...] = ()
+    puncture: Puncture | None = None
+    message: str = ""
+    withdrawal: tuple[Step, ...] = ()
+    is_pending: bool = False
+
+    @property
+    def status(self) -> str:
+        """The state of the case: "partial" if its path ended early."""
+        if self.is_pending:
+            return PENDING
+        return OK if not self.message else PARTIAL if self.steps else FAILED
+
+
+def with_work(steps: Sequence[Step], interfaces: Sequence[float] = ()) -> list[Step]:
+    """Return steps with the work of the tool (J) and that of friction, from those of the first on.
+
+    It is the work of the mean force between two depths. Across one of the ``interfaces`` (m), where the force jumps,
+    it is the change of the energies, and friction.
+    """
+    found = list(steps[:1])
+    for step in steps[1:]:
+        before = found[-1]
+        moved = (step.depth - before.depth) / 2
+        low, high = sorted((before.depth, step.depth))
+        rubs = moved * (step.friction + before.friction)
+        if any(low < end < high for end in interfaces):
+            work = step.stored + step.fracture - before.stored - before.fracture + rubs
+        else:
+            work = moved * (step.force + before.force)
+        found.append(replace(step, work=before.work + work, rubbed=before.rubbed + rubs))
+    return found

@@ -82,7 +82,7 @@ def _scene_texts(scene: _Scene, scaled: bool) -> tuple[tuple[str, ...], tuple[st
 
 def _unphysical(probe: Probe) -> tuple[str, ...]:
     """Return the keys without effect on the force of a case; that of a needle that cuts follows from the toughness."""
-    return _UNPHYSICAL_OF_CUTTING if probe.is_cutting else _UNPHYSICAL
+    return _UNPHYSICAL_OF_CUTTING if probe.crack else _UNPHYSICAL
 
 
 def _output_text(output: Output) -> str:

@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from inspect import cleandoc
+from typing import Any
 
 from pipeline.plan.cost import CostModel
 from pipeline.plan.equivalent_places import EquivalentPlace
@@ -67,6 +69,11 @@ class Plan:
         """Return the scale of a case, by which its record is multiplied."""
         depth = self.proportional.get(case.index)
         return replace(case.scale, length=depth.times * case.scale.length) if depth else case.scale
+
+    @cached_property
+    def kept(self) -> dict[str, Any]:
+        """What follows from the plan and is kept with it, by name."""
+        return {}
 
     @property
     def all_keys(self) -> frozenset[str]:

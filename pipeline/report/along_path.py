@@ -50,7 +50,7 @@ def along_path(dataset: xr.Dataset, plan: Plan, records: Mapping[str, Record]) -
     study = plan.study
     if not study.is_insertion:
         return dataset
-    along = list(followed(plan, records))
+    along = followed(plan, records)
     found, depths, withdraws = [path for path, _ in along], study.step_depths, study.insertion.withdraw
     axes = [axis for axis in study.axes if not axis.is_stage]
     dims, shape = tuple(axis.name for axis in axes), tuple(len(axis) for axis in axes)

@@ -16,7 +16,6 @@ from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.distance import Distance
 from pipeline.shapes.indenter import Indenter
-from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.shapes.tissue import FIBRE, Tissue
 from pipeline.solve import SolveError
 from pipeline.solve.conditions import Conditions, Front
@@ -59,7 +58,7 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
     Raises:
         CaseFailure: if it is a needle that cuts, which has no body: it is solved in a plane section.
     """
-    if case.probe.is_cutting:
+    if case.probe.crack:
         raise CaseFailure("a needle that is inserted is solved in a plane section, in a round scene only")
     tool = tool_of(case) if case.probe.is_unilateral else None
     degree, conditions = case.mesh.degree, conditions_of(case)
@@ -84,8 +83,8 @@ def memory_of_basis(case: Case, dofs: int) -> float:
 
 def meridian_problem(case: Case) -> Problem:
     """Return the problem of an axisymmetric ``case`` without loads, on its meridian."""
-    if case.probe.is_cutting:
-        return _needle_of(case)
+    if crack := case.probe.crack:
+        return NeedleSolver(crack.radius, crack.toughness)
     if case.probe.is_unilateral and case.has_load_steps:
         how = {} if case.mesh.accuracy is None else {"accuracy": case.mesh.accuracy / 2}
         return LargeMeridianContact(meridian_of(case), round_tool_of(case), **how)
@@ -94,13 +93,6 @@ def meridian_problem(case: Case) -> Problem:
     if case.probe.is_unilateral:
         return MeridianContact(meridian_of(case), round_tool_of(case))
     return MeridianProblem(meridian_of(case), conditions_of(case))
-
-
-def _needle_of(case: Case) -> NeedleSolver:
-    probe = case.probe
-    assert isinstance(probe, RoundIndenter)
-    assert probe.toughness is not None
-    return NeedleSolver(probe.limit, probe.toughness)
 
 
 def conditions_of(case: Case) -> Conditions:

@@ -1,11 +1,23 @@
-"""``[probe.insertion]``: a tool that is pushed in until tissue is pierced, and then cuts."""
+"""``[probe.insertion]``: a tool that is pushed in until tissue is pierced, and then cuts.
 
-from typing import Annotated
+The states of its path are cases like any other, without friction: it follows from them without a solve.
+"""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 from pydantic import BaseModel, Field
 
+from pipeline.arrays import FloatArray
+from pipeline.shapes.crack import Crack
+from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section, Words
-from pipeline.units import Length, Toughness
+from pipeline.units import Length, Toughness, canonical
+
+# Tissue that the insertion of a needle leaves beside and below its path, in half widths of the shaft. Farther, its
+# effect is a per cent.
+_ROOM = 10.0
 
 
 class Insertion(BaseModel):
@@ -22,7 +34,7 @@ class Insertion(BaseModel):
     ] = False
 
 
-class Inserted(BaseModel):
+class Inserted(Probe):
     """A tool that can be inserted."""
 
     toughness: Annotated[
@@ -42,10 +54,76 @@ class Inserted(BaseModel):
         ),
     ] = None
 
+    # How it cuts: a slit that it makes in the body, or a crack ahead of its tip, deep in tissue.
+    CUTS: ClassVar[Literal["slit", "crack"]]
+
     @property
     def is_inserted(self) -> bool:
         """Whether it is inserted, or in a state of an insertion in which it cuts."""
         return self.insertion is not None or self.toughness is not None
+
+    @property
+    @abstractmethod
+    def insertion_room(self) -> tuple[float, str]:
+        """Tissue (m) that an insertion leaves beside the tip's path, and what it is."""
+
+    @property
+    @abstractmethod
+    def insertion_clearance(self) -> float:
+        """Least distance (m) of the tip's steps from interfaces of layers."""
+
+    @abstractmethod
+    def stages(self, depths: Sequence[float], ends: Sequence[float]) -> Sequence[Self]:
+        """Return its first state, and those at ``depths`` (m), in a body with interfaces at the depths ``ends`` (m)."""
+
+    def in_state(self, **changes: Any) -> Self:
+        """Return it in a state of its insertion, with other values; a copy would keep what is cached."""
+        own: dict[str, Any] = {name: getattr(self, name) for name in type(self).model_fields}
+        values = own | {"insertion": None, "toughness": None, "friction": 0.0} | changes
+        return cast("Self", type(self).model_construct(self.model_fields_set | changes.keys(), **values))
+
+
+class Needle(Inserted):
+    """A tool with a shaft, which holds a crack open deep in tissue."""
+
+    CUTS = "crack"
+
+    @property
+    @abstractmethod
+    def limit(self) -> float:
+        """Half the width (m) of the shaft: its radius, if it is round."""
+
+    @property
+    @abstractmethod
+    def tip_heights(self) -> FloatArray:
+        """Heights (n) in m of the tip's surface, at equal steps of the half width from the axis to the shaft."""
+
+    @property
+    def crack(self) -> Crack | None:
+        """The crack in which it is: None on the surface."""
+        return Crack(self.limit, self.toughness) if self.toughness is not None and self.insertion is None else None
+
+    @property
+    def insertion_room(self) -> tuple[float, str]:
+        """Tissue (m) that an insertion leaves beside the tip's path, and what it is: ten radii."""
+        return _ROOM * self.limit, "ten radii of the needle"
+
+    @property
+    def insertion_clearance(self) -> float:
+        """Least distance (m) of the tip's steps from interfaces of layers: none."""
+        return 0.0
+
+    def stages(self, depths: Sequence[float], ends: Sequence[float]) -> Sequence[Self]:
+        """Return the needle in tissue that it cuts; depths at which the intact body is solved are found on the way."""
+        return [self.cutting()] * (1 + len(depths))
+
+    def cutting(self) -> Self:
+        """Return it deep in tissue that it cuts, over a depth of half its width; the coefficient of friction is 1."""
+        return self.in_state(friction=1.0, toughness=self.toughness, depth=self.limit)
+
+    def pressed_to(self, depth: float) -> Self:
+        """Return it at a depth (m) on the intact body."""
+        return self.in_state(depth=canonical(depth))
 
 
 def last_depth(insertion: object) -> object:

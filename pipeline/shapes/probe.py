@@ -10,6 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
+from pipeline.shapes.crack import Crack
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.history import History
 from pipeline.shapes.revolved import Revolved
@@ -177,9 +178,9 @@ class Probe(Section, ABC):
         return None
 
     @property
-    def is_cutting(self) -> bool:
-        """Whether it is a needle deep in tissue that it cuts: a state of its insertion."""
-        return False
+    def crack(self) -> Crack | None:
+        """The crack that it holds open as a needle deep in tissue that it cuts, a state of its insertion."""
+        return None
 
     @property
     def proportional_to(self) -> tuple[str, ...]:

@@ -2,20 +2,13 @@
 
 from collections.abc import Sequence
 from math import isfinite
-from typing import TYPE_CHECKING, cast
 
 from pipeline.shapes.body import Body, Layered
-from pipeline.shapes.insertion import Insertion
+from pipeline.shapes.insertion import Inserted, Insertion
 from pipeline.shapes.probe import STICK, Probe
 from pipeline.shapes.punch import Punch
 from pipeline.shapes.section import in_mm
 from pipeline.study.problems import Problems
-
-if TYPE_CHECKING:
-    from pipeline.shapes.probes._round import RoundIndenter
-    from pipeline.shapes.probes.blade import Blade
-
-    Tool = Blade | RoundIndenter
 
 # Largest coefficient of friction, whose reaction on the pressure is still a correction.
 _MOST_FRICTION = 1.0
@@ -23,10 +16,9 @@ _MOST_FRICTION = 1.0
 
 def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
     """Report an insertion for which keys are missing, or for which the body has no room."""
-    if "insertion" not in type(probe).model_fields:
+    if not isinstance(probe, Inserted):
         return
-    tool, before = cast("Tool", probe), len(problems.errors)
-    insertion = tool.insertion
+    tool, before, insertion = probe, len(problems.errors), probe.insertion
     if insertion is None:
         if tool.toughness is not None:
             problems.error("probe.toughness", f"{tool.toughness:g} J/m^2", "is for an insertion: add [probe.insertion]")
@@ -54,7 +46,7 @@ def check_same_path(probes: Sequence[Probe], problems: Problems) -> None:
         )
 
 
-def _check_keys(probe: "Tool", problems: Problems) -> None:
+def _check_keys(probe: Inserted, problems: Problems) -> None:
     if probe.toughness is None:
         problems.error("probe.toughness", None, 'is required for an insertion, such as toughness = "200 J/m^2"')
     if not probe.is_unilateral:
@@ -72,7 +64,7 @@ def _check_keys(probe: "Tool", problems: Problems) -> None:
         )
 
 
-def _check_end(body: Layered, probe: "Tool", insertion: Insertion, problems: Problems) -> None:
+def _check_end(body: Layered, probe: Inserted, insertion: Insertion, problems: Problems) -> None:
     """Report a path through the bottom or the support, and one whose slit leaves the top."""
     low, top = body.heights
     end = min(top - low, *(top - level for level in body.support.edges()), top - low)
@@ -93,7 +85,7 @@ def _check_end(body: Layered, probe: "Tool", insertion: Insertion, problems: Pro
         )
 
 
-def _warn_of_tougher_layers(body: Layered, probe: "Tool", insertion: Insertion, problems: Problems) -> None:
+def _warn_of_tougher_layers(body: Layered, probe: Inserted, insertion: Insertion, problems: Problems) -> None:
     """Warn of layers that the tip reaches and that are tougher than those above: they would be indented first."""
     top, own = body.heights[1], probe.toughness or 0.0
     tough = [layer.toughness or own for layer in body.layer]
@@ -108,7 +100,7 @@ def _warn_of_tougher_layers(body: Layered, probe: "Tool", insertion: Insertion, 
             )
 
 
-def _check_layers(body: Layered, probe: "Tool", insertion: Insertion, problems: Problems) -> None:
+def _check_layers(body: Layered, probe: Inserted, insertion: Insertion, problems: Problems) -> None:
     """Report layers that are thinner than a step, or than what a tool needs."""
     _, upper = body.heights
     step = insertion.to / insertion.steps

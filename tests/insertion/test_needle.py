@@ -48,7 +48,7 @@ def record(solve):
     """Return a record: F = K d² on the intact body, and energies per depth in the cut one."""
     probe = solve.case.probe
     scale = {"young": solve.case.scale.stress, "depth": solve.case.scale.length, "force_error": 1e-3}
-    if probe.is_cutting:
+    if probe.crack:
         assert (probe.depth, probe.friction) == (RADIUS, 1.0)
         energies = {"energy": STORED * RADIUS, "friction_force": SQUEEZE * RADIUS}
         return Record(solve.key, OK, force=STORED + TORN, **energies, **scale)
@@ -115,7 +115,7 @@ def test_withdrawal_cuts_nothing_and_friction_is_reversed(path):
 
 
 def test_a_needle_that_cannot_be_pressed_deep_enough_leaves_what_is_solved():
-    path = path_of(scene(), fails=lambda solve: not solve.case.probe.is_cutting and solve.case.probe.depth > 0.6e-3)
+    path = path_of(scene(), fails=lambda solve: not solve.case.probe.crack and solve.case.probe.depth > 0.6e-3)
     assert path.status == PARTIAL and path.puncture is None
     assert [step.depth for step in path.steps] == pytest.approx([0.25e-3, 0.5e-3])
     assert path.message == "1 mm: tissue is turned inside out"

@@ -1,6 +1,5 @@
 """Axisymmetric tools with unknown contact area: what sphere and cone have in common."""
 
-from abc import abstractmethod
 from math import pi
 
 import numpy as np
@@ -9,46 +8,24 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.contour import Contour
 from pipeline.shapes.distance import Distance, revolved
 from pipeline.shapes.indenter import Indenter
-from pipeline.shapes.insertion import Inserted
+from pipeline.shapes.insertion import Needle
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes.disc import Disc
 from pipeline.shapes.revolved import Revolved
 
 # Rings of a tip.
 _RINGS = 1000
-# Tissue that an insertion leaves beside and below the path: radii of the shaft. Farther, its effect is a per cent.
-_ROOM = 10.0
 
 
-class RoundIndenter(Inserted, Indenter):
+class RoundIndenter(Indenter, Needle):
     """An axisymmetric indenter, the end of a shaft: a needle, if it is inserted."""
 
     NOT_DRAWN = (*Indenter.NOT_DRAWN, "toughness", "insertion")
 
     @property
-    def is_cutting(self) -> bool:
-        """Whether it is a needle deep in tissue that it cuts: a state of its insertion."""
-        return self.toughness is not None and self.insertion is None
-
-    @property
-    def insertion_room(self) -> tuple[float, str]:
-        """Tissue (m) that an insertion leaves beside the tip's path, and what it is: ten radii."""
-        return _ROOM * self.limit, "ten radii of the needle"
-
-    @property
-    def insertion_clearance(self) -> float:
-        """Least distance (m) of the tip's steps from interfaces of layers: it cuts one material."""
-        return 0.0
-
-    @property
     def tip_heights(self) -> FloatArray:
         """Heights (n) in m of the tip's surface, at equal steps of the radius from the axis to the shaft."""
         return self.section.height(self.limit * np.linspace(0.0, 1.0, _RINGS + 1))
-
-    @property
-    @abstractmethod
-    def limit(self) -> float:
-        """Radius (m) at which the tool ends."""
 
     @property
     def kinks(self) -> tuple[float, ...]:

@@ -1,5 +1,6 @@
 """A blade."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from math import hypot
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -16,12 +17,16 @@ from pipeline.shapes.probes._edge import Edge
 from pipeline.shapes.punch import Punch
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.shapes.slit import Slit, to_rectangle
-from pipeline.units import Length, Travel
+from pipeline.units import Length, Travel, canonical
 
 _CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+# The front is solved this share of the distance to an interface ahead of it.
+SHORT = 0.75
+# A depth without effect, in widths of the blade: the force of a blade that slides in a slit does not depend on it.
+_ANY = 0.01
 
 
-class Blade(Inserted, Punch):
+class Blade(Punch, Inserted):
     """A flat rectangular punch with its length along ``direction``. With an ``incision`` it is in a slit."""
 
     is_round: ClassVar[bool] = False
@@ -30,6 +35,7 @@ class Blade(Inserted, Punch):
     PROPORTIONAL_TO = ("depth", "slice")
     REALTIME = ("frictionless",)
     EXPECTED_ERROR = 0.75
+    CUTS = "slit"
 
     shape: Literal["blade"]
     length: Annotated[Length, Words("Length of the blade's edge.", '"6 mm"')]
@@ -87,6 +93,27 @@ class Blade(Inserted, Punch):
     def insertion_clearance(self) -> float:
         """Least distance (m) of the tip's steps from interfaces of layers: half a width."""
         return self.width / 2
+
+    def stages(self, depths: Sequence[float], ends: Sequence[float]) -> Sequence[Self]:
+        """Return the blade on the intact body, and in slits."""
+        return [self.on_intact(), *(self.in_slit(depth, self.first_ahead(depth, ends)) for depth in depths)]
+
+    def on_intact(self) -> Self:
+        """Return it at its last depth on the intact body."""
+        return self.in_state(contact="frictionless")
+
+    def in_slit(self, depth: float, ahead: float) -> Self:
+        """Return it with its tip at a depth (m) in a slit, whose front is ``ahead`` (m) of it."""
+        slit = {"incision": canonical(depth + ahead), "ahead": ahead, "depth": canonical(_ANY * self.width)}
+        return self.in_state(contact="frictionless", **slit)
+
+    def first_ahead(self, depth: float, ends: Sequence[float]) -> float:
+        """Return the distance (m) of the front of the slit that is solved first, for a tip at a depth (m)."""
+        found = min(self.width, 2 * depth)
+        for end in ends:
+            if depth < end < depth + found / SHORT:
+                found = SHORT * (end - depth)
+        return canonical(found)
 
     @property
     def is_rounded(self) -> bool:

@@ -12,6 +12,7 @@ from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.contact import first_touch, is_flat, is_level
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
+from pipeline.shapes.insertion import Inserted
 from pipeline.shapes.probe import STICK, Probe
 from pipeline.shapes.section import in_mm
 from pipeline.study.loads import Load
@@ -107,8 +108,9 @@ def _coefficient(friction: float) -> float | str:
     return STICK if friction == inf else friction
 
 
-def _is_inserted(scene: Scene) -> bool:
-    return getattr(scene.probe, "insertion", None) is not None
+def _is_inserted(scene: Scene, cuts: str | None = None) -> bool:
+    found = scene.probe if isinstance(scene.probe, Inserted) and scene.probe.insertion else None
+    return found is not None and cuts in (None, found.CUTS)
 
 
 def _is_loaded(scene: Scene) -> bool:
@@ -160,9 +162,9 @@ FEATURES: dict[str, Feature] = {
     "open slit": Feature("probe.ends", lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
     "oblique slit": Feature("probe.direction", _is_oblique, ("body",), list),
     "insertion": Feature("probe.insertion", _is_inserted, write=lambda one: in_mm(one.to)),
-    "inserted blade": Feature("probe.insertion", lambda s: _is_inserted(s) and not isinstance(s.probe, Indenter)),
-    "inserted needle": Feature("probe.insertion", lambda s: _is_inserted(s) and isinstance(s.probe, Indenter)),
-    "needle that cuts": Feature("probe.toughness", lambda s: s.probe.is_cutting),
+    "inserted blade": Feature("probe.insertion", lambda s: _is_inserted(s, "slit")),
+    "inserted needle": Feature("probe.insertion", lambda s: _is_inserted(s, "crack")),
+    "needle that cuts": Feature("probe.toughness", lambda s: s.probe.crack is not None),
     "linear law": Feature("material.law", lambda s: not s.material.is_large),
     "model in three dimensions": Feature("mesh.model", lambda s: s.mesh.model == "3d"),
     "no round scene": Feature("probe.at", lambda s: s.body.half_plane() is None or any(s.probe.at), PLACE, list),
