@@ -168,3 +168,37 @@ def thin_layer(young: float, radius: float, depth: float, thickness: float) -> f
     chi = sqrt(radius * depth) / thickness
     series = 1 + 1.133 * chi + 1.283 * chi**2 + 0.769 * chi**3 + 0.0975 * chi**4
     return 16 / 9 * young * sqrt(radius) * depth**1.5 * series
+
+
+def thin_needle(toughness: float) -> tuple[float, float]:
+    """Return the half length b of the crack round a needle that cuts, and the force without friction per area of it.
+
+    In units of the radius R and of μ; the toughness is Γ/(μ R), up to about 0.3. Incompressible, at small strain.
+    A. Spagnoli et al. 2022 have the force π μ c² + 2b Γ from the contact of half width c under Hertz' pressure, and the
+    work P R of its resultant P. The pressure works over the round profile, P R (1 − c²/8), which is taken here. The
+    mean opening of a long crack at the needle is R: c² (ln(4b/c) + ½) = 2, and G = P²/(4π μ b).
+    """
+
+    def contact(half: float) -> float:
+        low, high = 0.0, sqrt(2.0)
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if middle**2 * (log(4 * half / middle) + 0.5) < 2 else (low, middle)
+        return low
+
+    low, high = 1.0, 1e6
+    for _ in range(_HALVINGS):
+        half = sqrt(low * high)
+        width = contact(half)
+        low, high = (half, high) if pi * width**4 / (4 * half) > toughness else (low, half)
+    return half, width**2 * (1 - width**2 / 8) + 2 * half * toughness / pi
+
+
+def tough_needle(toughness: float) -> tuple[float, float]:
+    """Return what :func:`thin_needle` returns of tough neo-Hookean tissue, from Γ/(μ R) of about 3 on.
+
+    The slit is opened to a cavity much wider than it is long. As far as it is stretched, the energy is that of the
+    angle round the cavity, which is harmonic: a slit is like a hole of radius b/2. So s = π μ R² ln(2R/b).
+    """
+    half = pi / (2 * toughness)
+    return half, log(2 / half) + 1

@@ -1,12 +1,14 @@
 """A crack in plane strain that a cylinder holds open: at small openings and at large ones, against closed forms."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from math import pi
 
 from mpi4py import MPI
 
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.plane.crack import LEVELS, open_crack
+from pipeline.solve.plane.opening import Opening
+from pipeline.verify import known
 from pipeline.verify.row import Row
 
 _INCOMPRESSIBLE = MaterialLaw.of_moduli(3.0, 0.5, "neo-hookean")
@@ -18,34 +20,48 @@ def needle_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows of cracks that a cylinder opens, none if ``quick``; collective."""
     if quick:
         return
-    found: list[Row] = []
-    if comm.rank == 0:
-        coarse, fine = (open_crack(_INCOMPRESSIBLE, _MOST, level) for level in LEVELS)
-        ratio = float(fine.ratios[_SMALL])
-        release = fine.release(ratio)
-        found.append(
-            Row(
-                "crack that a thin cylinder opens, ν = 0.5: energy release",
-                "plane strain",
-                # K = P/√(πb) for two forces P at its middle (H. Tada), G = K² (1 − ν²)/E.
-                float(fine.thrusts[_SMALL]) ** 2 / (4 * pi * ratio),
-                "concentrated forces on its faces",
-                release,
-                abs(coarse.release(ratio) / release - 1),
-                ratio**2,
-            )
-        )
-        ratio = float(min(coarse.ratios[-1], fine.ratios[-1]))
-        release = fine.release(ratio)
-        found.append(
-            Row(
-                "short crack round a cylinder, neo-Hookean: energy release",
-                "plane strain",
-                pi * ratio / 2,
-                "cavity in an infinite body",
-                release,
-                abs(coarse.release(ratio) / release - 1),
-                ratio**-2,
-            )
-        )
-    yield from comm.bcast(found)
+    yield from comm.bcast(list(_rows()) if comm.rank == 0 else [])
+
+
+def shaft_pressure(opening: Opening, toughness: float) -> float:
+    """Return the force without friction of a needle that cuts, per area of it, in units of μ; Γ is in units of μ R."""
+    ratio = opening.ratio(toughness)
+    return (opening.energy(ratio) / ratio**2 + 2 * toughness / ratio) / pi
+
+
+def _rows() -> Iterator[Row]:
+    coarse, fine = (open_crack(_INCOMPRESSIBLE, _MOST, level) for level in LEVELS)
+    thin, short = float(fine.ratios[_SMALL]), float(min(coarse.ratios[-1], fine.ratios[-1]))
+    gentle, tough = fine.release(thin), 0.99 * min(each.released[1] for each in (coarse, fine))
+
+    def row(scene: str, of: Callable[[Opening], float], reference: float, source: str) -> Row:
+        value = of(fine)
+        # The closed forms leave out terms of the square.
+        order = thin if "thin" in scene else 1 / short
+        return Row(scene, "plane strain", reference, source, value, abs(of(coarse) / value - 1), order**2)
+
+    yield row(
+        "crack that a thin cylinder opens, ν = 0.5: energy release",
+        lambda opening: opening.release(thin),
+        # K = P/√(πb) for two forces P at its middle (H. Tada), G = K² (1 − ν²)/E.
+        float(fine.thrusts[_SMALL]) ** 2 / (4 * pi * thin),
+        "concentrated forces on its faces",
+    )
+    yield row(
+        "thin needle that cuts, ν = 0.5: pressure on its shaft",
+        lambda opening: shaft_pressure(opening, gentle),
+        known.thin_needle(gentle)[1],
+        "Hertz' contact in a crack, after A. Spagnoli et al. 2022",
+    )
+    yield row(
+        "short crack round a cylinder, neo-Hookean: energy release",
+        lambda opening: opening.release(short),
+        pi * short / 2,
+        "cavity in an infinite body",
+    )
+    yield row(
+        "needle that cuts tough neo-Hookean tissue: pressure on its shaft",
+        lambda opening: shaft_pressure(opening, tough),
+        known.tough_needle(tough)[1],
+        "cavity in an infinite body",
+    )

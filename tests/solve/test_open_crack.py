@@ -8,6 +8,8 @@ import pytest
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.plane.crack import LEVELS, open_crack
 from pipeline.solve.plane.opening import Opening
+from pipeline.verify.known import thin_needle
+from pipeline.verify.needles import shaft_pressure
 
 
 @pytest.fixture(scope="module")
@@ -20,6 +22,14 @@ def test_a_thin_cylinder_opens_the_crack_as_two_concentrated_forces_do(opened):
     """K = P/√(πb) (H. Tada), while G is from the change of the energies."""
     ratio, thrust = opened.ratios[2], opened.thrusts[2]
     assert opened.release(ratio) == pytest.approx((1 - 0.3) * thrust**2 / (2 * pi * ratio), rel=0.03)
+
+
+def test_the_pressure_on_a_thin_needle_is_that_of_hertz_contact_in_its_crack(opened):
+    """In compressible tissue 4μ is E/(1 − ν²)."""
+    modulus, toughness = 1 / (2 * (1 - 0.3)), 0.01
+    half, pressure = thin_needle(toughness / modulus)
+    assert shaft_pressure(opened, toughness) == pytest.approx(modulus * pressure, rel=0.01)
+    assert 1 / opened.ratio(toughness) == pytest.approx(half, rel=0.01)
 
 
 def test_the_pressure_does_the_work_that_is_stored(opened):
