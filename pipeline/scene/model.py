@@ -19,9 +19,10 @@ from pipeline.scene.imprint import cut_out
 from pipeline.scene.regions import draw_inclusions, regions_of, remove_beyond
 from pipeline.scene.slit import draw_plane, draw_slit, mirror_of, sample_curve, singular_curves
 from pipeline.scene.tessellate import NotASolid, read_solid
-from pipeline.shapes.bodies.cad import SIZES, FromCad
+from pipeline.shapes.bodies.cad import FromCad
 from pipeline.shapes.body import Body, Drawn
 from pipeline.shapes.contact import is_flat, is_level
+from pipeline.shapes.files.loaded import UNITS
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.probe import Probe
@@ -157,7 +158,7 @@ def _add_body(scene: Scene) -> int:
         return body.draw(gmsh.model.occ, scene.units, scene.frame)
     if isinstance(body, FromCad):
         try:
-            return read_solid(body.file, body.unit, scene.units(SIZES[body.unit]))
+            return read_solid(body.file, body.unit, scene.units(UNITS[body.unit]))
         except NotASolid as error:
             raise SceneError(str(error)) from None
     raise SceneError(f"a {body.shape} is not drawn")

@@ -259,10 +259,12 @@ def test_bars_of_the_studies_hold_what_their_curves_were_made_with(name, tmp_pat
         assert one["high"] - one["low"] < 0.2 * value
 
 
-def test_design_ranks_tests_without_any_curve(folder, epsmesh, tmp_path):
-    """A study whose file does not exist yet: what one more test would do to the error bars of E."""
+@pytest.mark.parametrize("has_measurement", [True, False])
+def test_design_needs_neither_curve_nor_mesh_but_a_depth(folder, epsmesh, tmp_path, has_measurement):
+    """What one more test would do to the error bars of E, where no curve, and no measurement, is there yet."""
+    scene, measured, rest = (folder / "none.toml").read_text().partition("[[measurement]]")
     path = tmp_path / "planned.toml"
-    path.write_text((folder / "none.toml").read_text())
+    path.write_text(scene + measured + rest if has_measurement else scene + rest[rest.index("[identify]") :])
     done = epsmesh("identify", path, "--design", "--output", tmp_path)
     assert done.exit_code == 2
     assert "probe.depth: is required: the depth of the planned test" in done.stderr
@@ -271,23 +273,12 @@ def test_design_ranks_tests_without_any_curve(folder, epsmesh, tmp_path):
     assert done.exit_code == 0, done.output
     assert "as planned" in done.output
     assert "a further punch of radius 6.00 mm" in done.output
+    if not has_measurement:
+        return
     data = json.loads(epsmesh("identify", path, "--design", "--json", "--output", tmp_path).stdout)
     (study,) = data["studies"]
     assert {one["test"] for one in study["ranked"]} >= {"a further punch of radius 600 µm", "the same test, bonded"}
     assert all(one["half_widths"]["young"][0] > 0 for one in study["ranked"])
-
-
-def test_design_needs_neither_measurement_nor_mesh_but_a_depth(folder, epsmesh, tmp_path):
-    scene, _, rest = (folder / "none.toml").read_text().partition("[[measurement]]")
-    path = tmp_path / "scene.toml"
-    path.write_text(scene + rest[rest.index("[identify]") :])
-    done = epsmesh("identify", path, "--design", "--output", tmp_path)
-    assert done.exit_code == 2
-    assert "probe.depth: is required: the depth of the planned test" in done.stderr
-    path.write_text(path.read_text().replace('radius = "2 mm"', 'radius = "2 mm"\ndepth = "0.2 mm"'))
-    done = epsmesh("identify", path, "--design", "--output", tmp_path)
-    assert done.exit_code == 0, done.output
-    assert "a further punch of radius 6.00 mm" in done.output
 
 
 def test_design_needs_unknowns(folder, epsmesh, tmp_path):

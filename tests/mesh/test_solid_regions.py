@@ -77,6 +77,15 @@ def force(body):
     return record
 
 
+def test_files_of_inches_are_read(folder):
+    """Millimetres that are taken for inches are 25.4 times as large."""
+    mm, inches = (
+        case_of(folder, BOX | {"size": size}, REGION | {"unit": unit}).body.region[0].surface.volume
+        for unit, size in (("mm", ["40 mm", "40 mm", "20 mm"]), ("in", ["2 m", "2 m", "1 m"]))
+    )
+    assert inches == pytest.approx(25.4**3 * mm)
+
+
 @pytest.mark.parametrize("body", [CYLINDER, CAD], ids=lambda body: body["shape"])
 def test_an_ellipsoid_as_axes_and_as_surface_has_one_force(folder, body):
     as_axes = force(held(folder, body, inclusion=[INCLUSION]))

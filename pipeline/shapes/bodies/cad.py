@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.cad_face import CadFace, plane_piece, raised
 from pipeline.shapes.facetted import skin_of
-from pipeline.shapes.files.loaded import UNITS, Solid
+from pipeline.shapes.files.loaded import UNITS, LengthUnit, Solid
 from pipeline.shapes.frame import Frame, Vector, unit
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.rays import facing, pierce
@@ -22,7 +22,6 @@ from pipeline.shapes.support import Below, NamedFace
 from pipeline.shapes.surface import Surface
 from pipeline.shapes.triangles import closed_edges, doubled_normals
 
-SIZES = UNITS | {"in": 0.0254}
 # A face with a smaller radius than this share of the extent is a rounded edge: elements are small along it alone.
 _ROUNDED = 0.1
 _LEVEL = 1e-12
@@ -55,7 +54,7 @@ class FromCad(FromFile):
 
     shape: Literal["cad"]
     unit: Annotated[
-        Literal["m", "cm", "mm", "um", "µm", "in"],
+        LengthUnit,
         Field(exclude=True),
         Words("Unit of length. A STEP file has its own.", '"mm"'),
     ]
@@ -80,7 +79,7 @@ class FromCad(FromFile):
         """Return the solid in a file."""
         from pipeline.shapes.files.cad import read_solid  # noqa: PLC0415 (only when a file is read)
 
-        return read_solid(Path(file), given["unit"], SIZES[given["unit"]])
+        return read_solid(Path(file), given["unit"], UNITS[given["unit"]])
 
     @field_validator("file")
     @classmethod

@@ -11,12 +11,12 @@ from pipeline.shapes.section import Words
 from pipeline.shapes.triangles import Triangles
 
 # Metres in the units of length of files.
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
 # Endings of files of CAD solids.
 STEP, BREP = (".step", ".stp"), (".brep",)
 SOLIDS = STEP + BREP
 # The keys of a study that say how a surface file is read.
-LengthUnit = Literal["m", "cm", "mm", "um", "µm"]
+LengthUnit = Literal["m", "cm", "mm", "um", "µm", "in"]
 Repair = Annotated[
     bool,
     Field(exclude=True),
