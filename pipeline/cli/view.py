@@ -20,6 +20,9 @@ from pipeline.cli.words import (
     read_all,
 )
 
+# Of what writes more than one file.
+_ENDINGS = {"sofa": [".py", ".msh", ".npz"]}
+
 if TYPE_CHECKING:
     from mpi4py import MPI
 
@@ -48,10 +51,11 @@ def view(
     output: Output = DEFAULT_OUTPUT,
     mesh_only: Annotated[bool, typer.Option("--mesh-only", help="Mesh, but do not solve.")] = False,
     export: Annotated[
-        Literal["html", "vtu", "xdmf"] | None,
-        typer.Option(help="Write the page or a file for ParaView and PyVista, without pictures."),
+        Literal["html", "vtu", "xdmf", "sofa"] | None,
+        typer.Option(help="Write the page, a file for ParaView and PyVista, or a scene of SOFA, without pictures."),
     ] = None,
     vtk: Annotated[bool, typer.Option("--vtk", help="Short for --export vtu.")] = False,
+    sofa: Annotated[bool, typer.Option("--sofa", help="Short for --export sofa.")] = False,
     meshes: Annotated[Path, typer.Option(help="Folder of the mesh cache.")] = DEFAULT_MESHES,
     unit: Annotated[str, typer.Option(help="Unit of a label map whose header has none.", show_default=False)] = "",
     names: Annotated[
@@ -70,6 +74,10 @@ def view(
 
     Example: epsmesh view studies/figure3.toml 12 --export html
 
+    For SOFA it writes the scene <study>_<number>.py, its mesh .msh and its arrays .npz.
+
+    Example: epsmesh view studies/figure3.toml 12 --sofa
+
     Of a blade's insertion it writes a film of the path, <study>_<number>_path.gif, beside the dataset of a run: the
     deformed section over depth, and F. With --export, or "stage=5 mm", one state is shown.
 
@@ -80,7 +88,7 @@ def view(
 
     Example: epsmesh view meshes/liver.nii.gz
     """
-    export = export or ("vtu" if vtk else None)
+    export = export or ("vtu" if vtk else "sofa" if sofa else None)
     from pipeline.shapes.files.labels import is_image
 
     if is_image(file):
@@ -103,10 +111,14 @@ def view(
             return fields_of(study, one, comm, mesh_only=False, export=None, meshes=meshes)
 
         return film(study, chosen, output, solved)
+    if export == "sofa":
+        _check_sofa(study, chosen, mesh_only)
     number = next(n for n, other in enumerate(study.cases()) if other.index == chosen.index)
     stem = output / f"{study.name}_{number}"
     missing = "" if export else _missing()
-    endings = [f".{export or 'html'}"] if export or missing else ["_mesh.png", "_deformed.png"]
+    endings = (
+        _ENDINGS.get(export or "", [f".{export or 'html'}"]) if export or missing else ["_mesh.png", "_deformed.png"]
+    )
     check_output(*(stem.with_name(f"{stem.name}{ending}") for ending in endings))
     check_machine()
     from pipeline.workflow import abort_on_exception, ended_soon, load_solvers, world
@@ -118,6 +130,20 @@ def view(
         fields = fields_of(study, chosen, comm, mesh_only, export, meshes)
         if fields is not None:
             _write(study, fields, stem, export, missing)
+
+
+def _check_sofa(study: "Study", case: "Case", mesh_only: bool) -> None:
+    """Exit if a case has no scene of SOFA."""
+    from pipeline.study.capabilities.obstacles import obstacle
+
+    if mesh_only:
+        fail(
+            Fault(
+                "--mesh-only: a scene of SOFA has the displacement under the tool: omit one of both", key="--mesh-only"
+            )
+        )
+    if why := obstacle("SOFA scene", case):
+        fail(of_file(study.file, why, "docs/view.md"))
 
 
 def fields_of(
@@ -138,7 +164,7 @@ def fields_of(
     note(str(case))
     try:
         solve = solve_alone(study, case)
-        wanted = {"bar": export == "html", "stress": export in ("vtu", "xdmf")}
+        wanted = {"bar": export in ("html", "sofa"), "stress": export in ("vtu", "xdmf")}
         return compute_fields(solve, comm, mesh_only=mesh_only, cache=MeshCache(meshes), note=note, **wanted)
     except (CaseFailure, MeshError, SolveError) as failure:
         why = f"failed: {failure}"
@@ -169,6 +195,11 @@ def _written(study: "Study", fields: "Fields", stem: Path, export: str | None) -
 
         path = write_page(fields, stem.with_name(f"{stem.name}.html"), study.title)
         return {path: f" ({path.stat().st_size / 1e6:.1f} MB), to be opened in a browser"}
+    if export == "sofa":
+        from pipeline import __version__
+        from pipeline.view.sofa import write_sofa
+
+        return dict.fromkeys(write_sofa(fields, stem, title, __version__), "")
     if export:
         from pipeline.view.export import write_fields
 

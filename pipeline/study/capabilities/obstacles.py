@@ -64,6 +64,15 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "friction": "with friction, F_exact would not be more accurate than F on a fine mesh",
         "large displacements": "at large displacements, F_exact would not be more accurate than F on a fine mesh",
     },
+    "SOFA scene": {
+        "large displacements": "material.law: a scene of SOFA is for linear tissue",
+        "relaxation": "material.relaxation: a scene of SOFA is static",
+        "loads": "[load]: a scene of SOFA has the tool's force alone",
+        "half ball": 'mesh.epsilon: the far field of a half ball has no counterpart in SOFA: use epsilon = "full"',
+        "six motions": "probe.motion: a scene of SOFA has one motion",
+        "slit": "probe.incision: a scene of SOFA has no slit",
+        "insertion": "probe.insertion: a scene of SOFA has one state, without a path",
+    },
     "real-time model": {
         "rounded edge": "probe.edge: real-time models have sharp edges. Omit it",
         "friction": "probe.friction: real-time models have no friction. Omit it and export the frictionless force",
