@@ -111,13 +111,13 @@ class RunnableStudy:
         path = Path(store) if store else Path(output) / STORE_NAME
         kept = Path(meshes) if meshes else None
         plan, opened = workflow.prepare(self.declared, comm, path, fresh=fresh, without=without, meshes=kept)
-        shown = Terminal(len(plan.solves)) if progress and comm.rank == 0 else None
+        shown = (lambda part: Terminal(len(part.solves))) if progress and comm.rank == 0 else None
         with workflow.abort_on_exception(comm):
             outcome = workflow.run(plan, opened, comm, Path(output), shown)
             if outcome.interrupted:
                 workflow.end_ranks(comm, 130)
                 raise KeyboardInterrupt
-            dataset = comm.bcast(open_dataset(outcome.files[0]) if comm.rank == 0 else None)
+            dataset = comm.bcast(open_dataset(outcome.results.files[0]) if comm.rank == 0 else None)
         if outcome.failures:
             case, message = outcome.failures[0]
             text = f"{self.name}: {len(outcome.failures)} failed, the first: {case}: {message}"

@@ -18,7 +18,7 @@ from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.shard import Shard
 from pipeline.report.dataset import build
-from pipeline.report.publish import ResultsError, publish
+from pipeline.report.publish import Results, ResultsError, publish
 from pipeline.run.begun import ENDING, Begun, fail_begun
 from pipeline.run.merge import merge
 from pipeline.run.outcome import count_states, failures
@@ -33,6 +33,8 @@ from pipeline.study.sweep import Study
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Show = Callable[[Plan], Terminal]
 
 # Seconds that the first rank has, when a parallel run is interrupted, to write what is finished.
 _GRACE = 15
@@ -54,11 +56,11 @@ class Opened:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a run. ``failures`` (case, message) and ``files`` are rank 0's, the rest is every rank's."""
+    """What came of a run. ``failures`` (case, message) and ``results`` are rank 0's, the rest is every rank's."""
 
     counts: dict[str, int]
     failures: tuple[tuple[str, str], ...]
-    files: tuple[Path, ...]
+    results: Results
     interrupted: bool
 
 
@@ -115,8 +117,10 @@ def prepare(
     return replace(make_plan(study, stored, without, shard), cost=cost), opened
 
 
-def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Terminal | None = None) -> Outcome:
+def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, show: Show | None = None) -> Outcome:
     """Carry out ``plan`` and write ``<study>.nc`` and its figure into ``output``, unless it is a shard's; collective.
+
+    What insertions need besides is planned once their states are solved; ``show`` makes the progress of each plan.
 
     Ctrl-C, and the request to end that mpirun or a batch system sends, end it with what is finished written.
 
@@ -124,17 +128,17 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
         ResultsError: if the results cannot be written.
     """
     start = _now()
-    interrupted = _compute(plan, opened, comm, progress)
+    interrupted = _compute(plan, opened, comm, show and show(plan))
     while not interrupted and plan.part is None and (further := _lacking(plan, opened, comm)):
-        interrupted = _compute(further, opened, comm, None)
-    files: tuple[Path, ...] = ()
+        interrupted = _compute(further, opened, comm, show and show(further))
+    results = Results()
     wrong: ResultsError | None = None
     if opened.store is not None:
         opened.store.close()
         if plan.part is None:
             try:
                 with stage("results"):
-                    files = publish(plan, opened.records, {"start": start, "end": _now()}, output)
+                    results = publish(plan, opened.records, {"start": start, "end": _now()}, output)
             except ResultsError as error:
                 wrong = error
     counts = count_states(plan, opened.records)
@@ -142,7 +146,7 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
         counts, wrong = comm.bcast((counts, wrong))
     if wrong:
         raise wrong
-    return Outcome(counts, failures(plan, opened.records), files, interrupted)
+    return Outcome(counts, failures(plan, opened.records), results, interrupted)
 
 
 def solve(study: Study, comm: MPI.Comm, store: Path, progress: Terminal | None = None) -> "xr.Dataset":

@@ -3,6 +3,7 @@
 import sys
 import time
 from collections import Counter
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from shlex import quote
@@ -117,9 +118,9 @@ def run(
                 _announce(plan, opened, quiet=quiet or as_json, verbose=verbose)
                 if as_json and not quiet:
                     warn(study)
-            progress = _progress(plan, verbose=verbose) if speaks and not quiet else None
+            show = partial(_progress, plan, is_told=not as_json, verbose=verbose) if speaks and not quiet else None
             with workflow.abort_on_exception(comm):
-                outcome = workflow.run(plan, opened, comm, output, progress)
+                outcome = workflow.run(plan, opened, comm, output, show)
         except (StoreError, CompilerError) as wrong:
             fail(Fault(str(wrong), file=study.file), on_all_ranks=True)
         except workflow.ResultsError as wrong:
@@ -165,7 +166,10 @@ def _is_identification(file: Path) -> bool:
         return False
 
 
-def _progress(plan: "Plan", *, verbose: bool) -> "Terminal":
+def _progress(first: "Plan", plan: "Plan", *, is_told: bool, verbose: bool) -> "Terminal":
+    """Return the progress of a ``plan``; of one that follows the ``first``, what there is to do ``is_told``."""
+    if plan is not first and is_told:
+        print(f"  to do besides: {_to_do(plan)}", flush=True)
     from pipeline.run.progress import Terminal
     from pipeline.run.remaining import Remaining, expectations
 
@@ -188,12 +192,15 @@ def _announce(plan: "Plan", opened: "Opened", *, quiet: bool, verbose: bool) -> 
             f"  timing study: each case is computed alone {study.solve.repeats} times (median); nothing is struck out"
         )
     if plan.solves:
-        steps = plan.meshes
-        exact = sum(solve.is_reference for solve in plan.solves)
-        of_exact = f" ({exact} of them for F_exact)" if exact else ""
-        print(f"  to do: {counted(len(steps), 'mesh')}, {counted(len(plan.solves), 'solve')}{of_exact}", flush=True)
-        for number, step in enumerate(steps if verbose else (), start=1):
+        print(f"  to do: {_to_do(plan)}", flush=True)
+        for number, step in enumerate(plan.meshes if verbose else (), start=1):
             print(f"    step {number}: {counted(len(step.solves), 'solve')}: {step.solves[0].label}", flush=True)
+
+
+def _to_do(plan: "Plan") -> str:
+    exact = sum(solve.is_reference for solve in plan.solves)
+    of_exact = f" ({exact} of them for F_exact)" if exact else ""
+    return f"{counted(len(plan.meshes), 'mesh')}, {counted(len(plan.solves), 'solve')}{of_exact}"
 
 
 def _as_data(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float) -> dict[str, Any]:
@@ -206,7 +213,8 @@ def _as_data(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float)
         "stored": _read_back(plan),
         "failures": [{"case": case, "message": message} for case, message in outcome.failures],
         "skipped_because": list(_reasons(plan, opened, SKIPPED)),
-        "files": [str(file) for file in outcome.files],
+        "files": [str(file) for file in outcome.results.files],
+        "unchanged": [str(file) for file in outcome.results.unchanged],
         "seconds": round(seconds, 3),
         "interrupted": outcome.interrupted,
     }
@@ -234,11 +242,11 @@ def _conclude(
 
 def _of_insertions(plan: "Plan", outcome: "Outcome") -> "Iterator[str]":
     """Yield what is told of the paths of insertions, as the dataset has them."""
-    if plan.study.is_insertion and outcome.files:
+    if plan.study.is_insertion and outcome.results.files:
         from pipeline.report.insertion import answer
         from pipeline.report.read import read_file
 
-        yield from answer(read_file(outcome.files[0]))
+        yield from answer(read_file(outcome.results.files[0]))
 
 
 def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, shard: "Shard | None") -> str:
@@ -263,7 +271,7 @@ def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, sh
         name = f"{name}, shard {shard}"
         where = f"when all shards are done, merge them: `epsmesh status {quote(plan.study.file)} --merge`"
     else:
-        where = f"wrote {', '.join(map(str, outcome.files))}"
+        where = str(outcome.results)
     return f"{name}: {found}{read_back}; {where}; {format_seconds(seconds)}"
 
 

@@ -45,7 +45,7 @@ def merge_shards(
 
     counts, failed = count_states(plan, records), failures(plan, records)
     try:
-        files = publish(plan, records, _dates(records), output)
+        results = publish(plan, records, _dates(records), output)
     except ResultsError as wrong:
         fault, status = of_results(wrong, study.file)
         fail(fault, status=status)
@@ -60,10 +60,11 @@ def merge_shards(
             "problems": problems,
             "failures": [{"case": case, "message": message} for case, message in failed],
             "again": again,
-            "files": [str(path) for path in files],
+            "files": [str(path) for path in results.files],
+            "unchanged": [str(path) for path in results.unchanged],
         },
         *(f"{source.path}: {counted(source.records, 'record')}, {source.taken} of them new" for source in sources),
-        f"{file}: {totals}; wrote {', '.join(map(str, files))}",
+        f"{file}: {totals}; {results}",
     )
     if not is_json_wanted():
         for case, message in failed:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from pipeline.files import result_files
 from pipeline.launcher import is_interrupt
@@ -22,7 +23,23 @@ class ResultsError(Exception):
         self.is_unwritable = is_unwritable
 
 
-def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, str], output: Path) -> tuple[Path, ...]:
+class Results(NamedTuple):
+    """Files of results: those ``written``, the dataset first, and figures that had the same numbers before."""
+
+    written: tuple[Path, ...] = ()
+    unchanged: tuple[Path, ...] = ()
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All of them, the dataset first."""
+        return (*self.written, *self.unchanged)
+
+    def __str__(self) -> str:
+        left = f"; unchanged: {', '.join(map(str, self.unchanged))}" if self.unchanged else ""
+        return f"wrote {', '.join(map(str, self.written))}{left}"
+
+
+def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, str], output: Path) -> Results:
     """Write ``<study>.nc`` and its figure into ``output`` and return the files; ``attributes`` tell of the run.
 
     A figure of the same numbers stays as it is.
@@ -31,15 +48,16 @@ def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, 
         ResultsError: whatever keeps them from being made.
     """
     what = f"{output}: the results of {plan.study.file} cannot be"
-    path, *figures = files = result_files(output, plan.study.name)
+    path, *figures = result_files(output, plan.study.name)
     try:
         dataset = build(plan, records, attributes)
         write(dataset, path)
-        if not are_drawn(figures, mark_of(dataset)):
-            from pipeline.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)
+        if are_drawn(figures, mark_of(dataset)):
+            return Results((path,), tuple(figures))
+        from pipeline.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)
 
-            draw(dataset, path.with_suffix(""))
-        return tuple(files)
+        draw(dataset, path.with_suffix(""))
+        return Results((path, *figures))
     except (OSError, RuntimeError) as error:  # of a full disk HDF5 tells the latter
         raise ResultsError(f"{what} written: {error}; all forces are on record", is_unwritable=True) from error
     except Exception as error:

@@ -5,9 +5,11 @@ from math import pi
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from pipeline import workflow
 from pipeline.insertion.paths import lacking, paths
 from pipeline.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL
 from pipeline.plan.plan import make_plan
@@ -129,6 +131,20 @@ def test_a_path_costs_each_of_its_solves_once():
     )
     assert float(found["time_total"]) == len(records) > 2
     assert int(found["cells"]) == len(records) - 1 and int(found["iterations"]) == 2 * len(records)
+
+
+def test_each_round_of_solves_shows_its_progress(monkeypatch, tmp_path):
+    """What a path needs besides is planned once its states are solved."""
+    opened, shown = workflow.Opened(), []
+
+    def execute(plan, opened, *_):
+        opened.records |= {solve.key: record(solve) for solve in plan.solves}
+
+    monkeypatch.setattr(workflow, "_execute", execute)
+    plan = make_plan(scene())
+    workflow.run(plan, opened, MPI.COMM_SELF, tmp_path, lambda part: shown.append(len(part.solves)))
+    assert shown[0] == len(plan.solves) and len(shown) > 1
+    assert sum(shown) == len(opened.records)
 
 
 def test_friction_is_no_input_of_the_states_and_toughness_is_one():
