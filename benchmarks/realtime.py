@@ -61,6 +61,14 @@ axes = ["7 mm", "5 mm", "4 mm"]
 young = "35 kPa"
 poisson = 0.4
 """
+# Off the axis of a cylinder.
+_ASIDE = """[[body.inclusion]]
+name = "lump"
+at = ["-8 mm", "5 mm", "-13 mm"]
+axes = ["6 mm", "4 mm", "5 mm"]
+young = "45 kPa"
+poisson = 0.42
+"""
 _LAYERS = """[[body.layer]]
 name = "skin"
 thickness = "7 mm"
@@ -85,6 +93,7 @@ STUDIES = MappingProxyType(
         + _RANGE.replace("10 kPa", "8 kPa")
         + _FLAT,
         "nodule": '[body]\nshape = "box"\nsize = ["70 mm", "50 mm", "35 mm"]\n' + _NODULE + _SOFT + _FLAT,
+        "aside": '[body]\nshape = "cylinder"\nradius = "26 mm"\nheight = "30 mm"\n' + _ASIDE + _SOFT + _FLAT,
         "layers": '[body]\nshape = "box"\nsize = ["60 mm", "60 mm", "30 mm"]\n' + _LAYERS + _SOFT + _FLAT,
         "ellipsoid": '[body]\nshape = "ellipsoid"\naxes = ["40 mm", "40 mm", "25 mm"]\nfixed = {below = "-6 mm"}\n'
         + _RANGE
@@ -209,7 +218,7 @@ def _nearest(model: Model, check: Check) -> float:
     _, rows, columns = model.table.reciprocal.shape
     # Rounding must not put it outside.
     x = (1 - 1e-12) * model.table.reach[0] * shares(columns - 1, model.table.even[0])
-    if model.table.is_round:
+    if model.table.is_axial:
         radius = float(np.hypot(check.x, check.y))
         share = float(x[np.argmin(np.abs(x - radius))]) / max(radius, 1e-12)
         at = (check.x * share, check.y * share)

@@ -82,6 +82,6 @@ def _random_round(model: Model, rng: np.random.Generator, kind: int) -> Check:
 
 def _turned(model: Model, asked: Check) -> Check:
     """Return a touch of a round tool on a round body, rotated to y = 0, where the program solves a half."""
-    if not model.table.is_round or asked.tool.name == "blade":
+    if not model.table.is_axial or asked.tool.name == "blade":
         return asked
     return replace(asked, x=hypot(asked.x, asked.y), y=0.0)

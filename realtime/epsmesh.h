@@ -55,7 +55,7 @@ typedef enum {
 
 typedef struct {
     const double *reciprocal, *curvature, *tensors, *height, *bend; /* Chebyshev, over (nu, v, u) */
-    int counts[3], face_counts[2], is_round, even[2], leans, has_tensors, is_flat, is_loaded;
+    int counts[3], face_counts[2], is_round, is_axial, even[2], leans, has_tensors, is_flat, is_loaded;
     double c_ref, reach[2], sides[2], thickness, origin[3], axes[3][3], poisson_range[2];
     double young, poisson, largest, off, aligned, bar[4], bend_error;
     const double *pair_modes, *pair_links;

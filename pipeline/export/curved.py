@@ -98,7 +98,7 @@ def curved_region(scope: Scope, room: float) -> Region:
     if body.half_sides and not any(scope.case.probe.at[:2]) and not body.embedded:
         is_round, even = body.is_round, (True, True)
         reach = (_OF_AXES * body.half_sides[0], _OF_AXES * body.half_sides[1])
-    return Region(reach, (reach[0] + 2 * room, reach[1] + 2 * room), room, is_round, even)
+    return Region(reach, (reach[0] + 2 * room, reach[1] + 2 * room), room, is_round, even, is_axial=is_round)
 
 
 def _regular(
@@ -132,7 +132,7 @@ def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, 
         ExportError: if the face does not extend over the whole region.
     """
     share = np.cos(np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
-    count = 1 if table.is_round else _TERMS
+    count = 1 if table.is_axial else _TERMS
     xs = table.reach[0] * (np.sqrt((share + 1) / 2) if table.even[0] else share)
     ys = table.reach[1] * (np.sqrt((share + 1) / 2) if table.even[1] else share) if count > 1 else np.zeros(1)
     vander = np.polynomial.chebyshev.chebvander(share, _TERMS - 1)

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.export.compliance import per_newton
+from pipeline.export.disc import Disc
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.tabulate import extrema, ratios_of
@@ -150,6 +151,8 @@ def far_fields(body: Pressed, poissons: tuple[float, float]) -> FarFields:
 
 def _sources(region: Region) -> list[Place]:
     """Return the places to solve; all others are their images."""
+    if region.is_round and not region.is_axial:
+        return Disc(region.reach[0], region.even, 2 * _SIZE).places
     lines = [
         reach * extrema(2 * _SIZE)[: _SIZE + 1 if even else None]
         for reach, even in zip(region.reach, region.even, strict=True)
@@ -162,7 +165,7 @@ def _sources(region: Region) -> list[Place]:
 
 def _motions(region: Region) -> list[FloatArray]:
     """Return the symmetries of the body, which map its sources to all places."""
-    if region.is_round:
+    if region.is_axial:
         angles = 2 * pi * np.arange(4 * _SIZE + 1) / (4 * _SIZE + 1)
         return [np.array([[np.cos(t), -np.sin(t), 0], [np.sin(t), np.cos(t), 0], [0, 0, 1]]) for t in angles]
     x, y = ((1.0, -1.0) if even else (1.0,) for even in region.even)

@@ -15,7 +15,8 @@ class Region:
     """A tabulated region: half extents (m) of region (``reach``) and face (``sides``), or their radii twice.
 
     ``thickness`` (m) is the depth of the support or of other tissue. ``even`` says in which directions the body is its
-    own mirror image, ``is_square`` whether exchanging x and y leaves it unchanged.
+    own mirror image, ``is_square`` whether exchanging x and y leaves it unchanged. A round region may have a body that
+    is not: ``is_axial`` says whether the body is axisymmetric.
     """
 
     reach: tuple[float, float]
@@ -24,6 +25,7 @@ class Region:
     is_round: bool
     even: tuple[bool, bool] = (True, True)
     is_square: bool = False
+    is_axial: bool = False
 
     @staticmethod
     def of(body: Layered, share: float) -> "Region":
@@ -36,7 +38,8 @@ class Region:
         )
         is_square = sides[0] == sides[1] and body.holds_round
         reach = (sides[0] - left, sides[1] - left)
-        return Region(reach, sides, body.depth_of_tissue, body.is_round, (even[0], even[1]), is_square)
+        is_round, is_axial = body.has_round_top, body.is_round
+        return Region(reach, sides, body.depth_of_tissue, is_round, (even[0], even[1]), is_square, is_axial)
 
     @property
     def margin(self) -> float:

@@ -137,8 +137,6 @@ def _flat_refusal(case: Case, first: Case, body: Layered) -> str:
             return "the study has several sets of materials, and a model of inclusions has one: export a study of each"
     if body.cavities:
         return f'a {body.shape} with hollow regions has no real-time model: use shape = "surface", or omit them'
-    if body.has_round_top and not body.is_round:
-        return f"a {body.shape} with an inclusion off its axis, or a [[body.region]], has no real-time model: use a box"
     least = _SHALLOWEST * min(body.half_sides)
     if body.regions and body.depth_of_tissue < least:
         return (

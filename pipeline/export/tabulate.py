@@ -7,6 +7,7 @@ import numpy as np
 
 from epsmesh_realtime.table import Table
 from pipeline.arrays import FloatArray
+from pipeline.export.disc import Disc
 from pipeline.export.region import Region
 
 Places = Sequence[tuple[float, float]]
@@ -84,28 +85,27 @@ def _error(table: Table, place: tuple[float, float], poisson: float, c: float) -
 
 def _table(region: Region, poissons: tuple[float, float], size: int, values: FloatArray) -> Table:
     """Return the table through ``values`` (ν, places, 2 or 9)."""
-    c, h, *others = np.moveaxis(values.reshape(len(values), -1, size + 1, values.shape[-1]), -1, 0)
+    c, h, *others = np.moveaxis(values, -1, 0)
     c_ref = max(0.0, -float(np.nanmin(c))) + _ABOVE / region.thickness
     t = 1 / (c + c_ref)
-    tensors = _tensors(region, size, [f * t ** (3 if n < _BENDS else 1) for n, f in enumerate(others)])
-    t, q = _filled(t), _filled(h * t**3)
-    table = Table(_coefficients(t), _coefficients(q), c_ref, region.reach, region.is_round, poissons, region.even)
-    return replace(table, tensors=tensors) if others else table
+    places = _places(region, size)
+    plain = Table.none(region.reach, is_round=region.is_axial, even=region.even)
+    factors = np.array([plain.factors(x, y) for x, y in places])
 
+    def through(values: FloatArray, factor: FloatArray | None = None) -> FloatArray:
+        if region.is_round and not region.is_axial:
+            return _over_ratios(Disc(region.reach[0], region.even, size).through(places, values, factor))
+        shape = (len(values), -1, size + 1)
+        grid = values.reshape(shape)
+        return _coefficients(_filled(grid)) if factor is None else _divided(grid, factor.reshape(shape[1:]))
 
-def _tensors(region: Region, size: int, values: Sequence[FloatArray]) -> FloatArray:
-    """Return the coefficients of the tables for blades and bonded tools, divided by their known factors."""
-    xi, eta = (reach * shares(size, even) for reach, even in zip(region.reach, region.even, strict=True))
-    eta = np.zeros(1) if region.is_round else eta
-    plain = Table.none(region.reach, is_round=region.is_round, even=region.even)
-    factors = np.array([[plain.factors(x, y) for x in xi] for y in eta])
-    found: list[FloatArray] = []
-    for number, value in enumerate(values):
-        if region.is_round and number in _TWINS:
-            found.append(found[_TWINS[number]])
-            continue
-        found.append(_divided(value, factors[..., number]))
-    return np.array(found)
+    tensors: list[FloatArray] = []
+    for number, f in enumerate(others):
+        power = 3 if number < _BENDS else 1
+        twin = _TWINS.get(number) if region.is_axial else None
+        tensors.append(through(f * t**power, factors[:, number]) if twin is None else tensors[twin])
+    table = Table(through(t), through(h * t**3), c_ref, region.reach, region.is_round, poissons, region.even)
+    return replace(table, tensors=np.array(tensors)) if tensors else table
 
 
 def _divided(values: FloatArray, factor: FloatArray) -> FloatArray:
@@ -135,6 +135,8 @@ def _filled(values: FloatArray) -> FloatArray:
 
 def _places(region: Region, size: int, *, few: bool = False) -> Places:
     """Return the places of the nodes, x fastest; with ``few``, those of the sparse grid of :func:`_filled`."""
+    if region.is_round and not region.is_axial:
+        return Disc(region.reach[0], region.even, size).places
     x, y = (reach * shares(size, even) for reach, even in zip(region.reach, region.even, strict=True))
     ys = [0.0] if region.is_round else y.tolist()
     return [
@@ -176,6 +178,11 @@ def _coefficients(values: FloatArray, nodes: tuple[int, ...] | None = None) -> F
         if count > 1:
             values = np.moveaxis(np.tensordot(_inverse(of - 1, count), values, (1, axis)), 0, axis)
     return values
+
+
+def _over_ratios(values: FloatArray) -> FloatArray:
+    """Return the Chebyshev coefficients over ν of ``values`` (ν, ...) at the ratios."""
+    return np.tensordot(_inverse(len(values) - 1), values, 1) if len(values) > 1 else values
 
 
 def _inverse(size: int, count: int | None = None) -> FloatArray:

@@ -11,7 +11,7 @@ All numbers that a query needs are doubles, in SI units, for a body with E = 1:
     reciprocal, curvature    (poisson, v, u) Chebyshev coefficients of t = 1/(c + c_ref) (m) and of h t³ (1)
     tensors                  (7, poisson, v, u) for blades and bonded tools (`epsmesh_realtime.table`); optional
     c_ref                    1/m
-    is_round                 1: u = 2(x² + y²)/X² - 1 alone
+    is_round                 1: the region is a disc; with one v the body is axisymmetric, and u = 2(x² + y²)/X² - 1
     even                     (2,) 1: u = 2(x/X)² - 1, v = 2(y/Y)² - 1; 0: u = x/X, v = y/Y
     leans                    1: a query adds the tilt of the face under the force; 0: h includes it
     height, bend             (face_v, face_u) coefficients of the face's z (m) and its mean curvature (1/m), 0 if flat

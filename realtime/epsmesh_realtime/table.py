@@ -41,7 +41,8 @@ class Table:
 
     Coefficients (ν, v, u) of ``reciprocal`` t = 1/(c + c_ref) (m), which is smooth where c grows towards an edge, and
     of ``curvature`` q = h t³; half extents X, Y (m) of the region. In a direction in which the body is symmetric
-    (``even``), u and v are 2(x/X)² - 1 and 2(y/Y)² - 1, else x/X and y/Y. A round body has only u = 2(x² + y²)/X² - 1.
+    (``even``), u and v are 2(x/X)² - 1 and 2(y/Y)² - 1, else x/X and y/Y. On a round region (``is_round``), an
+    axisymmetric body has only u = 2(x² + y²)/X² - 1.
     ``leans``: h does not include the tilt of the face, which is added.
 
     ``tensors`` (7, ν, v, u), which may be empty, are t³ times the first two, and t times the others, of
@@ -50,8 +51,8 @@ class Table:
 
     R is the regular part of the Green's function at the force, A the second derivatives of R_zz with respect to the
     field point (h = A_xx + A_yy). Each is divided by the factor that symmetry implies. With ξ = x/X and η = y/Y the
-    factors are 1, 2ξη, ξ, η, 1, 1, 2ξη; for a round body ξ² - η², 2ξη, ξ, η, 1, ξ² - η², 2ξη. Without symmetry, 1
-    replaces ξ or η.
+    factors are 1, 2ξη, ξ, η, 1, 1, 2ξη; for an axisymmetric body ξ² - η², 2ξη, ξ, η, 1, ξ² - η², 2ξη. Without
+    symmetry, 1 replaces ξ or η.
     """
 
     reciprocal: Array
@@ -87,6 +88,11 @@ class Table:
     ) -> "Table":
         """Return the table of a half-space."""
         return Table(np.ones((1, 1, 1)), np.zeros((1, 1, 1)), 1.0, reach, is_round, poisson, even, leans=False)
+
+    @property
+    def is_axial(self) -> bool:
+        """Whether the body is axisymmetric."""
+        return self.is_round and self.reciprocal.shape[1] == 1
 
     @cached_property
     def _alone(self) -> Evaluator:

@@ -56,7 +56,8 @@ static void load_table(epsmesh_model *m, file *f) {
     wrong_if(f, !is_flag(leans), "leans"), wrong_if(f, !is_flag(even[0]) || !is_flag(even[1]), "even");
     wrong_if(f, !is_flag(is_round), "is_round");
     m->leans = leans == 1, m->is_round = is_round == 1, m->even[0] = even[0] == 1, m->even[1] = even[1] == 1;
-    wrong_if(f, m->is_round && (m->counts[1] != 1 || !m->even[0] || !m->even[1]), "is_round");
+    m->is_axial = m->is_round && m->counts[1] == 1;
+    wrong_if(f, m->is_axial && !(m->even[0] && m->even[1]), "is_round");
     wrong_if(f, !(-1 < range[0] && range[0] <= m->poisson && m->poisson <= range[1] && range[1] <= 0.5), "poisson_range");
     wrong_if(f, m->counts[0] > 1 && range[0] == range[1], "poisson_range");
 }
@@ -91,7 +92,7 @@ static void load_face(epsmesh_model *m, file *f) {
         wrong_if(f, shape[i] > EPSMESH_MOST, "height");
         m->face_counts[i] = (int)shape[i];
     }
-    wrong_if(f, m->is_round && shape[0] != 1, "height");
+    wrong_if(f, m->is_axial && shape[0] != 1, "height");
     m->is_flat = 1;
     for (i = 0; i < m->face_counts[0] * m->face_counts[1]; i++)
         if (m->height[i] != 0 || m->bend[i] != 0) m->is_flat = 0;

@@ -26,7 +26,7 @@ static void polynomials(double at, int n, double p[3][EPSMESH_MOST]) {
 
 static void directions(const epsmesh_model *m, double x, double y, int rows, int columns, terms *p) {
     double a = m->reach[0], b = m->reach[1], u, v;
-    if (m->is_round) {
+    if (m->is_axial) {
         u = 2 * (x * x + y * y) / (a * a) - 1, v = 0;
     } else {
         u = m->even[0] ? 2 * (x / a) * (x / a) - 1 : x / a;
@@ -51,7 +51,7 @@ static value along(const epsmesh_model *m, const double *table, const terms *p, 
         fv += p->left[1][j] * sum[0], fuv += p->left[1][j] * sum[1], fvv += p->left[2][j] * sum[0];
     }
     found.f = f;
-    if (m->is_round) {
+    if (m->is_axial) {
         double ux = bend * x, uy = bend * y;
         found.slope[0] = fu * ux, found.slope[1] = fu * uy;
         found.xx = fuu * ux * ux + fu * bend, found.xy = fuu * ux * uy, found.yy = fuu * uy * uy + fu * bend;
@@ -69,7 +69,7 @@ static double factor(const epsmesh_model *m, int k, double x, double y, double o
     double xi = m->even[0] ? x / m->reach[0] : 1, eta = m->even[1] ? y / m->reach[1] : 1;
     double of_x = m->even[0] ? 1 / m->reach[0] : 0, of_y = m->even[1] ? 1 / m->reach[1] : 0;
     own[0] = own[1] = 0;
-    if ((k == 0 || k == 5) && m->is_round) {
+    if ((k == 0 || k == 5) && m->is_axial) {
         own[0] = 2 * xi * of_x, own[1] = -2 * eta * of_y;
         return xi * xi - eta * eta;
     }

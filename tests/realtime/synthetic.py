@@ -12,7 +12,8 @@ from pipeline.export.file import write_model
 
 def random_model(*, is_round: bool = False, turned: bool = False, is_even: bool = True, curved: bool = False) -> Model:
     rng = np.random.default_rng(4)
-    shape = (3, 1, 7) if is_round else (3, 6, 7)
+    is_axial = is_round and is_even
+    shape = (3, 1, 7) if is_axial else (3, 6, 7)
     order = sum(np.ogrid[: shape[0], : shape[1], : shape[2]])
     reciprocal, curvature = rng.standard_normal((2, *shape)) / np.maximum(order, 1) ** 2 / 20
     reciprocal[0, 0, 0], curvature[0, 0, 0] = 1.0, 0.8
@@ -24,7 +25,7 @@ def random_model(*, is_round: bool = False, turned: bool = False, is_even: bool 
     origin = np.array([0.1, -0.2, 0.05]) if turned else np.zeros(3)
     face = Face()
     if curved:
-        heights = rng.standard_normal((2, 1 if is_round else 4, 5)) / np.arange(1, 6) ** 3
+        heights = rng.standard_normal((2, 1 if is_axial else 4, 5)) / np.arange(1, 6) ** 3
         face = Face(2e-3 * heights[0], 4.0 * heights[1])
     rest = {"face": face, "off": 1e-7, "aligned": 0.02 if curved else 1e-6, "bend_error": 3.0 if curved else 0.0}
     rest["pairs"] = None if curved else random_pairs(table)

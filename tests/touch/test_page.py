@@ -16,7 +16,14 @@ from tests.realtime.synthetic import random_surface, write_random, write_surface
 from tests.report.browser import CHROMIUM, Browser
 
 in_browser = pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="chromium is not installed")
-KINDS = ({}, {"is_round": True}, {"turned": True}, {"curved": True}, {"curved": True, "turned": True, "is_even": False})
+KINDS = (
+    {},
+    {"is_round": True},
+    {"turned": True},
+    {"curved": True},
+    {"curved": True, "turned": True, "is_even": False},
+    {"is_round": True, "is_even": False},
+)
 SIZES = ("radius", "angle", "width", "turn")
 SHAPES = ("disc", "sphere", "cone", "blade", "bonded")
 
