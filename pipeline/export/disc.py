@@ -1,5 +1,6 @@
 """Nodes on a disc, and polynomials through values there: tables of a round region whose body is not axisymmetric."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import pi
@@ -39,7 +40,7 @@ class Disc:
         return [*found, (0.0, 0.0)]
 
     def through(
-        self, places: list[tuple[float, float]], values: FloatArray, factor: FloatArray | None = None
+        self, places: Sequence[tuple[float, float]], values: FloatArray, factor: FloatArray | None = None
     ) -> FloatArray:
         """Return the Chebyshev coefficients (ν, v, u) of ``values`` (ν, places), over a ``factor`` (places,).
 
