@@ -37,7 +37,7 @@ def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, 
 
     comm, sections = world(), dict[float, Section]()
     load_solvers()
-    pierced, deepest = float(path["puncture_depth"]), float(path["depth"][-1])
+    pierced, deepest = float(path["puncture_depth"].min()), float(path["depth"][-1])
     # A blade that is pulled out passes all slits. Without a puncture there are none.
     first = 0.0 if "stroke" in path.dims and pierced > 0 else pierced
     with abort_on_exception(comm), ended_soon():

@@ -6,9 +6,13 @@ that is stored, and the work of fracture.
 """
 
 from dataclasses import dataclass, replace
+from typing import Self
+
+from scipy.interpolate import CubicHermiteSpline
 
 from pipeline.insertion.near_tip import EXTENSION_ERROR, NearTip, strength
 from pipeline.insertion.states import SHORT, Cut, Scene, Tissue
+from pipeline.insertion.steps import CUTTING, INDENTATION
 
 # A front is solved again if it is this much farther ahead than where it was solved.
 _FARTHER = 1.1
@@ -22,7 +26,8 @@ class Cutting:
     """A blade that cuts, its tip at ``depth`` (m) and the front of the slit ``ahead`` (m), in the ``field`` between.
 
     ``stored`` and ``fracture`` are energies (J) since the first touch; ``elastic`` and ``cutting`` the parts of the
-    force (N), ``squeeze`` (N) the normal force on each flank. Those with an error have its 95 % bar.
+    force (N), ``squeeze`` (N) the normal force on each flank. Those with an error have its 95 % bar. In the ``phase``
+    of indentation, the tip is below the front.
     """
 
     depth: float
@@ -36,6 +41,7 @@ class Cutting:
     cutting: float
     squeeze: float
     squeeze_error: float
+    phase: str = CUTTING
 
     @property
     def energy(self) -> float:
@@ -51,6 +57,38 @@ class Cutting:
     def crack_depth(self) -> float:
         """Depth (m) of the front of the slit."""
         return self.depth + self.ahead
+
+    @property
+    def flank(self) -> float:
+        """Depth (m) to which its flanks touch tissue."""
+        return min(self.depth, self.crack_depth)
+
+    @property
+    def is_indentation(self) -> bool:
+        """Whether it presses on tissue that it does not cut."""
+        return self.phase == INDENTATION
+
+    def moved(self, depth: float) -> Self:
+        """Return it at another depth (m), at the same force."""
+        by = depth - self.depth
+        return replace(
+            self, depth=depth, stored=self.stored + self.elastic * by, fracture=self.fracture + self.cutting * by
+        )
+
+    def defect(self, after: Self) -> float:
+        """Return by how much the mean force (N) up to a deeper state differs from the change of the energies."""
+        moved = after.depth - self.depth
+        return abs((after.energy - self.energy) / moved - (after.slope + self.slope) / 2) if moved else 0.0
+
+
+def between(before: Cutting, after: Cutting, depth: float) -> Cutting:
+    """Return the cutting blade at a depth (m) between two others."""
+    share = (depth - before.depth) / (after.depth - before.depth)
+    numbers = [name for name, value in vars(before).items() if isinstance(value, float)]
+    mixed = {name: (1 - share) * getattr(before, name) + share * getattr(after, name) for name in numbers}
+    ends = [before.depth, after.depth]
+    stored = CubicHermiteSpline(ends, [before.stored, after.stored], [before.elastic, after.elastic])
+    return replace(after, **(mixed | {"depth": depth, "stored": float(stored(depth))}))
 
 
 def cuttings(scene: Scene, depths: list[float]) -> tuple[list[Cutting], str]:

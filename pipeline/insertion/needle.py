@@ -191,4 +191,4 @@ class NeedleScene(InsertionScene[Needle]):
         slope = before.force / depth  # at least; the force grows faster than the depth
         force_error = whole.bar * before.force + slope * depth_error
         steps = [*(whole.step(each) for each in self.depths if each <= depth), *worked[1:]]
-        return Path(tuple(steps), Puncture(before, worked[0], depth_error, force_error), "", tuple(back))
+        return Path(tuple(steps), (Puncture(before, worked[0], depth_error, force_error),), "", tuple(back))

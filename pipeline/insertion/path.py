@@ -5,7 +5,7 @@ Tissue is pierced at the depth where U − U_slit = Γ A, at the slit for which 
 G = Γ, as in cutting. No threshold is fitted. Friction acts on both flanks.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -13,8 +13,10 @@ import scipy  # which loads its parts when they are used: a run without an inser
 
 from pipeline.insertion.cutting import Cutting, cuttings
 from pipeline.insertion.friction import rub
+from pipeline.insertion.indentation import Indentation, Pierced
+from pipeline.insertion.layers import through_layers
 from pipeline.insertion.states import Scene
-from pipeline.insertion.steps import CUTTING, INDENTATION, Path, Puncture, Step, with_work
+from pipeline.insertion.steps import Path, Puncture, Step, with_work
 from pipeline.insertion.withdrawal import withdrawn
 
 # The least depth at which a slit is solved, in widths of the blade.
@@ -37,7 +39,7 @@ def _needed(scene: Scene) -> tuple[float, ...]:
     pressed = scene.stiffness()
     if isinstance(pressed, str):
         return scene.depths if scene.is_pending else ()
-    first = _first(scene, _Whole(*pressed))
+    first = _first(scene, Indentation.of_surface(*pressed))
     through_all = scene.insertion.withdraw and np.isfinite(first)  # after the tissue is cut
     return tuple(depth for depth in scene.depths if through_all or depth >= first)
 
@@ -46,124 +48,75 @@ def _follow(scene: Scene) -> Path:
     pressed, depths = scene.stiffness(), np.array(scene.depths)
     if isinstance(pressed, str):
         return Path(message=pressed)
-    whole = _Whole(*pressed)
+    whole = Indentation.of_surface(*pressed)
     first = _first(scene, whole)
     found, message = cuttings(scene, list(_needed(scene)))
-    pierced = (number for number, one in enumerate(found) if whole.energy(one.depth) >= one.energy)
+    pierced = (number for number, one in enumerate(found) if whole.at(one.depth).energy >= one.energy)
     count = next(pierced, len(found))
     intact, cut = found[:count], found[count:]
     if not cut:
         deepest = intact[-1].depth if intact else max(depths[depths < first], default=0.0)
-        return Path(tuple(whole.step(depth) for depth in depths if depth <= deepest), message=message)
-    pierced_at = _puncture(scene, whole, intact, cut[0], max(depths[depths < first], default=0.0))
-    states = [pierced_at.after, *(one for one in cut if one.depth > pierced_at.depth)]
-    after = _steps(scene, states)
-    steps = [whole.step(depth) for depth in depths if depth < pierced_at.depth] + [
-        step for step in after if step.depth in scene.depths
-    ]
+        return Path(tuple(_steps(scene, [whole.at(one) for one in depths if one <= deepest])), message=message)
+    surface = _puncture(scene, whole, intact, cut[0], max(depths[depths < first], default=0.0))
+    deeper = [surface.after, *(one for one in cut if one.depth > surface.after.depth)]
+    states, punctures, ended = through_layers(scene, deeper)
+    states = [*(whole.at(one) for one in depths if one < surface.after.depth), surface.before, *states]
+    steps = {id(state): step for state, step in zip(states, _steps(scene, states), strict=True)}
+    last = steps[id(states[-1])]
+    peaks = tuple(_of(one, steps) if one else None for one in (surface, *punctures))
+    peaked = {id(one.before) for one in (surface, *punctures) if one}
+    own = [step for key, step in steps.items() if key not in peaked and step.depth in scene.depths]
     back: list[Step] = []
     if scene.insertion.withdraw:
-        above = [one for one in found if one.depth < pierced_at.depth]
-        back = [step for step in withdrawn(scene, [*above, *states][::-1], after[-1]) if step.depth in scene.depths]
-    puncture = Puncture(whole.step(pierced_at.depth), after[0], *pierced_at.errors(whole))
-    return Path(tuple(steps), puncture, message, tuple(back[::-1]))
+        back = withdrawn(scene, found[::-1], last)
+    return Path(tuple(own), peaks, ended or message, tuple(back[::-1]))
 
 
-def _first(scene: Scene, whole: "_Whole") -> float:
+def _of(one: Pierced, steps: Mapping[int, Step]) -> Puncture:
+    """Return a puncture by the steps of its states."""
+    return Puncture(steps[id(one.before)], steps[id(one.after)], one.depth_error, one.force_error)
+
+
+def _first(scene: Scene, whole: Indentation) -> float:
     """Return the first depth (m) at which tissue may be torn, infinite if there is none.
 
     No slit is cheaper than its work of fracture alone: before the intact body stores that, the tissue is whole.
     """
     least = (1 - _TINY) * scene.blade.length
-    may = (depth for depth in scene.depths if whole.energy(depth) >= least * scene.tear(depth))
+    may = (depth for depth in scene.depths if whole.at(depth).energy >= least * scene.tear(depth))
     return next(may, np.inf)
 
 
-@dataclass(frozen=True)
-class _Whole:
-    """The intact body: force over depth (N/m), with its error bar."""
-
-    stiffness: float
-    bar: float
-
-    def energy(self, depth: float) -> float:
-        return self.stiffness * depth**2 / 2
-
-    def step(self, depth: float) -> Step:
-        energy = self.energy(depth)
-        return Step(INDENTATION, depth, self.stiffness * depth, error=self.bar * depth, stored=energy, work=energy)
-
-
-@dataclass(frozen=True)
-class _Puncture:
-    """The puncture at a ``depth`` (m): the blade that cuts there, and the bar of the depth (m)."""
-
-    depth: float
-    after: Cutting
-    bar: float
-
-    @classmethod
-    def between(cls, whole: _Whole, before: Cutting, after: Cutting) -> "_Puncture":
-        """Return the puncture between two depths at which the energies of slits are known, with their slopes."""
-        ends = np.array([before.depth, after.depth])
-        energy = scipy.interpolate.CubicHermiteSpline(ends, [before.energy, after.energy], [before.slope, after.slope])
-        depth = float(scipy.optimize.brentq(lambda d: whole.energy(d) - float(energy(d)), *ends, xtol=1e-9))
-        one = _between(before, after, depth)
-        error = one.stored_error + whole.bar * depth**2 / 2 + _defect(before, after) * (after.depth - before.depth)
-        force = whole.stiffness * depth
-        return cls(depth, one, error / max(force - one.slope, _TINY * force))
-
-    @classmethod
-    def at_touch(cls, first: Cutting) -> "_Puncture":
-        """Return the puncture of tissue that is cut at the first touch, before a depth at which slits are solved."""
-        return cls(first.depth, first, first.depth)
-
-    def errors(self, whole: _Whole) -> tuple[float, float]:
-        """Return the error bars of depth (m) and force (N)."""
-        return self.bar, whole.bar * self.depth + whole.stiffness * self.bar
-
-
-def _puncture(scene: Scene, whole: _Whole, intact: list[Cutting], after: Cutting, low: float) -> _Puncture:
+def _puncture(scene: Scene, whole: Indentation, intact: list[Cutting], after: Cutting, low: float) -> Pierced:
     """Return the puncture above the first cut, and below the last ``intact`` state or a ``low`` depth (m)."""
     if not intact:
         # A slit that the intact body could just tear, without opening it.
         depth = max(_crossing(scene, whole, low, after.depth), _LEAST * scene.blade.width)
-        found, _ = cuttings(scene, [scene.clear(depth)]) if depth < after.depth else ([], "")
-        if found and whole.energy(depth) >= found[0].energy:
-            return _Puncture.at_touch(found[0])
-        intact = found
-    return _Puncture.between(whole, intact[-1], after) if intact else _Puncture.at_touch(after)
+        intact, _ = cuttings(scene, [scene.clear(depth)]) if depth < after.depth else ([], "")
+    found = whole.pierced(intact[-1], after) if intact else None
+    # Tissue that is cut at the first touch, before a depth at which slits are solved.
+    return found or whole.pierced_at(one := (intact or [after])[0], one.depth)
 
 
-def _crossing(scene: Scene, whole: _Whole, low: float, high: float) -> float:
+def _crossing(scene: Scene, whole: Indentation, low: float, high: float) -> float:
     """Return the depth (m) at which the intact body stores the work of fracture of a slit alone."""
 
     def lacks(depth: float) -> float:
-        return whole.energy(depth) - scene.blade.length * scene.tear(depth)
+        return whole.at(depth).energy - scene.blade.length * scene.tear(depth)
 
     return (
         float(scipy.optimize.brentq(lacks, max(low, _TINY * high), high)) if lacks(max(low, _TINY * high)) < 0 else low
     )
 
 
-def _between(before: Cutting, after: Cutting, depth: float) -> Cutting:
-    """Return the cutting blade at a depth (m) between two others."""
-    share = (depth - before.depth) / (after.depth - before.depth)
-    numbers = [name for name, value in vars(before).items() if isinstance(value, float)]
-    mixed = {name: (1 - share) * getattr(before, name) + share * getattr(after, name) for name in numbers}
-    ends = [before.depth, after.depth]
-    stored = scipy.interpolate.CubicHermiteSpline(ends, [before.stored, after.stored], [before.elastic, after.elastic])
-    return replace(after, **(mixed | {"depth": depth, "stored": float(stored(depth))}))
-
-
 def _steps(scene: Scene, states: list[Cutting]) -> list[Step]:
-    """Return the steps through ``states`` of cutting, the first of which is that after the puncture."""
-    found = [rub(scene.blade, one.depth, one.squeeze, one.squeeze_error, inwards=True) for one in states]
-    missed = [0.0 if _crosses(scene, *pair) else _defect(*pair) for pair in pairwise(states)]
+    """Return the steps through the ``states`` of a path."""
+    found = [rub(scene.blade, one.flank, one.squeeze, one.squeeze_error, inwards=True) for one in states]
+    missed = [0.0 if _crosses(scene, *pair) else pair[0].defect(pair[1]) for pair in pairwise(states)]
     missed = [max(pair) for pair in pairwise([0.0, *missed, 0.0])]
     steps = [
         Step(
-            phase=CUTTING,
+            phase=one.phase,
             depth=one.depth,
             elastic=one.elastic,
             cutting=one.cutting,
@@ -181,8 +134,3 @@ def _steps(scene: Scene, states: list[Cutting]) -> list[Step]:
 
 def _crosses(scene: Scene, before: Cutting, after: Cutting) -> bool:
     return any(before.depth < end < after.depth for end in scene.interfaces)
-
-
-def _defect(before: Cutting, after: Cutting) -> float:
-    """Return by how much the mean force (N) between two depths differs from the change of the energies."""
-    return abs((after.energy - before.energy) / (after.depth - before.depth) - (after.slope + before.slope) / 2)

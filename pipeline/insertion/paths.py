@@ -54,13 +54,18 @@ class CaseStates:
     def __post_init__(self) -> None:
         self._stages: dict[Probe, int] = {case.probe: number for number, case in enumerate(self.cases)}
 
-    def of(self, state: Inserted) -> Scalable | None:
-        """Return the record of a state of the tool: that of a stage, or of a case that is solved besides."""
-        if (number := self._stages.get(state)) is not None:
+    def of(self, state: Inserted, below: int = 0) -> Scalable | None:
+        """Return the record of a state of the tool: that of a stage, or of a case that is solved besides.
+
+        It is on the case's body, or what is ``below`` so many of its layers.
+        """
+        number = self._stages.get(state)
+        if number is not None and not below:
             found = self._of_stage(number)
             if found is None or found.status != SKIPPED:
                 return found
-        case = replace(self.cases[0], probe=state)
+        body = cast("Layered", self.cases[0].body)
+        case = replace(self.cases[0], probe=state, body=body.below(below) if below else body)
         own = make_plan(_alone(self.plan.study, case))
         (key,) = own.keys
         self.further[key] = own

@@ -50,8 +50,11 @@ class Solved(Protocol):
 class States(Protocol):
     """What has the solved states of a scene."""
 
-    def of(self, state: Inserted) -> Solved | None:
-        """Return the tool in a state of its insertion; None if that is still to be solved."""
+    def of(self, state: Inserted, below: int = 0) -> Solved | None:
+        """Return the tool in a state of its insertion; None if that is still to be solved.
+
+        It is on the body, or on what is ``below`` so many of its layers.
+        """
         ...
 
 
@@ -63,6 +66,11 @@ class Tissue:
     young: float
     poisson: float
     toughness: float
+
+    @property
+    def plane_modulus(self) -> float:
+        """E/(1 − ν²) in Pa."""
+        return self.young / (1 - self.poisson**2)
 
 
 @dataclass(frozen=True)
@@ -136,9 +144,9 @@ class InsertionScene(ABC, Generic[Tool]):
     def needed(self) -> Collection[float]:
         """Return the depths (m) at which the path needs the stage of its tool."""
 
-    def solved(self, state: Tool) -> Solved | str:
-        """Return the tool in a state, or why there is no force of it."""
-        found = self._states.of(state)
+    def solved(self, state: Tool, below: int = 0) -> Solved | str:
+        """Return the tool in a state, on the body ``below`` so many layers, or why there is no force of it."""
+        found = self._states.of(state, below)
         if found is None:
             self.is_pending = True
             return "not yet solved"
@@ -163,11 +171,14 @@ class Scene(InsertionScene[Blade]):
 
     # ---- solved states --------------------------------------------------------------------------------
 
-    def stiffness(self) -> tuple[float, float] | str:
-        """Return force over depth (N/m) of the blade on the intact surface, and its error bar; or why there is none."""
-        found = self.solved(self.blade.on_intact())
+    def stiffness(self, below: int = 0) -> tuple[float, float] | str:
+        """Return force over depth (N/m) of the blade on intact tissue, and its error bar; or why there is none.
+
+        It is the whole body, or what is ``below`` so many of its layers.
+        """
+        found = self.solved(self.blade.on_intact(), below)
         if isinstance(found, str):
-            return f"the intact body: {found}"
+            return f"the intact {'layers below' if below else 'body'}: {found}"
         return found.force / self.insertion.to, found.force * found.force_error / self.insertion.to
 
     def cuts(self, places: Sequence[tuple[float, float]]) -> dict[tuple[float, float], Cut | str]:

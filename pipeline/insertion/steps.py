@@ -39,7 +39,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Puncture:
-    """The puncture: the step ``before`` it, the peak, and the one ``after`` it, at the same depth (m).
+    """A puncture: the step ``before`` it, the peak, and the one ``after`` it, at the same depth (m).
 
     Error bars are those of the depth (m), and of the force (N) before.
     """
@@ -62,14 +62,15 @@ class Puncture:
 
 @dataclass(frozen=True)
 class Path:
-    """Steps of an insertion, at the depths of its scene up to where it ended, and the puncture between them.
+    """Steps of an insertion, at the depths of its scene up to where it ended, and the ``punctures`` between them.
 
-    Without a puncture the tissue stays whole. The ``withdrawal``, if any, has steps at the same depths. ``message``
-    says at which depth the path ended early, and why; ``is_pending`` that states are still to be solved.
+    The punctures are those of the layers from the surface down, None for one that is not pierced from a state of
+    indentation. Without any, the tissue stays whole. The ``withdrawal``, if any, has steps at the same depths.
+    ``message`` says at which depth the path ended early, and why; ``is_pending`` that states are still to be solved.
     """
 
     steps: tuple[Step, ...] = ()
-    puncture: Puncture | None = None
+    punctures: tuple[Puncture | None, ...] = ()
     message: str = ""
     withdrawal: tuple[Step, ...] = ()
     is_pending: bool = False

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.insertion.path import Path
 from pipeline.insertion.paths import followed
-from pipeline.insertion.steps import ENDED, PHASES, Step
+from pipeline.insertion.steps import ENDED, PHASES, Puncture, Step
 from pipeline.plan.plan import Plan
 from pipeline.quantities import RUN, attributes
 from pipeline.report.history import last_stage
@@ -45,7 +44,7 @@ def along_path(dataset: xr.Dataset, plan: Plan, records: Mapping[str, Record]) -
     """Return the dataset of a study with depths in place of the stages of its insertions; another one as it is.
 
     All cases have the same depths; values are missing beyond the depth at which a path ended. With a withdrawal there
-    is the dimension ``stroke``, too.
+    is the dimension ``stroke``, too; with a tougher layer below another, ``puncture``.
     """
     study = plan.study
     if not study.is_insertion:
@@ -70,19 +69,27 @@ def along_path(dataset: xr.Dataset, plan: Plan, records: Mapping[str, Record]) -
     phases = np.array([[_phases(steps, depths) for steps in each] for each in strokes], dtype=np.int8)
     if not withdraws:
         values, phases = values[:, 0], phases[:, 0]
-    both, sides = np.array([_at_puncture(path) for path in found]), ["before", "after"]
+    # One puncture without a dimension; several have one.
+    many, of_puncture = study.punctures, ("puncture",) if study.punctures > 1 else ()
+    pierced = [[*path.punctures, *[None] * many][:many] for path in found]
+    once = np.array([[_puncture(one) for one in each] for each in pierced])
+    both, sides = np.array([[_at_puncture(one) for one in each] for each in pierced]), ["before", "after"]
+    if not of_puncture:
+        once, both = once[:, 0], both[:, 0]
     variables = {name: variable(name, values[..., number], *more) for number, name in enumerate(STEPS)}
     flags = {"flag_values": np.arange(len(PHASES), dtype=np.int8), "flag_meanings": " ".join(PHASES)}
     variables["phase"] = variable("phase", phases, *more, **flags)
-    for name, own in zip(_PUNCTURE, np.array([_puncture(path) for path in found]).T, strict=True):
-        variables[name] = variable(name, own)
+    for number, name in enumerate(_PUNCTURE):
+        variables[name] = variable(name, once[..., number], *of_puncture)
     for number, name in enumerate(AT_PUNCTURE):
         what = f"{attributes(name)['long_name']}; on both sides of the puncture"
-        variables[f"{name}_at_puncture"] = variable(name, both[..., number], "side", long_name=what)
+        variables[f"{name}_at_puncture"] = variable(name, both[..., number], *of_puncture, "side", long_name=what)
     for name in ("status", "message"):
         texts = np.array([getattr(path, name) for path in found], dtype=object)
         variables[name] = variable(name, texts)
     coordinates = {"depth": ("depth", list(depths), attributes("depth")), "side": ("side", sides, attributes("side"))}
+    if of_puncture:
+        coordinates["puncture"] = ("puncture", np.arange(1, many + 1), attributes("puncture"))
     if withdraws:
         coordinates["stroke"] = ("stroke", ["insertion", "withdrawal"], attributes("stroke"))
     return whole.assign(variables).assign_coords(coordinates)
@@ -115,11 +122,10 @@ def _phases(steps: Sequence[Step], depths: Sequence[float]) -> list[int]:
     return [PHASES.index(by_depth.get(depth, ENDED)) for depth in depths]
 
 
-def _puncture(path: Path) -> tuple[float, ...]:
-    one = path.puncture
+def _puncture(one: Puncture | None) -> tuple[float, ...]:
     return (one.depth, one.depth_error, one.force, one.force_error) if one else (np.nan,) * len(_PUNCTURE)
 
 
-def _at_puncture(path: Path) -> list[tuple[float, ...]]:
-    sides = (path.puncture.before, path.puncture.after) if path.puncture else ()
+def _at_puncture(one: Puncture | None) -> list[tuple[float, ...]]:
+    sides = (one.before, one.after) if one else ()
     return [_of(side)[:-1] for side in sides] or [(np.nan,) * len(AT_PUNCTURE)] * 2

@@ -1,11 +1,13 @@
-"""An insertion in words: its puncture, the force while cutting, and the balance of energies."""
+"""An insertion in words: its punctures, the force while cutting, and the balance of energies."""
 
 from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
+from pipeline.insertion.steps import INDENTATION, PHASES
 from pipeline.quantities import write
+from pipeline.report.values import punctures
 
 
 def answer(dataset: xr.Dataset) -> Iterator[str]:
@@ -26,12 +28,18 @@ def _lines(dataset: xr.Dataset) -> Iterator[str]:
     if not reached.sizes["depth"]:
         return
     last = reached.isel(depth=-1)
-    if np.isnan(float(dataset["puncture_depth"])):
+    pierced = punctures(dataset)
+    for number in pierced["puncture"].values:
+        one = pierced.sel(puncture=number)
+        depth, bar = (write("depth", round(float(one[f"puncture_depth{end}"]), 8)) for end in ("", "_error"))
+        force, of_force = (1e3 * float(one[f"puncture_force{end}"]) for end in ("", "_error"))
+        where = f" of layer {number}" if number > 1 else ""
+        yield f"puncture{where} at {depth} ± {bar}, F = {force:.4g} ± {of_force:.2g} mN"
+    if not pierced.sizes["puncture"]:
         yield f"the tissue stays whole down to {write('depth', float(last['depth']))}: F is {_force(last)} there"
+    elif PHASES[int(last["phase"])] == INDENTATION:
+        yield f"a tougher layer is indented down to {write('depth', float(last['depth']))}: F is {_force(last)} there"
     else:
-        depth, bar = (write("depth", round(float(dataset[f"puncture_depth{end}"]), 8)) for end in ("", "_error"))
-        force, of_force = (1e3 * float(dataset[f"puncture_force{end}"]) for end in ("", "_error"))
-        yield f"puncture at {depth} ± {bar}, F = {force:.4g} ± {of_force:.2g} mN"
         parts = ", ".join(
             f"{part} {1e3 * float(last[f'force_{part}']):.4g}" for part in ("elastic", "cutting", "friction")
         )

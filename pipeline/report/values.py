@@ -56,19 +56,29 @@ def has_path(dataset: xr.Dataset) -> bool:
 def of_path(dataset: xr.Dataset) -> xr.Dataset:
     """Return what a path of an insertion is judged by, as ``force`` along the dimension ``quantity``.
 
-    These are force and depth of the puncture, and the force at the last depth.
+    These are force and depth of each puncture, and the force at the last depth.
     """
     dataset = dataset.isel(stroke=0, drop=True) if "stroke" in dataset.dims else dataset
     last = dataset.isel(depth=-1, drop=True)
-    found = {}
-    for name, parts in (("force", _JUDGED), ("force_error", [f"{name}_error" for name in _JUDGED])):
-        found[name] = xr.concat([last[part] for part in parts], "quantity").transpose(..., "quantity")
+    judged, names, found = [], [], {}
+    for number in range(last.sizes.get("puncture", 1)):
+        one = last.isel(puncture=number, drop=True) if "puncture" in last.dims else last
+        if number == 0 or one["puncture_depth"].notnull().any():
+            judged += [(one, "puncture_force"), (one, "puncture_depth")]
+            which = f" of layer {number + 1}" if number else ""
+            names += [f"force of the puncture{which}", f"depth of the puncture{which}"]
+    for name, end in (("force", ""), ("force_error", "_error")):
+        parts = [one[f"{part}{end}"] for one, part in [*judged, (last, "force")]]
+        found[name] = xr.concat(parts, "quantity").transpose(..., "quantity")
     full = at_full_order(found["force"]) if "epsilon" in found["force"].dims else found["force"] * np.nan
     found |= {"force_max": full, "force_ratio": found["force"] / full}
-    return last.assign(found).assign_coords(quantity=["force of the puncture", "depth of the puncture", "last force"])
+    return last.assign(found).assign_coords(quantity=[*names, "last force"])
 
 
-_JUDGED = ("puncture_force", "puncture_depth", "force")
+def punctures(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a path with the dimension ``puncture``, without those that are missing."""
+    found = dataset if "puncture" in dataset.dims else dataset.expand_dims(puncture=[1])
+    return found.isel(puncture=np.flatnonzero(np.isfinite(found["puncture_depth"].values)))
 
 
 def elastic(dataset: xr.Dataset) -> xr.Dataset:

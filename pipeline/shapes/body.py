@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from functools import cached_property
 from itertools import accumulate
 from math import inf
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self, cast
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.closed import Closed
@@ -13,7 +13,7 @@ from pipeline.shapes.half_plane import HalfPlane
 from pipeline.shapes.regions import Embedded, Inclusion, Layer, Region
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.segment import Segment
-from pipeline.shapes.support import Fixed, Support, support_of
+from pipeline.shapes.support import Below, Fixed, Support, support_of
 from pipeline.shapes.surface import Surface
 from pipeline.shapes.tissue import Tissue
 
@@ -277,6 +277,18 @@ class Layered(Drawn):
         low, high = self.heights
         ends = (high - total for total in accumulate(layer.thickness or inf for layer in self.layer))
         return tuple(end for end in ends if end - low > _SAME * (high - low))
+
+    @abstractmethod
+    def without_top(self, depth: float) -> dict[str, Any]:
+        """Return the keys of its size without the tissue above a ``depth`` (m) below the top."""
+
+    def below(self, number: int) -> Self:
+        """Return the body without its first ``number`` layers: the top is where they ended."""
+        depth = self.heights[1] - self.interfaces[number - 1]
+        fixed = Below(below=self.fixed.below + depth) if isinstance(self.fixed, Below) else self.fixed
+        changes = self.without_top(depth) | {"layer": self.layer[number:], "fixed": fixed}
+        own = {name: getattr(self, name) for name in type(self).model_fields}
+        return cast("Self", type(self).model_construct(self.model_fields_set, **(own | changes)))
 
     @property
     @abstractmethod

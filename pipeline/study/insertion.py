@@ -27,7 +27,8 @@ def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
     if len(problems.errors) == before and isinstance(body, Layered):
         _check_end(body, tool, insertion, problems)
         _check_layers(body, tool, insertion, problems)
-        _warn_of_tougher_layers(body, tool, insertion, problems)
+        if tool.CUTS == "crack":
+            _warn_of_tougher_layers(body, tool, insertion, problems)
         if insertion.withdraw and body.layer:
             problems.error(
                 "probe.insertion.withdraw", True, "withdrawal is computed in a body of one material: omit it, or layers"

@@ -38,6 +38,23 @@ def interfaces(bodies: Sequence[Body]) -> tuple[float, ...]:
     return tuple(sorted({canonical(body.heights[1] - end) for body in bodies for end in body.interfaces}))
 
 
+def punctures(tools: Sequence[Inserted], bodies: Sequence[Body]) -> int:
+    """Return the number of layers, from the surface down, that end with the last one that a tool may pierce."""
+    return max(number for tool in tools for body in bodies for number in pierced(tool, body))
+
+
+def pierced(tool: Inserted, body: Body) -> list[int]:
+    """Return the numbers of the layers that a tool may indent before it cuts: the first, and each that is tougher.
+
+    Tougher than the layer above, and within reach.
+    """
+    assert tool.insertion is not None
+    own = [getattr(layer, "toughness", None) or tool.toughness for layer in getattr(body, "layer", ())]
+    tough = [one or 0.0 for one in (*own, tool.toughness)]
+    reach = [end for end in interfaces([body]) if end < tool.insertion.to]
+    return [1, *(number for number in range(2, len(reach) + 2) if tough[number - 1] > tough[number - 2])]
+
+
 def step_depths(tools: Sequence[Inserted], ends: Sequence[float]) -> tuple[float, ...]:
     """Return the depths (m) of the steps: equal ones, but half a width or more away from the interfaces at ``ends``."""
     insertion, room = tools[0].insertion, max(tool.insertion_clearance for tool in tools)

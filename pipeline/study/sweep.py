@@ -5,16 +5,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import prod
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from pipeline.shapes.body import Body
-from pipeline.shapes.insertion import Insertion
+from pipeline.shapes.insertion import Inserted, Insertion
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
 from pipeline.study.case import Case
 from pipeline.study.identification import Identification
 from pipeline.study.identified import NOTHING, Identified
+from pipeline.study.insertion_stages import punctures
 from pipeline.study.loads import Load
 from pipeline.study.measurement import Measurement
 from pipeline.study.output import Output
@@ -86,6 +87,13 @@ class Study:
         """The depths (m) of the steps of its insertion."""
         (axis,) = (axis for axis in self.axes if axis.is_stage)
         return tuple(float(depth) for depth in axis.labels[1:])
+
+    @property
+    def punctures(self) -> int:
+        """The number of layers, from the surface down, that end with the last one that a tool may pierce."""
+        return punctures(
+            cast("Sequence[Inserted]", self.sections["tool"]), cast("Sequence[Body]", self.sections["body"])
+        )
 
     def tool(self, case: Case) -> Probe:
         """Return the tool of a case as the file has it, not at one of its stages."""

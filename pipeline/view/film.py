@@ -17,6 +17,7 @@ from pipeline.files import atomic
 from pipeline.insertion.steps import PHASES
 from pipeline.report.figures.insertion import with_puncture
 from pipeline.report.figures.style import COLOURS, DEFAULTS, GRID, LINE
+from pipeline.report.values import punctures
 from pipeline.shapes.probes.blade import Blade
 from pipeline.view.palette import TOOL
 from pipeline.view.section import Section
@@ -37,26 +38,33 @@ class Frame:
     force: float
     crack: float
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether the body has no slit."""
+        return bool(np.isnan(self.crack))
+
 
 def frames_of(path: xr.Dataset) -> Iterator[Frame]:
     """Yield the frames of the path of one case, in the order of the motion, with both sides of the puncture."""
     strokes = [path.isel(stroke=number) for number in range(2)] if "stroke" in path.dims else [path]
-    pierced = float(path["puncture_depth"])
+    pierced = punctures(path)
     for number, stroke in enumerate(strokes):
         known = stroke.isel(depth=np.flatnonzero(np.isfinite(stroke["force"].values)))
         phases = [PHASES[int(phase)] for phase in known["phase"]]
         found = [_frame(known.isel(depth=place), phase) for place, phase in enumerate(phases)]
-        if number == 0 and np.isfinite(pierced):
-            peak, fall = path["force_at_puncture"].values
-            found.append(Frame(pierced, "indentation", float(peak), np.nan))
-            found.append(Frame(pierced, "puncture", float(fall), float(path["crack_depth_at_puncture"][1])))
+        if number == 0:
+            for place in range(pierced.sizes["puncture"]):
+                one = pierced.isel(puncture=place)
+                depth, (peak, fall) = float(one["puncture_depth"]), one["force_at_puncture"].values
+                fronts = one["crack_depth_at_puncture"].values
+                found.append(Frame(depth, "indentation", float(peak), float(fronts[0]) or np.nan))
+                found.append(Frame(depth, "puncture", float(fall), float(fronts[1])))
             found.sort(key=lambda one: (one.depth, one.phase != "indentation", one.phase != "puncture"))
         yield from found if number == 0 else found[::-1]
 
 
 def _frame(step: xr.Dataset, phase: str) -> Frame:
-    crack = np.nan if phase == "indentation" else float(step["crack_depth"])
-    return Frame(float(step["depth"]), phase, float(step["force"]), crack)
+    return Frame(float(step["depth"]), phase, float(step["force"]), float(step["crack_depth"]) or np.nan)
 
 
 def write_film(path: xr.Dataset, blade: Blade, sections: Mapping[float, Section], file: Path, title: str) -> Path:
@@ -66,7 +74,7 @@ def write_film(path: xr.Dataset, blade: Blade, sections: Mapping[float, Section]
     last depth, to which the displacement is proportional. At the puncture the nearest slit is shown.
     """
     frames, last = list(frames_of(path)), float(path["depth"][-1])
-    pressed = max((frame.depth for frame in frames if frame.phase == "indentation"), default=0.0)
+    pressed = max((frame.depth for frame in frames if frame.is_whole), default=0.0)
     largest = _MM * max(pressed, *(float(section.size.max()) for depth, section in sections.items() if depth > 0), 0.0)
     solved = np.array([depth for depth in sections if depth > 0])
     with mpl.rc_context(DEFAULTS | {"font.size": 8}), atomic(file) as temporary:
@@ -80,7 +88,7 @@ def write_film(path: xr.Dataset, blade: Blade, sections: Mapping[float, Section]
         writer = PillowWriter(fps=_RATE)
         writer.setup(figure, str(temporary), dpi=_DOTS)
         for frame in [*frames, *[frames[-1]] * _LAST]:
-            intact = frame.phase == "indentation"
+            intact = frame.is_whole
             key = 0.0 if intact else float(solved[np.argmin(abs(solved - frame.depth))])
             share = frame.depth / blade.depth if intact else 1.0  # the path may end above the blade's last depth
             _draw_section(left, sections[key], frame, blade, share=share, largest=largest)

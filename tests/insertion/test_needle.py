@@ -89,9 +89,9 @@ def path():
 def test_tissue_is_pierced_where_the_intact_body_has_the_energy_of_the_cut_one(path):
     depth = brentq(lambda d: STIFFNESS * d**3 / 3 - (STORED + TORN) * energy(d), 0.4e-3, 3e-3)
     assert path.status == OK
-    assert path.puncture.depth == pytest.approx(depth, rel=1e-4)
-    assert path.puncture.force == pytest.approx(STIFFNESS * depth**2, rel=1e-4)
-    assert path.puncture.after.force < path.puncture.force
+    assert path.punctures[0].depth == pytest.approx(depth, rel=1e-4)
+    assert path.punctures[0].force == pytest.approx(STIFFNESS * depth**2, rel=1e-4)
+    assert path.punctures[0].after.force < path.punctures[0].force
     assert {step.phase for step in path.steps if step.depth < depth} == {INDENTATION}
 
 
@@ -118,7 +118,7 @@ def test_withdrawal_cuts_nothing_and_friction_is_reversed(path):
 
 def test_a_needle_that_cannot_be_pressed_deep_enough_leaves_what_is_solved():
     path = path_of(scene(), fails=lambda solve: not solve.case.probe.crack and solve.case.probe.depth > 0.6e-3)
-    assert path.status == PARTIAL and path.puncture is None
+    assert path.status == PARTIAL and not path.punctures
     assert [step.depth for step in path.steps] == pytest.approx([0.25e-3, 0.5e-3])
     assert path.message == "1 mm: tissue is turned inside out"
 

@@ -1,5 +1,8 @@
 """Paths through a body whose states have closed forms: the puncture, the force of cutting, and what failures leave."""
 
+from dataclasses import replace
+from itertools import groupby
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -108,11 +111,54 @@ def test_what_is_cut_stays_cut_in_a_layer_that_the_intact_body_would_not_tear():
     probe = BLADE | {"toughness": "60 J/m^2"}
     body = SCENE["body"] | {"layer": [layer | {"toughness": "2 J/m^2"}]}
     found = _path(read_mapping(SCENE | {"body": body, "probe": probe}, "layers"))
-    assert float(found["puncture_depth"]) < 1.5e-3
-    assert np.all(np.diff(found["phase"]) >= 0) and found["message"] == ""
-    deep = found.isel(depth=-1)
-    assert float(deep["energy_fracture"]) > STIFFNESS * float(deep["depth"]) ** 2 / 2
-    assert "at 3 mm the tissue below is tougher" in found.attrs["warnings"]
+    assert float(found["puncture_depth"][0]) < 1.5e-3 and found["message"] == ""
+    assert _phases(found) == ["indentation", "cutting", "indentation"] and np.isnan(found["puncture_depth"][1])
+    deep, end = found.isel(depth=found["depth"].values > 3e-3), 3e-3
+    np.testing.assert_allclose(deep["crack_depth"], end, rtol=1e-3)
+    np.testing.assert_allclose(np.diff(deep["force_elastic"]) / np.diff(deep["depth"]), 1.5 * STIFFNESS)
+    assert np.abs(found["energy_balance"].values).max() < 0.02
+
+
+@pytest.mark.parametrize("stiffer", [1.0, 2.0])
+def test_a_tougher_layer_is_indented_from_the_force_of_cutting_and_pierced_by_energy(stiffer):
+    """The rule of the first puncture: the state with less energy, at equal depth."""
+    layer = {"name": "fat", "thickness": "2.1 mm", "young": f"{20 / stiffer} kPa", "poisson": 0.3}
+    body = SCENE["body"] | {"layer": [layer | {"toughness": "2 J/m^2"}]}
+    study = read_mapping(SCENE | {"body": body, "probe": BLADE | {"insertion": {"to": "6 mm", "steps": 24}}}, "layers")
+    found = _path(study)
+    assert _phases(found) == ["indentation", "cutting", "indentation", "cutting"]
+    second = found.sel(puncture=2)
+    stiffness = (1 + 0.5 / stiffer) * STIFFNESS
+    last = found.isel(depth=found["depth"].values < 2.05e-3).isel(depth=-1)
+    arrived = float(last["force_elastic"] + last["force_cutting"])
+    touch = 2.1e-3 - float(last["crack_depth"] - last["depth"])
+    before, after = second["force_elastic_at_puncture"].values + second["force_cutting_at_puncture"].values
+    assert before == pytest.approx(arrived + stiffness * (float(second["puncture_depth"]) - touch), rel=1e-6)
+    assert before == pytest.approx(2 * after - arrived, rel=0.15)
+    energies = sum(second[f"energy_{name}_at_puncture"].values for name in ("stored", "fracture"))
+    assert energies[1] == pytest.approx(energies[0], rel=2e-3)
+    assert float(second["puncture_force_error"]) > 0.3 / stiffer * STIFFNESS * (
+        float(second["puncture_depth"]) - 2.1e-3
+    )
+    assert float(second["force_friction_at_puncture"][0]) > 0
+    assert np.abs(found["energy_balance"].values).max() < 0.02
+
+
+def test_layers_below_that_cannot_be_solved_end_the_path_at_their_interface():
+    layer = {"name": "fat", "thickness": "2.1 mm", "young": "20 kPa", "poisson": 0.3, "toughness": "2 J/m^2"}
+    study = read_mapping(SCENE | {"body": SCENE["body"] | {"layer": [layer]}}, "layers")
+    plan, records = solved(study)
+    records |= {
+        key: replace(records[key], status="failed", message="too thin") for key in records if key not in plan.keys
+    }
+    found = build(plan, records)
+    assert found["status"] == "partial" and found["message"] == "2.1 mm: the intact layers below: too thin"
+    assert float(found["force"].dropna("depth")["depth"][-1]) < 2.1e-3
+
+
+def _phases(path):
+    """Return the phases of a path, each once."""
+    return [PHASES[number] for number, _ in groupby(path["phase"].values)]
 
 
 def test_a_state_that_fails_ends_the_path_there_and_earlier_ones_are_kept():

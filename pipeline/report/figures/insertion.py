@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.curves import BARS, grid, share
 from pipeline.report.figures.facets import arrange, swept
 from pipeline.report.figures.style import COLOURS, LINE, WIDTH, finish, look, new_figure
+from pipeline.report.values import punctures
 from pipeline.report.words import choices
 
 _HEIGHT = 5.2  # inches
@@ -23,6 +24,7 @@ _LOW = 0.1
 _BAND = {"color": LINE, "alpha": 0.15, "linewidth": 0}
 _LABELS = ("cutting", "friction", "elastic")
 _OF_SEVERAL = "The force over depth; markers are the punctures. Bands and bars are 95\N{NO-BREAK SPACE}% error bars."
+_BARRED = ("depth", "force", "force_error", "depth_error")
 # Curves, columns and rows of a figure of several cases, and what is a curve first.
 _MOST, _CURVES = (6, 3, 1), ("epsilon", "friction", "toughness", "poisson", "law")
 _CAPTION = (
@@ -73,13 +75,12 @@ def _several(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             color, label = style["color"], choices(dataset, curve) or "F"
             panel.ax.fill_between(1e3 * depth, 1e3 * (force - bar), 1e3 * (force + bar), color=color, alpha=0.15)
             panel.ax.plot(1e3 * depth, 1e3 * force, **(style | {"marker": "none"}), label=label)
-            at = {name: 1e3 * float(one[f"puncture_{name}"]) for name in ("depth", "force")}
-            bars = {name: 1e3 * float(one[f"puncture_{name}_error"]) for name in at}
+            pierced = punctures(one)
             panel.ax.errorbar(
-                [at["depth"]],
-                [at["force"]],
-                [bars["force"]],
-                [bars["depth"]],
+                *(
+                    1e3 * pierced[f"puncture_{name}"].values
+                    for name in ("depth", "force", "force_error", "depth_error")
+                ),
                 **(style | {"linestyle": "none"}),
                 **BARS,
             )
@@ -90,12 +91,11 @@ def _several(dataset: xr.Dataset, title: str, warning: str) -> Figure:
 
 
 def with_puncture(dataset: xr.Dataset, name: str) -> np.ndarray:
-    """Return values along the path, with those of the first touch and of both sides of the puncture."""
-    depths, at = dataset["depth"].values, float(dataset["puncture_depth"])
-    own = np.full(2, at) if name == "depth" else dataset[f"{name}_at_puncture"].values
-    place = int(np.searchsorted(depths, at)) if np.isfinite(at) else 0
-    own = own if np.isfinite(at) else own[:0]
-    return np.concatenate([[0.0], dataset[name].values[:place], own, dataset[name].values[place:]])
+    """Return values along the path, with those of the first touch and of both sides of each puncture."""
+    pierced = punctures(dataset)
+    depths, at = dataset["depth"].values, np.repeat(pierced["puncture_depth"].values, 2)
+    own = at if name == "depth" else pierced[f"{name}_at_puncture"].transpose("puncture", "side").values.ravel()
+    return np.concatenate([[0.0], np.insert(dataset[name].values.astype(float), np.searchsorted(depths, at), own)])
 
 
 def _stack(ax: Axes, dataset: xr.Dataset, names: Sequence[str], factor: float) -> None:
@@ -105,15 +105,17 @@ def _stack(ax: Axes, dataset: xr.Dataset, names: Sequence[str], factor: float) -
 
 
 def _name_phases(ax: Axes, dataset: xr.Dataset) -> None:
-    """Mark the puncture, and name the phases beside it."""
-    end, depth = 1e3 * float(dataset["depth"][-1]), 1e3 * float(dataset["puncture_depth"])
+    """Mark the punctures, and name the phases beside the first one."""
+    end, depths = 1e3 * float(dataset["depth"][-1]), 1e3 * punctures(dataset)["puncture_depth"].values
     low, top = ax.get_ylim()
     ax.set_ylim(low if low < -_LOW * top else 0, 1.12 * top)
-    if np.isnan(depth):
+    if not len(depths):
         ax.text(end / 2, 1.04 * top, "indentation", ha="center")
         return
-    ax.axvline(depth, color=LINE, linewidth=0.6, linestyle=":")
-    ax.text((depth + end) / 2, 1.04 * top, "cutting", ha="center")
-    ax.annotate("puncture", (depth, 1.04 * top), xytext=(4, 0), textcoords="offset points")
-    if depth > _WIDE * end:
-        ax.text(depth / 2, 1.04 * top, "indentation", ha="center")
+    for depth in depths:
+        ax.axvline(depth, color=LINE, linewidth=0.6, linestyle=":")
+        ax.annotate("puncture", (depth, 1.04 * top), xytext=(4, 0), textcoords="offset points")
+    if len(depths) == 1:
+        ax.text((depths[0] + end) / 2, 1.04 * top, "cutting", ha="center")
+    if depths[0] > _WIDE * end:
+        ax.text(depths[0] / 2, 1.04 * top, "indentation", ha="center")

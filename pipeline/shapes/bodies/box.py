@@ -46,6 +46,10 @@ class Box(Layered):
         """Heights z (m) of bottom and top."""
         return -self.size[2], 0.0
 
+    def without_top(self, depth: float) -> dict[str, Any]:
+        """Return a smaller size along z."""
+        return {"size": (*self.size[:2], self.size[2] - depth)}
+
     @property
     def volume(self) -> float:
         """Volume (m³)."""

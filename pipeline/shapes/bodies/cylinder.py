@@ -40,6 +40,10 @@ class Cylinder(Layered):
         """Heights z (m) of bottom and top."""
         return -self.height, 0.0
 
+    def without_top(self, depth: float) -> dict[str, Any]:
+        """Return a smaller height."""
+        return {"height": self.height - depth}
+
     @property
     def volume(self) -> float:
         """Volume (m³)."""
