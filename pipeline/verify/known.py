@@ -7,6 +7,7 @@ from collections.abc import Callable
 from math import acos, cos, log, pi, sin, sqrt, tan
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 from scipy.special import ellipk
 
 from pipeline.arrays import FloatArray
@@ -202,3 +203,19 @@ def tough_needle(toughness: float) -> tuple[float, float]:
     """
     half = pi / (2 * toughness)
     return half, log(2 / half) + 1
+
+
+def flat_punch(toughness: float) -> tuple[float, float]:
+    """Return the radius b of the ring crack under a flat punch, and the force without friction per area of it.
+
+    In units of the radius R and of μ; the toughness is Γ/(μ R). Incompressible and neo-Hookean: the column within the
+    crack has the stretch λ = b²/R² along it, and the hole has the energy of a cylindrical cavity. Least over b, after
+    O. A. Shergold and N. A. Fleck 2004.
+    """
+
+    def pressure(stretch: float) -> float:
+        column, hole = (stretch**2 + 2 / stretch - 3) / 2, (1 - 1 / stretch) * log(stretch) / 2
+        return (stretch * (column + hole) + 2 * sqrt(stretch) * toughness) / (1 - stretch)
+
+    found = minimize_scalar(pressure, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-9})
+    return sqrt(found.x), float(found.fun)

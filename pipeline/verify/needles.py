@@ -1,4 +1,4 @@
-"""A crack in plane strain that a cylinder holds open: at small openings and at large ones, against closed forms."""
+"""Cracks deep in tissue that a shaft holds open: at small openings and at large ones, against closed forms."""
 
 from collections.abc import Callable, Iterator
 from math import pi
@@ -8,16 +8,19 @@ from mpi4py import MPI
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.plane.crack import LEVELS, open_crack
 from pipeline.solve.plane.opening import Opening
+from pipeline.solve.plane.ring import ring_cuts
 from pipeline.verify import known
 from pipeline.verify.row import Row
 
 _INCOMPRESSIBLE = MaterialLaw.of_moduli(3.0, 0.5, "neo-hookean")
 # G/(μ R) up to which the crack is opened, and the number of the small opening that is compared.
 _MOST, _SMALL = 7.0, 4
+# Γ/(μ R) of the ring crack, and the relative error of its least energy, whose place is known to 1e-5.
+_TOUGHNESS, _LEAST = 1.0, 1e-5
 
 
 def needle_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows of cracks that a cylinder opens, none if ``quick``; collective."""
+    """Yield the rows of cracks that a cylinder opens, and of a ring crack, none if ``quick``; collective."""
     if quick:
         return
     yield from comm.bcast(list(_rows()) if comm.rank == 0 else [])
@@ -64,4 +67,14 @@ def _rows() -> Iterator[Row]:
         lambda opening: shaft_pressure(opening, tough),
         known.tough_needle(tough)[1],
         "cavity in an infinite body",
+    )
+    low, high = ring_cuts(_INCOMPRESSIBLE, _TOUGHNESS)
+    yield Row(
+        "ring crack under a flat punch, neo-Hookean, ν = 0.5: pressure on it",
+        "round slice",
+        known.flat_punch(_TOUGHNESS)[1],
+        "least energy of column and hole, after O. A. Shergold and N. A. Fleck 2004",
+        high.energy / pi,
+        abs(low.energy / high.energy - 1) + high.balance,
+        _LEAST,
     )

@@ -160,7 +160,7 @@ def test_twice_the_modulus_and_the_toughness_needs_twice_the_force(monkeypatch):
 
     def answer(young, toughness):
         law, movement = MaterialLaw.of_moduli(young, 0.5, "neo-hookean"), Movement.along((0.0, 0.0, -RADIUS))
-        return needle.NeedleSolver(RADIUS, toughness).answer(Request(law, movement))
+        return needle.NeedleSolver(RADIUS, toughness, needle.plane_cuts).answer(Request(law, movement))
 
     # μ = 10 kPa; f = ρ³ and Γ = μ R/2 give ρ = 1 and e = 2 μ R².
     soft, stiff = answer(30e3, 2.5), answer(60e3, 5.0)

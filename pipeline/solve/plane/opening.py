@@ -18,22 +18,15 @@ from pipeline.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class Opening:
-    """Energies f (n,), in units of μ b², and their derivatives f' (n,) by the ratio, at rising ``ratios`` (n,) R/b.
+class Energies:
+    """Energies f (n,) and their derivatives f' (n,) at rising ``ratios`` ρ (n,).
 
-    ``thrusts`` (n,), in units of μ b per length, hold each face away from the line of the crack; ``angles`` (n,) are
-    those of the cylinder's surface, from the middle of a face, up to which it touches. Between the ratios, ln f is a
-    smooth function of ln ρ, beyond them a straight line. ``balance`` is the largest relative difference of the thrust
-    and what holds the tissue ahead of the tips. ``message`` says why no larger ratio was solved.
+    Between the ratios, ln f is a smooth function of ln ρ, beyond them a straight line.
     """
 
     ratios: FloatArray
     energies: FloatArray
     slopes: FloatArray
-    thrusts: FloatArray
-    angles: FloatArray
-    balance: float = 0.0
-    message: str = ""
 
     @cached_property
     def _logarithm(self) -> CubicHermiteSpline:
@@ -48,13 +41,29 @@ class Opening:
         return float(np.exp(self._logarithm(within) + exponent * (at - within))), exponent
 
     def energy(self, ratio: float) -> float:
-        """Return s/(μ b²) at a ratio."""
+        """Return f at a ratio."""
         return self._power(ratio)[0]
 
     def pressure(self, ratio: float) -> float:
-        """Return N/(μ b) at a ratio."""
+        """Return f' at a ratio."""
         energy, exponent = self._power(ratio)
         return energy * exponent / ratio
+
+
+@dataclass(frozen=True, eq=False)
+class Opening(Energies):
+    """Energies f = s/(μ b²) of a crack over the ratio R/b; f' is N/(μ b).
+
+    ``thrusts`` (n,), in units of μ b per length, hold each face away from the line of the crack; ``angles`` (n,) are
+    those of the cylinder's surface, from the middle of a face, up to which it touches. ``balance`` is the largest
+    relative difference of the thrust and what holds the tissue ahead of the tips. ``message`` says why no larger ratio
+    was solved.
+    """
+
+    thrusts: FloatArray
+    angles: FloatArray
+    balance: float = 0.0
+    message: str = ""
 
     def release(self, ratio: float) -> float:
         """Return G/(μ R) at a ratio."""

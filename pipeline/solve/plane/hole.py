@@ -1,0 +1,89 @@
+"""A round hole that a rigid cylinder opens, in plane strain, at large displacements and without friction.
+
+The body is a slice, whose faces do not move along the axis. Lengths are in units of the hole's radius b, stresses in
+units of μ. Of a hole that is opened to the radius κb, energies are those over πb² and a unit of length. They are a
+function of the growth of the hole's area, κ² − 1, whose derivative is the pressure in the hole.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
+from pipeline.mesh.cracked import FACE
+from pipeline.mesh.hole import LEVEL, slice_round_hole
+from pipeline.mesh.meridian import meridian_mesh
+from pipeline.shapes.distance import Distance
+from pipeline.solve import SolveError
+from pipeline.solve.contact.contact_steps import ContactPath, Stage, press
+from pipeline.solve.contact.deformed import PlacedTool
+from pipeline.solve.meridian.forms import MeridianForms
+from pipeline.solve.meridian.system import FreeSystem
+from pipeline.solve.meridian.tissue import MeridianTissue
+from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.plane.opening import Energies
+from pipeline.stages import stage
+
+# Columns of elements along a factor e of the radius, on the coarse mesh and the fine one: their difference is the bar.
+COLUMNS = (4, 8)
+DEGREE = 3
+# The first growth of the area, the factor to the next one, and the radius of the body.
+_FIRST, _FACTOR, _EXTENT = 1e-2, 1.5, 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class Hole(Energies):
+    """Energies of a hole over the growth of its area, with the largest residual, in units of the force on the hole."""
+
+    balance: float
+
+
+def open_hole(law: MaterialLaw, columns: int, is_enough: Callable[[Hole], bool]) -> Hole:
+    """Return the energies of a hole in tissue of one ``law``, on this process alone, on a mesh of so many ``columns``.
+
+    Its area grows until the energies are enough.
+
+    Raises:
+        SolveError: if a state before cannot be solved.
+    """
+    with stage("meshing"):
+        mesh = meridian_mesh(slice_round_hole(_EXTENT, columns))
+    with stage("assembly"):
+        forms = MeridianForms({0: mesh}, DEGREE, law)
+    dofs, places = forms.on(FACE)
+    free = np.setdiff1d(np.arange(forms.dofs), forms.on(LEVEL)[0][:, 1])
+    tissue = MeridianTissue(FreeSystem(forms, free), dofs, places)
+    path, found = ContactPath(Stage(0.0, np.zeros_like(tissue.state))), list[tuple[float, float, float, float]]()
+    growth = _FIRST
+    while len(found) < 2 or not is_enough(_hole(found)):
+        try:
+            press(tissue, lambda wider: _cylinder(tissue, wider), path, np.sqrt(1 + growth) - 1)
+        except SolveError as error:
+            raise SolveError(f"a hole that is opened to {np.sqrt(1 + growth):.3g} times its radius: {error}") from error
+        tissue.state, touched = path.last.state, path.last.touched
+        assert touched is not None
+        # Forms are per radian, and the slice is as high as the hole is wide: the whole is 2π times, over π.
+        force = float(touched.pressed.sum())
+        state = growth, 2 * forms.energy(tissue.state), force / np.sqrt(1 + growth), tissue.unbalanced() / force
+        found.append(state)
+        growth *= _FACTOR
+    return _hole(found)
+
+
+def _hole(found: list[tuple[float, float, float, float]]) -> Hole:
+    growths, energies, pressures, left = np.array(found).T
+    return Hole(growths, energies, pressures, float(left.max()))
+
+
+def _cylinder(tissue: MeridianTissue, wider: float) -> PlacedTool:
+    """Return the cylinder that is ``wider`` than the hole by this part of its radius."""
+
+    def distance(points: FloatArray) -> Distance:
+        normal = np.tile([1.0, 0.0], (len(points), 1))
+        return Distance(points[:, 0] - 1 - wider, normal, np.zeros((len(points), 2, 2)))
+
+    def complete(active: BoolArray) -> BoolArray:
+        return active
+
+    return PlacedTool(distance, complete, np.zeros(len(tissue.places), dtype=bool), wider)
