@@ -1,137 +1,24 @@
-"""The path of a round needle: indentation until the cut tissue has less energy than the intact body, then cutting.
+"""The path of a needle: indentation until the cut tissue has less energy than the intact one, then cutting.
 
-Deep in tissue, an advance takes e = s + 2b Γ per depth: the energy that the shaft stores as it wedges a plane crack of
-length 2b open, and the work of fracture (:mod:`pipeline.solve.plane`). At a section of its tip with radius r < R, e
-goes like a power of r, whose exponent is R N/e, since de/dr is the pressure N around the needle. The energy of all
-sections down to a depth D is E(D), and its derivative the force of cutting. Tissue is pierced at the depth at which
-the intact body stores E. No threshold is fitted. Coulomb's friction is μ N per depth.
-
-Sections are those of an endless needle. What the surface and the tip change is not computed: the bar of E is what one
-radius of depth takes, and that of the force falls with the square of the depth.
+Tissue is pierced at the depth at which it stores what a cut to that depth takes, E(D) (:mod:`.shaft`). No threshold is
+fitted. At the interface to a layer that takes more per depth, the needle indents again (:mod:`.pressing`).
 """
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
-import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
-from pipeline.arrays import FloatArray
+from pipeline.insertion.pressing import Press, Pressed
+from pipeline.insertion.shaft import NeedleCut, ShaftCut
 from pipeline.insertion.states import InsertionScene, Solved
-from pipeline.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL, Path, Puncture, Step, with_work
+from pipeline.insertion.steps import INDENTATION, WITHDRAWAL, Path, Puncture, Step, with_work
 from pipeline.shapes.insertion import Needle
 
-# Depths at which the needle is pressed on the intact body, in half widths: the first, and the factor to the next one.
-_FIRST, _FACTOR = 0.5, 2.0
+# The factor from one depth at which the needle is pressed to the next one.
+_FACTOR = 2.0
+# Tissue that may be cut after so many half widths of the shaft is cut at the first touch.
+_TOUCH = 1e-3
 _TINY = 1e-6
-
-
-@dataclass(frozen=True)
-class _Cut:
-    """The cut of a needle: per depth of its shaft, energies ``stored`` and ``torn`` (N), and pressure (N/m).
-
-    The pressure is the change of both energies with the half width of the shaft, and Coulomb's friction for a
-    coefficient of 1: ``squeeze``. ``bar`` is the relative 95 % bar of each.
-    """
-
-    needle: Needle
-    stored: float
-    torn: float
-    squeeze: float
-    bar: float
-
-    @classmethod
-    def of(cls, needle: Needle, deep: Solved) -> "_Cut":
-        """Return the cut of a needle that was solved ``deep`` in tissue, over a depth of half its width."""
-        stored = deep.energy / needle.limit
-        return cls(needle, stored, deep.force - stored, deep.friction_force / needle.limit, deep.force_error)
-
-    @property
-    def force(self) -> float:
-        """The force (N) of the shaft without friction: the energy per depth."""
-        return self.stored + self.torn
-
-    @cached_property
-    def _heights(self) -> FloatArray:
-        return self.needle.tip_heights
-
-    @cached_property
-    def _exponent(self) -> float:
-        return self.squeeze * self.needle.limit / self.force
-
-    def share(self, depth: float, exponent: float) -> float:
-        """Return the radius at a height above the tip of this ``depth`` (m), over the shaft's, to a power."""
-        radii = np.linspace(0.0, 1.0, len(self._heights))
-        return float(np.interp(depth, self._heights, radii)) ** exponent
-
-    def length(self, depth: float, exponent: float) -> float:
-        """Return the integral (m) of :meth:`share` over the heights up to a ``depth`` (m)."""
-        ends = np.minimum(self._heights, depth)
-        middles = (np.arange(len(ends) - 1) + 0.5) / (len(ends) - 1)
-        return float(np.diff(ends) @ middles**exponent) + max(depth - self._heights[-1], 0.0)
-
-    def energy(self, depth: float) -> float:
-        """Return stored energy and work of fracture (J) with the tip at a depth (m)."""
-        return self.force * self.length(depth, self._exponent)
-
-    def energy_error(self, depth: float) -> float:
-        """Return the bar (J) of it: of the solve, and of one radius of depth at surface and tip."""
-        return self.bar * self.energy(depth) + self.force * self.needle.limit
-
-    def step(self, depth: float, phase: str = CUTTING) -> Step:
-        """Return the step at a depth (m), without its work; pulled out, no tissue is cut."""
-        share, length = self.share(depth, self._exponent), self.length(depth, self._exponent)
-        rubs = self.needle.friction * self.squeeze * self.length(depth, self._exponent - 1)
-        radius = self.needle.limit
-        force = self.force if phase == CUTTING else self.stored
-        ends = force * min(1.0, (radius / depth) ** 2) + rubs * min(1.0, radius / depth)
-        return Step(
-            phase=phase,
-            depth=depth,
-            elastic=self.stored * share,
-            cutting=self.torn * share if phase == CUTTING else 0.0,
-            friction=rubs if phase == CUTTING else -rubs,
-            error=self.bar * (force * share + rubs) + ends,
-            stored=self.stored * length,
-            fracture=self.torn * length,
-            crack_depth=depth,
-        )
-
-
-@dataclass(frozen=True)
-class _Intact:
-    """The intact body at ``depths`` (n) in m: energies (J), forces (N), and the relative bar of both."""
-
-    depths: FloatArray
-    energies: FloatArray
-    forces: FloatArray
-    bar: float
-
-    @cached_property
-    def _logarithm(self) -> CubicHermiteSpline | None:
-        if len(self.depths) < 2:
-            return None
-        return CubicHermiteSpline(np.log(self.depths), np.log(self.energies), self._exponents)
-
-    @property
-    def _exponents(self) -> FloatArray:
-        return self.depths * self.forces / self.energies
-
-    def at(self, depth: float) -> tuple[float, float]:
-        """Return energy (J) and force (N) at a depth (m) up to the last one; a power of it below the first."""
-        first, exponent = self.depths[0], float(self._exponents[0])
-        if depth <= first or self._logarithm is None:
-            energy = float(self.energies[0]) * (depth / first) ** exponent
-            return energy, exponent * energy / depth
-        at = np.log(depth)
-        energy = float(np.exp(self._logarithm(at)))
-        return energy, float(self._logarithm(at, 1)) * energy / depth
-
-    def step(self, depth: float) -> Step:
-        """Return the step at a depth (m)."""
-        energy, force = self.at(depth)
-        return Step(INDENTATION, depth, force, error=self.bar * force, stored=energy, work=energy)
 
 
 class NeedleScene(InsertionScene[Needle]):
@@ -142,53 +29,124 @@ class NeedleScene(InsertionScene[Needle]):
         return self.depths
 
     def _follow(self) -> Path:
-        deep = self.solved(self.tool.cutting())
-        if isinstance(deep, str):
-            return Path(message=f"the needle deep in tissue: {deep}")
-        cut, radius = _Cut.of(self.tool, deep), self.tool.limit
-        whole, message = self._intact(cut)
-        if whole is None:
+        cut, end, message = self._cut()
+        if cut is None:
             return Path(message=message)
-        deepest = float(whole.depths[-1])
-        if whole.at(deepest)[0] < cut.energy(deepest):
-            return Path(tuple(whole.step(depth) for depth in self.depths if depth <= deepest), message=message)
-        pierced = float(
-            brentq(lambda depth: whole.at(depth)[0] - cut.energy(depth), _TINY * radius, deepest, xtol=_TINY * radius)
-        )
-        return self._pierced(cut, whole, pierced)
+        steps, punctures, press = [Step(INDENTATION, 0.0, 0.0)], list[Puncture | None](), None
+        for number, top in enumerate(cut.tops):
+            punctures.append(None)
+            if number:
+                steps += self._cuts(cut, steps[-1], top)
+                if steps[-1].depth > top or not cut.takes_more(number):  # or it was pierced with the layer above
+                    continue
+            press, why = self._press(cut, number, steps[-1], end)
+            if press is None:
+                message = why
+                break
+            pierced = self._pierced(cut, press, end)
+            if pierced is None:
+                message = why or message
+                steps += self._presses(press, end)
+                break
+            if number and pierced == self._touch(press):
+                continue
+            steps += self._presses(press, pierced)
+            punctures[-1] = found = _puncture(cut, press, pierced)
+            steps.append(found.after)
+        else:
+            steps += self._cuts(cut, steps[-1], end)
+        back = self._withdrawn(cut, press, steps[-1]) if any(punctures) and not message else []
+        return Path(self._own(steps), tuple(punctures), message, self._own(back))
 
-    def _intact(self, cut: _Cut) -> tuple[_Intact | None, str]:
-        """Return the intact body up to where the cut has less energy, or as deep as it is solved, and why no deeper."""
-        found: list[tuple[float, Solved]] = []
-        depth, message = _FIRST * self.tool.limit, ""
+    def _own(self, steps: list[Step]) -> tuple[Step, ...]:
+        """Return the steps at the depths of the path, from the surface down."""
+        return tuple(sorted((step for step in steps if step.depth in self.depths), key=lambda step: step.depth))
+
+    # ---- cutting --------------------------------------------------------------------------------------
+
+    def _cut(self) -> tuple[NeedleCut | None, float, str]:
+        """Return the cut, as far as its layers are solved, the depth (m) to which it is, and why no deeper."""
+        layers = [layer for layer in self.layers if layer.top < self.insertion.to]
+        deep = [self.solved(self.tool.cutting(layer.toughness), n) for n, layer in enumerate(layers)]
+        found, end, message = list[ShaftCut](), self.insertion.to, ""
+        for layer, one in zip(layers, deep, strict=True):
+            if isinstance(one, str):
+                where = f"{1e3 * layer.top:.4g} mm: " if found else ""
+                end, message = layer.top, f"{where}the needle deep in tissue: {one}"
+                break
+            found.append(ShaftCut.of(self.tool, one))
+        tops = tuple(layer.top for layer in layers[: len(found)])
+        return (NeedleCut(self.tool, tops, tuple(found)) if found else None), end, message
+
+    def _cuts(self, cut: NeedleCut, last: Step, end: float) -> list[Step]:
+        """Return the steps of cutting after the ``last`` one, down to a depth (m)."""
+        depths = sorted({depth for depth in (*self.depths, end) if last.depth < depth <= end})
+        return with_work([last, *map(cut.step, depths)], self.interfaces)[1:]
+
+    def _withdrawn(self, cut: NeedleCut, press: Press | None, last: Step) -> list[Step]:
+        """Return the steps of the withdrawal after the ``last`` step: from the layer that is pressed, and the cut."""
+        if not self.insertion.withdraw:
+            return []
+        pressed = press if press and last.phase == INDENTATION else None
+        steps = [
+            pressed.step(depth, WITHDRAWAL) if pressed and depth > last.crack_depth else cut.step(depth, WITHDRAWAL)
+            for depth in reversed(self.depths)
+        ]
+        steps = [replace(step, fracture=last.fracture, crack_depth=last.crack_depth) for step in steps]
+        return with_work([replace(steps[0], work=last.work, rubbed=last.rubbed), *steps[1:]], self.interfaces)
+
+    # ---- indentation ----------------------------------------------------------------------------------
+
+    def _press(self, cut: NeedleCut, number: int, arrived: Step, end: float) -> tuple[Press | None, str]:
+        """Return the needle that presses on what is below a ``number`` of layers, and why it is solved no deeper.
+
+        It is solved until the tissue is pierced, and there, or to a depth ``end`` (m) of the tip.
+        """
+        found, press, depth = dict[float, Solved](), None, self.tool.first_depth
+        added = self.layers[number - 1].plane_modulus / self.layers[number].plane_modulus / 2 if number else 0.0
         while True:
-            depth = min(depth, self.insertion.to)
-            solved = self.solved(self.tool.pressed_to(depth))
-            if isinstance(solved, str):
-                message = f"{1e3 * depth:.4g} mm: {solved}"
+            one = self.solved(self.tool.pressed_to(depth), number)
+            if isinstance(one, str):
+                at = press.depth_of(depth) if press and press.is_reached else arrived.depth + (0.0 if number else depth)
+                return press, f"{1e3 * at:.4g} mm: {one}"
+            found[depth] = one
+            press = Press(Pressed.of(found), arrived, added)
+            if (pierced := self._pierced(cut, press, end)) or press.deepest >= end:
                 break
-            found.append((depth, solved))
-            if solved.energy >= cut.energy(depth) or depth >= self.insertion.to:
-                break
-            depth *= _FACTOR
-        if not found:
-            return None, message
-        depths, energies, forces = np.array([(at, one.energy, one.force) for at, one in found]).T
-        return _Intact(depths, energies, forces, max(one.force_error for _, one in found)), message
+            depth = min(_FACTOR * depth, press.own_depth(end)) if press.is_reached else _FACTOR * depth
+        if pierced:
+            depth = float(f"{press.own_depth(pierced):.3g}")
+            one = self.solved(self.tool.pressed_to(depth), number)
+            if not isinstance(one, str):
+                press = Press(Pressed.of(found | {depth: one}), arrived, added)
+        return press, ""
 
-    def _pierced(self, cut: _Cut, whole: _Intact, depth: float) -> Path:
-        before, after = whole.step(depth), cut.step(depth)
-        deeper = [cut.step(each) for each in self.depths if each > depth]
-        worked = with_work([replace(after, work=before.work), *deeper])
-        back: list[Step] = []
-        if self.insertion.withdraw:
-            last = worked[-1]
-            steps = [cut.step(each, WITHDRAWAL) for each in reversed(self.depths)]
-            first = replace(steps[0], work=last.work, rubbed=last.rubbed)
-            back = [replace(one, fracture=last.fracture) for one in with_work([first, *steps[1:]])][::-1]
-        error = cut.energy_error(depth) + whole.bar * before.stored
-        depth_error = error / max(before.force - after.elastic - after.cutting, _TINY * before.force)
-        slope = before.force / depth  # at least; the force grows faster than the depth
-        force_error = whole.bar * before.force + slope * depth_error
-        steps = [*(whole.step(each) for each in self.depths if each <= depth), *worked[1:]]
-        return Path(tuple(steps), (Puncture(before, worked[0], depth_error, force_error),), "", tuple(back))
+    def _touch(self, press: Press) -> float:
+        return press.arrived.depth + _TOUCH * self.tool.limit
+
+    def _pierced(self, cut: NeedleCut, press: Press, end: float) -> float | None:
+        """Return the depth (m) at which tissue is pierced; None if it is not, down to ``end`` (m)."""
+        touch, deepest, low = self._touch(press), min(press.deepest, end), press.arrived.depth
+
+        def excess(depth: float) -> float:
+            return press.energy(depth)[0] - (cut.energy(depth) - cut.energy(low))
+
+        if deepest <= touch or excess(deepest) < 0:
+            return None
+        return touch if excess(touch) >= 0 else float(brentq(excess, touch, deepest, xtol=_TINY * self.tool.limit))
+
+    def _presses(self, press: Press, end: float) -> list[Step]:
+        """Return the steps of indentation down to a depth (m)."""
+        end = min(end, press.deepest)
+        return [press.step(depth) for depth in self.depths if press.arrived.depth < depth <= end]
+
+
+def _puncture(cut: NeedleCut, press: Press, depth: float) -> Puncture:
+    """Return the puncture at a depth (m)."""
+    before, low = press.step(depth), press.arrived
+    after = replace(cut.step(depth), work=before.work, rubbed=before.rubbed)
+    error = cut.energy_error(depth, low.depth) + press.energy(depth)[1]
+    gained = before.elastic - low.elastic - low.cutting
+    depth_error = error / max(before.elastic - after.elastic - after.cutting, _TINY * before.elastic)
+    # The slope of the force is this at least: it grows faster than the depth.
+    return Puncture(before, after, depth_error, before.error + gained / (depth - low.depth) * depth_error)

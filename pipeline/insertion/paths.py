@@ -17,6 +17,7 @@ from pipeline.shapes.probe import Probe
 from pipeline.states import SKIPPED
 from pipeline.study.axis import Axis
 from pipeline.study.case import Case, Scale
+from pipeline.study.schema import material_of
 from pipeline.study.sweep import Study
 
 if TYPE_CHECKING:
@@ -57,15 +58,19 @@ class CaseStates:
     def of(self, state: Inserted, below: int = 0) -> Scalable | None:
         """Return the record of a state of the tool: that of a stage, or of a case that is solved besides.
 
-        It is on the case's body, or what is ``below`` so many of its layers.
+        It is on the case's body, or what is ``below`` so many of its layers. A needle that cuts is deep in the first
+        tissue of that.
         """
         number = self._stages.get(state)
         if number is not None and not below:
             found = self._of_stage(number)
             if found is None or found.status != SKIPPED:
                 return found
-        body = cast("Layered", self.cases[0].body)
-        case = replace(self.cases[0], probe=state, body=body.below(below) if below else body)
+        body, material = cast("Layered", self.cases[0].body), self.cases[0].material
+        body = body.below(below) if below else body
+        if state.crack and body.layer:
+            body, material = body.model_copy(update={"layer": ()}), material_of(body.layer[0])
+        case = replace(self.cases[0], probe=state, body=body, material=material)
         own = make_plan(_alone(self.plan.study, case))
         (key,) = own.keys
         self.further[key] = own

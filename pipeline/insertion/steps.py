@@ -86,8 +86,8 @@ class Path:
 def with_work(steps: Sequence[Step], interfaces: Sequence[float] = ()) -> list[Step]:
     """Return steps with the work of the tool (J) and that of friction, from those of the first on.
 
-    It is the work of the mean force between two depths. Across one of the ``interfaces`` (m), where the force jumps,
-    it is the change of the energies, and friction.
+    It is the work of the mean force between two depths. From or across one of the ``interfaces`` (m), where the force
+    jumps, it is the change of the energies, and friction.
     """
     found = list(steps[:1])
     for step in steps[1:]:
@@ -95,7 +95,7 @@ def with_work(steps: Sequence[Step], interfaces: Sequence[float] = ()) -> list[S
         moved = (step.depth - before.depth) / 2
         low, high = sorted((before.depth, step.depth))
         rubs = moved * (step.friction + before.friction)
-        if any(low < end < high for end in interfaces):
+        if any(low <= end < high for end in interfaces):
             work = step.stored + step.fracture - before.stored - before.fracture + rubs
         else:
             work = moved * (step.force + before.force)

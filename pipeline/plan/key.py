@@ -24,7 +24,6 @@ PHYSICS_VERSION = 6
 
 # Keys of a probe without effect on the force of a case: action is a label, and an insertion has cases of its own.
 _UNPHYSICAL = ("action", "toughness", "insertion")
-_UNPHYSICAL_OF_CUTTING = ("action", "insertion")
 _MANY = 200_000  # sections of a large study
 # Keys of what follows from the elastic force without a solve: pipeline/report/history.py.
 _OF_TIME = ("history", "relaxation")
@@ -41,7 +40,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     element = case.mesh.element_for(poisson, is_large=case.material.is_large)
     parts = [
         *head,
-        _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, element),
+        "" if case.probe.crack else _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, element),
         text_of(case.solve, ("timing", "repeats", "exact")),
         *tail,
         *map(_output_text, case.outputs),
@@ -68,21 +67,18 @@ def _scene_texts(scene: _Scene, scaled: bool) -> tuple[tuple[str, ...], tuple[st
     """Return the parts of a key before and after the mesh, and the largest Poisson's ratio."""
     case = scene.case
     scaled = scaled and not obstacle("scaling", case)
+    if crack := case.probe.crack:  # deep in tissue, neither the body nor the end of the tool has an effect
+        return (str(PHYSICS_VERSION), _material_text(case.material, scaled=False), str(crack)), (), case.poisson
     head = (
         str(PHYSICS_VERSION),
         _body_text(case.body, case.scale.stress if scaled else 1.0),
         _material_text(case.material, scaled=scaled),
-        text_of(case.probe, (*_unphysical(case.probe), *(case.moves_in_proportion if scaled else ()))),
+        text_of(case.probe, (*_UNPHYSICAL, *(case.moves_in_proportion if scaled else ()))),
         _ratios_text(case.probe) if scaled else "",
     )
     tail = [_load_text(case.load, case.densities)] if case.load.acts else []
     tail += [_time_text(case)] if case.is_stepped else []
     return head, tuple(tail), case.poisson
-
-
-def _unphysical(probe: Probe) -> tuple[str, ...]:
-    """Return the keys without effect on the force of a case; that of a needle that cuts follows from the toughness."""
-    return _UNPHYSICAL_OF_CUTTING if probe.crack else _UNPHYSICAL
 
 
 def _output_text(output: Output) -> str:

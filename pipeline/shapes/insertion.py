@@ -18,6 +18,8 @@ from pipeline.units import Length, Toughness, canonical
 # Tissue that the insertion of a needle leaves beside and below its path, in half widths of the shaft. Farther, its
 # effect is a per cent.
 _ROOM = 10.0
+# The first depth at which a needle is pressed on the intact body, in half widths of the shaft.
+_FIRST = 0.5
 
 
 class Insertion(BaseModel):
@@ -113,13 +115,19 @@ class Needle(Inserted):
         """Least distance (m) of the tip's steps from interfaces of layers: none."""
         return 0.0
 
-    def stages(self, depths: Sequence[float], ends: Sequence[float]) -> Sequence[Self]:
-        """Return the needle in tissue that it cuts; depths at which the intact body is solved are found on the way."""
-        return [self.cutting()] * (1 + len(depths))
+    @property
+    def first_depth(self) -> float:
+        """The first depth (m) at which it is pressed on intact tissue."""
+        assert self.insertion is not None
+        return canonical(min(_FIRST * self.limit, self.insertion.to))
 
-    def cutting(self) -> Self:
+    def stages(self, depths: Sequence[float], ends: Sequence[float]) -> Sequence[Self]:
+        """Return it at the first depth on the intact body; which further states are solved is found on the way."""
+        return [self.pressed_to(self.first_depth)] * (1 + len(depths))
+
+    def cutting(self, toughness: float) -> Self:
         """Return it deep in tissue that it cuts, over a depth of half its width; the coefficient of friction is 1."""
-        return self.in_state(friction=1.0, toughness=self.toughness, depth=self.limit)
+        return self.in_state(friction=1.0, toughness=toughness, depth=self.limit)
 
     def pressed_to(self, depth: float) -> Self:
         """Return it at a depth (m) on the intact body."""

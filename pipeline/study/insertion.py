@@ -27,11 +27,11 @@ def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
     if len(problems.errors) == before and isinstance(body, Layered):
         _check_end(body, tool, insertion, problems)
         _check_layers(body, tool, insertion, problems)
-        if tool.CUTS == "crack":
-            _warn_of_tougher_layers(body, tool, insertion, problems)
-        if insertion.withdraw and body.layer:
+        if insertion.withdraw and body.layer and tool.CUTS == "slit":
             problems.error(
-                "probe.insertion.withdraw", True, "withdrawal is computed in a body of one material: omit it, or layers"
+                "probe.insertion.withdraw",
+                True,
+                "of a blade, it is computed in one material: omit it, or layers",
             )
 
 
@@ -84,21 +84,6 @@ def _check_end(body: Layered, probe: Inserted, insertion: Insertion, problems: P
             in_mm(getattr(probe, key)),
             f"leaves less than {in_mm(room)}, {words}, beside the path: use a {smaller}, or a larger body",
         )
-
-
-def _warn_of_tougher_layers(body: Layered, probe: Inserted, insertion: Insertion, problems: Problems) -> None:
-    """Warn of layers that the tip reaches and that are tougher than those above: they would be indented first."""
-    top, own = body.heights[1], probe.toughness or 0.0
-    tough = [layer.toughness or own for layer in body.layer]
-    tough += [] if body.is_filled else [own]
-    for number, end in enumerate(body.interfaces, start=1):
-        if top - end < insertion.to and tough[number] > tough[number - 1]:
-            problems.warn(
-                "probe.insertion",
-                None,
-                f"at {in_mm(top - end)} the tissue below is tougher: it is cut where the tip reaches it, and the peak "
-                "of F by its own indentation is not computed",
-            )
 
 
 def _check_layers(body: Layered, probe: Inserted, insertion: Insertion, problems: Problems) -> None:

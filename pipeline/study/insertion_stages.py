@@ -46,13 +46,20 @@ def punctures(tools: Sequence[Inserted], bodies: Sequence[Body]) -> int:
 def pierced(tool: Inserted, body: Body) -> list[int]:
     """Return the numbers of the layers that a tool may indent before it cuts: the first, and each that is tougher.
 
-    Tougher than the layer above, and within reach.
+    Tougher than the layer above, and within reach. A needle may indent any layer, since a stiffer one takes more, too.
     """
     assert tool.insertion is not None
     own = [getattr(layer, "toughness", None) or tool.toughness for layer in getattr(body, "layer", ())]
     tough = [one or 0.0 for one in (*own, tool.toughness)]
     reach = [end for end in interfaces([body]) if end < tool.insertion.to]
-    return [1, *(number for number in range(2, len(reach) + 2) if tough[number - 1] > tough[number - 2])]
+    return [
+        1,
+        *(
+            number
+            for number in range(2, len(reach) + 2)
+            if tool.CUTS == "crack" or tough[number - 1] > tough[number - 2]
+        ),
+    ]
 
 
 def step_depths(tools: Sequence[Inserted], ends: Sequence[float]) -> tuple[float, ...]:

@@ -149,7 +149,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("inserted blade", "large displacements", f"{_LINEAR}: a blade's cut is that of small strains"),
     Refusal("inserted needle", "linear law", "needs a law of large displacements: strains are above 1"),
     Refusal("inserted needle", "fibres", "its crack is computed in isotropic tissue: use another law"),
-    Refusal("inserted needle", "layers", "its crack is computed in one material: omit the layers, or use a blade"),
     Refusal("inserted needle", "column", "its crack is computed in the whole body: omit epsilon"),
     Refusal("inserted needle", "range of depths", "its depths have meshes of their own: omit it"),
     Refusal("inserted needle", "model in three dimensions", "is computed on the meridian: omit model"),
