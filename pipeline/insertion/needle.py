@@ -6,6 +6,7 @@ fitted. At the interface to a layer that takes more per depth, the needle indent
 
 from dataclasses import replace
 
+import numpy as np
 from scipy.optimize import brentq
 
 from pipeline.insertion.pressing import Press, Pressed
@@ -19,6 +20,8 @@ _FACTOR = 2.0
 # Tissue that may be cut after so many half widths of the shaft is cut at the first touch.
 _TOUCH = 1e-3
 _TINY = 1e-6
+# The bar of a puncture's depth is sought in so many doublings of half a width.
+_DOUBLINGS = 12
 
 
 class NeedleScene(InsertionScene[Needle]):
@@ -126,14 +129,12 @@ class NeedleScene(InsertionScene[Needle]):
 
     def _pierced(self, cut: NeedleCut, press: Press, end: float) -> float | None:
         """Return the depth (m) at which tissue is pierced; None if it is not, down to ``end`` (m)."""
-        touch, deepest, low = self._touch(press), min(press.deepest, end), press.arrived.depth
-
-        def excess(depth: float) -> float:
-            return press.energy(depth)[0] - (cut.energy(depth) - cut.energy(low))
-
-        if deepest <= touch or excess(deepest) < 0:
+        touch, deepest = self._touch(press), min(press.deepest, end)
+        if deepest <= touch or _excess(cut, press, deepest) < 0:
             return None
-        return touch if excess(touch) >= 0 else float(brentq(excess, touch, deepest, xtol=_TINY * self.tool.limit))
+        if _excess(cut, press, touch) >= 0:
+            return touch
+        return float(brentq(lambda depth: _excess(cut, press, depth), touch, deepest, xtol=_TINY * self.tool.limit))
 
     def _presses(self, press: Press, end: float) -> list[Step]:
         """Return the steps of indentation down to a depth (m)."""
@@ -141,12 +142,23 @@ class NeedleScene(InsertionScene[Needle]):
         return [press.step(depth) for depth in self.depths if press.arrived.depth < depth <= end]
 
 
+def _excess(cut: NeedleCut, press: Press, depth: float) -> float:
+    """Return by how much (J) more the tissue stores at a depth (m) than a cut takes."""
+    return press.energy(depth)[0] - (cut.energy(depth) - cut.energy(press.arrived.depth))
+
+
 def _puncture(cut: NeedleCut, press: Press, depth: float) -> Puncture:
-    """Return the puncture at a depth (m)."""
-    before, low = press.step(depth), press.arrived
+    """Return the puncture at a depth (m).
+
+    Its bar reaches to where the excess of energy is the bar of both energies, at most up to the first touch.
+    """
+    before, low = press.step(depth), press.arrived.depth
     after = replace(cut.step(depth), work=before.work, rubbed=before.rubbed)
-    error = cut.energy_error(depth, low.depth) + press.energy(depth)[1]
-    gained = before.elastic - low.elastic - low.cutting
-    depth_error = error / max(before.elastic - after.elastic - after.cutting, _TINY * before.elastic)
-    # The slope of the force is this at least: it grows faster than the depth.
-    return Puncture(before, after, depth_error, before.error + gained / (depth - low.depth) * depth_error)
+    error = cut.energy_error(depth, low) + press.energy(depth)[1]
+    gap = before.elastic - after.elastic - after.cutting
+    # The tissue's force grows, that of the cut does not: the excess reaches any error.
+    far = depth + cut.needle.limit * 2.0 ** np.arange(_DOUBLINGS)
+    end = next((at for at in far.tolist() if _excess(cut, press, at) >= error), None)
+    below = float(brentq(lambda at: _excess(cut, press, at) - error, depth, end)) - depth if end else float(far[-1])
+    bar = max(below, min(error / max(gap, _TINY * before.elastic), depth - low))
+    return Puncture(before, after, bar, before.error + press.force(depth + bar)[0] - before.elastic)

@@ -63,14 +63,14 @@ class Pressed:
         return self.depths * self.forces / self.energies
 
     def at(self, depth: float) -> tuple[float, float]:
-        """Return energy (J) and force (N) at a depth (m) up to the last one; a power of it below the first."""
-        first, exponent = self.depths[0], float(self._exponents[0])
-        if depth <= first or self._logarithm is None:
-            energy = float(self.energies[0]) * (depth / first) ** exponent
+        """Return energy (J) and force (N) at a depth (m): powers of it below the first depth, and beyond the last."""
+        end = 0 if depth <= self.depths[0] else -1
+        if self._logarithm is None or not self.depths[0] < depth < self.deepest:
+            exponent = float(self._exponents[end])
+            energy = float(self.energies[end]) * (depth / float(self.depths[end])) ** exponent
             return energy, exponent * energy / max(depth, np.finfo(float).tiny)
-        at = np.log(depth)
-        energy = float(np.exp(self._logarithm(at)))
-        return energy, float(self._logarithm(at, 1)) * energy / depth
+        energy = float(np.exp(self._logarithm(np.log(depth))))
+        return energy, float(self._logarithm(np.log(depth), 1)) * energy / depth
 
     def depth_of(self, force: float) -> float:
         """Return the depth (m) at which it has a force (N), infinite if it is not solved so far."""

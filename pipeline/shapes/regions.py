@@ -31,9 +31,7 @@ class Layer(Region):
     ] = None
     toughness: Annotated[
         Toughness | None,
-        Words(
-            "Toughness of the layer, for a blade that is inserted.", '"500 J/m^2"', default="that of the probe's key"
-        ),
+        Words("Toughness of the layer, for a tool that is inserted.", '"500 J/m^2"', default="that of the probe's key"),
     ] = None
 
 

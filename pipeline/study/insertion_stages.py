@@ -52,14 +52,8 @@ def pierced(tool: Inserted, body: Body) -> list[int]:
     own = [getattr(layer, "toughness", None) or tool.toughness for layer in getattr(body, "layer", ())]
     tough = [one or 0.0 for one in (*own, tool.toughness)]
     reach = [end for end in interfaces([body]) if end < tool.insertion.to]
-    return [
-        1,
-        *(
-            number
-            for number in range(2, len(reach) + 2)
-            if tool.CUTS == "crack" or tough[number - 1] > tough[number - 2]
-        ),
-    ]
+    layers, every = range(2, len(reach) + 2), tool.CUTS == "crack"
+    return [1, *(number for number in layers if every or tough[number - 1] > tough[number - 2])]
 
 
 def step_depths(tools: Sequence[Inserted], ends: Sequence[float]) -> tuple[float, ...]:

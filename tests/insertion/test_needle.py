@@ -208,6 +208,7 @@ def test_a_tougher_layer_is_indented_before_it_is_cut():
     one, two = path.punctures
     assert path.status == OK and one.depth < 2e-3
     assert two.depth == pytest.approx(5e-3 + below, abs=1e-6)
+    assert 0 < two.depth_error < 3 * RADIUS
     assert two.before.elastic == pytest.approx(cut + 1.5 * (STIFFNESS * (first + below) ** 2 - cut), rel=1e-3)
     assert two.after.elastic + two.after.cutting < two.before.elastic
     assert two.after.crack_depth > two.before.crack_depth == 5e-3
