@@ -134,12 +134,12 @@ def _cutting(scene: Scene, cut: Cut) -> Cutting:
     ahead, share = field.ahead(tissue.toughness), cut.release_error / cut.release
     # What is between the solved front and this one, and how far the error of G moves it.
     added = length * field.per_length(ahead, cut.ahead) + field.corners(ahead, cut.ahead)
+    added += sides(scene, field, cut.depth, cut.ahead)
     moved = length * field.strength
     fracture = length * scene.tear(cut.depth + ahead) + 2 * ahead**2 * tissue.toughness
     for layer, height in scene.above(cut.depth):
-        beside = replace(field, strength=_strength(scene, layer))
+        beside = _beside(scene, field, layer)
         end = beside.ahead(layer.toughness)
-        added += 2 * height * beside.per_length(end, cut.ahead)
         moved += 2 * height * beside.strength
         fracture += 2 * height * end * layer.toughness
     widened, solved_front = 2 * field.per_length(ahead, cut.ahead), length + 2 * cut.ahead
@@ -159,6 +159,20 @@ def _cutting(scene: Scene, cut: Cut) -> Cutting:
         squeeze=2 * stored / width,
         squeeze_error=2 * stored_error / width,
     )
+
+
+def sides(scene: Scene, field: NearTip, depth: float, solved: float) -> float:
+    """Return the energy (J) that both side ends of a slit add, down to a depth (m), where G is the toughness there.
+
+    That is to the energy with the front a ``solved`` distance (m) beside the blade.
+    """
+    layers = [(_beside(scene, field, layer), layer, height) for layer, height in scene.above(depth)]
+    return sum(2 * height * one.per_length(one.ahead(layer.toughness), solved) for one, layer, height in layers)
+
+
+def _beside(scene: Scene, field: NearTip, layer: Tissue) -> NearTip:
+    """Return the field beside the blade in a layer."""
+    return replace(field, strength=_strength(scene, layer))
 
 
 def _strength(scene: Scene, tissue: Tissue) -> float:

@@ -6,7 +6,7 @@ G = Γ, as in cutting. No threshold is fitted. Friction acts on both flanks.
 """
 
 from collections.abc import Mapping
-from itertools import pairwise
+from itertools import pairwise, takewhile
 
 import numpy as np
 import scipy  # which loads its parts when they are used: a run without an insertion uses none
@@ -45,10 +45,10 @@ def _needed(scene: Scene) -> tuple[float, ...]:
 
 
 def _follow(scene: Scene) -> Path:
-    pressed, depths = scene.stiffness(), np.array(scene.depths)
-    if isinstance(pressed, str):
-        return Path(message=pressed)
-    whole = Indentation.of_surface(*pressed)
+    intact_body, depths = scene.stiffness(), np.array(scene.depths)
+    if isinstance(intact_body, str):
+        return Path(message=intact_body)
+    whole = Indentation.of_surface(*intact_body)
     first = _first(scene, whole)
     found, message = cuttings(scene, list(_needed(scene)))
     pierced = (number for number, one in enumerate(found) if whole.at(one.depth).energy >= one.energy)
@@ -66,10 +66,12 @@ def _follow(scene: Scene) -> Path:
     peaks = tuple(_of(one, steps) if one else None for one in (surface, *punctures))
     peaked = {id(one.before) for one in (surface, *punctures) if one}
     own = [step for key, step in steps.items() if key not in peaked and step.depth in scene.depths]
-    back: list[Step] = []
+    back, message = list[Step](), ended or message
     if scene.insertion.withdraw:
-        back = withdrawn(scene, found[::-1], last)
-    return Path(tuple(own), peaks, ended or message, tuple(back[::-1]))
+        pressed = list(takewhile(lambda one: one.is_indentation, states[::-1]))
+        back, stuck = withdrawn(scene, pressed, found[::-1], last)
+        message = message or stuck
+    return Path(tuple(own), peaks, message, tuple(step for step in back[::-1] if step.depth in scene.depths))
 
 
 def _of(one: Pierced, steps: Mapping[int, Step]) -> Puncture:
@@ -112,7 +114,7 @@ def _crossing(scene: Scene, whole: Indentation, low: float, high: float) -> floa
 def _steps(scene: Scene, states: list[Cutting]) -> list[Step]:
     """Return the steps through the ``states`` of a path."""
     found = [rub(scene.blade, one.flank, one.squeeze, one.squeeze_error, inwards=True) for one in states]
-    missed = [0.0 if _crosses(scene, *pair) else pair[0].defect(pair[1]) for pair in pairwise(states)]
+    missed = [0.0 if scene.crosses(one.depth, other.depth) else one.defect(other) for one, other in pairwise(states)]
     missed = [max(pair) for pair in pairwise([0.0, *missed, 0.0])]
     steps = [
         Step(
@@ -130,7 +132,3 @@ def _steps(scene: Scene, states: list[Cutting]) -> list[Step]:
         for number, (one, (rubs, uncertain)) in enumerate(zip(states, found, strict=True))
     ]
     return with_work(steps, scene.interfaces)
-
-
-def _crosses(scene: Scene, before: Cutting, after: Cutting) -> bool:
-    return any(before.depth < end < after.depth for end in scene.interfaces)

@@ -165,6 +165,10 @@ class Scene(InsertionScene[Blade]):
         """Return the depth (m) nearest to ``depth`` at which the tip is half a width or more away from interfaces."""
         return clear(depth, self.interfaces, self.blade.width / 2)
 
+    def crosses(self, low: float, high: float) -> bool:
+        """Return whether an interface is between two depths (m)."""
+        return any(low < end < high for end in self.interfaces)
+
     def ahead(self, depth: float) -> float:
         """Return the distance (m) of the front of the slit that is solved first, for a tip at a depth (m)."""
         return self.blade.first_ahead(depth, self.interfaces)
@@ -183,10 +187,14 @@ class Scene(InsertionScene[Blade]):
 
     def cuts(self, places: Sequence[tuple[float, float]]) -> dict[tuple[float, float], Cut | str]:
         """Return the solved slits of pairs of depth and distance ahead (m), or why there is none."""
-        return {place: self._cut(*place) for place in places}
+        return {place: self.cut(*place) for place in places}
 
-    def _cut(self, depth: float, ahead: float) -> Cut | str:
-        found = self.solved(self.blade.in_slit(depth, ahead))
+    def cut(self, depth: float, ahead: float, beside: float | None = None) -> Cut | str:
+        """Return the solved slit with the front ``ahead`` of the tip at a depth (m), or why there is none.
+
+        The front is as far ``beside`` the blade's ends (m), if that is not given.
+        """
+        found = self.solved(self.blade.in_slit(depth, ahead, beside))
         if isinstance(found, str):
             return found
         # The bar on the force contains that on the energy.

@@ -13,7 +13,7 @@ from pipeline.study.case import Case
 
 # Of the axes of a probe, those that say how far it moves, and those that say where it is: the others say what it is.
 LOADS = {"depth", "slice"}
-PLACES = {"at", "probe_axis", "path", "x", "y", "incision", "ahead", "ends"}
+PLACES = {"at", "probe_axis", "path", "x", "y", "incision", "ahead", "beside", "ends"}
 _ROUNDING = 1e-9
 
 

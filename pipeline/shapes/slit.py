@@ -1,7 +1,8 @@
 """A slit with a blade in it: a plane crack below the surface, whose faces the blade opens by its width.
 
 In the probe's own coordinates the slit is the plane across = 0 down to its front at height -depth. The blade touches
-both faces along its length, from the surface down to its tip. The slit extends ``ahead`` of the blade to its front.
+both faces along its length, from the surface down to its tip. The front is ``ahead`` of the tip, and ``beside`` the
+blade's ends.
 """
 
 from dataclasses import dataclass
@@ -18,15 +19,16 @@ _ON = 1e-6
 
 @dataclass(frozen=True)
 class Slit:
-    """Sizes (m): ``depth`` of the front, ``length`` and ``width`` of the blade, and slit length ``ahead`` of it.
+    """Sizes (m): ``depth`` of the front, ``length`` and ``width`` of the blade, and slit length ``ahead`` of its tip.
 
-    With ``is_open`` the slit extends to the sides of the body; otherwise it ends ``ahead`` of the blade's ends, too.
+    With ``is_open`` the slit extends to the sides of the body; otherwise it ends ``beside`` the blade's ends.
     """
 
     depth: float
     length: float
     width: float
     ahead: float
+    beside: float
     is_open: bool
 
     @property
@@ -37,7 +39,7 @@ class Slit:
     @property
     def reach(self) -> float:
         """Half of the slit's length (m), infinite if it is open."""
-        return inf if self.is_open else self.length / 2 + self.ahead
+        return inf if self.is_open else self.length / 2 + self.beside
 
     @property
     def on_surface(self) -> float:
@@ -47,7 +49,7 @@ class Slit:
     @property
     def half_width(self) -> float:
         """Half of the smallest distance (m) between lines at which the displacement is singular."""
-        return min(self.ahead, self.tip, self.length) / 2
+        return min(self.clear, self.tip, self.length) / 2
 
     @property
     def edges(self) -> float:
@@ -110,12 +112,17 @@ class Slit:
         """Return the distance (m) from the front to the nearest of: blade, interface of layers, bottom, support."""
         top = body.heights[1]
         ends = (*body.interfaces, *body.support.edges(), body.heights[0])
-        return min(self.ahead, *(abs(end - top + self.depth) for end in ends))
+        return min(self.clear, *(abs(end - top + self.depth) for end in ends))
 
     def room_at_tip(self, body: Body) -> float:
         """Return the distance (m) from the blade's tip to the nearest of: front, surface, interface of layers."""
         top = body.heights[1]
-        return min(self.ahead, self.tip, *(abs(end - top + self.tip) for end in body.interfaces))
+        return min(self.clear, self.tip, *(abs(end - top + self.tip) for end in body.interfaces))
+
+    @property
+    def clear(self) -> float:
+        """The least distance (m) of the front from the blade."""
+        return self.ahead if self.is_open else min(self.ahead, self.beside)
 
 
 def _polygon(points: list[tuple[float, float]]) -> FloatArray:

@@ -24,6 +24,7 @@ _PAGES = {
     "material.relaxation": "howto/relaxation",
     "probe.incision": "howto/cut",
     "probe.ahead": "howto/cut",
+    "probe.beside": "howto/cut",
     "probe.ends": "howto/cut",
     "probe.slice": "howto/cut",
     "probe.insertion": "howto/insertion",

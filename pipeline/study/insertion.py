@@ -27,12 +27,6 @@ def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
     if len(problems.errors) == before and isinstance(body, Layered):
         _check_end(body, tool, insertion, problems)
         _check_layers(body, tool, insertion, problems)
-        if insertion.withdraw and body.layer and tool.CUTS == "slit":
-            problems.error(
-                "probe.insertion.withdraw",
-                True,
-                "of a blade, it is computed in one material: omit it, or layers",
-            )
 
 
 def check_same_path(probes: Sequence[Probe], problems: Problems) -> None:

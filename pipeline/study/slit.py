@@ -14,7 +14,7 @@ from pipeline.shapes.surface import Surface
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Mesh
 
-# Between a slit's front and what ends below or above it there must be this share of what it runs ahead of the blade.
+# Between a slit's front and what ends below or above it there must be this share of its distance from the blade.
 _LEAST_ROOM = 0.25
 # Points along a slit and down whose distance to an inclusion is looked at, and how often again near the nearest.
 _POINTS, _ROUNDS = 21, 8
@@ -57,13 +57,13 @@ def check_slit_in(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> N
 
 def _check_tip(body: Body, slit: Slit, problems: Problems) -> None:
     """Report a frictionless blade whose tip is too near to the surface or the end of a layer."""
-    least = _LEAST_ROOM * slit.ahead
+    least = _LEAST_ROOM * slit.clear
     if slit.tip > 0 and (room := slit.room_at_tip(body)) < least:
         problems.error(
             "probe.incision",
             in_mm(slit.depth),
             f"leaves {in_mm(room)} between the blade's tip and the surface or the end of a layer: frictionless contact "
-            f"needs {in_mm(least)}, a quarter of `ahead`",
+            f"needs {in_mm(least)}, a quarter of `ahead`, or of `beside`",
         )
 
 
@@ -89,13 +89,13 @@ def _check_support(body: Body, slit: Slit, problems: Problems) -> None:
 
 
 def _check_room(body: Body, slit: Slit, problems: Problems) -> None:
-    least = _LEAST_ROOM * slit.ahead
+    least = _LEAST_ROOM * slit.clear
     if (room := slit.room(body)) < least:
         problems.error(
             "probe.incision",
             in_mm(slit.depth),
             f"leaves {in_mm(room)} between the front of the slit and the end of a layer, the bottom or the support: "
-            f"must leave at least {in_mm(least)}, a quarter of `ahead`",
+            f"must leave at least {in_mm(least)}, a quarter of `ahead`, or of `beside`",
         )
 
 

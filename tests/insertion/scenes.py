@@ -28,9 +28,11 @@ SCENE = {
 FIELD = NearTip(strength(YOUNG, POISSON, WIDTH / 2), 700.0)
 
 
-def stored(depth, ahead):
-    """Return the energy (J) of the body with a slit."""
-    return GROWTH * depth + (LENGTH + 2 * depth) * FIELD.per_length(ahead, FAR) + FIELD.corners(ahead, FAR)
+def stored(depth, ahead, beside=None):
+    """Return the energy (J) of the body with a slit, whose front is as far beside the blade if that is not given."""
+    beside = ahead if beside is None else beside
+    corners = (FIELD.corners(ahead, FAR) + FIELD.corners(beside, FAR)) / 2
+    return GROWTH * depth + LENGTH * FIELD.per_length(ahead, FAR) + 2 * depth * FIELD.per_length(beside, FAR) + corners
 
 
 def elastic(depth, ahead):
@@ -47,9 +49,9 @@ def _record(key, case, bar, deepest):
         force = STIFFNESS * case.probe.depth
         return Record(key, OK, force=force, energy=force * case.probe.depth / 2, **scale)
     release = FIELD.release(slit.ahead)
-    drive = elastic(slit.tip, slit.ahead) + (LENGTH + 2 * slit.ahead) * release
+    drive = elastic(slit.tip, slit.beside) + (LENGTH + 2 * slit.ahead) * release
     of_front = {"energy_release": release, "energy_release_error": bar}
-    return Record(key, OK, force=drive, energy=stored(slit.tip, slit.ahead), **of_front, **scale)
+    return Record(key, OK, force=drive, energy=stored(slit.tip, slit.ahead, slit.beside), **of_front, **scale)
 
 
 def solved(study, bar=1e-3, deepest=np.inf):

@@ -294,3 +294,44 @@ def test_withdrawal_reverses_friction_and_tears_nothing():
     assert np.all(out["energy_stored"].values[:-1] < into["energy_stored"].values[-1])
     assert np.abs(found["energy_balance"].values).max() < 1e-3
     assert np.all(out["phase"] == PHASES.index("withdrawal"))
+
+
+def test_withdrawal_through_layers_has_the_slit_of_the_whole_insertion():
+    """With the tip in the upper layer, the front is far below, in the next one: such slits are solved."""
+    skin = {"name": "skin", "thickness": "3.1 mm", "young": "20 kPa", "poisson": 0.3, "toughness": "8 J/m^2"}
+    probe = BLADE | {"insertion": {"to": "6 mm", "steps": 12, "withdraw": True}}
+    study = read_mapping(SCENE | {"body": SCENE["body"] | {"layer": [skin]}, "probe": probe}, "layers")
+    found = _path(study)
+    out = found.sel(stroke="withdrawal")
+    assert np.abs(found["energy_balance"].values).max() < 0.02
+    assert np.all(out["force_cutting"] == 0) and np.all(out["force_friction"] < 0)
+    front, beside = float(out["crack_depth"][-1]), FIELD.ahead(8.0)
+    for step in (out.isel(depth=number) for number in (1, 3)):
+        depth = float(step["depth"])
+        ahead = front - depth
+        assert float(step["energy_stored"]) == pytest.approx(stored(depth, ahead, beside), rel=0.01)
+        exact = elastic(depth, beside) + (LENGTH + 2 * ahead) * FIELD.release(ahead)
+        assert abs(float(step["force_elastic"]) - exact) < float(step["force_error"])
+
+
+def test_a_blade_that_indents_a_tougher_layer_goes_back_the_same_way():
+    layer = {"name": "fat", "thickness": "3 mm", "young": "20 kPa", "poisson": 0.3, "toughness": "2 J/m^2"}
+    insertion = {"to": "6 mm", "steps": 12, "withdraw": True}
+    probe = BLADE | {"toughness": "60 J/m^2", "friction": 0.0, "insertion": insertion}
+    found = _path(read_mapping(SCENE | {"body": SCENE["body"] | {"layer": [layer]}, "probe": probe}, "layers"))
+    deep = found.isel(depth=found["depth"].values > 3e-3)
+    np.testing.assert_allclose(*(deep["force"].sel(stroke=stroke) for stroke in ("insertion", "withdrawal")))
+    np.testing.assert_allclose(found["crack_depth"].sel(stroke="withdrawal"), 3e-3, rtol=1e-3)
+    assert np.abs(found["energy_balance"].values).max() < 0.02
+
+
+def test_a_slit_of_the_withdrawal_that_fails_ends_it_there():
+    skin = {"name": "skin", "thickness": "3.1 mm", "young": "20 kPa", "poisson": 0.3, "toughness": "8 J/m^2"}
+    probe = BLADE | {"insertion": {"to": "6 mm", "steps": 12, "withdraw": True}}
+    plan, records = solved(read_mapping(SCENE | {"body": SCENE["body"] | {"layer": [skin]}, "probe": probe}, "layers"))
+    failed = {"status": "failed", "message": "too coarse"}
+    records |= {key: replace(one, **failed) for key, one in records.items() if key not in plan.keys}
+    found = build(plan, records)
+    assert found["status"] == "partial" and found["message"] == "withdrawal, 2.9 mm: too coarse"
+    assert np.isfinite(found["force"].sel(stroke="insertion")).all()
+    assert float(found["force"].sel(stroke="withdrawal").dropna("depth")["depth"][0]) > 3.1e-3

@@ -160,6 +160,14 @@ def test_flanks_that_slide():
     assert here.balance < 1e-6
 
 
+def test_fronts_nearer_to_the_ends_of_the_blade():
+    """Less is cut there: more is stored, by about what the front below releases per area."""
+    far, near, step = quarter(), run(case_of(beside="0.8 mm"), estimate=True), 0.2e-3
+    mean = finer(far)[1] / (2 * 4e-3)  # of the front below
+    released = (finer(near)[0] - finer(far)[0]) / (2 * step * 4e-3)
+    assert 0.3 * mean < released < 1.5 * mean
+
+
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     ("mirrors", "place"), [(("x",), {"at": ["0 mm", "0.01 mm"]}), ((), {"direction": [1.0, 0.01, 0.0]})]

@@ -31,6 +31,10 @@ def problems(**changes):
                                                                 "slice": "0.1 mm"}}),
         ("probe.ahead", "leaves no part of the blade in the slit", {"probe": {**SLIT, "incision": "1 mm"}}),
         ("probe.ahead", "there is no incision", {"probe": {**BLADE, "ahead": "1 mm"}}),
+        ("probe.beside", "there is no incision", {"probe": {**BLADE, "beside": "1 mm"}}),
+        ("probe.beside", "has no front there", {"probe": {**SLIT, "ends": "open", "beside": "1 mm"}}),
+        ("probe.slice", "past the slit's front at its end, which is 0.5 mm", {"probe": {
+            **SLIT, "beside": "0.5 mm", "slice": "0.6 mm"}}),
         ("probe.ends", "there is no incision", {"probe": {**BLADE, "ends": "open"}}),
         ("probe.incision", "through the whole body", {"probe": {**SLIT, "incision": "20 mm"}}),
         ("probe.incision", "through the support", {"probe": {**SLIT, "incision": "16 mm"},

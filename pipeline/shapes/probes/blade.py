@@ -58,15 +58,20 @@ class Blade(Punch, Inserted):
         Length | None,
         Field(json_schema_extra={"unit": "m"}),
         Words(
-            "Distance from the blade to the front of the slit, below its tip and beyond its ends.",
+            "Distance from the blade's tip to the front of the slit.",
             '"1 mm"',
             default="the blade's width",
         ),
     ] = None
+    beside: Annotated[
+        Length | None,
+        Field(json_schema_extra={"unit": "m"}),
+        Words("Distance from the blade's ends to the front of the slit.", '"0.5 mm"', default="that of `ahead`"),
+    ] = None
     ends: Annotated[
         Literal["blade", "open"],
         Words(
-            "Ends of the slit: `ahead` beyond the ends of the blade (blade), or the sides of the body (open).",
+            "Ends of the slit: `beside` the ends of the blade (blade), or the sides of the body (open).",
             '"blade"',
         ),
     ] = "blade"
@@ -102,10 +107,14 @@ class Blade(Punch, Inserted):
         """Return it at its last depth on the intact body."""
         return self.in_state(contact="frictionless")
 
-    def in_slit(self, depth: float, ahead: float) -> Self:
-        """Return it with its tip at a depth (m) in a slit, whose front is ``ahead`` (m) of it."""
-        slit = {"incision": canonical(depth + ahead), "ahead": ahead, "depth": canonical(_ANY * self.width)}
-        return self.in_state(contact="frictionless", **slit)
+    def in_slit(self, depth: float, ahead: float, beside: float | None = None) -> Self:
+        """Return it with its tip at a depth (m) in a slit, whose front is ``ahead`` (m) of it.
+
+        The front is as far ``beside`` its ends (m), if that is not given.
+        """
+        slit = {"incision": canonical(depth + ahead), "ahead": canonical(ahead), "depth": canonical(_ANY * self.width)}
+        more = {} if beside is None else {"beside": beside}
+        return self.in_state(contact="frictionless", **slit, **more)
 
     def first_ahead(self, depth: float, ends: Sequence[float]) -> float:
         """Return the distance (m) of the front of the slit that is solved first, for a tip at a depth (m)."""
@@ -131,7 +140,15 @@ class Blade(Punch, Inserted):
         if not self.incision:
             return None
         ahead = self.width if self.ahead is None else self.ahead
-        return Slit(self.incision, self.length, self.width, ahead, self.ends == "open")
+        beside = ahead if self.beside is None else self.beside
+        return Slit(
+            depth=self.incision,
+            length=self.length,
+            width=self.width,
+            ahead=ahead,
+            beside=beside,
+            is_open=self.ends == "open",
+        )
 
     @property
     def circumradius(self) -> float:
@@ -203,9 +220,10 @@ class Blade(Punch, Inserted):
         if self.slit:
             self._check_slit(self.slit, problems)
         else:
-            for key in ("ahead", "ends"):
+            for key in ("ahead", "beside", "ends"):
                 if key in self.model_fields_set:
-                    found = in_mm(self.ahead) if key == "ahead" and self.ahead else getattr(self, key)
+                    found = getattr(self, key)
+                    found = in_mm(found) if isinstance(found, float) else found
                     problems.error(f"probe.{key}", found, "applies to a slit only: there is no incision")
 
     def _check_slit(self, slit: Slit, problems: Problems) -> None:
@@ -216,13 +234,15 @@ class Blade(Punch, Inserted):
                 f"leaves no part of the blade in the slit, which is {in_mm(self.incision)} deep: must be below that "
                 "(the default is the blade's width)",
             )
-        elif slit.ahead < self.width:
+        elif slit.clear < self.width:
             problems.warn(
-                "probe.ahead",
-                in_mm(slit.ahead),
+                "probe.ahead" if slit.clear == slit.ahead else "probe.beside",
+                in_mm(slit.clear),
                 f"is less than the blade's width {in_mm(self.width)}: linear elasticity is then an extrapolation at "
                 "the slit's front",
             )
+        if slit.is_open and self.beside is not None:
+            problems.error("probe.beside", in_mm(self.beside), 'needs ends = "blade": an open slit has no front there')
         if self.contact == "bonded":
             self._check_travel(slit, problems)
         if self.contact == "frictionless":
@@ -235,12 +255,13 @@ class Blade(Punch, Inserted):
 
     def _check_travel(self, slit: Slit, problems: Problems) -> None:
         """Report a blade that would move past the front of its slit, where tissue is not cut."""
-        travels = {"depth": (self.depth, "below its tip"), "slice": (0.0 if slit.is_open else self.slice, "at its end")}
-        for key, (travel, where) in travels.items():
-            if travel >= slit.ahead:
+        slice_ = 0.0 if slit.is_open else self.slice
+        travels = {"depth": (self.depth, "below its tip", slit.ahead), "slice": (slice_, "at its end", slit.beside)}
+        for key, (travel, where, room) in travels.items():
+            if travel >= room:
                 problems.error(
                     f"probe.{key}",
                     in_mm(travel),
                     f"moves the blade past the slit's front {where}, which is "
-                    f"{in_mm(slit.ahead)} ahead of it and does not advance: must be below that",
+                    f"{in_mm(room)} ahead of it and does not advance: must be below that",
                 )
