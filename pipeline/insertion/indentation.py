@@ -75,7 +75,7 @@ class Indentation:
     def pierced(self, before: Cutting | None, after: Cutting) -> Pierced | None:
         """Return the puncture between two states of cutting; None if the first already has less energy.
 
-        Without a state ``before``, that at the first touch follows from the one ``after``.
+        Without a state ``before``, that with the front where it stays follows from the one ``after``.
         """
 
         def cut(depth: float) -> Cutting:
@@ -84,7 +84,8 @@ class Indentation:
         def excess(depth: float) -> float:
             return self.at(depth).energy - cut(depth).energy
 
-        low = self.arrived.depth if before is None else before.depth
+        first = self.arrived
+        low = max(first.depth, first.crack_depth - after.ahead) if before is None else before.depth
         if excess(low) >= 0:
             return None
         depth = float(brentq(excess, low, after.depth, xtol=1e-9))

@@ -1,9 +1,9 @@
 """Tougher layers: each is indented before it is cut.
 
 The front of the slit stays at its interface, and the blade presses on the layers below. The stiffness is at least that
-of these layers alone, which is solved. The tissue above is bonded to them, and adds E'_above/E'_below of it at most,
-as a half-space would, with E' = E/(1 − ν²). Half of that is added, and is the error bar. Blades at the bottom of
-notches are between these bounds (docs/howto/insertion.md).
+of these layers alone, which is solved. The tissue above is bonded to them, and adds that of a half-space of it at most.
+Half of that is added, and is the error bar. Blades at the bottom of notches are between these bounds
+(docs/howto/insertion.md).
 """
 
 from collections.abc import Sequence
@@ -33,9 +33,9 @@ def through_layers(scene: Scene, states: Sequence[Cutting]) -> tuple[list[Cuttin
         if isinstance(alone, str):
             return above, punctures[:-1], f"{1e3 * end:.4g} mm: {alone}"
         stiffness, error = alone
-        half = upper.plane_modulus / lower.plane_modulus / 2
+        half = upper.plane_modulus * scene.blade.half_space_stiffness / 2
         arrived = above[-1].moved(end - above[-1].ahead)
-        layer = Indentation(arrived, (1 + half) * stiffness, (1 + half) * error + half * stiffness)
+        layer = Indentation(arrived, stiffness + half, error + half)
         count = next((n for n, one in enumerate(below) if layer.at(one.depth).energy >= one.energy), len(below))
         pressed = [layer.at(arrived.depth), *(layer.at(one.depth) for one in below[:count])]
         if count == len(below):

@@ -89,7 +89,8 @@ def write_film(path: xr.Dataset, blade: Blade, sections: Mapping[float, Section]
         writer.setup(figure, str(temporary), dpi=_DOTS)
         for frame in [*frames, *[frames[-1]] * _LAST]:
             intact = frame.is_whole
-            key = 0.0 if intact else float(solved[np.argmin(abs(solved - frame.depth))])
+            # A blade that indents a layer is drawn in the slit with which it arrived there.
+            key = 0.0 if intact else float(solved[np.argmin(abs(solved - min(frame.depth, frame.crack)))])
             share = frame.depth / blade.depth if intact else 1.0  # the path may end above the blade's last depth
             _draw_section(left, sections[key], frame, blade, share=share, largest=largest)
             left.set(xlim=np.multiply(_MM * last, (-_SIDE, _SIDE)), ylim=np.multiply(_MM * last, (-_BELOW, _ABOVE)))
@@ -118,7 +119,7 @@ def _draw_section(ax: Axes, section: Section, frame: Frame, blade: Blade, *, sha
     ax.add_collection(body)
     half, tip, top = _MM * blade.width / 2, -_MM * frame.depth, _MM
     ax.fill([-half, half, half, -half], [tip, tip, top, top], color=TOOL, zorder=3)
-    if np.isfinite(frame.crack):
+    if frame.crack > frame.depth:
         ax.plot([0, 0], [tip, -_MM * frame.crack], color=COLOURS[4], linewidth=1.0, zorder=2)
     ax.set_aspect("equal")
     ax.set(xlabel="across the blade (mm)", ylabel="height (mm)", title=f"{frame.phase}, {_MM * frame.depth:.3g} mm")

@@ -15,6 +15,7 @@ from pipeline.insertion.friction import reaction
 from pipeline.insertion.steps import PHASES
 from pipeline.plan.plan import make_plan
 from pipeline.report.read import read_file
+from pipeline.shapes.probes.blade import Blade
 from pipeline.study.toml import to_toml
 from pipeline.view.film import frames_of
 
@@ -56,6 +57,13 @@ def test_the_elastic_force_is_the_change_of_the_stored_energy(ran):
     assert len(depth) >= 2 and np.all(abs(np.diff(cut["energy_stored"].values) - work) < error)
     assert float(abs(cut["energy_balance"]).max()) < 0.02
     assert np.all(cut["force_error"] < 0.1 * cut["force"])
+
+
+def test_the_intact_body_is_a_little_stiffer_than_a_half_space(ran):
+    folder, _ = ran
+    found = read_file(folder / "pad.nc")
+    own = Blade.model_construct(shape="blade", length=6e-3, width=0.8e-3, depth=1e-3).half_space_stiffness
+    assert 1 < float(found["puncture_force"] / found["puncture_depth"]) / (20e3 / (1 - 0.3**2) * own) < 1.3
 
 
 def test_a_second_run_reads_what_was_solved(ran, epsmesh):

@@ -21,6 +21,9 @@ from pipeline.study.problems import StudyError
 from pipeline.study.read import read_mapping
 from tests.insertion.scenes import BLADE, FIELD, LENGTH, SCENE, STIFFNESS, elastic, solved, stored
 
+# The blade on a half-space (N/m), by the rectangle's formula: what tissue above adds at most.
+ABOVE = 20e3 / (1 - 0.3**2) * 4e-3 * (0.73 + 1.54 * 0.05**0.75)
+
 
 def _study(**probe):
     return read_mapping(SCENE | {"probe": BLADE | probe}, "blade")
@@ -115,7 +118,7 @@ def test_what_is_cut_stays_cut_in_a_layer_that_the_intact_body_would_not_tear():
     assert _phases(found) == ["indentation", "cutting", "indentation"] and np.isnan(found["puncture_depth"][1])
     deep, end = found.isel(depth=found["depth"].values > 3e-3), 3e-3
     np.testing.assert_allclose(deep["crack_depth"], end, rtol=1e-3)
-    np.testing.assert_allclose(np.diff(deep["force_elastic"]) / np.diff(deep["depth"]), 1.5 * STIFFNESS)
+    np.testing.assert_allclose(np.diff(deep["force_elastic"]) / np.diff(deep["depth"]), STIFFNESS + ABOVE / 2)
     assert np.abs(found["energy_balance"].values).max() < 0.02
 
 
@@ -128,7 +131,7 @@ def test_a_tougher_layer_is_indented_from_the_force_of_cutting_and_pierced_by_en
     found = _path(study)
     assert _phases(found) == ["indentation", "cutting", "indentation", "cutting"]
     second = found.sel(puncture=2)
-    stiffness = (1 + 0.5 / stiffer) * STIFFNESS
+    stiffness = STIFFNESS + ABOVE / stiffer / 2
     last = found.isel(depth=found["depth"].values < 2.05e-3).isel(depth=-1)
     arrived = float(last["force_elastic"] + last["force_cutting"])
     touch = 2.1e-3 - float(last["crack_depth"] - last["depth"])
@@ -335,3 +338,12 @@ def test_a_slit_of_the_withdrawal_that_fails_ends_it_there():
     assert found["status"] == "partial" and found["message"] == "withdrawal, 2.9 mm: too coarse"
     assert np.isfinite(found["force"].sel(stroke="insertion")).all()
     assert float(found["force"].sel(stroke="withdrawal").dropna("depth")["depth"][0]) > 3.1e-3
+
+
+def test_the_guide_judges_each_puncture():
+    mesh = {"accuracy": "10 %", "epsilon": ["5 mm", "10 mm", "full"], "outside": "free"}
+    layer = {"name": "fat", "thickness": "2.1 mm", "young": "20 kPa", "poisson": 0.3, "toughness": "2 J/m^2"}
+    scene = SCENE | {"mesh": mesh, "body": SCENE["body"] | {"layer": [layer]}}
+    found = guide(_path(read_mapping(scene, "sweep")), "5 %")
+    judged = {quantity for part in found.parts for quantity in part.where["quantity"]}
+    assert {"force of the puncture", "force of the puncture of layer 2", "depth of the puncture of layer 2"} <= judged

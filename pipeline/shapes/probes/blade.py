@@ -175,6 +175,15 @@ class Blade(Punch, Inserted):
         sides = (self.length, self.width), (self.width, self.length)
         return sum(min(1.38 * (side / other) ** -0.06, 1.5) * side**2 / 12 for side, other in sides)
 
+    @property
+    def half_space_stiffness(self) -> float:
+        """Force over depth on an elastic half-space, without friction, over E/(1 − ν²), in m.
+
+        A fit to boundary elements for any rectangle (G. Gazetas, J. Geotech. Eng. 117, 1363, 1991, table 1).
+        """
+        longer, shorter = sorted((self.length, self.width), reverse=True)
+        return longer / 2 * (0.73 + 1.54 * (shorter / longer) ** 0.75)
+
     def gap(self, body: Body, frame: Frame) -> float:
         """Return the distance (m) from the nearest corner, or end of the slit, to the edge of the convex face."""
         if self.slit is None:
