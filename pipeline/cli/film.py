@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, cast
 from pipeline.cli.console import say
 from pipeline.cli.faults import fail, of_file
 from pipeline.cli.words import check_machine, check_output, read_dataset
+from pipeline.shapes.probes._round import RoundIndenter
+from pipeline.shapes.probes.blade import Blade
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -13,10 +15,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from mpi4py import MPI
 
-    from pipeline.shapes.probes.blade import Blade
     from pipeline.study.case import Case
     from pipeline.study.sweep import Study
     from pipeline.view.fields import Fields
+    from pipeline.view.film import Pictures
 
 _HOWTO = "docs/howto/insertion.md"
 
@@ -27,30 +29,63 @@ def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, 
     ``solved`` returns the fields of a state on the first rank; collective.
     """
     stages, position = _stages(study, chosen)
+    tool = study.tool(chosen)
+    if not isinstance(tool, Blade | RoundIndenter):
+        fail(of_file(study.file, f"there is no film of a {tool.shape} that is inserted", _HOWTO))
+    if isinstance(tool, RoundIndenter) and chosen.body.interfaces:
+        fail(of_file(study.file, "films of needles are those in one material: each layer has its own crack", _HOWTO))
     file = output / f"{study.name}_{position}_path.gif"
     check_output(file)
     path = _path(study, output, chosen)
     check_machine()
-    from pipeline.view.film import write_film
-    from pipeline.view.section import Section, section_of
     from pipeline.workflow import abort_on_exception, ended_soon, load_solvers, world
 
-    comm, sections = world(), dict[float, Section]()
+    comm = world()
     load_solvers()
+    from pipeline.view.film import write_film
+
+    with abort_on_exception(comm), ended_soon():
+        if isinstance(tool, RoundIndenter):
+            pictures = _of_needle(study, chosen, tool, path, comm)
+        else:
+            pictures = _of_blade(tool, study, stages, path, lambda case: solved(case, comm))
+        if comm.rank == 0:
+            write_film(path, pictures, file, study.title)
+            size = f"{file.stat().st_size / 1e6:.1f} MB"
+            say({"files": [str(file)]}, f"wrote {file} ({size})")
+
+
+def _of_blade(
+    blade: Blade, study: "Study", stages: "list[Case]", path: "xr.Dataset", solved: "Callable[[Case], Fields | None]"
+) -> "Pictures":
+    """Return the pictures of a blade, on the first rank those of the fields that are ``solved``; collective."""
+    from pipeline.view.blade_pictures import BladePictures
+    from pipeline.view.section import Section, section_of
+
+    sections = dict[float, Section]()
     pierced, deepest = float(path["puncture_depth"].min()), float(path["depth"][-1])
     # A blade that is pulled out passes all slits. Without a puncture there are none.
     first = 0.0 if "stroke" in path.dims and pierced > 0 else pierced
-    with abort_on_exception(comm), ended_soon():
-        for depth, case in zip((0.0, *study.step_depths), stages, strict=True):
-            if depth and not first <= depth <= deepest:
-                continue
-            fields = solved(case, comm)
-            if fields is not None:
-                sections[depth] = section_of(fields)
-        if comm.rank == 0:
-            write_film(path, cast("Blade", study.tool(chosen)), sections, file, study.title)
-            size = f"{file.stat().st_size / 1e6:.1f} MB"
-            say({"files": [str(file)]}, f"wrote {file} ({size})")
+    for depth, case in zip((0.0, *study.step_depths), stages, strict=True):
+        if depth and not first <= depth <= deepest:
+            continue
+        fields = solved(case)
+        if fields is not None:
+            sections[depth] = section_of(fields)
+    return BladePictures(path, blade, sections)
+
+
+def _of_needle(study: "Study", case: "Case", needle: RoundIndenter, path: "xr.Dataset", comm: "MPI.Comm") -> "Pictures":
+    """Return the pictures of a needle, solved on the first rank; exit if they cannot be; collective."""
+    from pipeline.mesh.generate import MeshError
+    from pipeline.run.meshing import on_first_rank
+    from pipeline.view.needle_pictures import NeedlePictures
+
+    try:
+        found = on_first_rank(comm, lambda: NeedlePictures.of(case, needle, path))
+    except MeshError as wrong:
+        fail(of_file(study.file, f"the film: {wrong}", _HOWTO))
+    return cast("Pictures", found)
 
 
 def _stages(study: "Study", chosen: "Case") -> "tuple[list[Case], int]":

@@ -78,8 +78,8 @@ def view(
 
     Example: epsmesh view studies/figure3.toml 12 --sofa
 
-    Of a blade's insertion it writes a film of the path, <study>_<number>_path.gif, beside the dataset of a run: the
-    deformed section over depth, and F. With --export, or "stage=5 mm", one state is shown.
+    Of an insertion it writes a film of the path, <study>_<number>_path.gif, beside the dataset of a run: deformed
+    sections over depth, and F. With --export, or "stage=5 mm", one state of a blade is shown.
 
     Example: epsmesh view studies/scalpel-path.toml
 
@@ -90,6 +90,7 @@ def view(
     """
     export = export or ("vtu" if vtk else "sofa" if sofa else None)
     from pipeline.shapes.files.labels import is_image
+    from pipeline.shapes.insertion import Needle
 
     if is_image(file):
         if mesh_only or export not in (None, "html"):
@@ -101,10 +102,11 @@ def view(
         fail(Fault(f"{option}: is for a label map; a study has it in [body]", key=option))
     (study,) = read_all([file])
     chosen = find_case(study, case or "0")
-    if chosen.probe.crack:
-        why = "a needle that is inserted is computed in a plane section, which is not drawn; films are those of blades"
+    is_state = mesh_only or bool(export) or "stage" in case
+    if is_state and study.is_insertion and isinstance(study.tool(chosen), Needle):
+        why = "states of a needle that is inserted are found on the way: only the film of its path is drawn"
         fail(of_file(study.file, why, "docs/howto/needle.md"))
-    if study.is_insertion and not (mesh_only or export or "stage" in case):
+    if study.is_insertion and not is_state:
         from pipeline.cli.film import film
 
         def solved(one: "Case", comm: "MPI.Comm") -> "Fields | None":

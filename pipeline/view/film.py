@@ -1,32 +1,32 @@
-"""A film of an insertion: the deformed section over depth, true to scale, beside F."""
+"""A film of an insertion: its pictures over depth, true to scale, beside F."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import matplotlib as mpl
 import numpy as np
 import xarray as xr
-from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from PIL import Image
 
+from pipeline.arrays import IntArray
 from pipeline.files import atomic
 from pipeline.insertion.steps import PHASES
 from pipeline.report.figures.insertion import with_puncture
 from pipeline.report.figures.style import COLOURS, DEFAULTS, GRID, LINE
 from pipeline.report.values import punctures
-from pipeline.shapes.probes.blade import Blade
-from pipeline.view.palette import TOOL
-from pipeline.view.section import Section
 
 _MM = 1e3
-# Inches and dots, and frames per second; the last frame stays for so many.
-_SIZE, _DOTS, _RATE, _LAST = (8.0, 3.9), 90, 6, 8
-# What is seen of the section, in last depths: to each side, below the surface, and above it.
-_SIDE, _BELOW, _ABOVE = 0.8, 1.3, 0.3
+# Height and dots per inch, and frames per second; the last frame stays for so many.
+_HEIGHT, _DOTS, _RATE, _LAST = 3.9, 90, 6, 8
+# Colours of a film, taken from so many pictures, and the number of the one that leaves what is there.
+_COLOURS, _SHEET, _SAME = 128, 8, 255
+# Inches: the width of the force.
+_FORCE = 3.6
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,16 @@ class Frame:
     def is_whole(self) -> bool:
         """Whether the body has no slit."""
         return bool(np.isnan(self.crack))
+
+
+class Pictures(Protocol):
+    """What is drawn of a path beside its force: in panels of so many inches each."""
+
+    widths: tuple[float, ...]
+
+    def draw(self, panels: Sequence[Axes], frame: Frame) -> None:
+        """Draw a frame into cleared panels."""
+        ...
 
 
 def frames_of(path: xr.Dataset) -> Iterator[Frame]:
@@ -67,37 +77,54 @@ def _frame(step: xr.Dataset, phase: str) -> Frame:
     return Frame(float(step["depth"]), phase, float(step["force"]), float(step["crack_depth"]) or np.nan)
 
 
-def write_film(path: xr.Dataset, blade: Blade, sections: Mapping[float, Section], file: Path, title: str) -> Path:
-    """Write the film of one case as a GIF, and return the file.
-
-    ``sections`` has the solved slits by the depth of the tip (m), and the intact body at 0, with the ``blade`` at its
-    last depth, to which the displacement is proportional. At the puncture the nearest slit is shown.
-    """
-    frames, last = list(frames_of(path)), float(path["depth"][-1])
-    pressed = max((frame.depth for frame in frames if frame.is_whole), default=0.0)
-    largest = _MM * max(pressed, *(float(section.size.max()) for depth, section in sections.items() if depth > 0), 0.0)
-    solved = np.array([depth for depth in sections if depth > 0])
+def write_film(path: xr.Dataset, pictures: Pictures, file: Path, title: str) -> Path:
+    """Write the film of the path of one case as a GIF, and return the file."""
+    frames, seen = list(frames_of(path)), list[IntArray]()
     with mpl.rc_context(DEFAULTS | {"font.size": 8}), atomic(file) as temporary:
-        figure = Figure(figsize=_SIZE)
-        FigureCanvasAgg(figure)
-        left, right = figure.subplots(1, 2, width_ratios=(1, 1))
+        widths = (*pictures.widths, _FORCE)
+        figure = Figure(figsize=(sum(widths), _HEIGHT))
+        canvas = FigureCanvasAgg(figure)
+        figure.set_dpi(_DOTS)
+        *panels, right = figure.subplots(1, len(widths), width_ratios=widths)
         figure.suptitle(title, fontsize=9)
         _draw_force(right, path)
         (dot,) = right.plot([], [], "o", color=COLOURS[4], zorder=5)
-        figure.tight_layout()
-        writer = PillowWriter(fps=_RATE)
-        writer.setup(figure, str(temporary), dpi=_DOTS)
-        for frame in [*frames, *[frames[-1]] * _LAST]:
-            intact = frame.is_whole
-            # A blade that indents a layer is drawn in the slit with which it arrived there.
-            key = 0.0 if intact else float(solved[np.argmin(abs(solved - min(frame.depth, frame.crack)))])
-            share = frame.depth / blade.depth if intact else 1.0  # the path may end above the blade's last depth
-            _draw_section(left, sections[key], frame, blade, share=share, largest=largest)
-            left.set(xlim=np.multiply(_MM * last, (-_SIDE, _SIDE)), ylim=np.multiply(_MM * last, (-_BELOW, _ABOVE)))
+        for frame in (frames[-1], *frames):
+            for panel in panels:
+                panel.clear()
+            pictures.draw(panels, frame)
+            if not seen:
+                figure.tight_layout()
             dot.set_data([_MM * frame.depth], [_MM * frame.force])
-            writer.grab_frame()
-        writer.finish()
+            canvas.draw()
+            seen.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())
+        _save(seen[1:], temporary)
     return file
+
+
+def _save(pictures: Sequence[IntArray], file: Path) -> None:
+    """Write pictures (height, width, 3) in the same few colours, each as what differs from the one before."""
+    sheet = np.concatenate(pictures[:: max(len(pictures) // _SHEET, 1)])
+    colours = Image.fromarray(sheet).quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE)
+    found, before = [], np.full(pictures[0].shape[:2], -1)
+    for picture in pictures:
+        now = np.asarray(Image.fromarray(picture).quantize(palette=colours, dither=Image.Dither.NONE), dtype=np.int64)
+        frame = Image.fromarray(np.where(now == before, _SAME, now).astype(np.uint8))
+        frame.putpalette(colours.getpalette())
+        found.append(frame)
+        before = now
+    seconds = [1 / _RATE] * (len(found) - 1) + [_LAST / _RATE]
+    first, *others = found
+    first.save(
+        file,
+        save_all=True,
+        append_images=others,
+        duration=[round(1e3 * each) for each in seconds],
+        loop=0,
+        transparency=_SAME,
+        disposal=1,
+        optimize=False,
+    )
 
 
 def _draw_force(ax: Axes, path: xr.Dataset) -> None:
@@ -109,17 +136,3 @@ def _draw_force(ax: Axes, path: xr.Dataset) -> None:
     ax.axhline(0, color=LINE, linewidth=0.6)
     ax.grid(color=GRID)
     ax.set(xlabel="depth of the tip (mm)", ylabel="force (mN)")
-
-
-def _draw_section(ax: Axes, section: Section, frame: Frame, blade: Blade, *, share: float, largest: float) -> None:
-    ax.clear()
-    colours = _MM * share * section.size.mean(axis=1)
-    body = PolyCollection(_MM * section.at(share), array=colours, cmap="YlGnBu", edgecolors=LINE, linewidths=0.08)
-    body.set_clim(0, largest)
-    ax.add_collection(body)
-    half, tip, top = _MM * blade.width / 2, -_MM * frame.depth, _MM
-    ax.fill([-half, half, half, -half], [tip, tip, top, top], color=TOOL, zorder=3)
-    if frame.crack > frame.depth:
-        ax.plot([0, 0], [tip, -_MM * frame.crack], color=COLOURS[4], linewidth=1.0, zorder=2)
-    ax.set_aspect("equal")
-    ax.set(xlabel="across the blade (mm)", ylabel="height (mm)", title=f"{frame.phase}, {_MM * frame.depth:.3g} mm")

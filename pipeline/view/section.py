@@ -1,12 +1,18 @@
 """The section of a deformed body in the plane through the contact, across the tool's length."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 
 from pipeline.arrays import FloatArray, IntArray
+from pipeline.report.figures.style import LINE
 from pipeline.view.fields import Fields
 
+_MM = 1e3
+_EDGES = 0.08  # points: the width of the edges of triangles
 # The plane is beside nodes that are in it, by this share of the body.
 _BESIDE = 1e-7
 # Of a cell with one corner on one side, the edges that the plane cuts; with two on each, in their order round it.
@@ -28,6 +34,20 @@ class Section:
     def at(self, share: float) -> FloatArray:
         """Return the places (n, 3, 2) at a share of the displacement."""
         return self.places + share * self.moved
+
+    def draw(self, ax: Axes, share: float, largest: float) -> None:
+        """Draw it at a share of the displacement, in mm and with equal axes; colours end at the ``largest`` (m)."""
+        colours = _MM * share * self.size.mean(axis=1)
+        body = PolyCollection(_MM * self.at(share), array=colours, cmap="YlGnBu", edgecolors=LINE, linewidths=_EDGES)
+        body.set_clim(0, _MM * largest)
+        ax.add_collection(body)
+        ax.set_aspect("equal")
+
+    @classmethod
+    def mirrored(cls, places: FloatArray, moved: FloatArray, signs: Sequence[tuple[int, int]]) -> "Section":
+        """Return the section whose parts (n, 3, 2) are mirrored by each pair of ``signs`` of the two coordinates."""
+        whole, displaced = (np.concatenate([part * sign for sign in signs]) for part in (places, moved))
+        return cls(whole, displaced, np.linalg.norm(displaced, axis=-1))
 
 
 def section_of(fields: Fields) -> Section:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.plane.crack import LEVELS, open_crack
+from pipeline.solve.plane.crack import LEVELS, open_crack, section
 from pipeline.solve.plane.opening import Opening
 from pipeline.verify.known import thin_needle
 from pipeline.verify.needles import shaft_pressure
@@ -38,6 +38,15 @@ def test_the_pressure_does_the_work_that_is_stored(opened):
     exponents = opened.ratios * opened.slopes / opened.energies
     steps = np.diff(np.log(opened.ratios))
     assert work == pytest.approx(steps * (exponents[1:] + exponents[:-1]) / 2, rel=0.01)
+
+
+def test_the_face_that_is_drawn_lies_round_the_cylinder():
+    places, moved = section(MaterialLaw.of_moduli(3.0, 0.5, "neo-hookean"), 0.1)
+    face = np.isclose(places[..., 1], 0.0, atol=1e-12) & (places[..., 0] < 1)
+    distances = np.hypot(*(places + moved)[face].T)
+    assert distances.min() == pytest.approx(0.1, rel=1e-3)
+    middle = np.isclose(places[..., 0], 0.0, atol=1e-12)
+    assert np.unique((places + moved)[face & middle].round(4), axis=0) == pytest.approx(np.array([[0.0, -0.1]]))
 
 
 def test_what_holds_the_tissue_ahead_of_the_tips_carries_the_thrust(opened):

@@ -2,12 +2,37 @@
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from pipeline.report.dataset import build
 from pipeline.study.read import read_mapping
-from pipeline.view.film import write_film
+from pipeline.view.blade_pictures import BladePictures
+from pipeline.view.film import frames_of, write_film
+from pipeline.view.needle_pictures import NeedlePictures
 from pipeline.view.section import Section
+from tests.insertion import test_needle as needles
 from tests.insertion.scenes import BLADE, SCENE, solved
+
+
+def test_a_needle_is_pressed_drawn_in_its_crack_and_pulled_out(tmp_path):
+    """The states that are drawn are solved; the path is one of closed forms."""
+    study = needles.scene(insertion={"to": "6 mm", "steps": 2, "withdraw": True})
+    path = build(*needles.solved(study))
+    path = path.squeeze(list(path["status"].dims), drop=True)
+    case = next(study.cases())
+    needle = study.tool(case)
+    pressed = {1e-3: Section(np.zeros((1, 3, 2)), np.zeros((1, 3, 2)), np.zeros((1, 3)))}
+    half = NeedlePictures.half_length(path, needle)
+    assert half == pytest.approx(needles.TORN / (2 * needle.toughness))
+    across = NeedlePictures.across(case, needle, 4 * needle.limit)
+    assert np.abs(across.at(1.0)[..., 1]).max() > 2 * needle.limit
+    seen = np.hypot(*np.moveaxis(across.at(1.0), -1, 0))
+    assert seen.min() == pytest.approx(needle.limit, rel=1e-2)
+    file = write_film(path, NeedlePictures(path, needle, pressed, across, half), tmp_path / "path.gif", "")
+    with Image.open(file) as film:
+        assert film.n_frames == len(list(frames_of(path)))
+        film.seek(film.n_frames - 1)
+        assert np.asarray(film.convert("L")).std() > 20
 
 
 def test_the_intact_body_of_a_path_that_ended_early_is_drawn_at_the_share_of_the_depth_it_was_solved_at(tmp_path):
@@ -23,5 +48,5 @@ def test_the_intact_body_of_a_path_that_ended_early_is_drawn_at_the_share_of_the
     assert np.isnan(path["puncture_depth"])
     section = Seen(np.zeros((1, 3, 2)), np.zeros((1, 3, 2)), np.zeros((1, 3)))
     blade = study.tool(next(study.cases()))
-    write_film(path, blade, {0.0: section}, tmp_path / "path.gif", "")
-    assert seen[:3] == pytest.approx([1 / 12, 2 / 12, 3 / 12])
+    write_film(path, BladePictures(path, blade, {0.0: section}), tmp_path / "path.gif", "")
+    assert seen[1:4] == pytest.approx([1 / 12, 2 / 12, 3 / 12])

@@ -103,6 +103,11 @@ class MeridianForms:
             result[number] = part.transferred(known, solution[of_known], ratio)
         return result
 
+    def triangles(self, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the corners (m, 3, 2) of all cells at rest, and their displacements (m, 3, 2) in a ``solution``."""
+        places, moved = zip(*(part.triangles(solution[number]) for part, number in self._parts), strict=True)
+        return np.concatenate(places), np.concatenate(moved)
+
     def mean_strains(self) -> tuple[FloatArray, FloatArray]:
         """Return the largest principal strain, by magnitude, of each cell's mean strain, and its corners (m, 3, 2).
 

@@ -11,10 +11,11 @@ them is the bar of the steps. Finer meshes have more steps.
 Lengths are in units of the contact radius of the mesh, stresses in units of μ of region 0.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.arrays import FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
 from pipeline.solve.meridian.large import LargeSolver, stopped
@@ -32,6 +33,8 @@ _BETWEEN_DEGREES, _BETWEEN_MESHES = 2.0, 1.0
 # and a degree whose error is well below that of the steps.
 _STEPS = {Grading(0.1, 1.0, 4.0): 8, Grading(0.02, 0.7, 4.0): 16}
 _ACCURACY_OF_STEPS, DEGREE_OF_STEPS = 1e-3, 3
+# Of pictures: a mesh whose corners follow the tool, and the degree of its elements.
+_SHOWN, _SHOWN_DEGREE = Grading(0.1, 0.2, 4.0), 2
 
 
 class LargeMeridianContact(LargeSolver):
@@ -47,6 +50,16 @@ class LargeMeridianContact(LargeSolver):
         super().__init__(meridian, **how)
         self._tool = tool
         self._kept = meridian.radius if isinstance(meridian, EllipticMeridian) else meridian.kept_radius
+
+    def sections(self, law: MaterialLaw, depths: Sequence[float]) -> list[tuple[FloatArray, FloatArray]]:
+        """Return triangles (n, 3, 2) at rest and their displacements, in m, at rising ``depths`` (m) as far as it goes.
+
+        They are for pictures: the mesh is even round the tool, and has elements of a low degree.
+        """
+        arrays, meshes = Punches(self._meridian, self._tool, law).mesh(min(self._tool.limit, 0.9 * self._kept), _SHOWN)
+        touch = MeridianTouch.of(arrays, meshes, _SHOWN_DEGREE, law, self._tool)
+        found = (each.tissue.system.forms.triangles(each.tissue.state) for each in touch.along(depths))
+        return [(arrays.unit * places, arrays.unit * moved) for places, moved in found]
 
     def _solve_on(self, grading: Grading, law: MaterialLaw, depth: float, before: Answer | None) -> Answer:
         touch = before.touch if isinstance(before, _Found) else None

@@ -202,6 +202,12 @@ class Region:
             fields.append((numbers, pressures, 0))
         return fields
 
+    def triangles(self, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the corners (m, 3, 2) of all cells at rest, and their displacements (m, 3, 2) in a ``solution``."""
+        nodes = compat.cell_dofs(self._displacements)[:, :3]  # those at the corners are first
+        places: FloatArray = self._displacements.tabulate_dof_coordinates()[nodes, :2]
+        return places, solution[self._numbers[nodes]]
+
     def mean_strains(self) -> tuple[FloatArray, FloatArray]:
         """Return the largest principal strain of each cell's mean strain, and its corners (m, 3, 2)."""
         corners = self._mesh.geometry.x[compat.geometry_dofs(self._mesh)[:, :3], :2]

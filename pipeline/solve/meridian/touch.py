@@ -6,7 +6,7 @@ the tool's axis, and a node meets the tool at its radius at rest.
 Lengths are in units of the mesh, stresses in units of μ of region 0.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import nan, pi
@@ -76,6 +76,16 @@ class MeridianTouch:
             LargeError: if the path ends before; ``reached`` are the depth and the force there.
         """
         return self._at_end(lambda path, there: press(self.tissue, self._placed, path, there), depth)
+
+    def along(self, depths: Sequence[float]) -> Iterator["MeridianTouch"]:
+        """Yield the contact without friction at rising ``depths`` (m) of one load path, as far as it goes."""
+        path = ContactPath(Stage(0.0, np.zeros_like(self.tissue.state)))
+        for depth in depths:
+            try:
+                press(self.tissue, self._placed, path, depth / self.unit)
+            except LargeError:
+                return
+            yield replace(self, touched=path.last.touched)
 
     def pressed_with_friction(self, depth: float, steps: int) -> "MeridianTouch":
         """Return the contact with friction at the end of a load path of at least so many ``steps`` to a ``depth`` (m).

@@ -33,6 +33,8 @@ DEGREE = 2
 _FIRST, _FACTOR, _LARGEST, _EXTENT = 0.05, 1.3, 12.0, 60.0
 # Thicknesses of the lens, in units of the first radius.
 _LENS = (0.25, 0.5, 1.0)
+# The same, in a picture.
+_SHOWN = 8.0
 # Quarters of the plane.
 _QUARTERS = 4
 
@@ -53,8 +55,7 @@ def open_crack(law: MaterialLaw, toughness: float, grading: CrackGrading) -> Ope
     ahead, ratio, balance = tissue.system.forms.on(AHEAD)[0][:, 1], _FIRST, 0.0
     while ratio < _LARGEST:
         try:
-            for share in _LENS if not found else (1.0,):
-                press(tissue, lambda radius: _cylinder(tissue, radius), path, share * ratio)
+            _open(tissue, path, ratio)
         except SolveError as error:
             message = str(error)
             break
@@ -69,6 +70,30 @@ def open_crack(law: MaterialLaw, toughness: float, grading: CrackGrading) -> Ope
     if len(found) < 2:
         raise SolveError(f"a crack that a cylinder opens: {message}")
     return replace(_opening(found), balance=balance, message=message)
+
+
+def section(law: MaterialLaw, ratio: float) -> tuple[FloatArray, FloatArray]:
+    """Return a quarter of the section at R/b = ``ratio``: triangles (n, 3, 2) at rest, and displacements (n, 3, 2).
+
+    The crack lies along the first coordinate.
+
+    Raises:
+        SolveError: if it cannot be opened so far.
+    """
+    with stage("meshing"):
+        mesh = meridian_mesh(cracked_quarter(_SHOWN * max(ratio, 1.0), LEVELS[-1]))
+    tissue = _tissue(mesh, law)
+    path = ContactPath(Stage(0.0, np.zeros_like(tissue.state)))
+    steps = max(round(np.log(ratio / _FIRST) / np.log(_FACTOR)), 0)
+    for each in np.geomspace(min(_FIRST, ratio), ratio, steps + 1):
+        _open(tissue, path, float(each))
+    return tissue.system.forms.triangles(path.last.state)
+
+
+def _open(tissue: MeridianTissue, path: ContactPath, ratio: float) -> None:
+    """Continue a path of radii to a ``ratio``; from rest, the first states are those of a lens."""
+    for share in _LENS if path.last.touched is None else (1.0,):
+        press(tissue, lambda radius: _cylinder(tissue, radius), path, share * ratio)
 
 
 class _State(NamedTuple):
