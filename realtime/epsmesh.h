@@ -15,7 +15,7 @@ extern "C" {
 
 /* Largest numbers: of polynomials along a direction, of tools at once, of modes of the interaction and of the surface. */
 enum { EPSMESH_MOST = 64, EPSMESH_TENSORS = 7, EPSMESH_MOST_RELAXING = 6, EPSMESH_MOST_TOOLS = 16 };
-enum { EPSMESH_MOST_MODES = 96, EPSMESH_MOST_LINKS = 3, EPSMESH_MOST_SEEN = 512 };
+enum { EPSMESH_MOST_MODES = 96, EPSMESH_MOST_LINKS = 3, EPSMESH_MOST_SEEN = 512, EPSMESH_MOST_NEAR = 16 };
 
 typedef enum {
     EPSMESH_OK,
@@ -68,6 +68,9 @@ typedef struct {
     int vertices, triangles, surface_counts[4]; /* modes, and polynomials of nu, y and x */
     double share[EPSMESH_MOST_RELAXING], time[EPSMESH_MOST_RELAXING]; /* of all tissue: epsmesh_relaxation.h */
     int relaxing;                                                     /* number of terms */
+    const double *near; /* Chebyshev, over (ratio, nu, x); balls at large displacements: src/contact.c */
+    double near_most, near_error, near_room;
+    int near_counts[2], is_large; /* nu, x */
     epsmesh_flaw flaw;
     const char *flawed; /* the array with the flaw */
 } epsmesh_model;

@@ -13,9 +13,9 @@ from pipeline.export.ranks import ALONE, Ranks
 from pipeline.stages import stage
 
 # Half sizes of the tools, in units of the largest allowed one at the place; depth in units of the half size.
-_SIZES, _DEPTH = (0.1, 0.99), 0.02
+SIZES, _DEPTH = (0.1, 0.99), 0.02
 # Safety factor on the largest error bar that the calibration set needs.
-_SAFETY = 1.3
+SAFETY = 1.3
 # Safety factor for curved bodies, whose calibration set is small. In three of four draws, the largest of six errors,
 # times this factor, exceeds the 95 % quantile of all errors.
 _SAFETY_FEW = 1.6
@@ -23,14 +23,15 @@ _SAFETY_FEW = 1.6
 _LEAST = 0.25
 # Range of a blade's length over its width.
 _SLENDER = (1.0, 12.0)
-TOOLS = ("disc", "blade", "bonded")
+TOOLS = ("disc", "blade", "bonded", "ball")
 
 
 @dataclass(frozen=True)
 class Check:
     """A touch: place and half size (m), ν, the force (N) of a full solve with its relative error bar, and the model's.
 
-    ``kind`` is an index of ``TOOLS``: a disc, a blade (its half size is half its diagonal), or a bonded disc.
+    ``kind`` is an index of ``TOOLS``: a disc, a blade (its half size is half its diagonal), a bonded disc, or a ball
+    at large displacements (its half size is its radius).
     ``vector`` is the force of the tissue on the tool (N) by the full solve. ``aside`` is the error of the model's
     lateral force on a bonded tool, in units of ``full``; the model's error bar ``bar`` covers it, too.
     """
@@ -85,7 +86,7 @@ def check_touches(model: Model, solver: Solver, touches: Sequence[Check], ranks:
 def random_touch(model: Model, rng: np.random.Generator, kind: int) -> Check:
     """Return a random touch with a tool of ``TOOLS``, not solved yet, with the model's force."""
     x, y = random_place(model, rng)
-    smallest, largest = np.log(_SIZES)
+    smallest, largest = np.log(SIZES)
     size = model.largest * model.room(x, y) * float(np.exp(rng.uniform(smallest, largest)))
     low, high = model.table.poisson
     poisson, depth = float(rng.uniform(low, high)), _DEPTH * size
@@ -147,7 +148,7 @@ def random_place(model: Model, rng: np.random.Generator) -> tuple[float, float]:
 
 def needed(checks: Sequence[Check], floor: float) -> float:
     """Return the factor, at least 1, by which error bars beyond ``floor`` must grow to cover all errors."""
-    return max(1.0, _SAFETY * max((abs(check.error) - floor) / (check.bar - floor) for check in checks))
+    return max(1.0, SAFETY * max((abs(check.error) - floor) / (check.bar - floor) for check in checks))
 
 
 def error_of_full(checks: Sequence[Check], bar: float) -> float:

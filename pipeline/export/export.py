@@ -14,6 +14,7 @@ from pipeline.export.curved import curved_model
 from pipeline.export.far import far_fields
 from pipeline.export.file import write_model
 from pipeline.export.full import Solver
+from pipeline.export.near import near_field, with_near
 from pipeline.export.pairs import tabulate_pairs
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
@@ -31,6 +32,7 @@ MARGIN, LARGEST = 0.15, 0.4
 # fourth power. No error bar is smaller than that of the full solves.
 _SHARE, _PRECISE, _PRECISE_CURVED, _PRECISE_TABLE, _BARS = 0.4, 0.25, 0.5, 1.0, (1e-3, 0.03, 0.1)
 _SEEDS = (1, 2)
+_UNSEEN = "at large displacements there is only a force"
 # Largest distance of a query from a flat face, in units of the thickness.
 _OFF = 1e-6
 
@@ -58,8 +60,10 @@ class Exported:
     @property
     def tools(self) -> str:
         """The tools that the model answers for, in words."""
+        more = "; blade; bonded disc" if len(self.model.table.tensors) else ""
+        known = f"disc, sphere, sharp cone: frictionless{more}"
         return (
-            f"disc, sphere, sharp cone: frictionless{'; blade; bonded disc' if len(self.model.table.tensors) else ''}; "
+            f"{'sphere: frictionless, at large displacements' if self.model.near else known}; "
             f"along the normal, contact up to {self.model.largest:g} of the distance to a side, the bottom or other "
             "tissue"
         )
@@ -105,7 +109,7 @@ def export(
     make = _flat if scope.is_flat else curved_model
     of_table = replace(solver, accuracy=_PRECISE_TABLE * accuracy)
     bare, error, places = make(scope, of_table, accuracy, largest, (*_BARS, precise), margin, ranks)
-    tools = range(len(TOOLS)) if len(bare.table.tensors) else (0,)
+    tools = range(TOOLS.index("ball")) if len(bare.table.tensors) and not scope.law else (0,)
     halves = [checks - checks // 2, checks // 2]
     touches = [random_touches(bare, count, seed, tools) for count, seed in zip(halves, _SEEDS, strict=True)]
     checked = check_touches(bare, solver, [*touches[0], *touches[1]], ranks)
@@ -117,6 +121,11 @@ def export(
     first, second, third = _BARS
     model = replace(bare, bar=(factor * first, factor * second, factor * third, floor))
     fitted, judged = ([with_bar(model, check) for check in half] for half in (fitted, judged))
+    if scope.law:
+        nonlinear = replace(solver, accuracy=accuracy, law=scope.law)
+        near = near_field(scope, nonlinear, ranks)
+        model, fitted, judged = with_near(model, near, nonlinear, halves, ranks)
+        return Exported(model, fitted, judged, error, places, None, _UNSEEN if surface else "")
     seen, unseen = None, ""
     if surface or scope.is_flat:
         ranks.note("solving for the deforming surface")

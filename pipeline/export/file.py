@@ -27,6 +27,7 @@ _DIMENSIONS: Mapping[str, tuple[str, ...]] = {
     "bar": ("term",),
     **dict.fromkeys(("relaxation_share", "relaxation_time"), ("relaxing",)),
     **dict.fromkeys(("even", "reach", "sides", "poisson_range"), ("pair",)),
+    "near": ("near_ratio", "near_node", "near_x"),
     "pair_modes": ("pair_mode", "pair_y", "pair_x"),
     "pair_links": ("pair_node", "pair_mode", "pair_other"),
     "surface_points": ("vertex", "component"),

@@ -1,8 +1,8 @@
 """Full solves: one touch of a tool on a study's body, with the error bar of its force."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import degrees, isfinite
+from dataclasses import dataclass, field
+from math import degrees, isfinite, nan
 from typing import Any
 
 from mpi4py import MPI
@@ -10,6 +10,7 @@ from mpi4py import MPI
 from pipeline.arrays import FloatArray, np
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
+from pipeline.shapes.tissue import KEYS_OF_LAWS
 from pipeline.study.read import parse
 
 
@@ -45,21 +46,29 @@ class Tool:
 
 @dataclass(frozen=True)
 class Full:
-    """The result of a full solve: F (N) along the axis, its relative error bar, the force on the tool (3,), in N."""
+    """The result of a full solve: F (N) along the axis, its relative error bar, the force on the tool (3,), in N.
+
+    ``radius`` (m) is that of the contact, NaN if it is prescribed.
+    """
 
     force: float
     error: float
     vector: FloatArray
+    radius: float = nan
 
 
 @dataclass(frozen=True)
 class Solver:
-    """Full solves on the body of a study with these ``sections``, to a relative ``accuracy``."""
+    """Full solves on the body of a study with these ``sections``, to a relative ``accuracy``.
+
+    ``law`` are the keys of the law of large displacements, none for linear elasticity.
+    """
 
     sections: Mapping[str, Any]
     file: str
     young: float
     accuracy: float
+    law: Mapping[str, Any] = field(default_factory=dict)
 
     def press(self, tool: Tool, at: tuple[float, ...], depth: float, poisson: float | None) -> Full:
         """Return the force of a tool at x and y, or x, y and z (m), at a ``depth`` (m).
@@ -87,9 +96,10 @@ class Solver:
         Raises:
             RuntimeError: if a solve failed.
         """
-        own = {name: _at_once(value) for name, value in self.sections.items() if name in ("body", "material")}
+        left_out = ("relaxation",) if self.law else ("relaxation", *KEYS_OF_LAWS)
+        own = {name: _without(left_out, value) for name, value in self.sections.items() if name in ("body", "material")}
         if poissons is not None:
-            own["material"] = {"young": f"{self.young:.12g} Pa", "poisson": list(poissons)}
+            own["material"] = {"young": f"{self.young:.12g} Pa", "poisson": list(poissons), **self.law}
         place: dict[str, Any] = {"at": [_mm(x) for x in at], "depth": [_mm(depth) for depth in depths]}
         if mesh is not None and len(depths) > 1:
             place["depth_range"] = [_mm(min(depths)), _mm(max(depths))]
@@ -101,14 +111,17 @@ class Solver:
         for record in found:
             if not record.is_ok or not isfinite(record.force_error):
                 raise RuntimeError(f"a full solve of a {tool.name} at {place['at']} failed: {record.message}")
-        return [Full(record.force, record.force_error, np.array(record.force_vector)) for record in found]
+        return [
+            Full(record.force, record.force_error, np.array(record.force_vector), record.contact_radius)
+            for record in found
+        ]
 
 
-def _at_once(section: Any) -> Any:
-    """Return a part of a study without relaxation: its tissue as it is at once."""
+def _without(keys: Sequence[str], section: Any) -> Any:
+    """Return a part of a study without these keys: its tissue as it is at once, or at small strain."""
     if isinstance(section, Mapping):
-        return {name: _at_once(value) for name, value in section.items() if name != "relaxation"}
-    return [_at_once(value) for value in section] if isinstance(section, list) else section
+        return {name: _without(keys, value) for name, value in section.items() if name not in keys}
+    return [_without(keys, value) for value in section] if isinstance(section, list) else section
 
 
 def _mm(length: float) -> str:

@@ -45,6 +45,11 @@ class Scope:
         return self.case.relaxations[-1]
 
     @property
+    def law(self) -> dict[str, Any]:
+        """The keys of the law of large displacements at the face, {} if displacements are small."""
+        return surface_tissue(self.case).keys_of_law
+
+    @property
     def is_flat(self) -> bool:
         """Whether the face is a plane: tables then come from the Green's function, else from full solves."""
         return isinstance(self.body, Layered)
@@ -104,10 +109,8 @@ def _refusal(case: Case, first: Case) -> str:
         return "probe.insertion: a path has no real-time model: give a depth instead"
     if reason := obstacle("real-time model", case):
         return reason
-    if case.relaxations != first.relaxations:
-        return "the study has several relaxations, and a model has one: export a study of each"
-    if (terms := len(case.relaxations[-1])) > MOST_RELAXING:
-        return f"material.relaxation has {terms} terms; a real-time model has at most {MOST_RELAXING}"
+    if reason := _large_refusal(case, first) or _relaxing_refusal(case, first):
+        return reason
     if case.poisson > _MOST:
         return f"material.poisson = {case.poisson:g} is too close to 0.5 for a real-time model: at most {_MOST}"
     if isinstance(body, Layered):
@@ -125,6 +128,32 @@ def _refusal(case: Case, first: Case) -> str:
         )
     if len(probe.at) != len("xy") or probe.axis is not None:
         return "probe.at must be x and y, the middle of the model's region; leave probe.axis out"
+    return ""
+
+
+def _relaxing_refusal(case: Case, first: Case) -> str:
+    if case.relaxations != first.relaxations:
+        return "the study has several relaxations, and a model has one: export a study of each"
+    if (terms := len(case.relaxations[-1])) > MOST_RELAXING:
+        return f"material.relaxation has {terms} terms; a real-time model has at most {MOST_RELAXING}"
+    return ""
+
+
+def _large_refusal(case: Case, first: Case) -> str:
+    """Return why a law of large displacements has no model, "" if it has one or there is none."""
+    if any(tissue.keys_of_law != other.keys_of_law for tissue, other in zip(case.tissues, first.tissues, strict=True)):
+        return "material.law: the study has several laws, and a model has one: export a study of each"
+    if not case.material.is_large:
+        return ""
+    if not isinstance(case.body, Layered):
+        return "material.law: at large displacements only boxes and cylinders have a real-time model"
+    if not surface_tissue(case).is_large:
+        return f'material.law = "{case.material.law}": a real-time model needs a law of large displacements at the face'
+    if case.probe.shape != "sphere":
+        return (
+            f'probe.shape = "{case.probe.shape}": at large displacements a real-time model answers for balls: write '
+            'shape = "sphere"'
+        )
     return ""
 
 

@@ -69,10 +69,10 @@ def tabulate(
     return table, float(error)
 
 
-def ratios_of(poissons: tuple[float, float]) -> FloatArray:
-    """Return the nodes of a range of Poisson's ratios; one if its ends are equal."""
+def ratios_of(poissons: tuple[float, float], count: int = _POISSONS) -> FloatArray:
+    """Return ``count`` nodes of a range of Poisson's ratios; one if its ends are equal."""
     low, high = poissons
-    return np.asarray((low + high) / 2 + (high - low) / 2 * (extrema(_POISSONS - 1) if low < high else np.zeros(1)))
+    return np.asarray((low + high) / 2 + (high - low) / 2 * (extrema(count - 1) if low < high else np.zeros(1)))
 
 
 def _error(table: Table, place: tuple[float, float], poisson: float, c: float) -> float:

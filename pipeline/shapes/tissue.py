@@ -55,6 +55,8 @@ LAWS = MappingProxyType(
         "veronda-westmann": ("alpha",),
     }
 )
+# These, and that of the law itself.
+KEYS_OF_LAWS = ("law", *sorted({key for keys in LAWS.values() for key in keys}))
 # Names that solvers have for the direction of fibres.
 FIBRE = ("fibre_x", "fibre_y", "fibre_z")
 # Tolerance of directions and of a dispersion.
@@ -206,6 +208,13 @@ class Tissue(Section):
         """What its law reads besides young and poisson, by key; None if it is missing."""
         keys = LAWS[self.law] if self.law is not None else ()
         return {key: _DEFAULTS.get(key) if getattr(self, key) in (None, ()) else getattr(self, key) for key in keys}
+
+    @property
+    def keys_of_law(self) -> dict[str, Any]:
+        """The keys of a study that set its law, {} of a linear one."""
+        if not self.is_large:
+            return {}
+        return self.model_dump(include=set(KEYS_OF_LAWS), exclude_none=True, exclude_defaults=True)
 
     @property
     def further(self) -> dict[str, float]:

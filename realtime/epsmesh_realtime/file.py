@@ -30,6 +30,14 @@ Relaxation of all tissue, optional:
     relaxation_share         (relaxing,) shares of the modulus at once, of a Prony series,
     relaxation_time          (relaxing,) and their times (s)
 
+Large displacements, optional: the model then answers for balls only. x = (F/E* R²)^(1/3), E* = 1/(1 - ν²):
+
+    near                     (2, near_node, near_x) Chebyshev coefficients over ν and 2x/near_most - 1 of depth and
+                             contact radius on a half-space at a force, in units of those of H. Hertz
+    near_most                the largest x
+    near_error               relative error of F at a depth on a half-space
+    near_room                error of c by large displacements, times room²/depth
+
 Interaction of tools on a flat face, optional:
 
     pair_modes               (pair_mode, pair_y, pair_x) Chebyshev coefficients of φ (1) over x/X and y/Y

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from epsmesh_realtime.evaluator import MOST_TOOLS, Array, Evaluator, Spot
 from epsmesh_realtime.file import ModelError, unpack
 from epsmesh_realtime.query import Query, packed_each
-from epsmesh_realtime.table import Face, Pairs, Table
+from epsmesh_realtime.table import Face, Near, Pairs, Table
 from epsmesh_realtime.touch import Touch, Touches
 
 # Numbers of a file that are fields of a model.
@@ -34,6 +34,7 @@ class Model:
     - ``pairs``: interaction of several tools; without it, the model answers for one tool at a time.
     - ``relaxation``: shares of the modulus at once, and their times (s). A query is answered for a sudden touch;
       for forces over time see :class:`epsmesh_realtime.history.History`.
+    - ``near``: a ball at large displacements on a half-space; without it, displacements are small.
     """
 
     table: Table
@@ -51,6 +52,7 @@ class Model:
     bend_error: float = 0.0
     pairs: Pairs | None = None
     relaxation: tuple[tuple[float, float], ...] = ()
+    near: Near | None = None
 
     def __repr__(self) -> str:
         x, y = (2e3 * size for size in self.table.reach)
@@ -131,8 +133,9 @@ class Model:
     def numbers(self) -> dict[str, ArrayLike]:
         """Return the arrays of the model's file, by name, without its surface."""
         own = {name: getattr(self, name) for name in (*_NUMBERS, "sides", "origin", "axes", "bar")}
-        pairs = self.pairs.numbers() if self.pairs else {}
-        found = own | self.table.numbers() | self.face.numbers() | pairs
+        found = own | self.table.numbers() | self.face.numbers()
+        for part in (self.pairs, self.near):
+            found |= part.numbers() if part else {}
         for name, terms in zip(
             ("relaxation_share", "relaxation_time"), zip(*self.relaxation, strict=True), strict=False
         ):
@@ -173,6 +176,7 @@ def loaded(data: bytes, evaluator: Evaluator) -> tuple[Model, dict[str, NDArray[
         sides=tuple(found["sides"].tolist()),
         face=Face(found["height"], found["bend"]),
         pairs=Pairs.of(found),
+        near=Near.of(found),
         relaxation=_relaxation(found),
         **{name: float(found[name]) for name in _NUMBERS if name in found},
     )

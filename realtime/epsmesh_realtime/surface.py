@@ -103,7 +103,8 @@ def surface_of(data: bytes) -> Surface:
     evaluator = Evaluator(data)
     model, found = loaded(data, evaluator)
     if "surface_points" not in found:
-        raise ModelError("the model has no surface: export it again, without --no-surface")
+        again, only = "export it again, without --no-surface", "at large displacements there is only a force"
+        raise ModelError(f"the model has no surface: {only if 'near' in found else again}")
     points, triangles, modes, amounts, error = (found[f"surface_{name}"] for name in _PARTS)
     table = SurfaceTable(points, triangles, modes, amounts, float(error), model.table.reach, model.table.poisson)
     surface = Surface(model, table)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from epsmesh_realtime.evaluator import Array, Evaluator, Pair, Place
 
 _EVEN = (True, True)
+_OF_NEAR = ("most", "error", "room")
 # The numbers of a body around a table by itself.
 _PLAIN: Mapping[str, ArrayLike] = {
     "origin": np.zeros(3), "axes": np.eye(3), "bar": np.zeros(4), "thickness": 1.0, "young": 1.0, "largest": 1.0,
@@ -120,6 +121,33 @@ class Table:
             leans=bool(found["leans"]),
             **tensors,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """A ball on a half-space at large displacements; the rest of the body remains linear.
+
+    Depth and contact radius at a force are in units of those of H. Hertz (1882), a function of ν and
+    x = (F/E* R²)^(1/3). ``values`` (2, ν, x) are their Chebyshev coefficients, over ν and 2x/``most`` - 1. ``error`` is
+    the relative error of F on the half-space. The error of c by large displacements is ``room`` times the depth over
+    the square of the distance to the nearest side or the bottom.
+    """
+
+    values: Array
+    most: float
+    error: float
+    room: float
+
+    def numbers(self) -> dict[str, ArrayLike]:
+        """Return the arrays of a file."""
+        return {"near": self.values, **{f"near_{name}": getattr(self, name) for name in _OF_NEAR}}
+
+    @staticmethod
+    def of(found: Mapping[str, NDArray[Any]]) -> "Near | None":
+        """Return the half-space in a file's arrays, None if the file has none."""
+        if "near" not in found:
+            return None
+        return Near(found["near"], *(float(found[f"near_{name}"]) for name in _OF_NEAR))
 
 
 @dataclass(frozen=True, eq=False)

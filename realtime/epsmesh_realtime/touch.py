@@ -13,7 +13,7 @@ SENTENCES = {
     "large": "The tool, or its contact, is too large here: a side, the bottom or other tissue is too near.",
     "deep": "The depth exceeds the model's range.",
     "tool": "The model has no such tool, or a size is missing: disc(radius), sphere(radius), cone(radius, angle), "
-    "blade(length, width).",
+    "blade(length, width). At large displacements it has the sphere alone.",
     "input": "A number of the query is not finite, or must be positive.",
     "poisson": "Poisson's ratio is outside the model's range.",
     "tilted": "The tool must press along the face's inward normal.",

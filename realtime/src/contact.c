@@ -13,14 +13,21 @@
  * has k r^2/2 more. D(s) is s artanh(s/R) for a ball (by a series without cancellation) and pi/2 m s for a cone whose flank
  * rises by m (A. E. H. Love, 1939); the first radii are H. Hertz's (1882) and Love's. A bonded disc has V. I. Mossakovskii's
  * normal stiffness (1954), and R. D. Mindlin's lateral one (1949).
+ *
+ * Large displacements of a ball. The body is linear far from the tool, where strains are small. At equal force, the contact
+ * of a half-space is deeper than H. Hertz's depth S by S (L/S - 1) and has 1 - A/a of his radius less. Both ratios are
+ * functions of nu and x = (F/E* R^2)^(1/3) alone: solved once for a law, and tabulated. That depth is added to d of a
+ * paraboloid, the tool of Hertz, so F derives from one energy as before. d has a further error that grows with d/room,
+ * since the tool comes nearer to what supports the body.
  */
 
 typedef struct {
     double force, aside[2], stiffness, radius, mean_square;
+    double share; /* relative change of F, per such change of the half-space's F at a depth */
 } contact;
 
 typedef struct {
-    double depth, slope, force, square, growth, compliance;
+    double depth, slope, force, square, growth, compliance, near_compliance, widened;
 } pressed;
 
 static double cube(double x) { return x * x * x; }
@@ -39,14 +46,17 @@ static contact press_disc(double a, double depth, const place *p) {
         double slope = p->slope_c[i] + p->slope_h[i] * (a * a / 3 - 4.0 / 45 * stiff * h * fifth(a));
         k.aside[i] = 0.5 * k.force * k.force * (slope - 4.0 / 3 * stiff * cube(a) * p->slope_tilt[i]);
     }
-    k.stiffness = k.force / depth, k.radius = a;
+    k.stiffness = k.force / depth, k.radius = a, k.share = 1;
     k.mean_square = 2.0 / 3 * a * a - 8.0 / 45 * stiff * h * fifth(a);
     return k;
 }
 
 /* D(s), D'(s), and the integrals of D and s^2 D from 0 to s */
-static void profile(const epsmesh_query *tool, double s, double out[4]) {
-    if (tool->shape == EPSMESH_SPHERE) {
+static void profile(const epsmesh_query *tool, int is_paraboloid, double s, double out[4]) {
+    if (is_paraboloid) {
+        double bend = 1 / tool->radius;
+        out[0] = bend * s * s, out[1] = 2 * bend * s, out[2] = bend * cube(s) / 3, out[3] = bend * fifth(s) / 5;
+    } else if (tool->shape == EPSMESH_SPHERE) {
         double big = tool->radius, t = (s / big) * (s / big), power = t, sum[4] = {0, 0, 0, 0};
         int k;
         for (k = 0; k < TERMS; k++) {
@@ -63,29 +73,53 @@ static void profile(const epsmesh_query *tool, double s, double out[4]) {
     }
 }
 
+/* Add the depth by which a half-space at large displacements differs from Hertz's. */
+static void add_near(const epsmesh_query *tool, const place *p, pressed *k) {
+    double big = tool->radius, x = cbrt(k->force / (p->plane * big * big)), terms[3][EPSMESH_MOST];
+    double ratio[2] = {0, 0}, growth = 0, hertz = pow(0.75, 2.0 / 3) * x * x * big;
+    int i, j;
+    polynomials(2 * x / p->near_most - 1, p->nears, terms);
+    for (i = 0; i < p->nears; i++) {
+        for (j = 0; j < 2; j++) ratio[j] += p->near[j][i] * terms[0][i];
+        growth += p->near[0][i] * terms[1][i] * 2 / p->near_most;
+    }
+    k->depth += hertz * (ratio[0] - 1);
+    k->compliance += hertz / (3 * k->force) * (2 * (ratio[0] - 1) + x * growth);
+    k->near_compliance = hertz / (3 * k->force) * (2 * ratio[0] + x * growth), k->widened = ratio[1];
+}
+
 static pressed press_to(double a, const epsmesh_query *tool, const place *p) {
     double stiff = p->plane, h = p->h, d[4], own = 1 - 2.0 / 3 * stiff * h * cube(a), power, effect;
-    pressed k = {-1, 0, 0, 0, 0, 0};
+    pressed k = {-1, 0, 0, 0, 0, 0, 0, 1};
     if (!(own > 0)) return k;
-    profile(tool, a, d);
+    profile(tool, p->nears > 0, a, d);
     d[0] += p->bend * a * a, d[1] += 2 * p->bend * a, d[2] += p->bend * cube(a) / 3, d[3] += p->bend * fifth(a) / 5;
     k.force = 2 * stiff * (a * d[0] - d[2]) / own;
     k.square = 4 * stiff * (cube(a) / 3 * d[0] - d[3]) + 4.0 / 15 * stiff * h * k.force * fifth(a);
     k.growth = 2 * stiff * a * d[1] + 2 * stiff * h * k.force * a * a;
     if (k.growth <= 0 || k.force <= 0) {
-        pressed none = {-1, 0, 0, 0, 0, 0};
+        pressed none = {-1, 0, 0, 0, 0, 0, 0, 1};
         return none;
     }
     power = own / k.growth * k.force / a;
     effect = -2.0 / 3 * stiff * p->tilt * cube(a) * k.force * (2 + 3 * power);
     k.depth = d[0] + 0.5 * h * k.force * a * a + p->c * k.force + 0.25 * h * k.square + effect;
     k.compliance = tangent(a, p) + effect * (1 + 3 * power) / k.force;
+    if (p->nears) add_near(tool, p, &k);
     k.slope = k.compliance * k.growth / own;
     return k;
 }
 
+/* The largest radius of contact that formulas and tables know. */
+static double limit_of(const epsmesh_query *tool, const place *p) {
+    double big = tool->radius, stiff;
+    if (!p->nears) return tool->shape == EPSMESH_SPHERE ? BALL_LIMIT * tool->radius : tool->radius;
+    stiff = 4 / (3 * big) + 2.0 / 3 * p->h * p->plane * big * big * cube(p->near_most);
+    return stiff > 0 ? cbrt(big * big * cube(p->near_most) / stiff) : 0;
+}
+
 static int press_round(const epsmesh_query *tool, const place *p, double most, contact *k) {
-    double limit = tool->shape == EPSMESH_SPHERE ? BALL_LIMIT * tool->radius : tool->radius, depth = tool->depth;
+    double limit = limit_of(tool, p), depth = tool->depth;
     double low = 0, high = most < limit ? most : limit, a, step, of_h, of_tilt;
     pressed found;
     int i;
@@ -104,8 +138,8 @@ static int press_round(const epsmesh_query *tool, const place *p, double most, c
         a = step;
     }
     found = press_to(a, tool, p);
-    k->force = found.force, k->stiffness = 1 / found.compliance, k->radius = a;
-    k->mean_square = found.square / found.force;
+    k->force = found.force, k->stiffness = 1 / found.compliance, k->radius = found.widened * a;
+    k->mean_square = found.square / found.force, k->share = found.near_compliance / found.compliance;
     of_h = 0.25 * found.force * found.force * k->mean_square +
            4.0 / 3 * p->plane * p->plane * p->tilt * fifth(a) * cube(found.force) / found.growth;
     of_tilt = -2.0 / 3 * p->plane * cube(a) * found.force * found.force;
@@ -155,7 +189,7 @@ static int press_blade(const epsmesh_query *q, const double edge[2], const place
             of_place[i] -= lean[j] / 2 * slope * (p->hessian[i][0] * e[j][0] + p->hessian[i][1] * e[j][1]);
     }
     k->force = q->depth / soft, k->stiffness = 1 / soft, k->radius = sqrt(big * big + small * small);
-    k->mean_square = along_edge + across;
+    k->mean_square = along_edge + across, k->share = 1;
     for (i = 0; i < 2; i++) k->aside[i] = 0.5 * k->force * k->force * of_place[i];
     return 1;
 }
@@ -171,6 +205,6 @@ static contact press_bonded(double a, double depth, const place *p) {
     det = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
     k.force = depth * (xx * yy - xy * xy) / det, k.stiffness = k.force / depth;
     k.aside[0] = depth * (xy * yz - xz * yy) / det, k.aside[1] = depth * (xy * xz - xx * yz) / det;
-    k.radius = a, k.mean_square = 2.0 / 3 * a * a;
+    k.radius = a, k.mean_square = 2.0 / 3 * a * a, k.share = 1;
     return k;
 }

@@ -143,6 +143,24 @@ static void load_relaxation(epsmesh_model *m, file *f) {
     m->relaxing = f->flaw ? 0 : (int)shape[0];
 }
 
+/* A ball on a half-space at large displacements: all of it, or none. */
+static void load_near(epsmesh_model *m, file *f) {
+    uint32_t shape[4] = {2, 0, 0, 0};
+    int i;
+    m->is_large = has(f, "near") || has(f, "near_most") || has(f, "near_error") || has(f, "near_room");
+    if (!m->is_large) return;
+    m->near = doubles(f, "near", 3, shape);
+    numbers(f, "near_most", &m->near_most, 0), numbers(f, "near_error", &m->near_error, 0);
+    numbers(f, "near_room", &m->near_room, 0);
+    for (i = 0; i < 2; i++) {
+        wrong_if(f, shape[i + 1] > EPSMESH_MOST_NEAR, "near");
+        m->near_counts[i] = (int)shape[i + 1];
+    }
+    wrong_if(f, shape[1] > 1 && m->poisson_range[0] == m->poisson_range[1], "near");
+    wrong_if(f, !(m->near_most > 0), "near_most"), wrong_if(f, m->near_error < 0, "near_error");
+    wrong_if(f, m->near_room < 0, "near_room"), wrong_if(f, !m->is_flat || m->has_pairs || m->relaxing, "near");
+}
+
 /* The deforming surface, for display: all of it, or none. */
 static void load_surface(epsmesh_model *m, file *f) {
     uint32_t points[4], corners[4], modes[4], amounts[4];
@@ -184,7 +202,7 @@ epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
     memset(m, 0, sizeof *m);
     file_open(&f, data, size);
     load_table(m, &f), load_body(m, &f), load_face(m, &f), load_pairs(m, &f);
-    load_relaxation(m, &f), load_surface(m, &f);
+    load_relaxation(m, &f), load_near(m, &f), load_surface(m, &f);
     m->flaw = f.flaw, m->flawed = f.name, m->is_loaded = f.flaw == EPSMESH_SOUND;
     return m->is_loaded ? EPSMESH_OK : EPSMESH_NO_MODEL;
 }

@@ -27,6 +27,7 @@ static epsmesh_status tool_of(const epsmesh_model *m, const epsmesh_query *q, do
     edge[0] = 1, edge[1] = 0;
     if ((int)q->shape < EPSMESH_DISC || (int)q->shape > EPSMESH_BONDED_DISC) return EPSMESH_TOOL;
     if ((is_blade || q->shape == EPSMESH_BONDED_DISC) && !m->has_tensors) return EPSMESH_TOOL;
+    if (m->is_large && q->shape != EPSMESH_SPHERE) return EPSMESH_TOOL;
     if (!is_blade) {
         if (!isfinite(q->radius) || (has_angle && !isfinite(q->angle))) return EPSMESH_TOOL;
         if (q->radius < SMALLEST || (has_angle && !(0.01 <= q->angle && q->angle <= PI / 2 - 0.001)))
@@ -178,6 +179,8 @@ static double bar_of(const epsmesh_model *m, const epsmesh_query *q, const asked
         double growth = 3 * k->stiffness / k->force - 2 / q->depth;
         error += m->bend_error / 2 * k->mean_square * (growth > 0 ? growth : 0);
     }
+    if (m->is_large)
+        error += m->near_error * k->share + m->near_room * k->stiffness * q->depth / (a->room * a->room);
     return error;
 }
 

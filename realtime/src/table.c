@@ -3,6 +3,8 @@
 typedef struct {
     double c, h, tilt, slope_c[2], slope_h[2], slope_tilt[2], plane, poisson, bend, slope_bend[2];
     double bent[2], bent_slopes[2][2], lean[2], hessian[2][2], regular[3][3]; /* of blades and bonded tools */
+    double near[2][EPSMESH_MOST_NEAR], near_most; /* over x, for nu; 0 terms at small strain */
+    int nears;
 } place;
 
 typedef struct {
@@ -101,6 +103,20 @@ static void shape_at(const epsmesh_model *m, const terms *s, double x, double y,
     p->regular[1][2] = p->regular[2][1] = f[3] / t;
 }
 
+/* The ratios of a ball on a half-space at large displacements to H. Hertz's, for this nu: src/contact.c. */
+static void near_of(const epsmesh_model *m, double ratio, place *p) {
+    double nu[3][EPSMESH_MOST], low = m->poisson_range[0], high = m->poisson_range[1];
+    const double *c = m->near;
+    int i, j, k;
+    p->nears = m->is_large ? m->near_counts[1] : 0, p->near_most = m->near_most;
+    if (!p->nears) return;
+    memset(p->near, 0, sizeof p->near);
+    polynomials(high == low ? 0 : (2 * ratio - low - high) / (high - low), m->near_counts[0], nu);
+    for (k = 0; k < 2; k++)
+        for (j = 0; j < m->near_counts[0]; j++)
+            for (i = 0; i < p->nears; i++) p->near[k][i] += nu[0][j] * *c++;
+}
+
 static int place_at(const epsmesh_model *m, double x, double y, double ratio, int whole, place *p) {
     double t, q, low = m->poisson_range[0], high = m->poisson_range[1];
     value of_t, of_q;
@@ -127,6 +143,7 @@ static int place_at(const epsmesh_model *m, double x, double y, double ratio, in
     p->tilt = 0.25 * (p->lean[0] * p->lean[0] + p->lean[1] * p->lean[1]);
     p->c = 1 / t - m->c_ref, p->h = q / (t * t * t), p->plane = 1 / (1 - ratio * ratio), p->poisson = ratio;
     p->bend = p->slope_bend[0] = p->slope_bend[1] = p->bent[0] = p->bent[1] = 0;
+    near_of(m, ratio, p);
     if (whole) shape_at(m, &s, x, y, t, of_t.slope, p);
     return 1;
 }

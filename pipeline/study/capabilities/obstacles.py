@@ -77,7 +77,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "rounded edge": "probe.edge: real-time models have sharp edges. Omit it",
         "friction": "probe.friction: real-time models have no friction. Omit it and export the frictionless force",
         "loads": "[load]: gravity, tractions and pressure in hollow regions have no real-time model",
-        "large displacements": "material.law: large displacements have no real-time model",
+        "fibres": "material.law: fibres have a direction, and the half-space of a real-time model has none",
         "time steps": "material.relaxation: all tissue of a real-time model relaxes alike. Omit the relaxation of "
         "layers and inclusions",
         "slit": f"probe.incision: {_PRESSED_ONLY}",

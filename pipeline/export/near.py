@@ -1,0 +1,159 @@
+"""A ball on a half-space at large displacements: what a law adds to a model, and the error bar of the sum.
+
+Strains are large next to the ball alone, so the rest of the body is taken as linear. At equal force, the ball then is
+as deep as at small strain, plus the difference of a half-space of the law from a linear one. This depends on ν, on
+depth over radius and on the law's parameters. It is solved on the meridian of a large cylinder, whose finite size
+is subtracted as a linear compliance.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+
+from epsmesh_realtime.model import Model
+from epsmesh_realtime.table import Near
+from pipeline.arrays import FloatArray
+from pipeline.export.checks import SAFETY, SIZES, TOOLS, Check, check_touches, on_face, random_place, with_bar
+from pipeline.export.full import Full, Solver, Tool
+from pipeline.export.ranks import Ranks
+from pipeline.export.scope import ExportError, Scope
+from pipeline.export.tabulate import ratios_of
+from pipeline.stages import stage
+
+# Radius of the ball (m); radius and depth of the linear disc that measures the cylinder's compliance; size of the
+# cylinder in radii of the ball.
+_RADIUS, _DISC, _SHALLOW, _SIZE = 1e-3, 4e-3, 1e-5, 100.0
+# Depths in radii of the ball, of which the last may have no equilibrium; accuracy of the solves.
+_DEPTHS, _FEWEST, _ACCURACY = (0.05, 0.15, 0.3, 0.5, 0.75, 1.0), 4, 1e-3
+# Number of nodes over ν, and terms in x beyond the first, which is known.
+_RATIOS, _TERMS = 4, 4
+# F is about in proportion to the depth to this power.
+_POWER = 1.5
+# Depths of the checks, in radii of the ball, and the factor to the next depth if one has no answer.
+_SHARES, _LESS = (0.1, 0.95), 0.9
+# Least error of c by large displacements, times room²/depth.
+_LEAST = 0.02
+# Seeds of calibration and test.
+_SEEDS = (3, 4)
+
+
+@stage("near field")
+def near_field(scope: Scope, solver: Solver, ranks: Ranks) -> Near:
+    """Return the half-space of the law of ``solver``. Its error of c is not known yet, and 0; collective.
+
+    Raises:
+        ExportError: if too few depths have an equilibrium.
+        RuntimeError: if a linear solve fails.
+    """
+    ratios = ratios_of(scope.poissons, _RATIOS)
+    size = f"{1e3 * _SIZE * _RADIUS:g} mm"
+    body = {"shape": "cylinder", "radius": size, "height": size, "fixed": "bottom"}
+    large = replace(solver, sections={"body": body}, accuracy=_ACCURACY)
+    small = replace(large, law={})
+
+    def solve(one: tuple[float, float]) -> list[Full]:
+        ratio, share = one
+        if share == 0.0:
+            return [small.press(Tool("disc", _DISC), (0.0, 0.0), _SHALLOW, ratio)]
+        try:
+            return [large.press(Tool("sphere", _RADIUS, contact="unilateral"), (0.0, 0.0), share * _RADIUS, ratio)]
+        except RuntimeError:
+            return []
+
+    asked = [(float(ratio), share) for ratio in ratios for share in (0.0, *_DEPTHS)]
+    found = iter(ranks.in_turn(asked, solve, "half-spaces solved"))
+    rows = [[next(found) for _ in (0.0, *_DEPTHS)] for _ in ratios]
+    count = min([*map(bool, row), False].index(False) for row in rows) - 1
+    if count < _FEWEST:
+        raise ExportError(
+            f'material.law = "{solver.law["law"]}": a half-space has no equilibrium {_DEPTHS[count]:g} radii of a ball '
+            f"deep; a real-time model needs {_DEPTHS[_FEWEST - 1]:g}"
+        )
+    solved = [[full for one in row[: count + 1] for full in one] for row in rows]
+    curves = [_curve(row, ratio, scope.young) for row, ratio in zip(solved, ratios, strict=True)]
+    most = min(float(x[-1]) for x, _ in curves)
+    fits = [_fitted(x, values, most) for x, values in curves]
+    values = np.tensordot(_over(ratios), np.array([fit for fit, _ in fits]), 1).swapaxes(0, 1)
+    between = float(np.abs(values[0, -1]).sum()) if len(ratios) > 1 else 0.0
+    bars = max(full.error for row in solved for full in row)
+    return Near(values, most, bars + _POWER * (max(missed for _, missed in fits) + between), 0.0)
+
+
+def _over(ratios: FloatArray) -> FloatArray:
+    """Return the matrix from values at the ratios to Chebyshev coefficients."""
+    first, last = ratios[0], ratios[-1]
+    places = (2 * ratios - first - last) / (first - last) if len(ratios) > 1 else np.zeros(1)
+    return np.asarray(np.linalg.inv(np.polynomial.chebyshev.chebvander(places, len(ratios) - 1)))
+
+
+def _curve(solved: Sequence[Full], ratio: float, young: float) -> tuple[FloatArray, FloatArray]:
+    """Return x (n,), and depth and contact radius (2, n) in units of Hertz's, from the solves of disc and balls."""
+    disc, *balls = solved
+    plane = 1 / (1 - ratio**2)
+    ends = young * _SHALLOW / disc.force - 0.5 / (_DISC * plane)  # 1/m, for E = 1
+    force, radius = np.array([(ball.force / young, ball.radius) for ball in balls]).T
+    depth = np.array(_DEPTHS[: len(force)]) * _RADIUS - ends * force
+    x = np.cbrt(force / (plane * _RADIUS**2))
+    hertz = 0.75 ** (1 / 3) * x * _RADIUS
+    return x, np.array([depth * _RADIUS / hertz**2, radius / hertz])
+
+
+def _fitted(x: FloatArray, values: FloatArray, most: float) -> tuple[FloatArray, float]:
+    """Return coefficients (2, terms) over 2x/``most`` - 1 of curves (2, n) that are 1 at 0, and the first's error."""
+    powers = (x / most)[:, None] ** np.arange(1, _TERMS + 1)
+    slopes = np.linalg.lstsq(powers, (values - 1).T, rcond=None)[0]
+    missed = float(np.abs(powers @ slopes - (values - 1).T)[:, 0].max())
+    share = np.polynomial.Polynomial([0.5, 0.5])  # x/most
+    series = [np.polynomial.Polynomial([1.0, *slope])(share) for slope in slopes.T]
+    return np.array([np.polynomial.chebyshev.poly2cheb(one.coef) for one in series]), missed
+
+
+def with_near(
+    bare: Model, near: Near, solver: Solver, counts: Sequence[int], ranks: Ranks
+) -> tuple[Model, list[Check], list[Check]]:
+    """Return a linear model with the half-space of a law, and two sets of balls: of its calibration and of its test.
+
+    They have ``counts`` touches. Collective.
+
+    Raises:
+        ExportError: if a ball fits nowhere.
+        RuntimeError: if a full solve fails.
+    """
+    unit, none = (replace(bare, near=replace(near, room=room)) for room in (1.0, 0.0))
+    touches = [_random_balls(unit, count, seed) for count, seed in zip(counts, _SEEDS, strict=True)]
+    checked = check_touches(unit, solver, [*touches[0], *touches[1]], ranks)
+    fitted = checked[: counts[0]]
+    model = replace(bare, near=replace(near, room=needed_room(fitted, [with_bar(none, check).bar for check in fitted])))
+    checked = [with_bar(model, check) for check in checked]
+    return model, checked[: counts[0]], checked[counts[0] :]
+
+
+def needed_room(checks: Sequence[Check], without: Sequence[float]) -> float:
+    """Return the error of c, times room²/depth, that covers all errors; in the checks' bars it is 1, ``without`` 0."""
+    needed = max((abs(check.error) - bar) / (check.bar - bar) for check, bar in zip(checks, without, strict=True))
+    return max(_LEAST, SAFETY * needed)
+
+
+def _random_balls(model: Model, count: int, seed: int) -> list[Check]:
+    rng = np.random.default_rng(seed)
+    return [_random_ball(model, rng) for _ in range(count)]
+
+
+def _random_ball(model: Model, rng: np.random.Generator) -> Check:
+    """Return a random touch, not solved yet: contact as large as in other checks, depth a random part of the radius."""
+    x, y = random_place(model, rng)
+    size = model.largest * model.room(x, y) * float(np.exp(rng.uniform(*np.log(SIZES))))
+    share, poisson = float(rng.uniform(*_SHARES)), float(rng.uniform(*model.table.poisson))
+    radius, (at, _) = size / np.sqrt(share), on_face(model, x, y)
+    while True:
+        touch = model.query("sphere", at=at.tolist(), depth=share * radius, poisson=poisson, radius=radius)
+        if touch.status == "ok":
+            break
+        share *= _LESS
+        if share < _LESS * _SHARES[0] * size / radius:
+            raise ExportError(f"a ball of {1e3 * radius:.3g} mm has no answer: {touch.message}")
+    tool = Tool("sphere", radius, contact="unilateral")
+    asked = Check(x, y, radius, share * radius, poisson, nan, nan, nan, nan, TOOLS.index("ball"), tool)
+    return with_bar(model, asked)
