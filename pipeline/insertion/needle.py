@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from pipeline.insertion.pressing import Press, Pressed
 from pipeline.insertion.shaft import NeedleCut, ShaftCut
-from pipeline.insertion.states import InsertionScene, Solved
+from pipeline.insertion.states import InsertionScene, Solved, Tissue
 from pipeline.insertion.steps import INDENTATION, WITHDRAWAL, Path, Puncture, Step, with_work
 from pipeline.shapes.insertion import Needle
 
@@ -73,13 +73,17 @@ class NeedleScene(InsertionScene[Needle]):
         deep = [self.solved(self.tool.cutting(layer.toughness), n) for n, layer in enumerate(layers)]
         found, end, message = list[ShaftCut](), self.insertion.to, ""
         for layer, one in zip(layers, deep, strict=True):
-            if isinstance(one, str):
+            shaft = one if isinstance(one, str) else self._shaft(layer, one)
+            if isinstance(shaft, str):
                 where = f"{1e3 * layer.top:.4g} mm: " if found else ""
-                end, message = layer.top, f"{where}the needle deep in tissue: {one}"
+                end, message = layer.top, f"{where}the needle deep in tissue: {shaft}"
                 break
-            found.append(ShaftCut.of(self.tool, one))
+            found.append(shaft)
         tops = tuple(layer.top for layer in layers[: len(found)])
         return (NeedleCut(self.tool, tops, tuple(found)) if found else None), end, message
+
+    def _shaft(self, layer: Tissue, deep: Solved) -> ShaftCut | str:
+        return ShaftCut.of(self.tool, deep, layer, self.beside, held=self.is_held)
 
     def _cuts(self, cut: NeedleCut, last: Step, end: float) -> list[Step]:
         """Return the steps of cutting after the ``last`` one, down to a depth (m)."""
@@ -106,7 +110,8 @@ class NeedleScene(InsertionScene[Needle]):
         It is solved until the tissue is pierced, and there, or to a depth ``end`` (m) of the tip.
         """
         found, press, depth = dict[float, Solved](), None, self.tool.first_depth
-        added = self.layers[number - 1].plane_modulus / self.layers[number].plane_modulus / 2 if number else 0.0
+        # Half of 2 R E', which a half-space of the tissue above would add round the shaft.
+        added = self.layers[number - 1].plane_modulus * self.tool.limit if number else 0.0
         while True:
             one = self.solved(self.tool.pressed_to(depth), number)
             if isinstance(one, str):

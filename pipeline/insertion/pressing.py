@@ -2,8 +2,8 @@
 
 At an interface the crack ends, and the needle arrives there with the force F₀ at which it cut the layer above. Tissue
 below bears that force: the needle goes on along the curve F(d) of these layers alone, from the depth d₀ at which
-F(d₀) = F₀. The tissue above is bonded to them, and adds up to the share E'_above/E'_below of what the curve gains, E' =
-E/(1 − ν²). Half of that is added, and is the error bar. At the surface of the body, F₀ and d₀ are zero.
+F(d₀) = F₀. The tissue above is bonded to them, and adds the stiffness of a half-space of it at most. Half of that is
+added, and is the error bar. At the surface of the body, F₀ and d₀ are zero.
 """
 
 from dataclasses import dataclass, replace
@@ -85,7 +85,7 @@ class Pressed:
 class Press:
     """A needle that presses on ``tissue`` from the step on at which it has ``arrived``.
 
-    ``added`` is half the share of the gain that tissue above may add.
+    Tissue above adds the stiffness ``added`` (N/m), give or take as much.
     """
 
     tissue: Pressed
@@ -122,14 +122,13 @@ class Press:
     def energy(self, depth: float) -> tuple[float, float]:
         """Return the energy (J) that is stored since the arrival, with the tip at a depth (m), and its bar."""
         own = self.tissue.at(self.own_depth(depth))[0] - self.tissue.at(self._first)[0]
-        gained = own - self._force * (depth - self.arrived.depth)
-        return own + self.added * gained, self.tissue.bar * own + self.added * abs(gained)
+        more = self.added * (depth - self.arrived.depth) ** 2 / 2
+        return own + more, self.tissue.bar * own + more
 
     def force(self, depth: float) -> tuple[float, float]:
         """Return the force (N) on the tip at a depth (m), and its bar."""
-        _, own = self.tissue.at(self.own_depth(depth))
-        gained = own - self._force
-        return own + self.added * gained, self.tissue.bar * own + self.added * abs(gained)
+        own, more = self.tissue.at(self.own_depth(depth))[1], self.added * (depth - self.arrived.depth)
+        return own + more, self.tissue.bar * own + more
 
     def step(self, depth: float, phase: str = INDENTATION) -> Step:
         """Return the step at a depth (m); the shaft rubs as on arrival, pulled out against its motion."""

@@ -18,9 +18,15 @@ from typing import Self
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.insertion.states import Solved
+from pipeline.insertion.states import Solved, Tissue
 from pipeline.insertion.steps import CUTTING, Step
 from pipeline.shapes.insertion import Needle
+from pipeline.shapes.section import in_mm
+
+# Free sides at a distance r take (b/r)² of e, s and N, within half of that: solved for r/b from 5 to 60 and three
+# toughnesses (docs/howto/needle.md). A fixed side adds 1/(1 − 2ν) times that: of a hole, at small strains. The longest
+# crack, in units of r.
+_UNSURE, _LONGEST = 0.5, 1 / 3
 
 
 @dataclass(frozen=True)
@@ -38,10 +44,20 @@ class ShaftCut:
     bar: float
 
     @classmethod
-    def of(cls, needle: Needle, deep: Solved) -> Self:
-        """Return the cut of a needle that was solved ``deep`` in tissue, over a depth of half its width."""
-        stored = deep.energy / needle.limit
-        return cls(needle, stored, deep.force - stored, deep.friction_force / needle.limit, deep.force_error)
+    def of(cls, needle: Needle, deep: Solved, tissue: Tissue, beside: float, *, held: bool) -> Self | str:
+        """Return the cut of a needle that was solved ``deep`` in tissue, over half its width; or why it is not known.
+
+        A free side at a distance ``beside`` (m) makes it softer. What one that is ``held`` does is in the bar.
+        """
+        stored, squeeze = deep.energy / needle.limit, deep.friction_force / needle.limit
+        half = (deep.force - stored) / (2 * tissue.toughness)
+        if half > _LONGEST * beside:
+            least = in_mm(half / _LONGEST)
+            return f"its crack is {in_mm(half)} long to each side, beside which less than {least} are kept"
+        ends = (half / beside) ** 2
+        lost, unsure = (0.0, min(ends / max(1 - 2 * tissue.poisson, ends), 1.0)) if held else (ends, _UNSURE * ends)
+        stored, torn, squeeze = ((1 - lost) * one for one in (stored, deep.force - stored, squeeze))
+        return cls(needle, stored, torn, squeeze, deep.force_error + unsure)
 
     @property
     def force(self) -> float:

@@ -94,16 +94,29 @@ class Cut:
 class InsertionScene(ABC, Generic[Tool]):
     """A body, a tool that is inserted, the depths (m) of its steps, and its solved states.
 
+    Tissue is kept up to a distance (m) from the tool's axis; ``beside`` is that, or the distance of the
+    nearest side, which ``is_held`` if it is fixed.
+
     ``is_pending`` tells whether a state was asked for that is still to be solved.
     """
 
-    def __init__(self, tool: Tool, body: "Layered", material: "Material", *, depths: Sequence[float], states: States):
+    def __init__(
+        self,
+        tool: Tool,
+        body: "Layered",
+        material: "Material",
+        *,
+        kept: float,
+        depths: Sequence[float],
+        states: States,
+    ):
         assert tool.insertion is not None
         assert tool.toughness is not None
         self.tool, self.depths, self._states = tool, tuple(depths), states
         self.insertion: Insertion = tool.insertion
         self.toughness, self.is_pending = tool.toughness, False
-        top = body.heights[1]
+        top, frame = body.heights[1], tool.frame_on(body)
+        self.beside, self.is_held = min(kept, tool.gap(body, frame) + tool.half_width), body.support.gap(0.0) == 0.0
         self.interfaces = interfaces([body])
         self.bottom = min(top - level for level in (body.heights[0], *body.support.edges()))
         self.layers = tuple(self._layers(body, material))

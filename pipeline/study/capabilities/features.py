@@ -184,6 +184,7 @@ FEATURES: dict[str, Feature] = {
     "fixed column": Feature("mesh.outside", lambda s: s.mesh.outside == "fixed" and _is_column(s), PLACE),
     "half ball": Feature("mesh.outside", _is_ball, PLACE),
     "Green's function": Feature("mesh.outside", lambda s: s.mesh.outside == "green" and _is_ball(s), PLACE),
+    "fine and coarse parts": Feature("mesh.epsilon", lambda s: s.mesh.keeps_all and isfinite(s.mesh.epsilon)),
     "linear outside": Feature("mesh.outside", lambda s: s.mesh.outside == "linear" and isfinite(s.mesh.epsilon)),
     "truncated body": Feature("mesh.outside", lambda s: not s.mesh.keeps_all and isfinite(s.mesh.epsilon)),
     "degree 1": Feature("mesh.degree", lambda s: s.mesh.degree == 1, write=int),

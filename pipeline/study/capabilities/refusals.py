@@ -149,7 +149,16 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("inserted blade", "large displacements", f"{_LINEAR}: a blade's cut is that of small strains"),
     Refusal("inserted needle", "linear law", "needs a law of large displacements: strains are above 1"),
     Refusal("inserted needle", "fibres", "its crack is computed in isotropic tissue: use another law"),
-    Refusal("inserted needle", "column", "its crack is computed in the whole body: omit epsilon"),
+    Refusal(
+        "inserted needle",
+        "fine and coarse parts",
+        'is computed on the meridian, on meshes of its own: cut the body at epsilon, outside = "free", or omit epsilon',
+    ),
+    Refusal(
+        "inserted needle",
+        "fixed column",
+        'would hold the tissue that the shaft pushes aside: use outside = "free"',
+    ),
     Refusal("inserted needle", "range of depths", "its depths have meshes of their own: omit it"),
     Refusal("inserted needle", "model in three dimensions", "is computed on the meridian: omit model"),
     Refusal("inserted needle", "no round scene", "needs a cylinder, and the needle on its axis"),
