@@ -99,6 +99,7 @@ def plan(
     room = machine_room() if memory is None else 1e9 * memory
     most = MEMORY_SHARE * room
     found |= {"memory_available": room, "too_large": sum(step["memory"] > most for step in found["steps"])}
+    found["besides"] = _besides(made, records, ranks)
     found["forecasts"] = _forecasts(study, made.cost)
     _show(study, found, quiet=quiet, verbose=verbose)
     # Where all cases are too large, that of F_exact may still be solved: for nothing.
@@ -111,6 +112,18 @@ def plan(
             "a smaller epsilon, or a larger machine (--memory)"
         )
     raise typer.Exit(SOME_FAILED if nothing_fits else DONE)
+
+
+def _besides(made: "Plan", records: "dict[str, Record]", ranks: int) -> dict[str, Any]:
+    """Return the most solves and seconds that paths need besides what is planned: which, is found on the way."""
+    if not made.study.is_insertion:
+        return {}
+    from pipeline.insertion.paths import possible
+    from pipeline.plan.describe import summary
+
+    rest = possible(made, records)
+    found = summary(rest, ranks) if rest else {"solves": 0}
+    return {name: found[name] for name in ("solves", "seconds", "memory")} if found["solves"] else {}
 
 
 def _check(files: list[Path]) -> NoReturn:
@@ -200,6 +213,9 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool) 
         ground = f"{counted(found['fitted_to'], 'case')} on record" if found["fitted_to"] else "no case on record yet"
         print(f"    ({ground}; a step's time is typically right within a factor of {found['factor']:.1f})")
         _list_steps(found["steps"], None if verbose else _MOST_STEPS)
+    if rest := found["besides"]:
+        most, seconds = counted(rest["solves"], "solve"), format_seconds(rest["seconds"])
+        print(f"  besides: up to {most}, {seconds} {on}: which are needed is found on the way")
     for forecast in found["forecasts"]:
         print(told(forecast))
 

@@ -4,6 +4,7 @@ Tissue is pierced at the depth at which it stores what a cut to that depth takes
 fitted. At the interface to a layer that takes more per depth, the needle indents again (:mod:`.pressing`).
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,8 @@ _FACTOR = 2.0
 # Tissue that may be cut after so many half widths of the shaft is cut at the first touch.
 _TOUCH = 1e-3
 _TINY = 1e-6
+# Share of the last depth at which a puncture is expected: what is solved there costs about the same anywhere.
+_SOMEWHERE = 0.7
 # The bar of a puncture's depth is sought in so many doublings of half a width.
 _DOUBLINGS = 12
 
@@ -30,6 +33,18 @@ class NeedleScene(InsertionScene[Needle]):
     def needed(self) -> tuple[float, ...]:
         """Return all depths: the stages of a needle are one state."""
         return self.depths
+
+    def possible(self) -> Iterator[tuple[Needle, int]]:
+        """Yield the needle deep in each layer, and pressed on it: to the last depth, and to that of a puncture."""
+        for number, layer in enumerate(self.layers):
+            if (end := self.insertion.to - layer.top) <= 0:
+                break
+            yield self.tool.cutting(layer.toughness), number
+            depth = self.tool.first_depth
+            while depth < end:
+                yield self.tool.pressed_to(depth), number
+                depth *= _FACTOR
+            yield from ((self.tool.pressed_to(share * end), number) for share in (_SOMEWHERE, 1.0))
 
     def _follow(self) -> Path:
         cut, end, message = self._cut()

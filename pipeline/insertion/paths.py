@@ -118,6 +118,23 @@ def lacking(plan: Plan, records: Records) -> Plan | None:
     """
     plans = [plan, *(one for end in plan.ends for one in (end.low, end.high) if one)]
     states = [one for each in plans for _, one in followed(each, records)]
+    return _of_states(plan, records, states)
+
+
+def possible(plan: Plan, records: Records) -> Plan | None:
+    """Return the plan of all states that paths may need besides their stages, and that have no record; None if unknown.
+
+    Slits whose front turns out to be farther ahead than that of a stage are not known before.
+    """
+    found = []
+    for scene, states in scenes(plan, records):
+        for state, below in scene.possible():
+            states.of(state, below)
+        found.append(states)
+    return _of_states(plan, records, found)
+
+
+def _of_states(plan: Plan, records: Records, states: Sequence[CaseStates]) -> Plan | None:
     further = [own for one in states for key, own in one.further.items() if key not in records]
     if not further:
         return None

@@ -149,6 +149,10 @@ class InsertionScene(ABC, Generic[Tool]):
         path = self._follow()
         return replace(path, is_pending=True) if self.is_pending else path
 
+    def possible(self) -> Iterator[tuple[Tool, int]]:
+        """Yield states that the path may need besides its stages, each with the layers above it; none, if unknown."""
+        yield from ()
+
     @abstractmethod
     def _follow(self) -> Path:
         """Return the path, up to the first state that is not solved."""

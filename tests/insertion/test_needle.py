@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from pipeline import workflow
-from pipeline.insertion.paths import lacking, paths
+from pipeline.insertion.paths import lacking, paths, possible
 from pipeline.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
@@ -134,6 +134,17 @@ def test_a_path_costs_each_of_its_solves_once():
     )
     assert float(found["time_total"]) == len(records) > 2
     assert int(found["cells"]) == len(records) - 1 and int(found["iterations"]) == 2 * len(records)
+
+
+def test_what_a_path_may_need_is_planned():
+    """All that it needs is in that plan; of the depth of the puncture, it has another one in its place."""
+    study = scene()
+    plan, records = solved(study)
+    stages = {key: records[key] for key in plan.keys}
+    planned = possible(plan, stages)
+    assert len(planned.keys) >= len(records) - len(stages)
+    assert len({*records} - {*stages, *planned.keys}) == 1
+    assert possible(plan, records) is None or {*records}.isdisjoint(possible(plan, records).keys)
 
 
 def test_each_round_of_solves_shows_its_progress(monkeypatch, tmp_path):

@@ -15,6 +15,7 @@ from pipeline.insertion.paths import complete, lacking
 from pipeline.insertion.steps import PHASES
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
+from pipeline.report.figures.insertion import insertion
 from pipeline.report.guide import guide
 from pipeline.run.stop import reason_to_skip, waves
 from pipeline.study.problems import StudyError
@@ -88,6 +89,17 @@ def test_the_work_of_the_tool_is_stored_torn_and_rubbed():
         np.diff(after["work"]), np.diff(after["depth"]) * (after["force"].values[1:] + after["force"].values[:-1]) / 2,
         rtol=1e-5,
     )  # fmt: skip
+
+
+def test_the_figure_names_the_phases_and_marks_the_puncture():
+    dataset = build(*solved(read_mapping(SCENE, "blade")))
+    pierced = 1e3 * dataset["puncture_depth"].item(), 1e3 * dataset["puncture_force"].item()
+    above = insertion(dataset, "", "").axes[0]
+    places = {text.get_text(): text.get_position()[0] for text in above.texts}
+    assert places["indentation"] == pytest.approx(pierced[0] / 2)
+    assert places["cutting"] == pytest.approx((pierced[0] + 6) / 2)
+    (marked,) = [line for line in above.lines if line.get_marker() == "o"]
+    assert [float(at[0]) for at in marked.get_data()] == pytest.approx(pierced)
 
 
 def test_tissue_that_is_tough_enough_stays_whole_and_without_toughness_is_cut_at_once():

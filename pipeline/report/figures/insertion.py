@@ -1,12 +1,13 @@
 """Figure of an insertion: F over depth with its parts and phases, and the energies below."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipeline.insertion.steps import ENDED, INDENTATION, PHASES
 from pipeline.report.figures.curves import BARS, grid, share
 from pipeline.report.figures.facets import arrange, swept
 from pipeline.report.figures.style import COLOURS, LINE, WIDTH, finish, look, new_figure
@@ -16,8 +17,8 @@ from pipeline.report.words import choices
 _HEIGHT = 5.2  # inches
 _PARTS = ("force_cutting", "force_friction", "force_elastic")
 _ENERGIES = ("energy_fracture", "energy_friction", "energy_stored")
-# Share of the depths from which on there is room for a name.
-_WIDE = 0.2
+# Share of the depths from which on there is room for a name; and room for names above the forces.
+_WIDE, _HEAD = 0.2, 1.35
 # Share of the largest force below zero that is drawn.
 _LOW = 0.1
 # Parts of the force are seen through its error bar.
@@ -29,7 +30,7 @@ _BARRED = ("depth", "force", "force_error", "depth_error")
 _MOST, _CURVES = (6, 3, 1), ("epsilon", "friction", "toughness", "poisson", "law")
 _CAPTION = (
     "Parts of the force, and of the work, one on top of the other: what they do not fill is the error of the balance "
-    "of energies. Grey band: 95 % error bar of F."
+    "of energies. Grey band and bars: 95 % error bars of F and of the puncture."
 )
 
 
@@ -77,10 +78,7 @@ def _several(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             panel.ax.plot(1e3 * depth, 1e3 * force, **(style | {"marker": "none"}), label=label)
             pierced = punctures(one)
             panel.ax.errorbar(
-                *(
-                    1e3 * pierced[f"puncture_{name}"].values
-                    for name in ("depth", "force", "force_error", "depth_error")
-                ),
+                *(1e3 * pierced[f"puncture_{name}"].values for name in _BARRED),
                 **(style | {"linestyle": "none"}),
                 **BARS,
             )
@@ -105,17 +103,34 @@ def _stack(ax: Axes, dataset: xr.Dataset, names: Sequence[str], factor: float) -
 
 
 def _name_phases(ax: Axes, dataset: xr.Dataset) -> None:
-    """Mark the punctures, and name the phases beside the first one."""
-    end, depths = 1e3 * float(dataset["depth"][-1]), 1e3 * punctures(dataset)["puncture_depth"].values
+    """Shade indentations, name the phases, and mark the punctures with their error bars."""
     low, top = ax.get_ylim()
-    ax.set_ylim(low if low < -_LOW * top else 0, 1.12 * top)
-    if not len(depths):
-        ax.text(end / 2, 1.04 * top, "indentation", ha="center")
-        return
-    for depth in depths:
-        ax.axvline(depth, color=LINE, linewidth=0.6, linestyle=":")
-        ax.annotate("puncture", (depth, 1.04 * top), xytext=(4, 0), textcoords="offset points")
-    if len(depths) == 1:
-        ax.text((depths[0] + end) / 2, 1.04 * top, "cutting", ha="center")
-    if depths[0] > _WIDE * end:
-        ax.text(depths[0] / 2, 1.04 * top, "indentation", ha="center")
+    ax.set_ylim(low if low < -_LOW * top else 0, _HEAD * top)
+    end, pierced = 1e3 * float(dataset["depth"][-1]), punctures(dataset)
+    for phase, start, stop in _phases(dataset):
+        if phase == INDENTATION:
+            ax.axvspan(start, stop, color=COLOURS[3], alpha=0.12, linewidth=0)
+        middle = (max(start, 0.0) + min(stop, end)) / 2
+        turned = {"rotation": 90, "va": "top"} if stop - start < _WIDE * end else {"va": "bottom"}
+        height = 0.98 if turned["va"] == "top" else 0.93
+        ax.text(middle, height, phase, ha="center", transform=ax.get_xaxis_transform(), **turned)
+    at = {name: 1e3 * pierced[f"puncture_{name}"].values for name in _BARRED}
+    ax.errorbar(*(at[name] for name in _BARRED), color=LINE, marker="o", linestyle="none", label="puncture", **BARS)
+
+
+def _phases(dataset: xr.Dataset) -> Iterator[tuple[str, float, float]]:
+    """Yield the phases of the way in, and the depths (mm) between which they are."""
+    depths, names = 1e3 * dataset["depth"].values, [PHASES[int(phase)] for phase in dataset["phase"]]
+    pierced, start = 1e3 * punctures(dataset)["puncture_depth"].values, 0.0
+    found = [(names[0], start)]
+    if len(pierced) and pierced[0] < depths[0]:
+        found = [(INDENTATION, 0.0), (names[0], pierced[0])]
+    for number in range(1, len(names)):
+        low, high = depths[number - 1 : number + 1]
+        inside = [depth for depth in pierced if low <= depth < high]
+        if names[number] != names[number - 1]:
+            found.append((names[number], inside[-1] if inside else (low + high) / 2))
+    ends = [start for _, start in found[1:]] + [float(depths[-1])]
+    for (name, start), stop in zip(found, ends, strict=True):
+        if name != ENDED:
+            yield name, start, stop
