@@ -106,6 +106,7 @@ benchmark: setup ## make every table of docs/performance.md in results/ (on an i
 	$(PYTHON) -m benchmarks.paths
 	$(PYTHON) -m benchmarks.scaling
 	$(PYTHON) -m benchmarks.work_precision
+	$(PYTHON) -m benchmarks.drag --minutes 5
 	$(EPSMESH) run studies/speedup.toml --fresh
 
 peers: setup ## compare the time for a true error with NGSolve and scikit-fem (on an idle machine): results/peers.md

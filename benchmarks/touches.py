@@ -43,11 +43,16 @@ def add_groups(path: Path, model: Model, solver: Solver, count: int, kinds: Sequ
     held, number = sum(map(len, known.values())), max(known, default=-1) + 1
     while held < count:
         found = _solve(model, solver, number, kinds[number % len(kinds)])
-        lines = [json.dumps(asdict(check) | {"group": number}) + "\n" for check in found]
-        with path.open("a", encoding="utf-8") as file:
-            file.write("".join(lines))
+        keep(path, number, found)
         held, number = held + len(found), number + 1
         yield found
+
+
+def keep(path: Path, number: int, group: Sequence[Check]) -> None:
+    """Append a group to a file of stored touches."""
+    lines = [json.dumps(asdict(check) | {"group": number}) + "\n" for check in group]
+    with path.open("a", encoding="utf-8") as file:
+        file.write("".join(lines))
 
 
 def flat_kinds(model: Model) -> range:

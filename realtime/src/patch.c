@@ -98,18 +98,41 @@ static void share_kernel(epsmesh_patch *t, double aspect) {
     t->aspect = aspect;
 }
 
+/* Subtract products of four pivot rows from a row, from `first` on. Each number waits for none of the others, so that
+ * compilers use wide registers; four pivots read and write the row once. */
+static void subtract(double *row, double p[][EPSMESH_CELLS], const double f[4], int first, int m) {
+    const double *a = p[0], *b = p[1], *c = p[2], *d = p[3];
+    int i;
+    for (i = first; i + 4 <= m; i += 4) {
+        double w = f[0] * a[i] + f[1] * b[i] + f[2] * c[i] + f[3] * d[i];
+        double x = f[0] * a[i + 1] + f[1] * b[i + 1] + f[2] * c[i + 1] + f[3] * d[i + 1];
+        double y = f[0] * a[i + 2] + f[1] * b[i + 2] + f[2] * c[i + 2] + f[3] * d[i + 2];
+        double z = f[0] * a[i + 3] + f[1] * b[i + 3] + f[2] * c[i + 3] + f[3] * d[i + 3];
+        w = row[i] - w, x = row[i + 1] - x, y = row[i + 2] - y, z = row[i + 3] - z;
+        row[i] = w, row[i + 1] = x, row[i + 2] = y, row[i + 3] = z;
+    }
+    for (; i < m; i++) row[i] -= f[0] * a[i] + f[1] * b[i] + f[2] * c[i] + f[3] * d[i];
+}
+
 /* Overwrite the upper half of the leading rows with its Cholesky factor, and solve for two right-hand sides. */
 static int solve_two(double a[][EPSMESH_CELLS], int m, double *one, double *two) {
-    int i, j, k;
-    for (k = 0; k < m; k++) {
-        double d = a[k][k];
-        if (!(d > 0)) return 0;
-        d = 1 / sqrt(d);
-        for (i = k; i < m; i++) a[k][i] *= d;
-        for (j = k + 1; j < m; j++) {
-            double f = a[k][j], *row = a[j];
-            const double *pivot = a[k];
-            for (i = j; i < m; i++) row[i] -= f * pivot[i];
+    int i, j, k, block, end;
+    for (block = 0; block < m; block = end) {
+        end = block + 4 < m ? block + 4 : m;
+        for (k = block; k < end; k++) {
+            double d = a[k][k];
+            if (!(d > 0)) return 0;
+            d = 1 / sqrt(d);
+            for (i = k; i < m; i++) a[k][i] *= d;
+            for (j = k + 1; j < end; j++) {
+                double f = a[k][j], *row = a[j];
+                for (i = j; i < m; i++) row[i] -= f * a[k][i];
+            }
+        }
+        for (j = end; j < m; j++) { /* none is left if the last block is shorter */
+            double f[4];
+            for (k = 0; k < 4; k++) f[k] = a[block + k][j];
+            subtract(a[j], &a[block], f, j, m);
         }
     }
     for (k = 0; k < m; k++) {
@@ -174,22 +197,22 @@ static void sum_up(const place *p, const cells *c, const double *pressure, const
 /* Find which cells press, beginning with those that did: 0 where no set of them is it. */
 static int settle(epsmesh_patch *t, const place *p, double depth, double turn, const double size[2], spread *s) {
     cells c;
-    double pressure[EPSMESH_CELLS], unit[EPSMESH_CELLS], soft, sum, bent;
-    int chosen[EPSMESH_CELLS], i, j, m, set, changed;
+    double pressure[EPSMESH_CELLS], unit[EPSMESH_CELLS], bends[EPSMESH_CELLS], soft, sum, bent;
+    const double *middle = &t->kernel[N - 1][N - 1]; /* of two cells it depends on their difference alone: see `at` */
+    int chosen[EPSMESH_CELLS], at[EPSMESH_CELLS], of_chosen[EPSMESH_CELLS], i, j, m, set, changed;
     lay(t, p, depth, turn, size, &c);
     share_kernel(t, c.step[1] / c.step[0]);
+    for (i = 0; i < ALL; i++) at[i] = (i / N) * (2 * N - 1) + i % N;
     soft = c.step[0] / p->plane;
     for (m = 0, i = 0; i < ALL; i++) m += t->pressed[i] = t->pressed[i] && c.gap[i] > 0;
     for (i = 0; i < ALL && !m; i++) t->pressed[i] = c.gap[i] > 0;
     for (set = 0; set < SETS; set++) {
         for (m = 0, i = 0; i < ALL; i++)
-            if (t->pressed[i]) chosen[m++] = i;
+            if (t->pressed[i]) of_chosen[m] = at[i], bends[m] = c.area * c.bent[i], chosen[m++] = i;
         if (!m) return 0;
         for (i = 0; i < m; i++) {
-            const int row = chosen[i] / N, column = chosen[i] % N;
-            for (j = i; j < m; j++)
-                t->matrix[i][j] = soft * t->kernel[row - chosen[j] / N + N - 1][column - chosen[j] % N + N - 1] +
-                                  c.area * (p->c + c.bent[chosen[i]] + c.bent[chosen[j]]);
+            const double *kernel = middle + of_chosen[i], rest = c.area * p->c + bends[i];
+            for (j = i; j < m; j++) t->matrix[i][j] = soft * kernel[-of_chosen[j]] + rest + bends[j];
             pressure[i] = c.gap[chosen[i]], unit[i] = 1;
         }
         if (!solve_two(t->matrix, m, pressure, unit)) return 0;
@@ -199,12 +222,12 @@ static int settle(epsmesh_patch *t, const place *p, double depth, double turn, c
             if (t->pressed[i]) {
                 presses = pressure[j++] > 0;
             } else {
-                double sunk = c.area * ((p->c + c.bent[i]) * sum + bent);
+                const double *kernel = middle + at[i];
+                double sunk = 0;
                 int k;
                 if (!(c.gap[i] > -HUGE_VAL)) continue;
-                for (k = 0; k < m; k++)
-                    sunk += soft * pressure[k] * t->kernel[i / N - chosen[k] / N + N - 1][i % N - chosen[k] % N + N - 1];
-                presses = c.gap[i] - sunk > THROUGH * depth;
+                for (k = 0; k < m; k++) sunk += pressure[k] * kernel[-of_chosen[k]];
+                presses = c.gap[i] - soft * sunk - c.area * ((p->c + c.bent[i]) * sum + bent) > THROUGH * depth;
             }
             changed |= presses != t->pressed[i];
             t->pressed[i] = (unsigned char)presses;
