@@ -87,7 +87,7 @@ class CostModel:
 
     def error_for(self, solves: Iterable[Solve]) -> float:
         """Return the typical factor of the error for ``solves``; kinds without stored times have that of the prior."""
-        unknown = [solve for solve in solves if ("solve", features(solve)[0]) not in self.laws]
+        unknown = [solve for solve in solves if ("solve", kind_of(solve)) not in self.laws]
         large = any(solve.case.material.is_large for solve in unknown)
         return max(self.error, *((_PRIOR_ERROR_LARGE if large else _PRIOR_ERROR,) if unknown else ()), 1.0)
 
@@ -107,7 +107,7 @@ class CostModel:
         kind, cells, _ = features(step.solves[0])
         seconds = self.seconds("mesh", kind, cells, 0.0)
         for solve in step.solves:
-            kind, _, poisson = features(solve)
+            kind, poisson = kind_of(solve), _poisson(solve.case)
             proof = 1.0 if solve.goal is None else _PROOF
             seconds += proof * sum(self.seconds(stage, kind, cells, poisson) for stage in ("solve", "bar"))
             seconds += self._further(solve)
@@ -138,16 +138,16 @@ def _memory(solve: Solve) -> float:
     return estimate.peak_memory(solve.case, share, of_bar, reduced=solve.reduced)
 
 
-def features(solve: Solve) -> tuple[str, float, float]:
-    """Return the inputs of the cost model for a solve: its kind, the estimated tetrahedra of the modelled part, ν.
+def kind_of(solve: Solve) -> str:
+    """Return the kind of a solve in the cost model.
 
-    The kind names element, degree, several movements, found contact, several materials, time steps, and a curved
-    or folded body.
+    It names element, degree, several movements, found contact, several materials, time steps, and a curved or folded
+    body.
     """
     case = solve.case
     if solve.axisymmetric:
         found = _FOUND if case.probe.is_unilateral else "meridian"
-        return _STEPS if case.has_load_steps else found, 1.0, 0.0
+        return _STEPS if case.has_load_steps else found
     words = [case.formulation, str(case.mesh.degree)]
     words += [str(case.movements)] if case.movements > 1 else []
     words += ["found"] if case.probe.is_unilateral else []
@@ -156,7 +156,14 @@ def features(solve: Solve) -> tuple[str, float, float]:
     if not isinstance(case.body, Layered):
         folds = case.body.curvature > _FOLDED * _OF_BALL * case.body.volume ** (1 / 3)
         words += ["folded" if folds else "curved"]
-    return " ".join(words), estimate.cells(case) * 0.5 ** len(solve.mirrors), _poisson(case)
+    return " ".join(words)
+
+
+def features(solve: Solve) -> tuple[str, float, float]:
+    """Return the inputs of the cost model for a solve: its kind, the estimated tetrahedra of the modelled part, ν."""
+    if solve.axisymmetric:
+        return kind_of(solve), 1.0, 0.0
+    return kind_of(solve), estimate.cells(solve.case) * 0.5 ** len(solve.mirrors), _poisson(solve.case)
 
 
 def speed_up(ranks: int) -> float:

@@ -98,9 +98,9 @@ def ask_for_exact(plan: Plan) -> Plan:
             keys.append(NO_RECORD)
             continue
         scene = case.body, case.material, case.probe, case.load
-        if scene not in reasons:
-            reasons[scene] = obstacle("F_exact", case)
-        if reason := reasons[scene]:
+        if (reason := reasons.get(scene)) is None:
+            reason = reasons[scene] = obstacle("F_exact", case)
+        if reason:
             keys.append(NO_RECORD)
             without[reason] += 1
             continue
@@ -110,9 +110,8 @@ def ask_for_exact(plan: Plan) -> Plan:
             case = plan.study.case(deeper.of)  # noqa: PLW2901
         enough = max(accuracy, EXACT_OF_SLIT) if case.probe.slit else accuracy
         scene = case.body, case.material, case.probe, case.load
-        if scene not in of_scene:
-            of_scene[scene] = reference_key(case, enough)
-        key = of_scene[scene]
+        if (key := of_scene.get(scene)) is None:
+            key = of_scene[scene] = reference_key(case, enough)
         is_wanted = is_asked or case.mesh.accuracy is None
         wanted = found if is_wanted else unasked
         keys.append(key if is_wanted else NO_RECORD)

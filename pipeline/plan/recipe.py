@@ -5,6 +5,7 @@ scale with the probe, hardly with the body. The expected error bars are measured
 own error bar exceeds the accuracy, the next mesh is tried.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot, pi, sqrt
 from typing import Any
@@ -123,7 +124,7 @@ def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
     Values that the study gives for rim, growth, degree and sizes stay.
     """
     ladder = _ladder(case)
-    expected = [_expected(case, recipe) for recipe in ladder]
+    expected = _expected(case, ladder)
     first = next((i for i, bar in enumerate(expected) if bar <= MARGIN * accuracy), len(ladder) - 1)
     tried = [first]
     for number in range(first + 1, len(ladder)):
@@ -159,8 +160,8 @@ def edge_width_of(case: Case) -> float:
     return case.probe.edge_width if isinstance(case.probe, Indenter) else case.probe.half_width
 
 
-def _expected(case: Case, recipe: Recipe) -> float:
-    """Return the expected relative error bar of a recipe for a case."""
+def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
+    """Return the expected relative error bars of recipes for a case."""
     shape = case.probe.EXPECTED_ERROR
     if mirror_planes(case) == movement_planes(case):
         shape *= 1 + _SLIDE * _slide(case)
@@ -174,9 +175,10 @@ def _expected(case: Case, recipe: Recipe) -> float:
         shape *= (_FOUND_LARGE if case.probe.is_unilateral else _OF_LARGE) * (1 + deeper)
     thickness = 1 + _THICKNESS * min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
     if case.element == "mixed":
-        return recipe.bar * shape * thickness * (_MIXED_EVEN if is_even else _MIXED)[recipe.degree]
+        of_degree = _MIXED_EVEN if is_even else _MIXED
+        return [recipe.bar * shape * thickness * of_degree[recipe.degree] for recipe in ladder]
     locking = ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
-    return float(recipe.bar * shape * thickness * locking)
+    return [float(recipe.bar * shape * thickness * locking) for recipe in ladder]
 
 
 def _near(case: Case) -> float:
