@@ -100,6 +100,11 @@ def _needle(study: Study) -> None:
     del study["probe"]["depth"]
 
 
+def _flat_needle(study: Study) -> None:
+    _needle(study)
+    study["probe"].update(shape="disc", edge="0.2 mm")
+
+
 def _indenter(**keys: Any) -> Callable[[Study], None]:
     """Return the change to a tool that finds its contact, whose edge asks for smaller elements."""
 
@@ -228,6 +233,7 @@ FEATURES = (
     Feature("slit", "probe", _probe(**_SLIT)),
     Feature("insertion", "probe", _insertion),
     Feature("needle", "probe", _needle),
+    Feature("flat needle", "probe", _flat_needle),
     Feature("frictionless", "contact", _update("probe", contact="frictionless")),
     Feature("unilateral", "contact", _update("probe", contact="unilateral")),
     Feature("friction", "contact", _update("probe", contact="unilateral", friction=0.3)),

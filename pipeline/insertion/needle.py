@@ -85,20 +85,38 @@ class NeedleScene(InsertionScene[Needle]):
     def _cut(self) -> tuple[NeedleCut | None, float, str]:
         """Return the cut, as far as its layers are solved, the depth (m) to which it is, and why no deeper."""
         layers = [layer for layer in self.layers if layer.top < self.insertion.to]
-        deep = [self.solved(self.tool.cutting(layer.toughness), n) for n, layer in enumerate(layers)]
+        deep = [self._deep(layer, number) for number, layer in enumerate(layers)]
         found, end, message = list[ShaftCut](), self.insertion.to, ""
-        for layer, one in zip(layers, deep, strict=True):
-            shaft = one if isinstance(one, str) else self._shaft(layer, one)
+        for layer, shaft in zip(layers, deep, strict=True):
             if isinstance(shaft, str):
                 where = f"{1e3 * layer.top:.4g} mm: " if found else ""
                 end, message = layer.top, f"{where}the needle deep in tissue: {shaft}"
                 break
             found.append(shaft)
+            room, words = self.tool.insertion_room
+            if end > (deepest := (self.bottom - room) / shaft.reach):
+                ring = f"the ring crack, {shaft.reach:.3g} times as deep as the tool, ends {words} above"
+                end, message = deepest, f"{1e3 * deepest:.4g} mm: {ring} the bottom or the support"
         tops = tuple(layer.top for layer in layers[: len(found)])
         return (NeedleCut(self.tool, tops, tuple(found)) if found else None), end, message
 
-    def _shaft(self, layer: Tissue, deep: Solved) -> ShaftCut | str:
-        return ShaftCut.of(self.tool, deep, layer, self.beside, held=self.is_held)
+    def _deep(self, layer: Tissue, below: int) -> ShaftCut | str:
+        """Return the cut of a layer ``below`` so many, in the crack of least force, or why there is none."""
+        found = []
+        for state in self.tool.cuts(layer.toughness):
+            one = self.solved(state, below)
+            shaft = (
+                one
+                if isinstance(one, str)
+                else self._shaft(layer, one, is_ring=bool(state.crack and state.crack.is_ring))
+            )
+            if isinstance(shaft, str):
+                return shaft
+            found.append(shaft)
+        return min(found, key=lambda cut: cut.force)
+
+    def _shaft(self, layer: Tissue, deep: Solved, *, is_ring: bool) -> ShaftCut | str:
+        return ShaftCut.of(self.tool, deep, layer, self.beside, held=self.is_held, is_ring=is_ring)
 
     def _cuts(self, cut: NeedleCut, last: Step, end: float) -> list[Step]:
         """Return the steps of cutting after the ``last`` one, down to a depth (m)."""

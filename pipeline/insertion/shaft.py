@@ -12,7 +12,7 @@ has what a change of e takes over one radius, and that of the force falls with t
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
+from math import inf, pi
 from typing import Self
 
 import numpy as np
@@ -34,7 +34,8 @@ class ShaftCut:
     """A needle that cuts one tissue: energies ``stored`` and ``torn`` per depth of its shaft (N), and pressure (N/m).
 
     The pressure ``squeeze`` is the change of both energies with the half width of the shaft, and Coulomb's friction for
-    a coefficient of 1. ``bar`` is the relative 95 % bar of each.
+    a coefficient of 1. ``bar`` is the relative 95 % bar of each. The crack is ``reach`` times as deep as the tip: ahead
+    of a flat end, a ring crack contains a column that is compressed.
     """
 
     needle: Needle
@@ -42,22 +43,30 @@ class ShaftCut:
     torn: float
     squeeze: float
     bar: float
+    reach: float = 1.0
 
     @classmethod
-    def of(cls, needle: Needle, deep: Solved, tissue: Tissue, beside: float, *, held: bool) -> Self | str:
+    def of(
+        cls, needle: Needle, deep: Solved, tissue: Tissue, beside: float, *, held: bool, is_ring: bool = False
+    ) -> Self | str:
         """Return the cut of a needle that was solved ``deep`` in tissue, over half its width; or why it is not known.
 
-        A free side at a distance ``beside`` (m) makes it softer. What one that is ``held`` does is in the bar.
+        A free side at a distance ``beside`` (m) makes it softer. What one that is ``held`` does is in the bar; what any
+        does to a ring crack, too. The faces of a ring touch the shaft, and the column ahead of it.
         """
-        stored, squeeze = deep.energy / needle.limit, deep.friction_force / needle.limit
-        half = (deep.force - stored) / (2 * tissue.toughness)
+        limit = needle.limit
+        stored, squeeze = deep.energy / limit, deep.friction_force / limit
+        half = limit if is_ring else (deep.force - stored) / (2 * tissue.toughness)
         if half > _LONGEST * beside:
             least = in_mm(half / _LONGEST)
             return f"its crack is {in_mm(half)} long to each side, beside which less than {least} are kept"
         ends = (half / beside) ** 2
         lost, unsure = (0.0, min(ends / max(1 - 2 * tissue.poisson, ends), 1.0)) if held else (ends, _UNSURE * ends)
+        if is_ring and not held:
+            lost, unsure = 0.0, ends
         stored, torn, squeeze = ((1 - lost) * one for one in (stored, deep.force - stored, squeeze))
-        return cls(needle, stored, torn, squeeze, deep.force_error + unsure)
+        reach = deep.contact_area / (2 * pi * limit**2) if is_ring else 1.0
+        return cls(needle, stored, torn, squeeze, deep.force_error + unsure, reach)
 
     @property
     def force(self) -> float:
@@ -146,5 +155,5 @@ class NeedleCut:
             error=error + bar * rubs + ends + rubs * limit / max(depth, limit),
             stored=stored,
             fracture=torn,
-            crack_depth=depth,
+            crack_depth=depth * self.layers[-1].reach,
         )

@@ -26,7 +26,7 @@ Tool = TypeVar("Tool", bound=Inserted)
 class Solved(Protocol):
     """A solved state: energy (J), force and sum of tangential forces (N), energy release rate (J/m²).
 
-    Bars are relative half widths, of 95 %.
+    Bars are relative half widths, of 95 %. A crack deep in tissue has the area of contact (m²) of its faces.
     """
 
     @property
@@ -41,6 +41,8 @@ class Solved(Protocol):
     def force_error(self) -> float: ...  # noqa: D102
     @property
     def friction_force(self) -> float: ...  # noqa: D102
+    @property
+    def contact_area(self) -> float: ...  # noqa: D102
     @property
     def energy_release(self) -> float: ...  # noqa: D102
     @property

@@ -23,7 +23,7 @@ from pipeline.units import canonical
 PHYSICS_VERSION = 6
 
 # Keys of a probe without effect on the force of a case: action is a label, and an insertion has cases of its own.
-_UNPHYSICAL = ("action", "toughness", "insertion")
+_UNPHYSICAL = ("action", "toughness", "insertion", "crack_shape")
 _MANY = 200_000  # sections of a large study
 # Keys of what follows from the elastic force without a solve: pipeline/report/history.py.
 _OF_TIME = ("history", "relaxation")

@@ -33,6 +33,7 @@ from pipeline.solve.movement import FarField, Movement, Place
 from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.plane.needle import NeedleSolver, plane_cuts
+from pipeline.solve.plane.ring import ring_cuts
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Spaces
@@ -84,7 +85,7 @@ def memory_of_basis(case: Case, dofs: int) -> float:
 def meridian_problem(case: Case) -> Problem:
     """Return the problem of an axisymmetric ``case`` without loads, on its meridian."""
     if crack := case.probe.crack:
-        return NeedleSolver(crack.radius, crack.toughness, plane_cuts)
+        return NeedleSolver(crack.radius, crack.toughness, ring_cuts if crack.is_ring else plane_cuts)
     if case.probe.is_unilateral and case.has_load_steps:
         how = {} if case.mesh.accuracy is None else {"accuracy": case.mesh.accuracy / 2}
         return LargeMeridianContact(meridian_of(case), round_tool_of(case), **how)

@@ -125,9 +125,13 @@ class Needle(Inserted):
         """Return it at the first depth on the intact body; which further states are solved is found on the way."""
         return [self.pressed_to(self.first_depth)] * (1 + len(depths))
 
-    def cutting(self, toughness: float) -> Self:
+    def cuts(self, toughness: float) -> tuple[Self, ...]:
+        """Return it deep in tissue that it cuts, in each of the cracks of which the one of least force counts."""
+        return (self.cutting(toughness),)
+
+    def cutting(self, toughness: float, **changes: Any) -> Self:
         """Return it deep in tissue that it cuts, over a depth of half its width; the coefficient of friction is 1."""
-        return self.in_state(friction=1.0, toughness=toughness, depth=self.limit)
+        return self.in_state(friction=1.0, toughness=toughness, depth=self.limit, **changes)
 
     def pressed_to(self, depth: float) -> Self:
         """Return it at a depth (m) on the intact body."""

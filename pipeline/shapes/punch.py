@@ -22,7 +22,7 @@ class Punch(Probe):
     # Zero (m): contact is expected to end at the edge of the face.
     rim_offset: ClassVar[float] = 0.0
 
-    NOT_DRAWN = ("action", "depth", "contact", "friction", "slice", "motion", "toughness", "insertion")
+    NOT_DRAWN = ("action", "depth", "contact", "friction", "slice", "motion", "toughness", "insertion", "crack_shape")
 
     @property
     def force_exponent(self) -> float | None:

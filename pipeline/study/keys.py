@@ -52,8 +52,8 @@ SECTION_TEXTS = {
     "`points`. Optional.",
     "probe.history": "Depth of the tool over time: ramp, hold and sine, or a table. The dataset has the dimension "
     "`time`. Optional; every value but the table can be swept.",
-    "probe.insertion": "Insertion of a blade or a round needle: indentation, puncture and cutting. Give `to` in place "
-    "of `depth`, and `toughness`. Optional.",
+    "probe.insertion": "Insertion of a blade, or of a round needle, pointed or flat: indentation, puncture and "
+    "cutting. Give `to` in place of `depth`, and `toughness`. Optional.",
     "mesh": "Sizes and degree of elements, and the meshed part of the body.",
     "solve": "Solver, and timing of cases. Optional; its lists are no sweeps.",
     "load": "Loads besides the tool. They keep their size and direction. `force` in the dataset is due to the "

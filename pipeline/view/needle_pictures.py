@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from pipeline.arrays import FloatArray
 from pipeline.insertion.steps import WITHDRAWAL
 from pipeline.report.figures.style import COLOURS, LINE, QUIET
-from pipeline.run.problem import law_of, meridian_problem
+from pipeline.run.problem import CaseFailure, law_of, meridian_problem
 from pipeline.shapes.insertion import Needle
 from pipeline.solve.meridian.large_contact import LargeMeridianContact
 from pipeline.solve.plane import crack
@@ -33,6 +33,8 @@ _ACROSS = 2.2
 _BOTH, _ALL = ((1, 1), (-1, 1)), ((1, 1), (-1, 1), (1, -1), (-1, -1))
 _TISSUE = "#eef6d5"
 _POINTS = 60
+# The front of a ring crack is deeper than the tip, by more than rounding.
+_RING = 1 + 1e-6
 # Opacity of the crack round the needle, and where it has closed.
 _OPEN, _CLOSED = 0.3, 0.12
 
@@ -58,8 +60,10 @@ class NeedlePictures:
         """Solve what is drawn of the ``path`` of a ``case``, on this process alone.
 
         Raises:
-            CaseFailure, SolveError: if it cannot be solved.
+            CaseFailure, SolveError: if it cannot be solved, or cuts a ring.
         """
+        if (path["crack_depth"] > _RING * path["depth"]).any():
+            raise CaseFailure("a film of a ring crack is not drawn: use crack_shape = 'plane', or the figure")
         pressed = sorted({frame.depth for frame in frames_of(path) if frame.is_whole})
         intact = replace(case, probe=needle.pressed_to(pressed[-1] if pressed else needle.limit))
         problem, law = meridian_problem(intact), law_of(intact)

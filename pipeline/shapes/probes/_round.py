@@ -20,7 +20,7 @@ _RINGS = 1000
 class RoundIndenter(Indenter, Needle):
     """An axisymmetric indenter, the end of a shaft: a needle, if it is inserted."""
 
-    NOT_DRAWN = (*Indenter.NOT_DRAWN, "toughness", "insertion")
+    NOT_DRAWN = (*Indenter.NOT_DRAWN, "toughness", "insertion", "crack_shape")
 
     @property
     def tip_heights(self) -> FloatArray:

@@ -3,13 +3,14 @@
 from math import nan
 from typing import ClassVar, Literal
 
+from pipeline.shapes.probes._flat_needle import FlatNeedle
 from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.shapes.rounded import Rounded
 from pipeline.shapes.section import Problems, in_mm
 from pipeline.units import Length
 
 
-class RoundedDisc(RoundIndenter):
+class RoundedDisc(FlatNeedle, RoundIndenter):
     """A disc with its edge rounded to the radius ``edge`` (m), in unilateral contact: `shape = "disc"` in a study."""
 
     # None: contact grows on the rounding while the face stays in contact.
@@ -32,12 +33,20 @@ class RoundedDisc(RoundIndenter):
         return self.radius
 
     def check(self, problems: Problems) -> None:
-        """Report an edge that leaves no face."""
+        """Report an edge that leaves no face, and a withdrawal from a ring crack."""
         if self.edge >= self.radius:
             problems.error(
                 "probe.edge",
                 in_mm(self.edge),
                 f"leaves no flat face of a disc of radius {in_mm(self.radius)}: use a smaller edge, or a sphere",
+            )
+            return
+        if self.insertion is not None and self.insertion.withdraw and self.crack_shape != "plane":
+            problems.error(
+                "probe.insertion.withdraw",
+                True,
+                "the column within a ring crack stretches again, which is not computed: omit it, or use "
+                'crack_shape = "plane"',
             )
             return
         super().check(problems)

@@ -9,13 +9,17 @@ from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probes._edge import Edge
+from pipeline.shapes.probes._flat_needle import FlatNeedle
 from pipeline.shapes.round import RoundPunch
-from pipeline.shapes.section import Words
+from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.units import Length
 
+# Edge that is suggested, in radii.
+_ROUNDED = 0.2
 
-class Disc(RoundPunch):
-    """A flat round punch, such as the tip of a blunt needle."""
+
+class Disc(FlatNeedle, RoundPunch):
+    """A flat round punch, such as the tip of a blunt needle; inserted, it is the end of a shaft of its radius."""
 
     REALTIME = ("frictionless", "bonded")
     EXPECTED_ERROR = 1.0
@@ -28,6 +32,11 @@ class Disc(RoundPunch):
     def is_rounded(self) -> bool:
         """Whether contact is found on its rounded edge."""
         return self.edge > 0 and self.is_unilateral
+
+    @property
+    def limit(self) -> float:
+        """The radius (m)."""
+        return self.radius
 
     @property
     def semi_axes(self) -> tuple[float, float]:
@@ -55,3 +64,15 @@ class Disc(RoundPunch):
     def to_edge(self, points: FloatArray) -> FloatArray:
         """Return the points moved radially onto the circle."""
         return self.radius * points / np.linalg.norm(points, axis=1, keepdims=True)
+
+    def check(self, problems: Problems) -> None:
+        """Report an insertion with a sharp edge."""
+        if self.insertion is not None and not self.edge:
+            problems.error(
+                "probe.edge",
+                in_mm(self.edge),
+                "tissue turns inside out at a sharp edge, at large displacements: an insertion needs a rounded edge, "
+                f"such as {in_mm(_ROUNDED * self.radius)}",
+            )
+            return
+        super().check(problems)

@@ -9,7 +9,7 @@ from pipeline.solve.physics import MaterialLaw
 class Cut(NamedTuple):
     """A cut round a shaft of radius R, per depth: ``energy``, stored and torn, and what of it is ``stored``, in μ R².
 
-    ``pressure`` N is in units of μ R. ``touched`` is the length of the circumference that touches, in units of R.
+    ``pressure`` N on the shaft is in units of μ R, ``touched`` the area of the crack's faces that touch, in units of R.
     ``balance`` and ``steps`` are those of the solve.
     """
 

@@ -76,7 +76,7 @@ class Ring:
         energy, radius = self.energy(growth, stretch), 1 / sqrt(1 + growth)
         torn = 2 * pi * radius * self._toughness / (1 - stretch)
         pressure = 2 * pi * self._hole.pressure(growth)
-        return Cut(energy, energy - torn, pressure, 2 * pi, self._hole.balance, len(self._hole.ratios))
+        return Cut(energy, energy - torn, pressure, 2 * pi / (1 - stretch), self._hole.balance, len(self._hole.ratios))
 
 
 def ring_cuts(law: MaterialLaw, toughness: float) -> tuple[Cut, Cut]:

@@ -14,6 +14,7 @@ from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.insertion import Inserted
 from pipeline.shapes.probe import STICK, Probe
+from pipeline.shapes.probes._flat_needle import FlatNeedle
 from pipeline.shapes.section import in_mm
 from pipeline.study.loads import Load
 from pipeline.study.schema import Material, Mesh
@@ -113,6 +114,10 @@ def _is_inserted(scene: Scene, cuts: str | None = None) -> bool:
     return found is not None and cuts in (None, found.CUTS)
 
 
+def _may_cut_a_ring(scene: Scene) -> bool:
+    return _is_inserted(scene) and isinstance(scene.probe, FlatNeedle) and scene.probe.crack_shape != "plane"
+
+
 def _is_loaded(scene: Scene) -> bool:
     return scene.load.acts or bool(scene.body.pressures)
 
@@ -164,6 +169,7 @@ FEATURES: dict[str, Feature] = {
     "insertion": Feature("probe.insertion", _is_inserted, write=lambda one: in_mm(one.to)),
     "inserted blade": Feature("probe.insertion", lambda s: _is_inserted(s, "slit")),
     "inserted needle": Feature("probe.insertion", lambda s: _is_inserted(s, "crack")),
+    "ring crack": Feature("probe.crack_shape", _may_cut_a_ring),
     "needle that cuts": Feature("probe.toughness", lambda s: s.probe.crack is not None),
     "linear law": Feature("material.law", lambda s: not s.material.is_large),
     "model in three dimensions": Feature("mesh.model", lambda s: s.mesh.model == "3d"),

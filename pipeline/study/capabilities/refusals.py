@@ -142,13 +142,15 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("slit", "insertion", "a blade that is inserted makes its own slit: omit `incision`"),
     Refusal("slice", "insertion", "a blade that is inserted moves along its axis: omit it"),
     Refusal("history", "insertion", "an insertion has no time: omit one of the two"),
-    Refusal("rounded edge", "insertion", "the blade of an insertion has sharp edges: omit it"),
+    Refusal("rounded edge", "inserted blade", "the blade of an insertion has sharp edges: omit it"),
     Refusal(
         "insertion", "no flat top", "needs the flat top of a box or a cylinder, and a blade that goes straight down"
     ),
     Refusal("inserted blade", "large displacements", f"{_LINEAR}: a blade's cut is that of small strains"),
     Refusal("inserted needle", "linear law", "needs a law of large displacements: strains are above 1"),
     Refusal("inserted needle", "fibres", "its crack is computed in isotropic tissue: use another law"),
+    Refusal("ring crack", "layers", 'ends in one material: use crack_shape = "plane", or omit the layers'),
+    Refusal("ring crack", "column", 'is computed in the whole body: use crack_shape = "plane", or omit epsilon'),
     Refusal(
         "inserted needle",
         "fine and coarse parts",
