@@ -67,7 +67,7 @@ def _follow(scene: Scene) -> Path:
     peaked = {id(one.before) for one in (surface, *punctures) if one}
     own = [step for key, step in steps.items() if key not in peaked and step.depth in scene.depths]
     back, message = list[Step](), ended or message
-    if scene.insertion.withdraw:
+    if scene.insertion.withdraw and not scene.is_pending:  # its slits depend on where the path ended
         pressed = list(takewhile(lambda one: one.is_indentation, states[::-1]))
         back, stuck = withdrawn(scene, pressed, found[::-1], last)
         message = message or stuck

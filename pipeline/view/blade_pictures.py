@@ -37,9 +37,11 @@ class BladePictures:
     def draw(self, panels: Sequence[Axes], frame: Frame) -> None:
         """Draw the section."""
         (ax,) = panels
-        # A blade that indents a layer is drawn in the slit with which it arrived there.
-        tip = min(frame.depth, frame.crack)
-        key = 0.0 if frame.is_whole else float(self._slits[np.argmin(abs(self._slits - tip))])
+        tip, slits = frame.depth, self._slits
+        # A blade that indents a layer is drawn in the slit with which it arrived there, if that was solved.
+        above = slits[slits < frame.crack]
+        slits = above if frame.crack < tip and len(above) else slits
+        key = 0.0 if frame.is_whole else float(slits[np.argmin(abs(slits - tip))])
         # The path may end above the blade's last depth.
         share = frame.depth / self._blade.depth if frame.is_whole else 1.0
         self._sections[key].draw(ax, share, self._largest)
