@@ -148,6 +148,7 @@ FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
     "path_excess": ("path", path_excess),
     "retractor": ("retractor", of_kind("force")),
     "insertion": ("scalpel-path", of_kind("insertion")),
+    "insertion_layers": ("scalpel-layers", of_kind("insertion")),
     "insertion_epsilon": ("scalpel-epsilon", of_kind("insertion")),
     "needle_path": ("needle-path", of_kind("insertion")),
     "deep": ("deep", deep),
