@@ -69,7 +69,7 @@ typedef struct {
     double share[EPSMESH_MOST_RELAXING], time[EPSMESH_MOST_RELAXING]; /* of all tissue: epsmesh_relaxation.h */
     int relaxing;                                                     /* number of terms */
     const double *near; /* Chebyshev, over (ratio, nu, x); balls at large displacements: src/contact.c */
-    double near_most, near_error, near_room;
+    double near_most, near_error, near_room, near_support;
     int near_counts[2], is_large; /* nu, x */
     epsmesh_flaw flaw;
     const char *flawed; /* the array with the flaw */

@@ -33,8 +33,9 @@ _RATIOS, _TERMS = 4, 4
 _POWER = 1.5
 # Depths of the checks, in radii of the ball, and the factor to the next depth if one has no answer.
 _SHARES, _LESS = (0.1, 0.95), 0.9
-# Least error of c by large displacements, times room²/depth.
-_LEAST = 0.02
+# Least error of c by large displacements, times room²/depth. Largest effect of the support that a fit may have, in the
+# units of `Near`, and the one to which its first order is taken.
+_LEAST, _MOST_SUPPORT, _TRIAL = 0.01, 0.3, 0.05
 # Seeds of calibration and test.
 _SEEDS = (3, 4)
 
@@ -105,9 +106,10 @@ def _fitted(x: FloatArray, values: FloatArray, most: float) -> tuple[FloatArray,
     powers = (x / most)[:, None] ** np.arange(1, _TERMS + 1)
     slopes = np.linalg.lstsq(powers, (values - 1).T, rcond=None)[0]
     missed = float(np.abs(powers @ slopes - (values - 1).T)[:, 0].max())
-    share = np.polynomial.Polynomial([0.5, 0.5])  # x/most
-    series = [np.polynomial.Polynomial([1.0, *slope])(share) for slope in slopes.T]
-    return np.array([np.polynomial.chebyshev.poly2cheb(one.coef) for one in series]), missed
+    series = np.vstack([np.ones(2), slopes])  # in powers of x/most
+    places = np.cos(np.pi * (np.arange(_TERMS + 1) + 0.5) / (_TERMS + 1))
+    inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(places, _TERMS))
+    return np.asarray((inverse @ np.polynomial.polynomial.polyvander((1 + places) / 2, _TERMS) @ series).T), missed
 
 
 def with_near(
@@ -121,13 +123,30 @@ def with_near(
         ExportError: if a ball fits nowhere.
         RuntimeError: if a full solve fails.
     """
-    unit, none = (replace(bare, near=replace(near, room=room)) for room in (1.0, 0.0))
-    touches = [_random_balls(unit, count, seed) for count, seed in zip(counts, _SEEDS, strict=True)]
-    checked = check_touches(unit, solver, [*touches[0], *touches[1]], ranks)
-    fitted = checked[: counts[0]]
-    model = replace(bare, near=replace(near, room=needed_room(fitted, [with_bar(none, check).bar for check in fitted])))
+    # Balls that have an answer whatever the effect of the support.
+    stiff = replace(bare, near=replace(near, support=_MOST_SUPPORT))
+    touches = [_random_balls(stiff, count, seed) for count, seed in zip(counts, _SEEDS, strict=True)]
+    checked = check_touches(stiff, solver, [*touches[0], *touches[1]], ranks)
+    model = replace(bare, near=calibrated(bare, near, checked[: counts[0]]))
     checked = [with_bar(model, check) for check in checked]
     return model, checked[: counts[0]], checked[counts[0] :]
+
+
+def calibrated(bare: Model, near: Near, checks: Sequence[Check]) -> Near:
+    """Return the half-space with the effect of the support that fits full solves best, and the error that is left."""
+    plain, some = (_errors(bare, replace(near, support=support), checks) for support in (0.0, _TRIAL))
+    slope = (some - plain) / _TRIAL
+    support = float(np.clip(-(plain @ slope) / (slope @ slope), 0.0, _MOST_SUPPORT))
+    of_room = [
+        [with_bar(replace(bare, near=replace(near, support=support, room=room)), check) for check in checks]
+        for room in (1.0, 0.0)
+    ]
+    return replace(near, support=support, room=needed_room(of_room[0], [check.bar for check in of_room[1]]))
+
+
+def _errors(bare: Model, near: Near, checks: Sequence[Check]) -> FloatArray:
+    model = replace(bare, near=near)
+    return np.array([with_bar(model, check).error for check in checks])
 
 
 def needed_room(checks: Sequence[Check], without: Sequence[float]) -> float:

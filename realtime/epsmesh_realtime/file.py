@@ -36,6 +36,7 @@ Large displacements, optional: the model then answers for balls only. x = (F/E* 
                              contact radius on a half-space at a force, in units of those of H. Hertz
     near_most                the largest x
     near_error               relative error of F at a depth on a half-space
+    near_support             b: the depth of the ball is b F L/thickness² less, where L is its depth on a half-space
     near_room                error of c by large displacements, times room²/depth
 
 Interaction of tools on a flat face, optional:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from epsmesh_realtime.evaluator import Array, Evaluator, Pair, Place
 
 _EVEN = (True, True)
-_OF_NEAR = ("most", "error", "room")
+_OF_NEAR = ("most", "error", "room", "support")
 # The numbers of a body around a table by itself.
 _PLAIN: Mapping[str, ArrayLike] = {
     "origin": np.zeros(3), "axes": np.eye(3), "bar": np.zeros(4), "thickness": 1.0, "young": 1.0, "largest": 1.0,
@@ -129,14 +129,16 @@ class Near:
 
     Depth and contact radius at a force are in units of those of H. Hertz (1882), a function of ν and
     x = (F/E* R²)^(1/3). ``values`` (2, ν, x) are their Chebyshev coefficients, over ν and 2x/``most`` - 1. ``error`` is
-    the relative error of F on the half-space. The error of c by large displacements is ``room`` times the depth over
-    the square of the distance to the nearest side or the bottom.
+    the relative error of F on the half-space. As the ball comes nearer to the bottom or other tissue, its depth at a
+    force is smaller by ``support`` F L/thickness² for E = 1, where L is the depth on the half-space. The error of c by
+    large displacements is ``room`` times the depth over the square of the distance to the nearest side or the bottom.
     """
 
     values: Array
     most: float
     error: float
     room: float
+    support: float = 0.0
 
     def numbers(self) -> dict[str, ArrayLike]:
         """Return the arrays of a file."""

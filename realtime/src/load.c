@@ -147,18 +147,20 @@ static void load_relaxation(epsmesh_model *m, file *f) {
 static void load_near(epsmesh_model *m, file *f) {
     uint32_t shape[4] = {2, 0, 0, 0};
     int i;
-    m->is_large = has(f, "near") || has(f, "near_most") || has(f, "near_error") || has(f, "near_room");
+    m->is_large = has(f, "near") || has(f, "near_most") || has(f, "near_error") || has(f, "near_room") ||
+                  has(f, "near_support");
     if (!m->is_large) return;
     m->near = doubles(f, "near", 3, shape);
     numbers(f, "near_most", &m->near_most, 0), numbers(f, "near_error", &m->near_error, 0);
-    numbers(f, "near_room", &m->near_room, 0);
+    numbers(f, "near_room", &m->near_room, 0), numbers(f, "near_support", &m->near_support, 0);
     for (i = 0; i < 2; i++) {
         wrong_if(f, shape[i + 1] > EPSMESH_MOST_NEAR, "near");
         m->near_counts[i] = (int)shape[i + 1];
     }
     wrong_if(f, shape[1] > 1 && m->poisson_range[0] == m->poisson_range[1], "near");
     wrong_if(f, !(m->near_most > 0), "near_most"), wrong_if(f, m->near_error < 0, "near_error");
-    wrong_if(f, m->near_room < 0, "near_room"), wrong_if(f, !m->is_flat || m->has_pairs || m->relaxing, "near");
+    wrong_if(f, m->near_room < 0, "near_room"), wrong_if(f, m->near_support < 0, "near_support");
+    wrong_if(f, !m->is_flat || m->has_pairs || m->relaxing, "near");
 }
 
 /* The deforming surface, for display: all of it, or none. */

@@ -3,7 +3,7 @@
 typedef struct {
     double c, h, tilt, slope_c[2], slope_h[2], slope_tilt[2], plane, poisson, bend, slope_bend[2];
     double bent[2], bent_slopes[2][2], lean[2], hessian[2][2], regular[3][3]; /* of blades and bonded tools */
-    double near[2][EPSMESH_MOST_NEAR], near_most; /* over x, for nu; 0 terms at small strain */
+    double near[2][EPSMESH_MOST_NEAR], near_most, near_support; /* over x, for nu; 0 terms at small strain */
     int nears;
 } place;
 
@@ -109,6 +109,7 @@ static void near_of(const epsmesh_model *m, double ratio, place *p) {
     const double *c = m->near;
     int i, j, k;
     p->nears = m->is_large ? m->near_counts[1] : 0, p->near_most = m->near_most;
+    p->near_support = m->near_support / (m->thickness * m->thickness);
     if (!p->nears) return;
     memset(p->near, 0, sizeof p->near);
     polynomials(high == low ? 0 : (2 * ratio - low - high) / (high - low), m->near_counts[0], nu);

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from epsmesh_realtime.table import Near
 from pipeline.export.checks import Check
 from pipeline.export.full import Solver, Tool
-from pipeline.export.near import near_field, needed_room
+from pipeline.export.near import calibrated, near_field, needed_room
 from pipeline.export.ranks import ALONE
 from pipeline.export.scope import ExportError, scope_of
 from pipeline.study.read import parse
@@ -35,13 +36,13 @@ def test_a_half_space_of_a_law_on_a_linear_layer_is_that_layer_of_the_law():
     rests = 1e-5 * scope.young / np.array(forces) - 0.5 / (plane * radii)
     c, h = np.linalg.solve(np.column_stack([np.ones(2), radii**2 / 3]), rests)
     body = replace(of_place(c, h, 0.3), thickness=0.04, largest=0.4, young=scope.young)
-    model = replace(body, near=replace(near, room=0.15))
+    model = replace(body, near=replace(near, room=0.05, support=0.08))
     ball, fulls = Tool("sphere", RADIUS, contact="unilateral"), {}
     for share in (0.3, 0.7):
         fulls[share] = full = solver.press(ball, (0.0, 0.0), share * RADIUS, 0.3)
         touch = model.query("sphere", radius=RADIUS, at=(0.0, 0.0, 0.0), depth=share * RADIUS)
         error = abs(touch.force[2] / full.force - 1)
-        assert error < min(touch.force_error, 0.012)
+        assert error < min(touch.force_error, 0.004)
         assert touch.contact_radius == pytest.approx(full.radius, rel=0.02)
     linear = body.query("sphere", radius=RADIUS, at=(0.0, 0.0, 0.0), depth=0.3 * RADIUS).force[2]
     assert abs(linear / fulls[0.3].force - 1) > 0.02
@@ -64,6 +65,22 @@ def test_a_half_space_of_a_law_on_a_linear_layer_is_that_layer_of_the_law():
 def test_what_has_no_model_at_large_displacements_is_refused(sections, words):
     with pytest.raises(ExportError, match=words):
         scope_of(study(**sections))
+
+
+def test_the_effect_of_the_support_is_fitted_to_full_solves():
+    curve = Near(np.array([[[1.05, 0.05]], [[0.95, -0.05]]]), 1.2, 0.0, 0.0)
+    bare = replace(of_place(-20.0, 3e4, 0.3), thickness=0.04, largest=0.4)
+    true = replace(bare, near=replace(curve, support=0.13))
+    checks = []
+    for share in (0.1, 0.4, 0.6):
+        tool, depth = Tool("sphere", RADIUS, contact="unilateral"), share * RADIUS
+        touch = true.query("sphere", radius=RADIUS, at=(0.0, 0.0, 0.0), depth=depth)
+        full = float(touch.force[2])
+        checks.append(Check(0.0, 0.0, RADIUS, depth, 0.3, full, 0.0, full, touch.force_error, 3, tool))
+    found = calibrated(bare, curve, checks)
+    assert found.support == pytest.approx(0.13, rel=0.1)
+    wrong = [replace(check, full=off * check.full) for off, check in zip((0.97, 1.03, 0.97), checks, strict=True)]
+    assert calibrated(bare, curve, wrong).room > 2 * found.room
 
 
 def test_bars_cover_what_they_are_calibrated_on():

@@ -13,7 +13,8 @@ from epsmesh_realtime.table import Near
 from tests.realtime.synthetic import of_place, random_model
 
 # Depth and radius over Hertz's, over x, for all ν and with ν.
-ALIKE = Near(np.array([[[1.1, 0.08, -0.02]], [[0.9, -0.1, 0.01]]]), 1.2, 2e-3, 0.1)
+ALIKE = Near(np.array([[[1.1, 0.08, -0.02]], [[0.9, -0.1, 0.01]]]), 1.2, 2e-3, 0.1, 0.08)
+THICK = 0.02
 VARIED = replace(ALIKE, values=np.concatenate([ALIKE.values, 0.1 * ALIKE.values, 0.03 * ALIKE.values], axis=1))
 RADIUS, POISSON = 6e-3, 0.3
 PLANE = 1 / (1 - POISSON**2)
@@ -34,14 +35,15 @@ def in_body(force: float, h: float) -> float:
 
 @pytest.mark.parametrize(("c", "h"), [(0.0, 0.0), (-30.0, 0.0), (20.0, 1e5), (-30.0, 3e5)])
 def test_the_half_space_of_a_law_is_added_to_a_linear_body(c, h):
-    model = replace(of_place(c, h, POISSON), near=ALIKE)
+    model = replace(of_place(c, h, POISSON), near=ALIKE, thickness=THICK)
     for share in (0.01, 0.1, 0.4, 0.7):
         touch = model.query("sphere", depth=share * RADIUS, **BALL)
         force = touch.force[2]
         x = np.cbrt(force / (PLANE * RADIUS**2))
         deeper, wider = np.polynomial.chebyshev.chebval(2 * x / ALIKE.most - 1, ALIKE.values[:, 0].T)
         hertz = 0.75 ** (1 / 3) * x * RADIUS
-        assert deeper * hertz**2 / RADIUS + c * force + in_body(force, h) == pytest.approx(share * RADIUS, rel=1e-9)
+        near = deeper * hertz**2 / RADIUS * (1 - ALIKE.support * force / THICK**2)
+        assert near + c * force + in_body(force, h) == pytest.approx(share * RADIUS, rel=1e-9)
         if not h:
             assert touch.contact_radius == pytest.approx(wider * hertz)
         step = 1e-5 * RADIUS
@@ -65,7 +67,7 @@ def test_a_closed_loop_does_no_work(kind):
 
 
 def test_bars_grow_with_depth_over_the_distance_to_the_support():
-    near, model = ALIKE, of_place(-5.0, 0.0, POISSON)
+    near, model = replace(ALIKE, support=0.0), of_place(-5.0, 0.0, POISSON)
     model = replace(model, thickness=0.04, largest=0.4, near=near)
     for share in (0.05, 0.3, 0.6):
         touch = model.query("sphere", depth=share * RADIUS, **BALL)
@@ -97,7 +99,13 @@ def test_its_file_is_the_model_and_a_damaged_one_is_none():
     asked = {"at": (0.011, 0.017, 0.0), "depth": 3e-3, "radius": RADIUS, "poisson": 0.4}
     assert again.query("sphere", **asked).force.tolist() == model.query("sphere", **asked).force.tolist()
     found = unpack(data)
-    wrongs = ({"near_most": -1.0}, {"near_room": -1.0}, {"near": VARIED.values[:1]}, {"near": np.full((2, 1, 40), 1.0)})
+    wrongs = (
+        {"near_most": -1.0},
+        {"near_room": -1.0},
+        {"near_support": -1.0},
+        {"near": VARIED.values[:1]},
+        {"near": np.full((2, 1, 40), 1.0)},
+    )
     for wrong in (*wrongs, {"relaxation_share": [0.1], "relaxation_time": [1.0]}):
         with pytest.raises(ModelError, match="near"):
             model_of(pack({**found, **wrong}))
