@@ -32,7 +32,7 @@ typedef enum {
     EPSMESH_NO_MODEL, /* the file is of another kind or version, cut short, or inconsistent */
     EPSMESH_NEAR,     /* two contacts' middles are closer than twice the sum of their radii */
     EPSMESH_OTHERS,   /* another tool, on whose force this one depends, has no answer */
-    EPSMESH_ALONE,    /* one tool at a time: the face is curved, or the file has no pair_modes */
+    EPSMESH_ALONE,    /* one tool at a time: the file has no pair_modes */
     EPSMESH_PAST,     /* the force depends on a past that is not known: epsmesh_relaxation.h */
     EPSMESH_STATUSES
 } epsmesh_status;

@@ -168,7 +168,7 @@ def _check_evaluator() -> None:
 def _print_result(exported: "Exported", wanted: float, path: Path, packed: tuple[dict[str, str], list[str]]) -> None:
     """Print what the model is for, and how good it is; then what was ``packed``."""
     if exported.unseen:
-        warning(f"{path} has no deforming surface: {exported.unseen}")
+        warning(f"{path} has no deforming surface, and answers for one tool at a time: {exported.unseen}")
     found, checked = exported.summary(wanted), len(exported.fitted) + len(exported.judged)
     say(
         found | {"file": str(path)} | packed[0],

@@ -1,4 +1,4 @@
-"""Models of curved bodies: c and h at each place come from full solves with two discs."""
+"""Models of curved bodies: the values at each place come from full solves of three discs, one of them bonded."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
 from pipeline.export.tabulate import Places, ratios_of, tabulate
-from pipeline.shapes.frame import PlaceError
+from pipeline.shapes.frame import PlaceError, Vector
 
 # Radii of the two discs, in units of the study's; the larger one is close to the model's largest contact.
 RADII, _LARGER = (0.6, 1.5), 1.03
@@ -104,9 +104,10 @@ def curved_region(scope: Scope, room: float) -> Region:
 def _regular(
     solver: Solver, at: tuple[float, float], radius: float, scope: Scope, ratios: Sequence[float]
 ) -> tuple[FloatArray, list[float]]:
-    """Return c and h for each Poisson's ratio (ratios, 2), and the relative error bars of the full solves.
+    """Return the values to tabulate for each Poisson's ratio (ratios, 9), and the error bars of the frictionless discs.
 
-    They satisfy d/F = 1/(2aE*) + c + a²h/3 - 2E*h²a⁵/45 for both radii.
+    c and h satisfy d/F = 1/(2aE*) + c + a²h/3 - 2E*h²a⁵/45 for both radii. A₁ and A_xy are 0: second derivatives of R
+    do not exist at a force on a curved face. R is the compliance of a bonded disc beyond that on a half-space.
     """
     radii, rests = [share * radius for share in RADII], []
     bars: list[float] = []
@@ -122,7 +123,44 @@ def _regular(
     for _ in range(_STEPS):
         bent = [rest + 2 / 45 * planes * h**2 * r**5 for rest, r in zip(rests, radii, strict=True)]
         h = 3 * (bent[1] - bent[0]) / (b**2 - a**2)
-    return np.stack([bent[0] - a**2 * h / 3, h], axis=-1), bars
+    none = np.zeros(len(ratios))
+    return np.stack(
+        [bent[0] - a**2 * h / 3, h, none, none, *_bonded(solver, at, radius, scope, ratios).T], axis=-1
+    ), bars
+
+
+def _bonded(
+    solver: Solver, at: tuple[float, float], radius: float, scope: Scope, ratios: Sequence[float]
+) -> FloatArray:
+    """Return R_xz, R_yz, the mean of R_xx and R_yy, half their difference, and R_xy (ratios, 5), in 1/m.
+
+    R is that of a bonded disc of the study's ``radius``: its dependence on the radius is small.
+    """
+    tool, depth = Tool("disc", radius, contact="bonded", motion="all"), _DEPTH * radius
+    turn = upright(scope.body.frame(at).outward)
+    found = []
+    for ratio, full in zip(
+        ratios, solver.press_all(tool, at, [depth], ratios if len(ratios) > 1 else None), strict=True
+    ):
+        soft = np.linalg.inv(turn @ full.stiffness[:3, :3] @ turn.T / scope.young)
+        # A half-space under a bonded disc pulled along its face (R. D. Mindlin, 1949).
+        xx, yy = soft[0, 0] - _soft_aside(radius, ratio), soft[1, 1] - _soft_aside(radius, ratio)
+        found.append([soft[0, 2], soft[1, 2], (xx + yy) / 2, (xx - yy) / 2, soft[0, 1]])
+    return np.array(found)
+
+
+def _soft_aside(radius: float, poisson: float) -> float:
+    return (2 - poisson) * (1 + poisson) / (4 * radius)
+
+
+def upright(normal: Vector) -> FloatArray:
+    """Return the axes (rows) of a place: those of the body, turned by the least angle from z to the outward normal."""
+    x, y, z = normal
+    aside = np.array([x, y])
+    turn = np.eye(3)
+    turn[:2, :2] -= np.outer(aside, aside) / (1 + z)
+    turn[:2, 2], turn[2] = -aside, normal
+    return turn
 
 
 def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, float, float]:

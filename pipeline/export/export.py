@@ -41,7 +41,8 @@ _OFF = 1e-6
 class Exported:
     """A model, the touches of its calibration (``fitted``) and of its test (``judged``), the number of places solved.
 
-    ``table_error`` is that of its table; ``unseen`` is why it has no deforming surface, "" if it has one or needs none.
+    ``table_error`` is that of its table. ``unseen`` is why it has no deforming surface, and answers for one tool at a
+    time; "" if it has both.
     """
 
     model: Model
@@ -127,15 +128,14 @@ def export(
         model, fitted, judged = with_near(model, near, nonlinear, halves, ranks)
         return Exported(model, fitted, judged, error, places, None, _UNSEEN if surface else "")
     seen, unseen = None, ""
-    if surface or scope.is_flat:
-        ranks.note("solving for the deforming surface")
-        try:
-            far = far_fields(surface_body(scope, model, margin, ranks), scope.poissons)
-        except ExportError as reason:
-            unseen = str(reason)
-        else:
-            seen = tabulate_surface(far, model.origin) if surface else None
-            model = replace(model, pairs=tabulate_pairs(far)) if scope.is_flat else model
+    ranks.note("solving for the deforming surface")
+    try:
+        far = far_fields(surface_body(scope, model, margin, ranks), scope.poissons)
+    except ExportError as reason:
+        unseen = str(reason)
+    else:
+        seen = tabulate_surface(far, model.origin) if surface else None
+        model = replace(model, pairs=tabulate_pairs(far))
     return Exported(model, fitted, judged, error, places, seen, unseen)
 
 

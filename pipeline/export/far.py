@@ -51,7 +51,9 @@ class Pressed:
     """A meshed body with a ``region`` of its face, and the point ``force`` at a place for a Poisson's ratio.
 
     ``law`` gives the tissues in units of μ at the face, for its Poisson's ratio; None if there is one tissue. R is not
-    tested within ``next`` (m) of a force. Each of ``ranks`` has the whole mesh, and solves for some of the places.
+    tested within ``next`` (m) of a force. A node is on the face if its height differs by at most ``off`` (m). ``doubt``
+    is the error of R by the mesh, times the distance to the nearest side or the bottom, beyond what tests show. Each of
+    ``ranks`` has the whole mesh, and solves for some of the places.
     """
 
     mesh: BodyMesh
@@ -59,6 +61,8 @@ class Pressed:
     force: Callable[[Place, float], PointForce]
     law: Callable[[float], MaterialLaw | None] = lambda _: None
     next: float = 0.0
+    off: float = 0.0
+    doubt: float = 0.0
     ranks: Ranks = ALONE
 
     def solve(self, places: Sequence[Place], poisson: float) -> OnBoundary:

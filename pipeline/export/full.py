@@ -25,6 +25,7 @@ class Tool:
     width: float = 0.0
     along: tuple[float, float, float] = (1.0, 0.0, 0.0)
     contact: str = "frictionless"
+    motion: str = "press"
 
     @property
     def sizes(self) -> dict[str, Any]:
@@ -37,7 +38,7 @@ class Tool:
     @property
     def section(self) -> dict[str, Any]:
         """The keys of a study's section ``probe`` for this tool."""
-        found: dict[str, Any] = {"shape": self.name, "contact": self.contact}
+        found: dict[str, Any] = {"shape": self.name, "contact": self.contact, "motion": self.motion}
         if self.name == "blade":
             return found | {"length": _mm(self.length), "width": _mm(self.width), "direction": list(self.along)}
         found["radius"] = _mm(self.radius)
@@ -48,13 +49,15 @@ class Tool:
 class Full:
     """The result of a full solve: F (N) along the axis, its relative error bar, the force on the tool (3,), in N.
 
-    ``radius`` (m) is that of the contact, NaN if it is prescribed.
+    ``radius`` (m) is that of the contact, NaN if it is prescribed. ``stiffness`` (6, 6) is that of all rigid motions,
+    if the tool has them.
     """
 
     force: float
     error: float
     vector: FloatArray
     radius: float = nan
+    stiffness: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,13 @@ class Solver:
             if not record.is_ok or not isfinite(record.force_error):
                 raise RuntimeError(f"a full solve of a {tool.name} at {place['at']} failed: {record.message}")
         return [
-            Full(record.force, record.force_error, np.array(record.force_vector), record.contact_radius)
+            Full(
+                record.force,
+                record.force_error,
+                np.array(record.force_vector),
+                record.contact_radius,
+                np.array(record.stiffness),
+            )
             for record in found
         ]
 

@@ -28,6 +28,11 @@ class PlacedForce(PointForce):
     turn: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     blunt: float = 0.0
 
+    @property
+    def outward(self) -> Vector:
+        """The outward unit normal of the half-space."""
+        return self.turn[2]
+
     def at(self, points: FloatArray) -> FloatArray:
         """Return the displacement (n, 3) by a unit force, in m."""
         return np.asarray(self._plain.at(self._local(points)) @ self._rows)

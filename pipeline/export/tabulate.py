@@ -19,7 +19,6 @@ _SIZES, _POISSONS = (4, 8, 16), 3
 # c_ref minus the least c, in units of 1/thickness.
 _ABOVE = 1.0
 _DIGITS = 12
-_UNKNOWN = np.full(2, np.nan)
 # Exchange of x and y: order and signs of c, h, A₁, A_xy, R_xz, R_yz, mean and half difference, R_xy.
 _SWAPPED, _SIGNS = [0, 1, 2, 3, 5, 4, 6, 7, 8], np.array([1, 1, -1, 1, 1, 1, 1, -1, 1])
 # Of the tables after c and h, the first _BENDS are second derivatives. On a round body, along x, some equal others.
@@ -97,7 +96,8 @@ def _table(region: Region, poissons: tuple[float, float], size: int, values: Flo
             return _over_ratios(Disc(region.reach[0], region.even, size).through(places, values, factor))
         shape = (len(values), -1, size + 1)
         grid = values.reshape(shape)
-        return _coefficients(_filled(grid)) if factor is None else _divided(grid, factor.reshape(shape[1:]))
+        grid = _filled(grid)
+        return _coefficients(grid) if factor is None else _divided(grid, factor.reshape(shape[1:]))
 
     tensors: list[FloatArray] = []
     for number, f in enumerate(others):
@@ -156,7 +156,9 @@ def _image(region: Region, place: tuple[float, float]) -> tuple[float, float]:
 def _turned(region: Region, place: tuple[float, float], found: Mapping[tuple[float, float], FloatArray]) -> FloatArray:
     """Return the values at a place, or those of its image on a square face, exchanged."""
     image = _image(region, place)
-    values = found.get(image, _UNKNOWN)
+    values = found.get(image)
+    if values is None:
+        return np.full(len(next(iter(found.values()))), np.nan)
     if image == place or len(values) < len(_SWAPPED):
         return values
     return values[_SWAPPED] * _SIGNS

@@ -51,6 +51,11 @@ class PointForce:
         """λ/μ of the half-space."""
         return 2 * self.poisson / (1 - 2 * self.poisson)
 
+    @property
+    def outward(self) -> Place:
+        """The outward unit normal of the half-space."""
+        return 0.0, 0.0, 1.0
+
     def at(self, points: FloatArray) -> FloatArray:
         """Return the displacement (n, 3) of a unit, in m: ε/ρ times a function of the direction."""
         outward, distance = self._directions(points)

@@ -39,11 +39,11 @@ Large displacements, optional: the model then answers for balls only. x = (F/E* 
     near_support             b: the depth of the ball is b F L/thickness² less, where L is its depth on a half-space
     near_room                error of c by large displacements, times room²/depth
 
-Interaction of tools on a flat face, optional:
+Interaction of tools, optional:
 
     pair_modes               (pair_mode, pair_y, pair_x) Chebyshev coefficients of φ (1) over x/X and y/Y
     pair_links               (pair_node, pair_mode, pair_other) S (1/m), over ν: a unit force at y displaces x by
-                             φ(x)·S φ(y) more than on a half-space; exactly symmetric
+                             φ(x)·S φ(y) more than on a half-space, along the normals; exactly symmetric
     pair_error               error of that displacement, times the root of both distances to a side or the bottom (1)
     pair_aside               largest lateral displacement by a unit force, times the distance to the force (1)
 

@@ -154,7 +154,7 @@ class Near:
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Interaction of places: the normal part of a body's Green's function, E = 1, on a flat face.
+    """Interaction of places: the normal part of a body's Green's function on its face, E = 1.
 
         G(x, y) = (1 - ν²)/(π |x - y|) + R(x, y),    R(x, y) = Σ φ_k(x) S_kl(ν) φ_l(y).
 

@@ -21,7 +21,7 @@ SENTENCES = {
     "damaged": "The model's numbers are inconsistent here: export it again.",
     "near": "Two tools are too close: the distance of their middles must be twice the sum of both contact radii.",
     "others": "There is no answer for another tool, on whose force this one depends.",
-    "alone": "The model answers for one tool at a time: its face is curved, or its file has no pair_modes.",
+    "alone": "The model answers for one tool at a time: its file has no pair_modes.",
     "past": "The force depends on a past that is not known. Place, tool or tissue have changed while it remembers; the "
     "contact of a round tool has grown again, or too often; or a query in contact was refused: begin a new History.",
 }

@@ -22,9 +22,12 @@
  * and nu. It is fitted to full solves. The bar includes what is left, in proportion to d/room.
  */
 
+/* `aside` is the slope of the energy with x and y; or, if the tool `sticks`, a reaction along the face: components along
+ * axes that are turned by the least angle from the body's to the normal. */
 typedef struct {
     double force, aside[2], stiffness, radius, mean_square;
     double share; /* relative change of F, per such change of the half-space's F at a depth */
+    int sticks;
 } contact;
 
 typedef struct {

@@ -163,9 +163,11 @@ static int surveyed(const epsmesh_model *m, const epsmesh_query *q, asked *a) {
 /* Return whether the contact of a tool at a depth of its query is small enough. */
 static int press(const epsmesh_model *m, const epsmesh_query *q, const asked *a, contact *k) {
     double most = m->largest * a->room;
+    k->sticks = 0;
     if (q->shape == EPSMESH_BLADE) return press_blade(q, a->edge, &a->p, most, k);
     if (q->shape == EPSMESH_SPHERE || q->shape == EPSMESH_CONE) return press_round(q, &a->p, most, k);
     *k = q->shape == EPSMESH_DISC ? press_disc(q->radius, q->depth, &a->p) : press_bonded(q->radius, q->depth, &a->p);
+    k->sticks = q->shape == EPSMESH_BONDED_DISC;
     return q->radius <= most;
 }
 
@@ -191,7 +193,8 @@ static epsmesh_touch told(const epsmesh_model *m, double young, double depth, co
     double force[3];
     int i, j;
     t.status = EPSMESH_OK, t.stiffness = young * k->stiffness, t.contact_radius = k->radius, t.force_error = error;
-    force_at(&a->f, k->force, k->aside, depth, force);
+    if (k->sticks) reaction_at(&a->f, k->force, k->aside, force);
+    else force_at(&a->f, k->force, k->aside, depth, force);
     for (i = 0; i < 3; i++)
         for (t.force[i] = 0, j = 0; j < 3; j++) t.force[i] += young * force[j] * m->axes[j][i];
     if (!(k->force > 0 && is_positive(t.stiffness) && t.force_error >= 0 && isfinite(t.force_error) &&

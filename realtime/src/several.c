@@ -1,4 +1,4 @@
-/* Several tools at once on a flat face, E = 1, with their interaction.
+/* Several tools at once, E = 1, with their interaction.
  *
  *     U(F) = sum U_i(F_i) + sum_{i<j} F_i F_j (G + m_i w_i + m_j w_j)(x_i, x_j),    d_i = dU/dF_i,    aside on i: dU/dx_i
  *
@@ -8,7 +8,8 @@
  *     G(x, y) = (1 - nu^2)/(pi |x - y|) + R(x, y),    R(x, y) = sum phi_k(x) S_kl(nu) phi_l(y).
  *
  * The first term is a half-space's (J. Boussinesq, 1885). The regular part R has low rank: modes phi are polynomials over
- * the region, and links S are symmetric, because R is (E. Betti, 1872). m is the second moment of a contact on a
+ * the region, and links S are symmetric, because R is (E. Betti, 1872). On a curved face forces and displacements are
+ * along the normals, |x - y| is the chord, and R includes the effect of the curvature. m is the second moment of a contact on a
  * half-space, which depends on its force only; M is its tensor, and m w = 1/2 M:grad grad G its effect on a half-space's G.
  *
  * Error bars: errors of depths and of the tools' models propagate between tools in the worst case. Neglected in G are the
@@ -19,12 +20,13 @@
  */
 enum { TOOLS = EPSMESH_MOST_TOOLS };
 
-/* Of places i and j: G, its slope with x_i, the size of the Laplacian of R, a half-space's share of G, x_i - x_j over
- * the distance, and that; of a tool i at the place of j, w and its slope with x_i. */
+/* Of places i and j: G, its slope with x_i, the size of the Laplacian of R, a half-space's share of G, the distance and
+ * its slope with x_i; seen from above, the distance, and x_i - x_j over it. Of a tool i at the place of j, w and its slope
+ * with x_i; and the slope of the w of j at i with x_i. */
 typedef struct {
     double sinks[TOOLS][TOOLS], slopes[TOOLS][TOOLS][2], bends[TOOLS][TOOLS], near[TOOLS][TOOLS];
-    double away[TOOLS][TOOLS][2], apart[TOOLS][TOOLS];
-    double bent[TOOLS][TOOLS], slope_bent[TOOLS][TOOLS][2];
+    double apart[TOOLS][TOOLS], grows[TOOLS][TOOLS][2], level[TOOLS][TOOLS], away[TOOLS][TOOLS][2];
+    double bent[TOOLS][TOOLS], slope_bent[TOOLS][TOOLS][2], slope_felt[TOOLS][TOOLS][2];
 } influence;
 
 typedef struct {
@@ -86,15 +88,18 @@ static void bent_at(const epsmesh_query *q, const double edge[2], int n, int i, 
     int j, k;
     tensor(q, edge, t);
     for (j = 0; j < n; j++) {
-        double d = g->apart[i][j], *e = g->away[i][j], along[2], share, near = g->near[i][j] / (d * d);
-        if (i == j) {
-            g->bent[i][j] = g->slope_bent[i][j][0] = g->slope_bent[i][j][1] = 0;
-            continue;
-        }
+        double d = g->apart[i][j], *e = g->away[i][j], along[2], share, near = g->near[i][j] / (d * d), turns;
+        g->bent[i][j] = g->slope_bent[i][j][0] = g->slope_bent[i][j][1] = 0;
+        g->slope_felt[j][i][0] = g->slope_felt[j][i][1] = 0;
+        if (i == j) continue;
         for (k = 0; k < 2; k++) along[k] = t[k][0] * e[0] + t[k][1] * e[1];
         share = along[0] * e[0] + along[1] * e[1];
         g->bent[i][j] = near * (1.5 * share - 0.5);
-        for (k = 0; k < 2; k++) g->slope_bent[i][j][k] = near / d * (3 * along[k] + (1.5 - 7.5 * share) * e[k]);
+        for (k = 0; k < 2; k++) {
+            turns = 3 * near / g->level[i][j] * (along[k] - share * e[k]);
+            g->slope_bent[i][j][k] = turns - 3 * g->bent[i][j] / d * g->grows[i][j][k];
+            g->slope_felt[j][i][k] = -turns - 3 * g->bent[i][j] / d * g->grows[j][i][k];
+        }
     }
 }
 
@@ -122,15 +127,17 @@ static void influences(const epsmesh_model *m, int n, const epsmesh_query *q, co
     for (i = 0; i < n; i++)
         for (j = 0; j < n; j++) {
             double x = a[i].local[0] - a[j].local[0], y = a[i].local[1] - a[j].local[1], d = sqrt(x * x + y * y);
-            double r[4] = {0, 0, 0, 0};
+            double z = a[i].f.height - a[j].f.height, r[4] = {0, 0, 0, 0};
             if (d < TOUCHING) d = TOUCHING;
+            g->level[i][j] = d, g->away[i][j][0] = x / d, g->away[i][j][1] = y / d, d = sqrt(d * d + z * z);
+            g->grows[i][j][0] = (x + z * a[i].f.slope[0]) / d, g->grows[i][j][1] = (y + z * a[i].f.slope[1]) / d;
             for (l = 0; l < 4; l++)
                 for (k = 0; k < rank; k++) r[l] += f[i][l][k] * linked[j][k];
-            g->apart[i][j] = d, g->away[i][j][0] = x / d, g->away[i][j][1] = y / d;
+            g->apart[i][j] = d;
             g->near[i][j] = i == j ? 0 : 1 / (PI * plane * d);
             g->sinks[i][j] = i == j ? 0 : g->near[i][j] + r[0], g->bends[i][j] = i == j ? 0 : fabs(r[3]);
             for (l = 0; l < 2; l++)
-                g->slopes[i][j][l] = i == j ? 0 : r[l + 1] - g->near[i][j] / d * g->away[i][j][l];
+                g->slopes[i][j][l] = i == j ? 0 : r[l + 1] - g->near[i][j] / d * g->grows[i][j][l];
         }
     for (i = 0; i < n; i++) bent_at(&q[i], a[i].edge, n, i, g);
 }
@@ -181,8 +188,8 @@ static void asides(int n, const epsmesh_query *q, const influence *g, settled *s
         for (l = 0; l < 2; l++) {
             double fi = s->k[i].force, more = 0;
             for (j = 0; j < n; j++)
-                more += fi * s->k[j].force * (g->slopes[i][j][l] + s->mean[i] * g->slope_bent[i][j][l] -
-                                              s->mean[j] * g->slope_bent[j][i][l]);
+                more += fi * s->k[j].force * (g->slopes[i][j][l] + s->mean[i] * g->slope_bent[i][j][l] +
+                                              s->mean[j] * g->slope_felt[i][j][l]);
             s->aside[i][l] = s->k[i].aside[l] + (q[i].shape == EPSMESH_BONDED_DISC ? 0 : more);
         }
 }

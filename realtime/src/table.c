@@ -196,3 +196,10 @@ static void force_at(const spot *f, double push, const double aside[2], double d
     out[0] = push * f->normal[0] + x, out[1] = push * f->normal[1] + y;
     out[2] = push * f->normal[2] + x * f->slope[0] + y * f->slope[1];
 }
+
+/* The force on a tool that sticks, from components along the normal and along axes turned by the least angle to it. */
+static void reaction_at(const spot *f, double push, const double aside[2], double out[3]) {
+    const double *n = f->normal, share = (aside[0] * n[0] + aside[1] * n[1]) / (1 + n[2]);
+    out[0] = push * n[0] + aside[0] - share * n[0], out[1] = push * n[1] + aside[1] - share * n[1];
+    out[2] = push * n[2] - share * (1 + n[2]);
+}

@@ -7,12 +7,13 @@ from math import pi
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.spatial.transform import Rotation
 
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Table
 from pipeline.export.checks import Check, error_of_full, needed
 from pipeline.export.compliance import coarse_mesh, compliances
-from pipeline.export.curved import curved_model
+from pipeline.export.curved import curved_model, upright
 from pipeline.export.full import Full, Solver, Tool
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, scope_of
@@ -230,19 +231,37 @@ def test_forces_are_those_of_full_solves(middle, probe, asked, most):
 
 @dataclass(frozen=True)
 class Known:
-    """Full solves of discs on a body whose c and h are known."""
+    """Full solves of discs on a dome whose c, h and R are known."""
 
     young: float
     accuracy: float = 0.01
+    axes: tuple[float, float, float] = (30e-3, 30e-3, 15e-3)
 
     def press_all(self, tool: Tool, at: tuple[float, ...], depths: Sequence[float], poissons=None) -> list[Full]:
         (depth,) = depths
         found = []
         for poisson in poissons or [0.45]:
-            place = of_place(*self.regular(*at, poisson), poisson)
+            place, stiffness = of_place(*self.regular(*at, poisson), poisson), np.zeros((6, 6))
+            if tool.motion == "all":
+                x, y, z = self.normal(*at)
+                turn = Rotation.from_rotvec(np.array([-y, x, 0]) / np.sinc(np.arccos(z) / pi)).as_matrix()
+                soft = np.diag([*2 * [(2 - poisson) * (1 + poisson) / (4 * tool.radius)], 200.0]) + self.tensor(*at)
+                stiffness[:3, :3] = self.young * turn @ np.linalg.inv(soft) @ turn.T
             touch = place.query("disc", radius=tool.radius, at=(0.0, 0.0, 0.0), depth=depth)
-            found.append(Full(self.young * float(touch.force[2]), 0.0, np.zeros(3)))
+            found.append(Full(self.young * float(touch.force[2]), 0.0, np.zeros(3), stiffness))
         return found
+
+    def normal(self, x: float, y: float) -> np.ndarray:
+        a, b, c = self.axes
+        z = c * np.sqrt(1 - (x / a) ** 2 - (y / b) ** 2)
+        steepest = np.array([x / a**2, y / b**2, z / c**2])
+        return steepest / np.linalg.norm(steepest)
+
+    def tensor(self, x: float, y: float) -> np.ndarray:
+        """R of a body that is the same all round, along axes turned by the least angle to the normal."""
+        xi, eta = 50 * x, 50 * y
+        plane = [[40 + xi**2 - eta**2, 2 * xi * eta], [2 * xi * eta, 40 - xi**2 + eta**2]]
+        return np.block([[np.array(plane), np.array([[9 * xi], [9 * eta]])], [np.array([9 * xi, 9 * eta, -9.0])]])
 
     def regular(self, x: float, y: float, poisson: float = 0.45) -> tuple[float, float]:
         share = (1 - poisson**2) / (1 - 0.45**2)
@@ -250,16 +269,19 @@ class Known:
 
 
 @pytest.mark.parametrize("axes", [(30, 30, 15), (40, 30, 15)])
-def test_a_curved_body_is_what_two_discs_tell(axes):
-    solver = Known(10e3)
+def test_a_curved_body_is_what_three_discs_tell(axes):
+    a, b, c = (1e-3 * axis for axis in axes)
+    solver = Known(10e3, axes=(a, b, c))
     scope = scope_of(study(body=DOME | {"axes": [f"{axis} mm" for axis in axes]}))
     model, missed, places = curved_model(scope, solver, 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
-    a, b, c = (1e-3 * axis for axis in axes)
     assert missed < 5e-3
     assert places == (5 if axes[0] == axes[1] else 13)
     for x, y in np.random.default_rng(5).uniform(-0.25, 0.25, (20, 2)) * (a, b):
         found, spot = model.table.at(x, y, 0.45), model.spot(x, y)
         assert (found.c, found.h) == pytest.approx(solver.regular(x, y), rel=2e-3)
+        own = solver.tensor(x, y)
+        own[2, 2] = found.c
+        assert found.regular == pytest.approx(own, abs=0.15)
         z = c * np.sqrt(1 - (x / a) ** 2 - (y / b) ** 2)
         steepest = np.array([x / a**2, y / b**2, z / c**2])
         assert spot.height == pytest.approx(z, abs=1e-6 * c)
@@ -273,11 +295,18 @@ def test_a_curved_body_is_what_two_discs_tell(axes):
     sharp = 1 / (1 / 6e-3 + (c / a**2 + c / b**2) / 2)
     radius = model.query("sphere", radius=6e-3, at=at, depth=depth).contact_radius
     assert radius == pytest.approx((sharp * depth) ** 0.5, rel=0.03)
-    for tool, more in (("blade", {"length": 4e-3, "width": 1e-3}), ("disc", {"radius": 2e-3, "contact": "bonded"})):
-        assert model.query(tool, at=at, depth=depth, **more).status == "tool"
-    assert model.query("disc", radius=2e-3, at=at, depth=depth, poisson=0.4).status == "poisson"
-    assert model.query("disc", radius=2e-3, at=(0, 0, c + 1e-3), depth=depth).status == "off"
-    assert model.query("disc", radius=3.2e-3, at=at, depth=depth).status == "large"
+    blade = {"tool": "blade", "length": 4e-3, "width": 1e-3, "depth": depth}
+    flat = of_place(*solver.regular(0.0, 0.0), 0.45).query(at=(0.0, 0.0, 0.0), **blade)
+    assert model.query(at=at, young=1.0, **blade).force[2] == pytest.approx(flat.force[2], rel=1e-3)
+    # A bonded disc off the middle is held along the face, too.
+    x, y, radius = 0.2 * a, -0.1 * b, 2e-3
+    spot, turn = model.spot(x, y), upright(tuple(solver.normal(x, y)))
+    down = 0.1 * 1.45 / (2 * radius * np.log(1.2))
+    soft = np.diag([*2 * [1.55 * 1.45 / (4 * radius)], down + radius**2 / 3 * model.table.at(x, y, 0.45).h])
+    stiff = turn.T @ np.linalg.inv(soft + model.table.at(x, y, 0.45).regular) @ turn
+    touch = model.query("disc", contact="bonded", radius=radius, at=(x, y, spot.height), depth=depth, young=1.0)
+    assert touch.force == pytest.approx(depth * stiff @ turn[2], rel=1e-4, abs=1e-3 * depth * stiff[2, 2])
+    assert abs(touch.force @ turn[0]) > 0.005 * abs(touch.force @ turn[2])
 
 
 def test_a_layer_is_a_load_on_the_regular_part_of_the_skin():

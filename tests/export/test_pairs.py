@@ -2,17 +2,21 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from benchmarks.two_discs import forces, meshed
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Table
 from pipeline.export import far, tabulate
 from pipeline.export.compliance import compliances
+from pipeline.export.curved import curved_model
 from pipeline.export.far import FarFields, far_fields
 from pipeline.export.pairs import tabulate_pairs
 from pipeline.export.scope import scope_of
 from pipeline.export.surface_body import surface_body
-from tests.export.test_export import BOX, CYLINDER, SKIN, study
+from pipeline.run.case_solution import CaseSolution
+from pipeline.run.solved import solve_alone, solve_fields
+from tests.export.test_export import BOX, CYLINDER, DISC, DOME, SKIN, Known, study
 from tests.realtime.synthetic import point_force
 
 
@@ -72,6 +76,32 @@ def test_the_bar_holds_what_a_table_of_few_places_misses(monkeypatch):
     solved = [row[0] for row in compliances(known.body.mesh, region, places, 0.45)]
     off = np.abs(told - solved) * [region.room(*place) for place in places]
     assert 0.004 < off.max() < pairs.error
+
+
+def test_a_disc_on_a_dome_sinks_the_face_beside_it_as_a_full_solve_does():
+    """Along the normals of the places, by the force and the second moment of the disc."""
+    disc = DISC | {"radius": "1.5 mm", "depth": "0.03 mm", "at": ["5 mm", "-4 mm"]}
+    scope = scope_of(study(body=DOME, probe=DISC | {"radius": "3 mm"}))
+    model, *_ = curved_model(scope, Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
+    pairs = tabulate_pairs(far_fields(surface_body(scope, model, 0.0), scope.poissons))
+    assert pairs.links == pytest.approx(pairs.links.transpose(0, 2, 1), rel=1e-12)
+    assert 0.003 < pairs.error < 0.006
+    pressed = study(body=DOME, probe=disc, mesh={"accuracy": "0.8 %"})
+    solution = CaseSolution(solve_fields(solve_alone(pressed, pressed.case(())), MPI.COMM_SELF))
+    places = [
+        (5e-3 + r * np.cos(angle), -4e-3 + r * np.sin(angle)) for r, angle in ((5e-3, 2.8), (7e-3, 1.2), (8e-3, 2))
+    ]
+    here, *there = (model.spot(*place) for place in [(5e-3, -4e-3), *places])
+    points = np.array([[*place, spot.height] for place, spot in zip(places, there, strict=True)])
+    normals = np.array([spot.normal for spot in there])
+    moved = solution.at(points - 1e-6 * normals).displacement.values
+    apart = np.linalg.norm(points - [5e-3, -4e-3, here.height], axis=1)
+    plane, square = (1 - 0.45**2) / np.pi, 2 / 3 * 1.5e-3**2
+    told = plane / apart + pairs.regular(places, [(5e-3, -4e-3)], 0.45)[:, 0] + square / 4 * plane / apart**3
+    sunk = -10e3 / solution.force * np.einsum("ni,ni->n", moved, normals)
+    assert told == pytest.approx(sunk, abs=pairs.error / model.thickness + 0.01 * sunk.max())
+    # On a half-space it were half as much again.
+    assert (plane / apart > 1.2 * sunk).all()
 
 
 @pytest.mark.parametrize(("poisson", "apart"), [(0.45, 16e-3)])

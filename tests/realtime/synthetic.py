@@ -19,7 +19,7 @@ def random_model(*, is_round: bool = False, turned: bool = False, is_even: bool 
     reciprocal[0, 0, 0], curvature[0, 0, 0] = 1.0, 0.8
     reach, sides = ((0.03, 0.03), (0.036, 0.036)) if is_round else ((0.03, 0.025), (0.036, 0.03))
     tensors = rng.standard_normal((7, *shape)) / np.maximum(order, 1) ** 2 * 0.05
-    kind = {"even": (is_even, is_even), "leans": not curved, "tensors": np.zeros((0, 1, 1, 1)) if curved else tensors}
+    kind = {"even": (is_even, is_even), "leans": not curved, "tensors": tensors}
     table = Table(0.02 * reciprocal, 0.06 * curvature, 45.0, reach, is_round, (0.3, 0.49), **kind)
     axes = np.linalg.qr(rng.standard_normal((3, 3)))[0] if turned else np.eye(3)
     origin = np.array([0.1, -0.2, 0.05]) if turned else np.zeros(3)
@@ -28,7 +28,7 @@ def random_model(*, is_round: bool = False, turned: bool = False, is_even: bool 
         heights = rng.standard_normal((2, 1 if is_axial else 4, 5)) / np.arange(1, 6) ** 3
         face = Face(2e-3 * heights[0], 4.0 * heights[1])
     rest = {"face": face, "off": 1e-7, "aligned": 0.02 if curved else 1e-6, "bend_error": 3.0 if curved else 0.0}
-    rest["pairs"] = None if curved else random_pairs(table)
+    rest["pairs"] = random_pairs(table)
     return Model(table, origin, axes, sides, 0.02, 10e3, 0.45, 0.5, (0.02, 0.1, 0.5, 0.001), **rest)
 
 
