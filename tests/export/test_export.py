@@ -131,7 +131,7 @@ def test_tables_of_tensors_know_their_images(shape):
                 "probe": DISC | {"contact": "bonded"},
                 "mesh": {"epsilon": "full", "fine": "2 mm", "coarse": "8 mm", "degree": 2},
             },
-            "material.law",
+            "at large displacements a real-time model answers for balls",
         ),
         ({"body": [CYLINDER | {"name": "a"}, BOX | {"name": "b"}]}, "several"),
         ({"probe": BLADE | {"incision": "4 mm"}}, "press straight down"),
