@@ -248,7 +248,7 @@ class Known:
                 soft = np.diag([*2 * [(2 - poisson) * (1 + poisson) / (4 * tool.radius)], 200.0]) + self.tensor(*at)
                 stiffness[:3, :3] = self.young * turn @ np.linalg.inv(soft) @ turn.T
             touch = place.query("disc", radius=tool.radius, at=(0.0, 0.0, 0.0), depth=depth)
-            found.append(Full(self.young * float(touch.force[2]), 0.0, np.zeros(3), stiffness))
+            found.append(Full(self.young * float(touch.force[2]), 0.0, np.zeros(3), stiffness=stiffness))
         return found
 
     def normal(self, x: float, y: float) -> np.ndarray:
