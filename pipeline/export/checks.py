@@ -23,15 +23,17 @@ _SAFETY_FEW = 1.6
 _LEAST = 0.25
 # Range of a blade's length over its width.
 _SLENDER = (1.0, 12.0)
-TOOLS = ("disc", "blade", "bonded", "ball")
+TOOLS = ("disc", "blade", "bonded")
+# The kind of a ball at large displacements, after the flat tools.
+BALL = len(TOOLS)
 
 
 @dataclass(frozen=True)
 class Check:
     """A touch: place and half size (m), ν, the force (N) of a full solve with its relative error bar, and the model's.
 
-    ``kind`` is an index of ``TOOLS``: a disc, a blade (its half size is half its diagonal), a bonded disc, or a ball
-    at large displacements (its half size is its radius).
+    ``kind`` is an index of ``TOOLS``: a disc, a blade (its half size is half its diagonal), or a bonded disc; or it is
+    ``BALL``, whose half size is its radius.
     ``vector`` is the force of the tissue on the tool (N) by the full solve. ``aside`` is the error of the model's
     lateral force on a bonded tool, in units of ``full``; the model's error bar ``bar`` covers it, too.
     """

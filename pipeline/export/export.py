@@ -110,7 +110,7 @@ def export(
     make = _flat if scope.is_flat else curved_model
     of_table = replace(solver, accuracy=_PRECISE_TABLE * accuracy)
     bare, error, places = make(scope, of_table, accuracy, largest, (*_BARS, precise), margin, ranks)
-    tools = range(TOOLS.index("ball")) if len(bare.table.tensors) and not scope.law else (0,)
+    tools = range(len(TOOLS)) if len(bare.table.tensors) and not scope.law else (0,)
     halves = [checks - checks // 2, checks // 2]
     touches = [random_touches(bare, count, seed, tools) for count, seed in zip(halves, _SEEDS, strict=True)]
     checked = check_touches(bare, solver, [*touches[0], *touches[1]], ranks)

@@ -15,7 +15,7 @@ import numpy as np
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Near
 from pipeline.arrays import FloatArray
-from pipeline.export.checks import SAFETY, SIZES, TOOLS, Check, check_touches, on_face, random_place, with_bar
+from pipeline.export.checks import BALL, SAFETY, SIZES, Check, check_touches, on_face, random_place, with_bar
 from pipeline.export.full import Full, Solver, Tool
 from pipeline.export.ranks import Ranks
 from pipeline.export.scope import ExportError, Scope
@@ -174,5 +174,5 @@ def _random_ball(model: Model, rng: np.random.Generator) -> Check:
         if share < _LESS * _SHARES[0] * size / radius:
             raise ExportError(f"a ball of {1e3 * radius:.3g} mm has no answer: {touch.message}")
     tool = Tool("sphere", radius, contact="unilateral")
-    asked = Check(x, y, radius, share * radius, poisson, nan, nan, nan, nan, TOOLS.index("ball"), tool)
+    asked = Check(x, y, radius, share * radius, poisson, nan, nan, nan, nan, BALL, tool)
     return with_bar(model, asked)
