@@ -151,6 +151,7 @@ FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
     "insertion_layers": ("scalpel-layers", of_kind("insertion")),
     "insertion_epsilon": ("scalpel-epsilon", of_kind("insertion")),
     "needle_path": ("needle-path", of_kind("insertion")),
+    "punch_path": ("punch-path", of_kind("insertion")),
     "deep": ("deep", deep),
     "large_depth": ("large_depth", of_kind("force")),
 }

@@ -39,7 +39,7 @@ class NeedleScene(InsertionScene[Needle]):
         for number, layer in enumerate(self.layers):
             if (end := self.insertion.to - layer.top) <= 0:
                 break
-            yield self.tool.cutting(layer.toughness), number
+            yield from ((state, number) for state in self.tool.cuts(layer.toughness))
             depth = self.tool.first_depth
             while depth < end:
                 yield self.tool.pressed_to(depth), number

@@ -5,7 +5,7 @@ from math import pi
 import pytest
 from scipy.optimize import brentq
 
-from pipeline.insertion.paths import lacking, paths
+from pipeline.insertion.paths import lacking, paths, scenes
 from pipeline.insertion.steps import CUTTING
 from pipeline.plan.plan import make_plan
 from pipeline.run.record import Record
@@ -101,6 +101,12 @@ def test_the_intact_body_is_solved_once_for_all_cracks():
     assert ring.keys == plane.keys
     records = {solve.key: record(solve, CUTS) for solve in ring.solves}
     assert set(lacking(ring, records).keys).isdisjoint(lacking(plane, records).keys)
+
+
+@pytest.mark.parametrize(("shape", "rings"), [("ring", [True]), ("plane", [False]), ("least", [False, True])])
+def test_each_crack_that_counts_is_a_solve_that_the_path_may_need(shape, rings):
+    ((found, _),) = scenes(make_plan(scene(crack_shape=shape)), {})
+    assert sorted(state.crack.is_ring for state, _ in found.possible() if state.crack) == rings
 
 
 def test_the_path_ends_where_the_column_ahead_is_near_the_bottom():
