@@ -27,6 +27,7 @@ from epsmesh_realtime import read
 from epsmesh_realtime.model import Model
 from pipeline.arrays import FloatArray
 from pipeline.export.checks import TOOLS, Check, with_bar
+from pipeline.export.disc import Disc
 from pipeline.export.export import export, write
 from pipeline.export.full import Solver
 from pipeline.export.scope import Scope, scope_of
@@ -208,6 +209,7 @@ def _half_space(model: Model, check: Check) -> float:
         curvature=np.zeros((1, 1, 1)),
         c_ref=1.0,
         leans=False,
+        even=(True, True),
         tensors=np.zeros((len(model.table.tensors), 1, 1, 1)),
     )
     return with_bar(replace(model, table=zero), check).force
@@ -222,6 +224,14 @@ def _nearest(model: Model, check: Check) -> float:
         radius = float(np.hypot(check.x, check.y))
         share = float(x[np.argmin(np.abs(x - radius))]) / max(radius, 1e-12)
         at = (check.x * share, check.y * share)
+    elif model.table.is_round:
+        even = model.table.even
+        nodes = np.array(Disc(model.table.reach[0], even, (columns - 1) * (1 + even[0])).places) * (1 - 1e-12)
+        signs = [
+            np.copysign(1.0, place) if is_even else 1.0 for place, is_even in zip((check.x, check.y), even, strict=True)
+        ]
+        x, y = (nodes * signs)[np.argmin(np.hypot(*(nodes * signs - (check.x, check.y)).T))]
+        at = (float(x), float(y))
     else:
         y = (1 - 1e-12) * model.table.reach[1] * shares(rows - 1, model.table.even[1])
         at = (_closest(x, check.x, model.table.even[0]), _closest(y, check.y, model.table.even[1]))

@@ -18,8 +18,9 @@ from pipeline.shapes.frame import PlaceError, Vector
 
 # Radii of the two discs, in units of the study's; the larger one is close to the model's largest contact.
 RADII, _LARGER = (0.6, 1.5), 1.03
-# Half size of the region: of a body without axes in units of the disc's radius; of an ellipsoid in its semi-axes.
-_REACH, _OF_AXES = 3.0, 0.4
+# Half size of the region: of a body without axes, in units of the disc's radius, the largest one with a face;
+# of an ellipsoid in its semi-axes.
+_REACHES, _OF_AXES = (3.0, 2.25, 1.5), 0.4
 # Intervals of the tables; depth over radius; fixed-point steps for h, whose square has little weight.
 _SIZES, _DEPTH, _STEPS = (2, 4), 0.02, 50
 # c depends most on the smaller disc, whose solve is so much more accurate.
@@ -54,7 +55,7 @@ def curved_model(
     radius = scope.case.probe.circumradius
     room = _LARGER * RADII[1] * radius / largest
     middle = scope.case.probe.at[:2]
-    region = curved_region(scope, room)
+    region, face, off, bend_error = _region_and_face(scope, room, middle)
     ratios = ratios_of(scope.poissons).tolist()
     known: dict[tuple[float, float], FloatArray] = {}
     bars_of_full: list[float] = []
@@ -71,7 +72,6 @@ def curved_model(
 
     table, error = tabulate(region, scope.poissons, found, _SHARE * accuracy, _SIZES, sparse=not region.is_round)
     table = replace(table, leans=False)
-    face, off, bend_error = _face(scope, table, middle)
     model = Model(
         table,
         np.array([*middle, 0.0]),
@@ -91,13 +91,38 @@ def curved_model(
     return model, error, len(known) * len(ratios)
 
 
-def curved_region(scope: Scope, room: float) -> Region:
-    """Return the region of a curved body round the study's place; ``room`` (m) is the distance to its boundary."""
-    body, radius = scope.body, scope.case.probe.circumradius
-    is_round, reach, even = False, (_REACH * radius,) * 2, (False, False)
-    if body.half_sides and not any(scope.case.probe.at[:2]) and not body.embedded:
-        is_round, even = body.is_round, (True, True)
-        reach = (_OF_AXES * body.half_sides[0], _OF_AXES * body.half_sides[1])
+def _region_and_face(scope: Scope, room: float, middle: tuple[float, ...]) -> tuple[Region, Face, float, float]:
+    """Return the largest region that has a face, and what :func:`_face` tells of it.
+
+    Raises:
+        ExportError: if even the smallest has none.
+    """
+    share, *smaller = _REACHES
+    while True:
+        region = curved_region(scope, room, share * scope.case.probe.circumradius)
+        try:
+            return region, *_face(scope, region, middle)
+        except ExportError:
+            if not smaller or not _is_free(scope):
+                raise
+            share, *smaller = smaller
+
+
+def _is_free(scope: Scope) -> bool:
+    """Return whether the region has the size of the tool, not that of the body."""
+    return not scope.body.half_sides or any(scope.case.probe.at[:2]) or bool(scope.body.embedded)
+
+
+def curved_region(scope: Scope, room: float, half: float) -> Region:
+    """Return the region of a curved body round the study's place; ``room`` (m) is the distance to its boundary.
+
+    ``half`` (m) is its half size, unless the body's symmetry gives one.
+    """
+    is_round, reach, even = False, (half, half), (False, False)
+    if not _is_free(scope):
+        assert scope.body.half_sides is not None
+        is_round, even = scope.body.is_round, (True, True)
+        reach = (_OF_AXES * scope.body.half_sides[0], _OF_AXES * scope.body.half_sides[1])
     return Region(reach, (reach[0] + 2 * room, reach[1] + 2 * room), room, is_round, even, is_axial=is_round)
 
 
@@ -163,28 +188,29 @@ def upright(normal: Vector) -> FloatArray:
     return turn
 
 
-def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, float, float]:
+def _face(scope: Scope, region: Region, middle: tuple[float, ...]) -> tuple[Face, float, float]:
     """Return the face as polynomials, with their largest errors in height (m) and in curvature (1/m).
 
     Raises:
         ExportError: if the face does not extend over the whole region.
     """
     share = np.cos(np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
-    count = 1 if table.is_axial else _TERMS
-    xs = table.reach[0] * (np.sqrt((share + 1) / 2) if table.even[0] else share)
-    ys = table.reach[1] * (np.sqrt((share + 1) / 2) if table.even[1] else share) if count > 1 else np.zeros(1)
+    count = 1 if region.is_axial else _TERMS
+    xs = region.reach[0] * (np.sqrt((share + 1) / 2) if region.even[0] else share)
+    ys = region.reach[1] * (np.sqrt((share + 1) / 2) if region.even[1] else share) if count > 1 else np.zeros(1)
     vander = np.polynomial.chebyshev.chebvander(share, _TERMS - 1)
-    heights = _heights(scope, middle, xs, ys, f"the model's region, {1e3 * table.reach[0]:.3g} mm to each side of it,")
+    heights = _heights(scope, middle, xs, ys, f"the model's region, {1e3 * region.reach[0]:.3g} mm to each side of it,")
     rows = vander if count > 1 else np.ones((1, 1))
     height = _fitted(rows, vander, heights)
     if scope.body.half_sides:  # a smooth body
+        table = Table.none(region.reach, is_round=region.is_axial, even=region.even)
         plain = table.with_arrays(Face(height, np.zeros_like(height)).numbers())
         bends, doubt = np.array([[_bend(plain, x, y) for x in xs] for y in ys]), 0.0
     else:
         bends, doubt = _bends(scope, middle, xs, ys)
     bend = _fitted(rows, vander, bends)
     errors = [float(np.abs(rows @ fit @ vander.T - known).max()) for fit, known in ((height, heights), (bend, bends))]
-    return Face(height, bend), errors[0], doubt + errors[1] if doubt else 0.0
+    return Face(height, bend), errors[0], doubt + errors[1]
 
 
 def _heights(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArray, what: str) -> FloatArray:

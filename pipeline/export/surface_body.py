@@ -55,7 +55,7 @@ def surface_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE
 
 def _curved(scope: Scope, model: Model, ranks: Ranks) -> Pressed:
     radius = scope.case.probe.circumradius
-    region = curved_region(scope, model.thickness)
+    region = curved_region(scope, model.thickness, model.table.reach[0])
 
     def on_face(place: tuple[float, float], poisson: float) -> PlacedForce:
         spot = model.spot(*place)

@@ -309,6 +309,30 @@ def test_a_curved_body_is_what_three_discs_tell(axes):
     assert abs(touch.force @ turn[0]) > 0.005 * abs(touch.force @ turn[2])
 
 
+@pytest.mark.parametrize(("x", "half"), [(12, 9e-3), (22, 6.75e-3), (25, 4.5e-3)])
+def test_a_region_near_the_end_of_a_face_is_the_largest_that_fits(x, half):
+    disc = DISC | {"radius": "3 mm", "at": [f"{x} mm", "0 mm"]}
+    model, *_ = curved_model(
+        scope_of(study(body=DOME, probe=disc)), Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0
+    )
+    assert model.table.reach == pytest.approx((half, half))
+    z = 15e-3 * np.sqrt(1 - (x / 30) ** 2)
+    assert model.query("disc", radius=2e-3, at=(1e-3 * x, 0.0, z), depth=2e-5).status == "ok"
+    assert model.query("disc", radius=2e-3, at=(1e-3 * x, 1.01 * half, z), depth=2e-5).status == "outside"
+    # On a steep face polynomials know the curvature less well, and so the forces on balls.
+    bars = [
+        model.query(tool, radius=radius, at=(1e-3 * x, 0.0, z), depth=2e-4).force_error
+        for tool, radius in (("sphere", 6e-3), ("disc", 1e-3))
+    ]
+    assert (bars[0] > 3 * bars[1]) == (x > 20)
+
+
+def test_a_face_that_ends_beside_the_tool_has_no_region():
+    disc = DISC | {"radius": "3 mm", "at": ["28 mm", "0 mm"]}
+    with pytest.raises(ExportError, match="to each side of it, does not fit on the face"):
+        curved_model(scope_of(study(body=DOME, probe=disc)), Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
+
+
 def test_a_layer_is_a_load_on_the_regular_part_of_the_skin():
     layered = CYLINDER | {"layer": [SKIN | {"thickness": "6 mm"}]}
     scope = scope_of(study(body=layered))
