@@ -15,7 +15,7 @@ from pipeline.view.page import render_scene
 
 _TEMPLATES = Path(__file__).parent / "templates"
 # Each knows those before it.
-_SCRIPTS = [_TEMPLATES / name for name in ("evaluator.js", "surface.js", "touch.js")]
+_SCRIPTS = [_TEMPLATES / name for name in ("evaluator.js", "surface.js", "unanswered.js", "touch.js")]
 # The evaluator in C, by realtime/wasm/build.py.
 EVALUATOR = _TEMPLATES / "evaluator.wasm"
 _MM = 1e3
@@ -65,6 +65,7 @@ def _facts(surface: Surface) -> list[str]:
     return [
         *at_once,
         f"Valid within the grey line: {region}. Tools move {along}, {friction}.",
+        "Shaded: no answer for this tool at this depth.",
         "Drag on the body's face to move the tool, beside it to turn the body; scroll to zoom.",
     ]
 
@@ -103,7 +104,7 @@ def _told(surface: Surface) -> dict[str, Any]:
     numbers = {name: np.asarray(getattr(model, name)).tolist() for name in ("origin", "axes", "young", "poisson")}
     is_which = {"is_flat": model.face.is_flat, "is_round": model.table.is_round}
     return {
-        "model": numbers | is_which | {"reach": list(model.table.reach)},
+        "model": numbers | is_which | {"reach": list(model.table.reach), "sides": list(model.sides)},
         "eye": (np.array([-0.5, -0.75, 0.55]) / hypot(0.5, 0.75, 0.55)).tolist(),
         "centre": (_MM * (low + high) / 2).tolist(),
         "radius": float(_MM * np.linalg.norm(high - low) / 2),

@@ -172,6 +172,37 @@ def test_the_dent_is_seen_and_outside_the_region_no_number_is(browser, tmp_path)
     assert browser.messages == []
 
 
+@in_browser
+@pytest.mark.parametrize("kind", [{}, {"is_round": True}, {"curved": True, "turned": True}])
+def test_places_without_an_answer_are_shaded_before_one_gets_there(browser, tmp_path, kind):
+    surface, _ = opened(browser, tmp_path, **kind)
+    model = surface.model
+    seen = set()
+    for tool, sizes in (("disc", {"radius": 3}), ("sphere", {"radius": 7, "depth": 1.2})):
+        change(browser, **{"tool": tool, "x": 0, "y": 0, "depth": -0.1} | sizes)
+        asked = {"radius": 1e-3 * sizes["radius"], "depth": max(1e-3 * sizes.get("depth", -0.1), 1e-9)}
+        found = browser.ask("page.unanswered.statuses({...page.query, depth: Math.max(page.query.depth, 1e-9)})")
+        for status, u, v, wide, long in found[::7]:
+            x, y = u + wide / 2, v + long / 2
+            inside = np.clip([x, y], *np.array([-1, 1])[:, None] * (1 - 1e-9) * np.array(model.table.reach))
+            height = 0.0 if model.face.is_flat else model.spot(*inside.tolist()).height
+            at = model.origin + np.array([x, y, height]) @ model.axes
+            assert status == model.query(tool, at=at.tolist(), **asked).status
+        seen |= {row[0] for row in found}
+        shown = browser.ask("[...document.querySelectorAll('#unanswered li')].map(one => one.textContent)")
+        assert {line.split(", ")[1].split(":")[0] for line in shown} == {row[0] for row in found} - {"ok"}
+        drawn_cells = browser.ask("page.unanswered.other.geometry.getAttribute('position').count") / 6
+        assert drawn_cells == sum(row[0] not in ("ok", "outside") for row in found)
+    assert seen >= ({"ok", "large"} if kind.get("curved") else {"ok", "outside"})
+    # Dragging does not ask again; another size does.
+    before = browser.ask("(page.unanswered.shares.marked = 1, page.unanswered.seen)")
+    change(browser, x=1)
+    assert browser.ask("page.unanswered.shares.marked") == 1
+    change(browser, radius=2)
+    assert browser.ask("page.unanswered.seen") != before
+    assert browser.messages == []
+
+
 def test_the_page_of_relaxing_tissue_says_that_it_shows_a_sudden_touch():
     surface = random_surface()
     assert "sudden touch" not in render(surface, "")

@@ -59,6 +59,7 @@ class Page {
     this.stage.colour({ stops: told.stops });
     this.stage.addLines([this.border()]);
     this.arrow = this.stage.addSolid(told.ink.footprint);
+    this.unanswered = new Unanswered(this);
     this.listen();
     this.whole();
     this.update();
@@ -181,6 +182,18 @@ class Page {
     if (isIn) this.point(query, touch);
     this.place(query, isIn);
     this.tell(query, touch, took);
+    this.tellUnanswered(this.unanswered.update(query));
+  }
+  // Why parts of the face are shaded.
+  tellUnanswered(shares) {
+    const list = document.getElementById("unanswered");
+    const reasons = Object.keys(shares).filter((status) => status !== "ok");
+    list.replaceChildren(...reasons.map((status) => {
+      const item = document.createElement("li");
+      item.className = status === "outside" ? "outside" : "other";
+      item.textContent = `${Math.round(100 * shares[status])} % of the face, ${status}: ${this.told.sentences[status]}`;
+      return item;
+    }));
   }
   fillBody(pressed, deepest) {
     const { made, surface } = this;
