@@ -1,9 +1,10 @@
-"""The pressure on a needle that cuts, over the toughness: ``python docs/draw_needles.py``, a few minutes.
+"""The pressure on a needle that cuts, over the toughness: ``python docs/draw_needles.py``, ten minutes.
 
-Cracks are solved as a run solves them, on the finer mesh, and drawn with closed forms of ``pipeline/verify/known.py``
-into ``docs/figures/needle_pressure.png``.
+Cracks are solved as a run solves them, on the finer mesh, those of flat punches at a few places. They are drawn with
+closed forms of ``pipeline/verify/known.py`` into ``docs/figures/needle_pressure.png``.
 """
 
+from collections.abc import Iterator
 from math import nan, pi
 from pathlib import Path
 
@@ -15,9 +16,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from pipeline.report.figures.style import COLOURS, GRID, LINE, STYLE
+from pipeline.solve import SolveError
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.plane.crack import LEVELS, open_crack
 from pipeline.solve.plane.opening import Opening
+from pipeline.solve.plane.ring import ring_cuts
 from pipeline.verify.known import thin_needle, tough_needle
 from pipeline.verify.needles import shaft_pressure
 
@@ -25,6 +28,7 @@ PICTURE = Path(__file__).parent / "figures" / "needle_pressure.png"
 DPI = 130
 # Γ/(μ R) that is drawn, and where the closed forms hold.
 LEAST, MOST = 0.01, 100.0
+OF_FLAT = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 9.0, 30.0, 100.0)
 THIN, TOUGH = (LEAST, 0.4), (2.0, 30.0)
 # Where linear elasticity opens the crack to the circle itself: Γ/(μ R), and F/(μ π R²) (A. Spagnoli et al. 2022).
 LAST = (pi, 3.0)
@@ -51,6 +55,8 @@ def main() -> None:
             opening = open_crack(law, MOST, LEVELS[-1])
             toughness = np.geomspace(max(opening.released[0], LEAST), 0.999 * min(opening.released[1], MOST), 40)
             curves(left, right, opening, toughness, name, colour)
+            flat = dict(of_flat(law))
+            left.plot(list(flat), list(flat.values()), "s", color=colour, markersize=3.5, linestyle="none")
             if alpha > 2:
                 power(left, toughness[-1], shaft_pressure(opening, toughness[-1]), (alpha - 2) / (alpha - 1), colour)
                 power(right, toughness[-1], 1 / opening.ratio(toughness[-1]), -1 / (alpha - 1), colour)
@@ -63,6 +69,7 @@ def main() -> None:
             left.plot(at, pressure, line, color=LINE, label=name)
             right.plot(at, half, line, color=LINE)
         left.plot(*LAST, "k*", markersize=9, label="small strain: crack opened to a circle")
+        left.plot([nan], [nan], "s", color=LINE, markersize=3.5, label="flat punch, in the law's colour")
         left.plot([nan], [nan], ":", color=LINE, label="large stretch: slope for Ogden's law")
         for ax, what in ((left, "pressure on the shaft, p/μ"), (right, "half length of the crack, b/R")):
             ax.set(xscale="log", yscale="log", xlabel="toughness, Γ/(μR)", ylabel=what)
@@ -71,6 +78,16 @@ def main() -> None:
             ax.grid(color=GRID)
         left.legend(fontsize=8)
         drawn.savefig(PICTURE, dpi=DPI)
+
+
+def of_flat(law: MaterialLaw) -> Iterator[tuple[float, float]]:
+    """Yield Γ/(μ R) and the pressure on a flat punch in units of μ, as far as it is solved."""
+    for toughness in OF_FLAT:
+        try:
+            _, fine = ring_cuts(law, toughness)
+        except SolveError:
+            return
+        yield toughness, fine.energy / pi
 
 
 def curves(left: plt.Axes, right: plt.Axes, opening: Opening, toughness: np.ndarray, name: str, colour: str) -> None:

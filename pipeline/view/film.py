@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgba_array
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -17,14 +18,18 @@ from pipeline.arrays import IntArray
 from pipeline.files import atomic
 from pipeline.insertion.steps import PHASES
 from pipeline.report.figures.insertion import with_puncture
-from pipeline.report.figures.style import COLOURS, DEFAULTS, GRID, LINE
+from pipeline.report.figures.style import COLOURS, DEFAULTS, GRID, LINE, PAPER
 from pipeline.report.values import punctures
+from pipeline.view.palette import TOOL
+from pipeline.view.section import SCALE
 
 _MM = 1e3
 # Height and dots per inch, and frames per second; the last frame stays for so many.
 _HEIGHT, _DOTS, _RATE, _LAST = 3.9, 90, 6, 8
 # Colours of a film, taken from so many pictures, and the number of the one that leaves what is there.
 _COLOURS, _SHEET, _SAME = 128, 8, 255
+# Colours that are not lost, though few points have them: in one of so many lines of the sheet.
+_KEPT, _EVERY = (PAPER, LINE, COLOURS[4], TOOL, *mpl.colormaps[SCALE](np.linspace(0.0, 1.0, 32))), 6
 # Inches: the width of the force.
 _FORCE = 3.6
 
@@ -105,7 +110,8 @@ def write_film(path: xr.Dataset, pictures: Pictures, file: Path, title: str) -> 
 def _save(pictures: Sequence[IntArray], file: Path) -> None:
     """Write pictures (height, width, 3) in the same few colours, each as what differs from the one before."""
     sheet = np.concatenate(pictures[:: max(len(pictures) // _SHEET, 1)])
-    colours = Image.fromarray(sheet).quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE)
+    sheet[::_EVERY, :] = to_rgba_array(list(_KEPT))[np.arange(sheet.shape[1]) % len(_KEPT), :3] * 255
+    colours = Image.fromarray(sheet).quantize(_COLOURS)
     found, before = [], np.full(pictures[0].shape[:2], -1)
     for picture in pictures:
         now = np.asarray(Image.fromarray(picture).quantize(palette=colours, dither=Image.Dither.NONE), dtype=np.int64)

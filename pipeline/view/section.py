@@ -12,6 +12,7 @@ from pipeline.report.figures.style import LINE
 from pipeline.view.fields import Fields
 
 _MM = 1e3
+SCALE = "YlGnBu"
 _EDGES = 0.08  # points: the width of the edges of triangles
 # The plane is beside nodes that are in it, by this share of the body.
 _BESIDE = 1e-7
@@ -38,7 +39,7 @@ class Section:
     def draw(self, ax: Axes, share: float, largest: float) -> None:
         """Draw it at a share of the displacement, in mm and with equal axes; colours end at the ``largest`` (m)."""
         colours = _MM * share * self.size.mean(axis=1)
-        body = PolyCollection(_MM * self.at(share), array=colours, cmap="YlGnBu", edgecolors=LINE, linewidths=_EDGES)
+        body = PolyCollection(_MM * self.at(share), array=colours, cmap=SCALE, edgecolors=LINE, linewidths=_EDGES)
         body.set_clim(0, _MM * largest)
         ax.add_collection(body)
         ax.set_aspect("equal")
