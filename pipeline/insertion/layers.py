@@ -26,14 +26,13 @@ def through_layers(scene: Scene, states: Sequence[Cutting]) -> tuple[list[Cuttin
         if not below:
             break
         punctures.append(None)
-        upper, lower = scene.layers[number - 1 : number + 1]
-        if not above or above[-1].is_indentation or lower.toughness <= upper.toughness:
+        if not above or above[-1].is_indentation or not scene.tougher(number):
             continue
         alone = scene.stiffness(number)
         if isinstance(alone, str):
             return above, punctures[:-1], f"{1e3 * end:.4g} mm: {alone}"
         stiffness, error = alone
-        half = upper.plane_modulus * scene.blade.half_space_stiffness / 2
+        half = scene.layers[number - 1].plane_modulus * scene.blade.half_space_stiffness / 2
         arrived = above[-1].moved(end - above[-1].ahead)
         layer = Indentation(arrived, stiffness + half, error + half)
         count = next((n for n, one in enumerate(below) if layer.at(one.depth).energy >= one.energy), len(below))

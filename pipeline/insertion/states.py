@@ -192,6 +192,26 @@ class Scene(InsertionScene[Blade]):
         """Return the distance (m) of the front of the slit that is solved first, for a tip at a depth (m)."""
         return self.blade.first_ahead(depth, self.interfaces)
 
+    def tougher(self, number: int) -> bool:
+        """Return whether the layer below so many is tougher than the one above it: it is indented first."""
+        return self.layers[number].toughness > self.layers[number - 1].toughness
+
+    def far(self, depth: float, deepest: float) -> tuple[float, float, float]:
+        """Return the slit that is solved at a depth of a withdrawal, with the front of cutting at the ``deepest`` one.
+
+        That is the depth, and the distances of the front ahead of the tip, and beside the ends (m).
+        """
+        return depth, deepest + self.ahead(deepest) - depth, self.ahead(depth)
+
+    def possible(self) -> Iterator[tuple[Blade, int]]:
+        """Yield the blade on the layers below a tougher one's interface, and slits of the withdrawal above the last."""
+        last = self.depths[-1]
+        for number, end in enumerate(self.interfaces, start=1):
+            if end < last and self.tougher(number):
+                yield self.blade.on_intact(), number
+        if self.insertion.withdraw:
+            yield from ((self.blade.in_slit(*self.far(one, last)), 0) for one in self.depths if self.crosses(one, last))
+
     # ---- solved states --------------------------------------------------------------------------------
 
     def stiffness(self, below: int = 0) -> tuple[float, float] | str:

@@ -123,9 +123,8 @@ def _above(scene: Scene, state: Cutting, deepest: Cutting, front: float) -> _Ope
     depth, length, width = state.depth, scene.blade.length, scene.blade.width
     if not scene.crosses(depth, (1 - _TINY) * front):
         return None
-    beside = scene.ahead(depth)
-    solved = deepest.depth + scene.ahead(deepest.depth) - depth
-    cut = scene.cut(depth, solved, beside)
+    _, solved, beside = place = scene.far(depth, deepest.depth)
+    cut = scene.cut(*place)
     if isinstance(cut, str):
         return cut
     ahead = front - depth

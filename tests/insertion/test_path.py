@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from pipeline.insertion.friction import reaction
 from pipeline.insertion.near_tip import NearTip
-from pipeline.insertion.paths import complete, lacking
+from pipeline.insertion.paths import complete, lacking, possible
 from pipeline.insertion.steps import PHASES
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
@@ -359,3 +359,13 @@ def test_the_guide_judges_each_puncture():
     found = guide(_path(read_mapping(scene, "sweep")), "5 %")
     judged = {quantity for part in found.parts for quantity in part.where["quantity"]}
     assert {"force of the puncture", "force of the puncture of layer 2", "depth of the puncture of layer 2"} <= judged
+
+
+def test_the_solves_of_layers_are_known_before():
+    """On the layers below, and for the withdrawal: what a plan tells is what a path through them needs."""
+    fat = {"name": "fat", "thickness": "2.1 mm", "young": "20 kPa", "poisson": 0.3, "toughness": "2 J/m^2"}
+    probe = BLADE | {"insertion": {"to": "6 mm", "steps": 12, "withdraw": True}}
+    plan, records = solved(read_mapping(SCENE | {"body": SCENE["body"] | {"layer": [fat]}, "probe": probe}, "layers"))
+    told = possible(plan, {key: records[key] for key in plan.keys})
+    assert {*told.keys} == {*records} - {*plan.keys}
+    assert possible(plan, records) is None
