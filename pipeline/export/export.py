@@ -112,7 +112,9 @@ def export(
     bare, error, places = make(scope, of_table, accuracy, largest, (*_BARS, precise), margin, ranks)
     tools = range(len(TOOLS)) if len(bare.table.tensors) and not scope.law else (0,)
     halves = [checks - checks // 2, checks // 2]
-    touches = [random_touches(bare, count, seed, tools) for count, seed in zip(halves, _SEEDS, strict=True)]
+    # Discs calibrate the linear part of a law; balls test the whole.
+    of_linear = [halves[0], 0] if scope.law else halves
+    touches = [random_touches(bare, count, seed, tools) for count, seed in zip(of_linear, _SEEDS, strict=True)]
     checked = check_touches(bare, solver, [*touches[0], *touches[1]], ranks)
     fitted, judged = checked[: halves[0]], checked[halves[0] :]
     # Bonded tools have further errors, and would enlarge the error bars of the others.
