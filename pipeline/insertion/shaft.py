@@ -5,8 +5,9 @@ length 2b open, and the work of fracture (:mod:`pipeline.solve.plane`). At a sec
 goes like a power of r, whose exponent is R N/e, since de/dr is the pressure N around the needle. The energy of all
 sections down to a depth D is E(D), and its derivative the force of cutting. Coulomb's friction is μ N per depth.
 
-Sections are those of an endless needle. What a surface, an interface and the tip change is not computed: the bar of E
-has what a change of e takes over one radius, and that of the force falls with the square of the distance.
+Sections are those of an endless needle. What the surface and the tip change is in the bar of E: e over half a radius,
+twice what tips change that widen holes (docs/howto/needle.md); over a radius for blunt ends, and for the change of e at
+an interface. The bar of the force is as much of e at a distance of a radius, and falls with the square of the distance.
 """
 
 from collections.abc import Iterator
@@ -27,6 +28,8 @@ from pipeline.shapes.section import in_mm
 # toughnesses (docs/howto/needle.md). A fixed side adds 1/(1 − 2ν) times that: of a hole, at small strains. The longest
 # crack, in units of r.
 _UNSURE, _LONGEST = 0.5, 1 / 3
+# What the surface and a tip that is as high as the shaft's half width change at most, in units of e times that.
+_POINTED = 0.5
 
 
 @dataclass(frozen=True)
@@ -110,9 +113,11 @@ class NeedleCut:
             yield layer, depth - top, depth - end
 
     def _jumps(self) -> Iterator[tuple[float, float]]:
-        """Yield the depth (m) of each layer's top, and by how much the force of the shaft (N) differs there."""
+        """Yield the depth (m) of each layer's top, and what is not known there of the force of the shaft (N)."""
         forces = [layer.force for layer in self.layers]
-        yield from zip(self.tops, np.abs(np.diff([0.0, *forces])).tolist(), strict=False)
+        is_pointed = self.needle.tip_heights[-1] >= self.needle.limit
+        shares = [_POINTED if is_pointed else 1.0, *(1.0 for _ in forces[1:])]
+        yield from zip(self.tops, (np.abs(np.diff([0.0, *forces])) * shares).tolist(), strict=False)
 
     def takes_more(self, number: int) -> bool:
         """Return whether a layer below another takes more per depth than that."""
@@ -126,7 +131,7 @@ class NeedleCut:
     def energy_error(self, depth: float, since: float = 0.0) -> float:
         """Return the bar (J) of what an advance from a depth ``since`` (m) takes.
 
-        It has those of the solves, and at a surface or an interface what one radius of depth takes.
+        It has those of the solves, and what is not known of the force of the shaft at each top, over one radius.
         """
         bar = max(layer.bar for layer in self.layers)
         ends = sum(jump for top, jump in self._jumps() if since <= top < depth)

@@ -95,6 +95,8 @@ def test_tissue_is_pierced_where_the_intact_body_has_the_energy_of_the_cut_one(p
     assert path.punctures[0].depth == pytest.approx(depth, rel=1e-4)
     assert path.punctures[0].force == pytest.approx(STIFFNESS * depth**2, rel=1e-4)
     assert path.punctures[0].after.force < path.punctures[0].force
+    # Half a radius of what a cut takes per depth is the bar of the energy.
+    assert path.punctures[0].depth_error >= CUT * RADIUS / 2 / path.punctures[0].force
     assert {step.phase for step in path.steps if step.depth < depth} == {INDENTATION}
 
 
