@@ -83,6 +83,13 @@ def test_the_pressure_on_the_shaft_is_the_change_of_the_holes_energy_with_its_ra
     assert compressible.cut().pressure == pytest.approx(2 * pi * slope, rel=1e-3)
 
 
+def test_a_column_is_found_within_what_the_law_allows():
+    """Gent's law has no energy of a column that is shortened to nothing, where its least is sought."""
+    found = ring(MaterialLaw.of_moduli(2.8, 0.4, "gent", limit=3.0))
+    assert found.cut().energy > ring(COMPRESSIBLE).cut().energy
+    assert found.cut().energy == min(found.least(share * found.solved()) for share in (0.8, 1.0, 1.2))
+
+
 def test_stiffening_and_toughness_make_the_crack_need_more():
     stiff = MaterialLaw.of_moduli(
         3.0, 0.5, "ogden", share1=1.0, alpha1=9.0, share2=0.0, alpha2=1.0, share3=0.0, alpha3=1.0

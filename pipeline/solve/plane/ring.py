@@ -12,7 +12,7 @@ and the least over b and λ is the force without friction. The least over λ is 
 e = −πb² ∂ψ/∂λ. Incompressible tissue has λ = (b/R)².
 """
 
-from math import exp, log, pi, sqrt
+from math import exp, isfinite, log, pi, sqrt
 
 from scipy.optimize import brentq, minimize_scalar
 
@@ -50,7 +50,9 @@ class Ring:
 
         def slope(stretch: float) -> float:
             energy, force = self._column.energy(across, stretch)
-            return (1 - stretch) * force + energy + fixed
+            value = (1 - stretch) * force + energy + fixed
+            # Beyond what a law allows, the column is compressed too much, or too little.
+            return value if isfinite(value) else stretch * across**2 - 1
 
         return float(brentq(slope, _LEAST, 1.0))
 
