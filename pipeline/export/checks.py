@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from math import nan
 
 import numpy as np
+from scipy.optimize import linprog
 
 from epsmesh_realtime.model import Model
 from pipeline.arrays import FloatArray
@@ -16,10 +17,12 @@ from pipeline.stages import stage
 SIZES, _DEPTH = (0.1, 0.99), 0.02
 # Safety factor on the largest error bar that the calibration set needs.
 SAFETY = 1.3
-# Safety factor for curved bodies, whose calibration set is small. In three of four draws, the largest of six errors,
-# times this factor, exceeds the 95 % quantile of all errors.
-_SAFETY_FEW = 1.6
-# Least error of full solves, as a share of their error bars.
+# The same on the narrowest bars that cover twelve touches: for normally distributed errors, they then cover 96 % of
+# others, on average.
+_SAFETY_NARROW = 1.5
+# Least factor on the parts of a bar that grow with the tool: few touches are of the largest.
+_LEAST_SHAPE = 0.25
+# Error that full solves have in common, as a share of their error bars.
 _LEAST = 0.25
 # Range of a blade's length over its width.
 _SLENDER = (1.0, 12.0)
@@ -148,19 +151,21 @@ def random_place(model: Model, rng: np.random.Generator) -> tuple[float, float]:
     return float(r * np.cos(angle)), float(r * np.sin(angle))
 
 
-def needed(checks: Sequence[Check], floor: float) -> float:
-    """Return the factor, at least 1, by which error bars beyond ``floor`` must grow to cover all errors."""
-    return max(1.0, SAFETY * max((abs(check.error) - floor) / (check.bar - floor) for check in checks))
+def narrowest(model: Model, checks: Sequence[Check]) -> tuple[float, float, float, float]:
+    """Return the narrowest error bars of a model, on average, that cover the errors of all ``checks``, with a margin.
 
-
-def error_of_full(checks: Sequence[Check], bar: float) -> float:
-    """Return the relative error of full solves: their error ``bar``, or less if the checks show less.
-
-    On curved bodies these error bars are several times the error. The largest error of the checks, times a safety
-    factor, is then enough.
+    The first three parts of ``model.bar`` keep their proportions. The fourth, which is the same for all tools, is at
+    least the error that full solves may have in common, a share of their error bars.
     """
-    seen = max(abs(check.error) - (check.bar - bar) for check in checks)
-    return min(bar, max(_LEAST * bar, _SAFETY_FEW * seen))
+    bare = replace(model, bar=(*model.bar[:3], 0.0))
+    shapes = np.array([with_bar(bare, check).bar for check in checks])
+    errors = np.abs([check.error for check in checks])
+    rows = -np.column_stack([np.ones_like(shapes), shapes])
+    bounds = [(0.0, None), (_LEAST_SHAPE, None)]
+    floor, factor = _SAFETY_NARROW * linprog([1.0, shapes.mean()], A_ub=rows, b_ub=-errors, bounds=bounds).x
+    common = _LEAST * float(np.mean([check.full_error for check in checks]))
+    first, second, third = (float(factor) * part for part in model.bar[:3])
+    return first, second, third, max(float(floor), common)
 
 
 def columns(fitted: Sequence[Check], judged: Sequence[Check]) -> dict[str, FloatArray]:
