@@ -16,6 +16,7 @@ from pipeline.shapes.segment import Segment
 from pipeline.shapes.support import Below, Fixed, Support, support_of
 from pipeline.shapes.surface import Surface
 from pipeline.shapes.tissue import Tissue
+from pipeline.units import canonical
 
 # Keys of a body's regions.
 PIECES = ("layer", "inclusion", "region")
@@ -285,7 +286,9 @@ class Layered(Drawn):
     def below(self, number: int) -> Self:
         """Return the body without its first ``number`` layers: the top is where they ended."""
         depth = self.heights[1] - self.interfaces[number - 1]
-        fixed = Below(below=self.fixed.below + depth) if isinstance(self.fixed, Below) else self.fixed
+        fixed = self.fixed
+        if isinstance(fixed, Below):
+            fixed = Below.model_construct(below=canonical(fixed.below + depth))
         changes = self.without_top(depth) | {"layer": self.layer[number:], "fixed": fixed}
         own = {name: getattr(self, name) for name in type(self).model_fields}
         return cast("Self", type(self).model_construct(self.model_fields_set, **(own | changes)))

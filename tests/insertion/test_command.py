@@ -133,3 +133,19 @@ def test_a_path_has_no_real_time_model(ran, epsmesh):
     folder, _ = ran
     done = epsmesh("export", folder / "pad.toml", "--output", folder / "pad.epsm")
     assert done.exit_code == 2 and "probe.insertion: a path has no real-time model" in done.stderr
+
+
+def test_two_layers_have_two_punctures_and_a_withdrawal_by_solves(tmp_path):
+    """The lower one is tougher. Above the interface, the withdrawal's force is the change of the solved energies."""
+    layer = {"name": "soft", "thickness": "2 mm", "young": "12 kPa", "poisson": 0.3, "toughness": "1.5 J/m^2"}
+    insertion = {"to": "4 mm", "steps": 8, "withdraw": True}
+    scene = {"body": STUDY["body"] | {"layer": [layer]}, "probe": STUDY["probe"] | {"insertion": insertion}}
+    scene["probe"] |= {"toughness": "6 J/m^2"}
+    found = pipeline.read(STUDY | scene).run(output=tmp_path)
+    depths, forces = (found[f"puncture_{name}"].values for name in ("depth", "force"))
+    assert depths[0] < 2e-3 < depths[1] and forces[1] > 1.5 * forces[0]
+    assert float(abs(found["energy_balance"]).max()) < 0.02
+    above = found.sel(stroke="withdrawal").isel(depth=slice(0, 3))
+    mean = (above["force_elastic"].values[1:] + above["force_elastic"].values[:-1]) / 2
+    change = np.diff(above["energy_stored"]) / np.diff(above["depth"])
+    assert np.all(abs(change - mean) < above["force_error"].values[1:])

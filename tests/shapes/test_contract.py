@@ -16,7 +16,7 @@ from pipeline.mesh.generate import generate
 from pipeline.mesh.size import Sizes
 from pipeline.plan.key import case_key, normalised, reference_key
 from pipeline.scene.model import Scene
-from pipeline.shapes.body import Body, Drawn
+from pipeline.shapes.body import Body, Drawn, Layered
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import PLANES, Probe
 from pipeline.shapes.registry import BODIES, PROBES, specialised
@@ -125,6 +125,22 @@ def test_reach_thickness_and_farthest_hold_all_of_the_body(meshed):
     flat = 1e-9 if has_edges(scene.body) else 0.02
     assert -local[:, 2].min() == pytest.approx(scene.body.thickness(scene.frame), rel=flat)
     assert 1 <= scene.body.farthest(scene.frame) / np.linalg.norm(local, axis=1).max() < 1.01
+
+
+@pytest.mark.parametrize("shape", [name for name, model in DRAWN.items() if issubclass(model, Layered)])
+def test_what_is_below_its_layers_is_a_lower_body(shape):
+    """The support stays at its place; the other layers, and the rest of the body, too."""
+    sizes = (("a", "2 mm"), ("b", "3 mm"))
+    layers = tuple({"name": name, "thickness": size, "young": "1 kPa", "poisson": 0.3} for name, size in sizes)
+    whole = example(DRAWN[shape], layer=layers, fixed={"below": "-9 mm"})
+    for number, depth in ((1, 2e-3), (2, 5e-3)):
+        found = whole.below(number)
+        low, top = whole.heights
+        assert found.heights == pytest.approx((low + depth, top))
+        assert found.volume / whole.volume == pytest.approx((top - depth - low) / (top - low))
+        assert found.support.edges() == pytest.approx([-9e-3 + depth])
+        assert found.interfaces == pytest.approx([end + depth for end in whole.interfaces[number:]])
+        assert found.layer == whole.layer[number:]
 
 
 def test_a_curved_surface_says_how_much(a_body):

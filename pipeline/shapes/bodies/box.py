@@ -12,7 +12,7 @@ from pipeline.shapes.convex import slab
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.surface import Plane, Surface
-from pipeline.units import Length
+from pipeline.units import Length, canonical
 
 # Rounding of coordinates, in units of the body's extent.
 _ROUNDING = 1e-12
@@ -48,7 +48,7 @@ class Box(Layered):
 
     def without_top(self, depth: float) -> dict[str, Any]:
         """Return a smaller size along z."""
-        return {"size": (*self.size[:2], self.size[2] - depth)}
+        return {"size": (*self.size[:2], canonical(self.size[2] - depth))}
 
     @property
     def volume(self) -> float:

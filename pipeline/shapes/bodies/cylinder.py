@@ -12,7 +12,7 @@ from pipeline.shapes.frame import Frame, PlaceError, Units, Vector
 from pipeline.shapes.half_plane import Rectangle
 from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.surface import Plane, Surface, Tube
-from pipeline.units import Length
+from pipeline.units import Length, canonical
 
 # Segments of each circle in pictures.
 _ROUND = 200
@@ -42,7 +42,7 @@ class Cylinder(Layered):
 
     def without_top(self, depth: float) -> dict[str, Any]:
         """Return a smaller height."""
-        return {"height": self.height - depth}
+        return {"height": canonical(self.height - depth)}
 
     @property
     def volume(self) -> float:
