@@ -110,8 +110,12 @@ def solved(model: Model, solver: Solver, asked: Check, poissons: Sequence[float]
     Raises:
         RuntimeError: if a full solve failed.
     """
-    at, _ = on_face(model, asked.x, asked.y)
-    fulls = solver.press_all(asked.tool, (float(at[0]), float(at[1])), [asked.depth], poissons)
+    at, normal = on_face(model, asked.x, asked.y)
+    x, y, z = (-normal).tolist()
+    # A bonded tool is held along its own plane: on facets, whose normals differ, that is the model's.
+    is_turned = asked.tool.contact == "bonded" and not model.face.is_flat
+    tool = replace(asked.tool, axis=(x, y, z)) if is_turned else asked.tool
+    fulls = solver.press_all(tool, (float(at[0]), float(at[1])), [asked.depth], poissons)
     return [
         with_full(model, replace(asked, poisson=poisson), full)
         for poisson, full in zip(poissons or [asked.poisson], fulls, strict=True)

@@ -60,8 +60,11 @@ def curved_model(
     known: dict[tuple[float, float], FloatArray] = {}
     bars_of_full: list[float] = []
 
+    smooth = Table.none(region.reach, is_round=region.is_axial, even=region.even).with_arrays(face.numbers())
+
     def regular(place: tuple[float, float]) -> tuple[FloatArray, list[float]]:
-        return _regular(solver, (place[0] + middle[0], place[1] + middle[1]), radius, scope, ratios)
+        at, (x, y, z) = (place[0] + middle[0], place[1] + middle[1]), smooth.spot(*place).normal.tolist()
+        return _regular(solver, at, (x, y, z), radius, scope, ratios)
 
     def found(places: Places, poisson: float) -> FloatArray:
         unknown = [place for place in dict.fromkeys(places) if place not in known]
@@ -127,7 +130,7 @@ def curved_region(scope: Scope, room: float, half: float) -> Region:
 
 
 def _regular(
-    solver: Solver, at: tuple[float, float], radius: float, scope: Scope, ratios: Sequence[float]
+    solver: Solver, at: tuple[float, float], normal: Vector, radius: float, scope: Scope, ratios: Sequence[float]
 ) -> tuple[FloatArray, list[float]]:
     """Return the values to tabulate for each Poisson's ratio (ratios, 9), and the error bars of the frictionless discs.
 
@@ -150,19 +153,21 @@ def _regular(
         h = 3 * (bent[1] - bent[0]) / (b**2 - a**2)
     none = np.zeros(len(ratios))
     return np.stack(
-        [bent[0] - a**2 * h / 3, h, none, none, *_bonded(solver, at, radius, scope, ratios).T], axis=-1
+        [bent[0] - a**2 * h / 3, h, none, none, *_bonded(solver, at, normal, radius, scope, ratios).T], axis=-1
     ), bars
 
 
 def _bonded(
-    solver: Solver, at: tuple[float, float], radius: float, scope: Scope, ratios: Sequence[float]
+    solver: Solver, at: tuple[float, float], normal: Vector, radius: float, scope: Scope, ratios: Sequence[float]
 ) -> FloatArray:
     """Return R_xz, R_yz, the mean of R_xx and R_yy, half their difference, and R_xy (ratios, 5), in 1/m.
 
-    R is that of a bonded disc of the study's ``radius``: its dependence on the radius is small.
+    R is that of a bonded disc of the study's ``radius``: its dependence on the radius is small. The disc is normal to
+    the model's smooth face: a tilt against facets would add a share of its own compliances to R.
     """
-    tool, depth = Tool("disc", radius, contact="bonded", motion="all"), _DEPTH * radius
-    turn = upright(scope.body.frame(at).outward)
+    x, y, z = normal
+    tool, depth = Tool("disc", radius, contact="bonded", motion="all", axis=(-x, -y, -z)), _DEPTH * radius
+    turn = upright(normal)
     found = []
     for ratio, full in zip(
         ratios, solver.press_all(tool, at, [depth], ratios if len(ratios) > 1 else None), strict=True

@@ -26,6 +26,7 @@ class Tool:
     along: tuple[float, float, float] = (1.0, 0.0, 0.0)
     contact: str = "frictionless"
     motion: str = "press"
+    axis: tuple[float, float, float] | None = None
 
     @property
     def sizes(self) -> dict[str, Any]:
@@ -39,6 +40,7 @@ class Tool:
     def section(self) -> dict[str, Any]:
         """The keys of a study's section ``probe`` for this tool."""
         found: dict[str, Any] = {"shape": self.name, "contact": self.contact, "motion": self.motion}
+        found |= {"axis": list(self.axis)} if self.axis else {}
         if self.name == "blade":
             return found | {"length": _mm(self.length), "width": _mm(self.width), "direction": list(self.along)}
         found["radius"] = _mm(self.radius)
