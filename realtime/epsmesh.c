@@ -11,7 +11,9 @@
 #include <string.h>
 
 static const double PI = 3.14159265358979323846;
-static const double TOUCHING = 1e-12, SMALLEST = 1e-6, SLENDER = 0.02, SOFT = 1e-12, STICKS = 0.1;
+static const double TOUCHING = 1e-12, SMALLEST = 1e-6, SLENDER = 0.02, SOFT = 1e-12;
+/* Of a bonded disc, errors of c: by lateral tractions, times room^2/((1 - 2 nu) a); and on a curved face, by mean curvature. */
+static const double STICKS = 0.1, STICKS_BENT = 0.02;
 static const double BALL_LIMIT = 0.6, NEGLIGIBLE = 1e-17, CLOSE = 1e-10;
 static const double FOOT_SAME = 1e-13; /* of the region */
 /* Of several tools: NEAR in units of both radii; see src/several.c for the others. */

@@ -174,9 +174,12 @@ static int press(const epsmesh_model *m, const epsmesh_query *q, const asked *a,
 static double bar_of(const epsmesh_model *m, const epsmesh_query *q, const asked *a, const contact *k) {
     double share = (k->radius / a->room) * (k->radius / a->room), error;
     double bent = fabs(a->p.h) + 2 * sqrt(a->p.bent[0] * a->p.bent[0] + a->p.bent[1] * a->p.bent[1]);
-    double sticks = q->shape == EPSMESH_BONDED_DISC ? STICKS * (1 - 2 * q->poisson) * k->radius / a->room : 0;
-    error = m->bar[3] + k->stiffness * ((m->bar[0] + m->bar[2] * share * share + sticks) / a->room +
-                                        m->bar[1] * bent * k->mean_square);
+    double sticks = 0;
+    if (k->sticks)
+        sticks = STICKS * (1 - 2 * q->poisson) * k->radius / (a->room * a->room) +
+                 STICKS_BENT * (fabs(a->p.bend) + m->bend_error);
+    error = m->bar[3] + k->stiffness * ((m->bar[0] + m->bar[2] * share * share) / a->room +
+                                        m->bar[1] * bent * k->mean_square + sticks);
     if (q->shape == EPSMESH_SPHERE || q->shape == EPSMESH_CONE) {
         double growth = 3 * k->stiffness / k->force - 2 / q->depth;
         error += m->bend_error / 2 * k->mean_square * (growth > 0 ? growth : 0);
