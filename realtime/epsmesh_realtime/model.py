@@ -59,7 +59,8 @@ class Model:
         region = f"a region of {x:.3g} mm across" if self.table.is_round else f"a region of {x:.3g} × {y:.3g} mm"
         tissue = f"{1e3 * self.thickness:.3g} mm of tissue, E = {self.young:.4g} Pa, ν = {self.poisson:.3g}"
         low, high = self.table.poisson
-        return f"Model of {region}, {tissue}{f' ({low:.3g} to {high:.3g})' if high > low else ''}"
+        large = ", at large displacements" if self.near else ""
+        return f"Model of {region}, {tissue}{f' ({low:.3g} to {high:.3g})' if high > low else ''}{large}"
 
     @cached_property
     def evaluator(self) -> Evaluator:

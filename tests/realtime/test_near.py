@@ -96,6 +96,7 @@ def test_its_file_is_the_model_and_a_damaged_one_is_none():
     model = large()
     data = pack(model.numbers())
     again = model_of(data)
+    assert repr(again).endswith("at large displacements")
     asked = {"at": (0.011, 0.017, 0.0), "depth": 3e-3, "radius": RADIUS, "poisson": 0.4}
     assert again.query("sphere", **asked).force.tolist() == model.query("sphere", **asked).force.tolist()
     found = unpack(data)
