@@ -15,6 +15,7 @@ from pipeline.insertion.shaft import NeedleCut, ShaftCut
 from pipeline.insertion.states import InsertionScene, Solved, Tissue
 from pipeline.insertion.steps import INDENTATION, WITHDRAWAL, Path, Puncture, Step, with_work
 from pipeline.shapes.insertion import Needle
+from pipeline.units import canonical
 
 # The factor from one depth at which the needle is pressed to the next one.
 _FACTOR = 2.0
@@ -23,6 +24,8 @@ _TOUCH = 1e-3
 _TINY = 1e-6
 # Share of the last depth at which a puncture is expected: what is solved there costs about the same anywhere.
 _SOMEWHERE = 0.7
+# Load steps that ended reach this share of their depth again.
+_NEARLY = 0.99
 # The bar of a puncture's depth is sought in so many doublings of half a width.
 _DOUBLINGS = 12
 
@@ -140,19 +143,23 @@ class NeedleScene(InsertionScene[Needle]):
     def _press(self, cut: NeedleCut, number: int, arrived: Step, end: float) -> tuple[Press | None, str]:
         """Return the needle that presses on what is below a ``number`` of layers, and why it is solved no deeper.
 
-        It is solved until the tissue is pierced, and there, or to a depth ``end`` (m) of the tip.
+        It is solved until the tissue is pierced, and there, or to a depth ``end`` (m) of the tip. Where load steps end,
+        it is solved to the last depth that they reached.
         """
-        found, press, depth = dict[float, Solved](), None, self.tool.first_depth
+        found, press, depth, why = dict[float, Solved](), None, self.tool.first_depth, ""
         # Half of 2 R E', which a half-space of the tissue above would add round the shaft.
         added = self.layers[number - 1].plane_modulus * self.tool.limit if number else 0.0
         while True:
             one = self.solved(self.tool.pressed_to(depth), number)
             if isinstance(one, str):
                 at = press.depth_of(depth) if press and press.is_reached else arrived.depth + (0.0 if number else depth)
-                return press, f"{1e3 * at:.4g} mm: {one}"
+                if why or not (reached := self.reached(self.tool.pressed_to(depth), number)) > max(found, default=0.0):
+                    return press, why or f"{1e3 * at:.4g} mm: {one}"
+                depth, why = canonical(_NEARLY * reached), f"{1e3 * at:.4g} mm: {one}"
+                continue
             found[depth] = one
             press = Press(Pressed.of(found), arrived, added)
-            if (pierced := self._pierced(cut, press, end)) or press.deepest >= end:
+            if (pierced := self._pierced(cut, press, end)) or press.deepest >= end or why:
                 break
             depth = min(_FACTOR * depth, press.own_depth(end)) if press.is_reached else _FACTOR * depth
         if pierced:
@@ -160,7 +167,8 @@ class NeedleScene(InsertionScene[Needle]):
             one = self.solved(self.tool.pressed_to(depth), number)
             if not isinstance(one, str):
                 press = Press(Pressed.of(found | {depth: one}), arrived, added)
-        return press, ""
+            why = ""
+        return press, why
 
     def _touch(self, press: Press) -> float:
         return press.arrived.depth + _TOUCH * self.tool.limit

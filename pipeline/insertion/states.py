@@ -26,13 +26,16 @@ Tool = TypeVar("Tool", bound=Inserted)
 class Solved(Protocol):
     """A solved state: energy (J), force and sum of tangential forces (N), energy release rate (J/m²).
 
-    Bars are relative half widths, of 95 %. A crack deep in tissue has the area of contact (m²) of its faces.
+    Bars are relative half widths, of 95 %. A crack deep in tissue has the area of contact (m²) of its faces. Load steps
+    that ended early did at ``depth_reached`` (m).
     """
 
     @property
     def status(self) -> str: ...  # noqa: D102
     @property
     def message(self) -> str: ...  # noqa: D102
+    @property
+    def depth_reached(self) -> float: ...  # noqa: D102
     @property
     def energy(self) -> float: ...  # noqa: D102
     @property
@@ -170,6 +173,11 @@ class InsertionScene(ABC, Generic[Tool]):
             self.is_pending = True
             return "not yet solved"
         return found if found.status == OK else found.message or found.status
+
+    def reached(self, state: Tool, below: int = 0) -> float:
+        """Return the depth (m) at which the load steps of a state that is not solved ended; NaN if there are none."""
+        found = self._states.of(state, below)
+        return found.depth_reached if found else np.nan
 
 
 class Scene(InsertionScene[Blade]):

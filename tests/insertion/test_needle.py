@@ -1,7 +1,7 @@
 """Insertion of a round needle: paths through states with closed forms, and what is refused."""
 
 from dataclasses import replace
-from math import pi
+from math import nan, pi
 
 import numpy as np
 import pytest
@@ -61,12 +61,12 @@ def record(solve):
     return Record(solve.key, OK, force=force, energy=force * probe.depth / 3, **scale)
 
 
-def solved(study, fails=lambda solve: False):
+def solved(study, fails=lambda solve: False, reached=nan):
     plan = further = make_plan(study)
     records = {}
     while further:
         for solve in further.solves:
-            failed = Record(solve.key, "failed", "tissue is turned inside out")
+            failed = Record(solve.key, "failed", "tissue is turned inside out", depth_reached=reached)
             records[solve.key] = failed if fails(solve) else record(solve)
         further = lacking(plan, records)
     return plan, records
@@ -98,6 +98,21 @@ def test_tissue_is_pierced_where_the_intact_body_has_the_energy_of_the_cut_one(p
     # Half a radius of what a cut takes per depth is the bar of the energy.
     assert path.punctures[0].depth_error >= CUT * RADIUS / 2 / path.punctures[0].force
     assert {step.phase for step in path.steps if step.depth < depth} == {INDENTATION}
+
+
+def test_a_puncture_before_the_depth_that_load_steps_reached_is_found():
+    """Depths double: 2 mm fails, and the puncture is between 1 mm and the 1.5 mm that were reached."""
+    (free,) = path_of(scene()).punctures
+    assert 1e-3 < free.depth < 1.2e-3
+    found = {
+        reached: path_of(scene(), fails=lambda solve: solve.case.probe.depth > reached, reached=reached)  # noqa: B023
+        for reached in (1.5e-3, 1.03e-3)
+    }
+    assert found[1.5e-3].status == OK
+    assert found[1.5e-3].punctures[0].depth == pytest.approx(free.depth, rel=2e-3)
+    short = found[1.03e-3]
+    assert (short.punctures, short.status) == ((None,), PARTIAL)
+    assert short.message.startswith("2 mm: ") and short.steps[-1].depth == 1e-3
 
 
 def test_the_shaft_cuts_at_a_constant_force_and_its_friction_grows(path):
