@@ -37,7 +37,7 @@ _CHECKS, _SEED = 12, 7
 TOOLS = {"disc": (0.55, 0.08), "ball": (1.6, 0.12), "cone": (0.7, 0.1)}
 _ANGLE = radians(70)
 # Accuracies of the full solves: of discs, and of tools whose contact is found.
-_PRECISE, _PRECISE_ROUND = 0.001, 0.004
+_PRECISE, _PRECISE_ROUND = 0.001, 0.01
 # Below this depth, in units of the deepest, a place is not solved: contact is then smaller than elements.
 _SHALLOW = 0.3
 _COLUMNS = (
