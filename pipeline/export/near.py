@@ -15,7 +15,7 @@ import numpy as np
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Near
 from pipeline.arrays import FloatArray
-from pipeline.export.checks import BALL, SAFETY, SIZES, Check, check_touches, on_face, random_place, with_bar
+from pipeline.export.checks import BALL, SIZES, Check, check_touches, margin, on_face, random_place, with_bar
 from pipeline.export.full import Full, Solver, Tool
 from pipeline.export.ranks import Ranks
 from pipeline.export.scope import ExportError, Scope
@@ -150,9 +150,12 @@ def _errors(bare: Model, near: Near, checks: Sequence[Check]) -> FloatArray:
 
 
 def needed_room(checks: Sequence[Check], without: Sequence[float]) -> float:
-    """Return the error of c, times room²/depth, that covers all errors; in the checks' bars it is 1, ``without`` 0."""
+    """Return the error of c, times room²/depth, that covers all errors, with a margin; ``checks`` have 1 of it.
+
+    ``without`` are their bars with none of it.
+    """
     needed = max((abs(check.error) - bar) / (check.bar - bar) for check, bar in zip(checks, without, strict=True))
-    return max(_LEAST, SAFETY * needed)
+    return max(_LEAST, margin(len(checks)) * needed)
 
 
 def _random_balls(model: Model, count: int, seed: int) -> list[Check]:

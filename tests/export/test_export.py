@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Table
-from pipeline.export.checks import narrowest, random_touches, with_bar, with_full
+from pipeline.export.checks import margin, narrowest, random_touches, with_bar, with_full
 from pipeline.export.compliance import coarse_mesh, compliances
 from pipeline.export.curved import curved_model, upright
 from pipeline.export.full import Full, Solver, Tool
@@ -402,8 +402,25 @@ def test_bars_are_as_wide_as_errors_and_cover_those_of_other_touches(uniform, sh
     assert np.median([touch.bar for touch in others] / np.array(ideal)) < 1.6
 
 
+@pytest.mark.parametrize("count", [2, 4, 8])
+def test_bars_of_few_touches_have_a_margin_for_the_others(count):
+    """Normally distributed errors that are the same everywhere, or in proportion to the bars."""
+    rng, model = np.random.default_rng(3), random_model()
+    bare, covered = replace(model, bar=(0.001, 0.03, 0.1, 0.0)), []
+    touches = random_touches(bare, 300, 5)
+    shapes = np.array([with_bar(bare, touch).bar for touch in touches])
+    for uniform, share in 30 * [(0.003, 0.0), (0.0, 3.0)]:
+        errors = (uniform + share * shapes) * rng.standard_normal(len(touches))
+        chosen = rng.permutation(len(touches))[:count]
+        fulls = [Full(touches[one].force / (1 + errors[one]), 0.0, np.zeros(3)) for one in chosen]
+        solved = [with_full(bare, touches[one], full) for one, full in zip(chosen, fulls, strict=True)]
+        *parts, floor = narrowest(bare, solved)
+        covered.append(np.mean(np.abs(errors) <= floor + parts[0] / bare.bar[0] * shapes))
+    assert np.mean(covered) > 0.94
+
+
 def test_bars_are_no_narrower_than_what_full_solves_have_in_common():
     model = random_model()
     touches = [with_full(model, touch, Full(touch.force, 2e-3, np.zeros(3))) for touch in random_touches(model, 12, 5)]
-    least = 1.5 * 0.25 * np.array(model.bar[:3])
+    least = margin(12) * 0.25 * np.array(model.bar[:3])
     np.testing.assert_allclose(narrowest(model, touches), [*least, 0.25 * 2e-3])
