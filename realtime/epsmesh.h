@@ -114,7 +114,7 @@ void epsmesh_touch_each(const epsmesh_model *model, size_t count, const epsmesh_
 
 /* Answer `count` queries of tools that press at the same time, with equal E and nu. The stiffness of each tool is at fixed
  * depths of the others. If one has no answer, the others get EPSMESH_OTHERS. More than EPSMESH_MOST_TOOLS, or different E
- * or nu, give EPSMESH_INPUT. The call takes 100 kB of stack. */
+ * or nu, give EPSMESH_INPUT. The call takes 120 kB of stack. */
 void epsmesh_touch_all(const epsmesh_model *model, int count, const epsmesh_query *queries, epsmesh_touch *touches);
 
 /* Return the name of a status in Python. */

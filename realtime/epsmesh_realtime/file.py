@@ -2,7 +2,7 @@
 
 Little-endian; a header of 32 bytes, 64 bytes for each array, then the arrays, each at a multiple of 8 bytes:
 
-    header   8 bytes "epsmesh" and a zero; uint32 version (3), 0x01020304, number of arrays, 0; uint64 the file's length
+    header   8 bytes "epsmesh" and a zero; uint32 version (4), 0x01020304, number of arrays, 0; uint64 the file's length
     array    32 bytes name, filled with zeros; uint32 kind, rank, shape (4, 1 beyond the rank); uint64 where it begins
     kinds    0 double, 1 float, 2 int32, 3 int16, 4 bytes
 
@@ -65,7 +65,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-VERSION = 3
+VERSION = 4
 _MAGIC, _ORDER = b"epsmesh", 0x01020304
 _HEAD = np.dtype(
     [("magic", "S8"), ("version", "<u4"), ("order", "<u4"), ("count", "<u4"), ("zero", "<u4"), ("size", "<u8")]

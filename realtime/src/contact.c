@@ -120,7 +120,7 @@ static double limit_of(const epsmesh_query *tool, const place *p) {
     double big = tool->radius, stiff;
     if (!p->nears) return tool->shape == EPSMESH_SPHERE ? BALL_LIMIT * tool->radius : tool->radius;
     stiff = 4 / (3 * big) + 2.0 / 3 * p->h * p->plane * big * big * cube(p->near_most);
-    return stiff > 0 ? cbrt(big * big * cube(p->near_most) / stiff) : 0;
+    return stiff > 0 ? cbrt(big * big * cube(p->near_most) / stiff) : HUGE_VAL; /* no contact reaches that force */
 }
 
 static int press_round(const epsmesh_query *tool, const place *p, double most, contact *k) {

@@ -25,7 +25,7 @@ typedef struct {
     const char *name; /* of the array with the flaw */
 } file;
 
-enum { FLOAT64, FLOAT32, INT32, INT16, BYTES, KINDS, FILE_VERSION = 3, FILE_ORDER = 0x01020304 };
+enum { FLOAT64, FLOAT32, INT32, INT16, BYTES, KINDS, FILE_VERSION = 4, FILE_ORDER = 0x01020304 };
 
 static void file_open(file *f, const void *data, size_t size) {
     file_head head;

@@ -52,6 +52,16 @@ def test_the_half_space_of_a_law_is_added_to_a_linear_body(c, h):
     assert model.query("sphere", depth=2.5 * RADIUS, **BALL).status == "large"
 
 
+@pytest.mark.parametrize("h", [-2e3, 0.0, 2e3])
+def test_a_ball_much_larger_than_the_body_may_touch_it_lightly(h):
+    model = replace(of_place(-10.0, h, POISSON), near=ALIKE, thickness=THICK, largest=0.4)
+    asked = {"radius": 20 * RADIUS, "at": (0.0, 0.0, 0.0), "depth": 1e-4}
+    small = replace(model, near=replace(ALIKE, values=np.ones((2, 1, 1)), support=0.0)).query("sphere", **asked)
+    assert small.status == "ok"
+    assert model.query("sphere", **asked).force[2] == pytest.approx(small.force[2], rel=0.1)
+    assert model.query("sphere", **asked | {"depth": 1e-3}).status == "large"
+
+
 @pytest.mark.parametrize("kind", [{}, {"is_round": True}])
 def test_a_closed_loop_does_no_work(kind):
     model, angle, weight = large(**kind), 2 * pi * np.arange(64) / 64, 2 * pi / 64
@@ -110,5 +120,10 @@ def test_its_file_is_the_model_and_a_damaged_one_is_none():
     for wrong in (*wrongs, {"relaxation_share": [0.1], "relaxation_time": [1.0]}):
         with pytest.raises(ModelError, match="near"):
             model_of(pack({**found, **wrong}))
+    # A program that does not know large displacements must not read it as a model of small ones.
+    old = bytearray(data)
+    old[8] = 3
+    with pytest.raises(ModelError, match="another version than 4"):
+        model_of(bytes(old))
     with pytest.raises(ModelError, match="near_error"):
         model_of(pack({name: value for name, value in found.items() if name != "near_error"}))
