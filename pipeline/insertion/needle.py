@@ -97,7 +97,8 @@ class NeedleScene(InsertionScene[Needle]):
                 break
             found.append(shaft)
             room, words = self.tool.insertion_room
-            if end > (deepest := (self.bottom - room) / shaft.reach):
+            if canonical(end * shaft.reach) > canonical(self.bottom - room):
+                deepest = (self.bottom - room) / shaft.reach
                 ring = f"the ring crack, {shaft.reach:.3g} times as deep as the tool, ends {words} above"
                 end, message = deepest, f"{1e3 * deepest:.4g} mm: {ring} the bottom or the support"
         tops = tuple(layer.top for layer in layers[: len(found)])
@@ -161,7 +162,9 @@ class NeedleScene(InsertionScene[Needle]):
             press = Press(Pressed.of(found), arrived, added)
             if (pierced := self._pierced(cut, press, end)) or press.deepest >= end or why:
                 break
-            depth = min(_FACTOR * depth, press.own_depth(end)) if press.is_reached else _FACTOR * depth
+            # On the curve of layers, a depth of the tip is known to the tolerance of a root.
+            last = press.own_depth(end) * (1 + _TINY if number else 1)
+            depth = min(_FACTOR * depth, last) if press.is_reached else _FACTOR * depth
         if pierced:
             depth = float(f"{press.own_depth(pierced):.3g}")
             one = self.solved(self.tool.pressed_to(depth), number)

@@ -124,13 +124,15 @@ def lacking(plan: Plan, records: Records) -> Plan | None:
 def possible(plan: Plan, records: Records) -> Plan | None:
     """Return the plan of all states that paths may need besides their stages, and that have no record; None if unknown.
 
-    Slits whose front turns out to be farther ahead than that of a stage are not known before.
+    Paths that are solved need none. Slits whose front turns out to be farther ahead than that of a stage are not known
+    before.
     """
     found = []
     for scene, states in scenes(plan, records):
-        for state, below in scene.possible():
-            states.of(state, below)
-        found.append(states)
+        if scene.follow().is_pending:
+            for state, below in scene.possible():
+                states.of(state, below)
+            found.append(states)
     return _of_states(plan, records, found)
 
 

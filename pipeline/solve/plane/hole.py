@@ -28,8 +28,9 @@ from pipeline.stages import stage
 # Columns of elements along a factor e of the radius, on the coarse mesh and the fine one: their difference is the bar.
 COLUMNS = (4, 8)
 DEGREE = 3
-# The first growth of the area, the factor to the next one, and the radius of the body.
-_FIRST, _FACTOR, _EXTENT = 1e-2, 1.5, 1e3
+# The first growth of the area, the factor to the next one, and the radius of the body: a hole that is opened to R lacks
+# a share (R/extent)² of its energy at most. In a wider body round-off is more than that.
+_FIRST, _FACTOR, _EXTENT = 1e-2, 1.5, 3e3
 
 
 @dataclass(frozen=True, eq=False)
