@@ -56,7 +56,8 @@ def has_path(dataset: xr.Dataset) -> bool:
 def of_path(dataset: xr.Dataset) -> xr.Dataset:
     """Return what a path of an insertion is judged by, as ``force`` along the dimension ``quantity``.
 
-    These are force and depth of each puncture, and the force at the last depth.
+    These are force and depth of each puncture, and the force at the last depth. All are missing of a path with other
+    punctures than the full order has.
     """
     dataset = dataset.isel(stroke=0, drop=True) if "stroke" in dataset.dims else dataset
     last = dataset.isel(depth=-1, drop=True)
@@ -70,7 +71,11 @@ def of_path(dataset: xr.Dataset) -> xr.Dataset:
     for name, end in (("force", ""), ("force_error", "_error")):
         parts = [one[f"{part}{end}"] for one, part in [*judged, (last, "force")]]
         found[name] = xr.concat(parts, "quantity").transpose(..., "quantity")
-    full = at_full_order(found["force"]) if "epsilon" in found["force"].dims else found["force"] * np.nan
+    full = found["force"] * np.nan
+    if "epsilon" in found["force"].dims:
+        full = at_full_order(found["force"])
+        alike = (found["force"].notnull() == full.notnull()).isel(quantity=slice(-1)).all("quantity")
+        found["force"] = found["force"].where(alike)
     found |= {"force_max": full, "force_ratio": found["force"] / full}
     return last.assign(found).assign_coords(quantity=[*names, "last force"])
 

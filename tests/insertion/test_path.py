@@ -361,6 +361,17 @@ def test_the_guide_judges_each_puncture():
     assert {"force of the puncture", "force of the puncture of layer 2", "depth of the puncture of layer 2"} <= judged
 
 
+@pytest.mark.parametrize("pierced", [[True, False, False], [False, True, True]])
+def test_a_path_with_other_punctures_than_the_full_order_does_not_suffice(pierced):
+    mesh = {"accuracy": "10 %", "epsilon": ["5 mm", "10 mm", "full"], "outside": "free"}
+    layer = {"name": "fat", "thickness": "2.1 mm", "young": "20 kPa", "poisson": 0.3, "toughness": "2 J/m^2"}
+    dataset = _path(read_mapping(SCENE | {"mesh": mesh, "body": SCENE["body"] | {"layer": [layer]}}, "sweep"))
+    kept = xr.DataArray(pierced, dims="epsilon") | (dataset["puncture"] == 1)
+    names = [name for name in dataset if str(name).startswith("puncture_")]
+    found = guide(dataset.assign({name: dataset[name].where(kept) for name in names}), "5 %")
+    assert found.answer.labels["epsilon"] == pytest.approx(10e-3)
+
+
 def test_the_solves_of_layers_are_known_before():
     """On the layers below, and for the withdrawal: what a plan tells is what a path through them needs."""
     fat = {"name": "fat", "thickness": "2.1 mm", "young": "20 kPa", "poisson": 0.3, "toughness": "2 J/m^2"}
