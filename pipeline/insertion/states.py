@@ -121,7 +121,8 @@ class InsertionScene(ABC, Generic[Tool]):
         self.insertion: Insertion = tool.insertion
         self.toughness, self.is_pending = tool.toughness, False
         top, frame = body.heights[1], tool.frame_on(body)
-        self.beside, self.is_held = min(kept, tool.gap(body, frame) + tool.half_width), body.support.gap(0.0) == 0.0
+        side = tool.gap(body, frame) + tool.half_width
+        self.beside, self.is_held = min(kept, side), side <= kept and body.support.gap(0.0) == 0.0
         self.interfaces = interfaces([body])
         self.bottom = min(top - level for level in (body.heights[0], *body.support.edges()))
         self.layers = tuple(self._layers(body, material))

@@ -218,10 +218,12 @@ def test_a_narrow_column_is_softer_and_has_a_larger_bar():
     forces = [path.steps[-1].elastic + path.steps[-1].cutting for path in (whole, narrow)]
     assert forces[1] == pytest.approx(0.99 * (STORED + TORN))
     assert narrow.steps[-1].error - whole.steps[-1].error > abs(forces[1] - forces[0]) / 2
-    held = path_of(parse(SCENE | {"body": SCENE["body"] | {"fixed": "bottom+sides"}}))
+    both = SCENE | {"body": SCENE["body"] | {"fixed": "bottom+sides"}}
+    held = path_of(parse(both))
     last = held.steps[-1]
     assert last.elastic + last.cutting == pytest.approx(STORED + TORN)
     assert last.error - whole.steps[-1].error == pytest.approx(0.01**2 / 0.02 * last.force, rel=0.1)
+    assert path_of(parse(both | {"mesh": {"accuracy": "2 %", "epsilon": "3 mm", "outside": "free"}})) == narrow
     split = path_of(parse(SCENE | {"mesh": {"accuracy": "2 %", "epsilon": "0.85 mm", "outside": "free"}}))
     assert split.message == (
         "the needle deep in tissue: its crack is 0.3 mm long to each side, beside which less than 0.9 mm are kept"
