@@ -50,7 +50,7 @@ static contact press_disc(double a, double depth, const place *p) {
         double slope = p->slope_c[i] + p->slope_h[i] * (a * a / 3 - 4.0 / 45 * stiff * h * fifth(a));
         k.aside[i] = 0.5 * k.force * k.force * (slope - 4.0 / 3 * stiff * cube(a) * p->slope_tilt[i]);
     }
-    k.stiffness = k.force / depth, k.radius = a, k.share = 1;
+    k.stiffness = k.force / depth, k.radius = a, k.share = 1, k.sticks = 0;
     k.mean_square = 2.0 / 3 * a * a - 8.0 / 45 * stiff * h * fifth(a);
     return k;
 }
@@ -144,7 +144,7 @@ static int press_round(const epsmesh_query *tool, const place *p, double most, c
     }
     found = press_to(a, tool, p);
     k->force = found.force, k->stiffness = 1 / found.compliance, k->radius = found.widened * a;
-    k->mean_square = found.square / found.force, k->share = found.near_compliance / found.compliance;
+    k->mean_square = found.square / found.force, k->share = found.near_compliance / found.compliance, k->sticks = 0;
     of_h = 0.25 * found.force * found.force * k->mean_square +
            4.0 / 3 * p->plane * p->plane * p->tilt * fifth(a) * cube(found.force) / found.growth;
     of_tilt = -2.0 / 3 * p->plane * cube(a) * found.force * found.force;
@@ -194,7 +194,7 @@ static int press_blade(const epsmesh_query *q, const double edge[2], const place
             of_place[i] -= lean[j] / 2 * slope * (p->hessian[i][0] * e[j][0] + p->hessian[i][1] * e[j][1]);
     }
     k->force = q->depth / soft, k->stiffness = 1 / soft, k->radius = sqrt(big * big + small * small);
-    k->mean_square = along_edge + across, k->share = 1;
+    k->mean_square = along_edge + across, k->share = 1, k->sticks = 0;
     for (i = 0; i < 2; i++) k->aside[i] = 0.5 * k->force * k->force * of_place[i];
     return 1;
 }
@@ -210,6 +210,6 @@ static contact press_bonded(double a, double depth, const place *p) {
     det = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
     k.force = depth * (xx * yy - xy * xy) / det, k.stiffness = k.force / depth;
     k.aside[0] = depth * (xy * yz - xz * yy) / det, k.aside[1] = depth * (xy * xz - xx * yz) / det;
-    k.radius = a, k.mean_square = 2.0 / 3 * a * a, k.share = 1;
+    k.radius = a, k.mean_square = 2.0 / 3 * a * a, k.share = 1, k.sticks = 1;
     return k;
 }

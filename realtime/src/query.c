@@ -163,11 +163,9 @@ static int surveyed(const epsmesh_model *m, const epsmesh_query *q, asked *a) {
 /* Return whether the contact of a tool at a depth of its query is small enough. */
 static int press(const epsmesh_model *m, const epsmesh_query *q, const asked *a, contact *k) {
     double most = m->largest * a->room;
-    k->sticks = 0;
     if (q->shape == EPSMESH_BLADE) return press_blade(q, a->edge, &a->p, most, k);
     if (q->shape == EPSMESH_SPHERE || q->shape == EPSMESH_CONE) return press_round(q, &a->p, most, k);
     *k = q->shape == EPSMESH_DISC ? press_disc(q->radius, q->depth, &a->p) : press_bonded(q->radius, q->depth, &a->p);
-    k->sticks = q->shape == EPSMESH_BONDED_DISC;
     return q->radius <= most;
 }
 

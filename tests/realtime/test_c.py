@@ -3,6 +3,7 @@
 import os
 import shutil
 import subprocess
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 
@@ -11,7 +12,9 @@ import pytest
 
 from epsmesh_realtime import BuildError, Query
 from epsmesh_realtime import library as built
-from tests.realtime.synthetic import random_model, write_surface
+from epsmesh_realtime.table import Near
+from pipeline.export.file import write_model
+from tests.realtime.synthetic import random_model, random_surface
 
 SOURCES = Path(__file__).parents[2] / "realtime"
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror")
@@ -94,9 +97,20 @@ def test_the_foot_of_a_tip_is_its_place_and_its_depth(kind):
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("program", ["test_epsmesh.c", "tips.c"])
-def test_a_damaged_file_breaks_nothing(tmp_path, program):
-    write_surface(tmp_path / "model.epsm")
+@pytest.mark.parametrize(
+    ("program", "kind", "near"),
+    [
+        ("test_epsmesh.c", {}, None),
+        ("test_epsmesh.c", {"curved": True, "is_even": False}, None),
+        ("test_epsmesh.c", {"is_round": True, "is_even": False}, None),
+        ("test_epsmesh.c", {}, Near(np.array([[[1.1, 0.08]], [[0.9, -0.1]]]), 1.2, 2e-3, 0.1, 0.08)),
+        ("tips.c", {}, None),
+    ],
+)
+def test_a_damaged_file_breaks_nothing(tmp_path, program, kind, near):
+    made = random_surface(**kind)
+    model = replace(made.model, near=near, pairs=None) if near else made.model
+    write_model(tmp_path / "model.epsm", model, {}, {"title": "random"}, made.table)
     (tmp_path / "tips.c").write_text(_TIPS)
     source = tmp_path / program if program == "tips.c" else SOURCES / program
     sanitize = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
