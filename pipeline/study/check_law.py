@@ -98,5 +98,7 @@ def _check_unread(given: Sequence[tuple[dict[str, Any], str, Tissue]], problems:
         for name in (name for name in _OF_LAWS if name in tissue.model_fields_set):
             if (key, owner, name) not in read:
                 laws = " or ".join(f'"{law}"' for law, keys in LAWS.items() if name in keys)
+                found = getattr(tissue, name)
                 with problems.about(**about):
-                    problems.error(f"{key}.{name}", getattr(tissue, name), f"is read only with law = {laws}")
+                    value = found if isinstance(found, str | float) else None  # no tables
+                    problems.error(f"{key}.{name}", value, f"is read only with law = {laws}")

@@ -30,6 +30,10 @@ MISTAKES = {
         {"body": {"inclusion": [BALL | {"c2": 0.3}]}, "material": YEOH},
         ["body.inclusion[1].c2 = 0.3", "only with law"],
     ),
+    "terms of a region without a law": (
+        {"body": {"layer": [SKIN | {"terms": [{"alpha": 3.0}]}]}, "material": YEOH},
+        ['body.layer[1].terms: is read only with law = "ogden"'],
+    ),
     "unstable mooney-rivlin": ({"material": {"law": "mooney-rivlin", "c2": 1.1}}, ["material.c2 = 1.1", "0 to 1"]),
     "unstable yeoh": (
         {"material": {"law": "yeoh", "c2": [0.4, -0.6], "c3": 0.1}},
