@@ -58,19 +58,15 @@ def curved_model(
     region, face, off, bend_error = _region_and_face(scope, room, middle)
     ratios = ratios_of(scope.poissons).tolist()
     known: dict[tuple[float, float], FloatArray] = {}
-    bars_of_full: list[float] = []
-
     smooth = Table.none(region.reach, is_round=region.is_axial, even=region.even).with_arrays(face.numbers())
 
-    def regular(place: tuple[float, float]) -> tuple[FloatArray, list[float]]:
+    def regular(place: tuple[float, float]) -> FloatArray:
         at, (x, y, z) = (place[0] + middle[0], place[1] + middle[1]), smooth.spot(*place).normal.tolist()
         return _regular(solver, at, (x, y, z), radius, scope, ratios)
 
     def found(places: Places, poisson: float) -> FloatArray:
         unknown = [place for place in dict.fromkeys(places) if place not in known]
-        for place, (values, bars) in zip(unknown, ranks.in_turn(unknown, regular, "places solved"), strict=True):
-            known[place] = values
-            bars_of_full.extend(bars)
+        known.update(zip(unknown, ranks.in_turn(unknown, regular, "places solved"), strict=True))
         return np.array([known[place][ratios.index(poisson)] for place in places])
 
     table, error = tabulate(region, scope.poissons, found, _SHARE * accuracy, _SIZES, sparse=not region.is_round)
@@ -84,7 +80,7 @@ def curved_model(
         scope.young,
         scope.poisson,
         largest,
-        (*bar[:3], float(np.mean(bars_of_full))),
+        bar,
         face,
         max(_OFF * off, _LEAST_OFF * room),
         _ALIGNED,
@@ -131,30 +127,27 @@ def curved_region(scope: Scope, room: float, half: float) -> Region:
 
 def _regular(
     solver: Solver, at: tuple[float, float], normal: Vector, radius: float, scope: Scope, ratios: Sequence[float]
-) -> tuple[FloatArray, list[float]]:
-    """Return the values to tabulate for each Poisson's ratio (ratios, 9), and the error bars of the frictionless discs.
+) -> FloatArray:
+    """Return the values to tabulate for each Poisson's ratio (ratios, 9).
 
     c and h satisfy d/F = 1/(2aE*) + c + a²h/3 - 2E*h²a⁵/45 for both radii. A₁ and A_xy are 0: second derivatives of R
     do not exist at a force on a curved face. R is the compliance of a bonded disc beyond that on a half-space.
     """
     radii, rests = [share * radius for share in RADII], []
-    bars: list[float] = []
     planes = 1 / (1 - np.square(ratios))
     for a, share in zip(radii, (_FINER, 1.0), strict=True):
         # The study's own materials, or all ratios on one mesh.
         fulls = replace(solver, accuracy=share * solver.accuracy).press_all(
             Tool("disc", a), at, [_DEPTH * a], ratios if len(ratios) > 1 else None
         )
-        bars.extend(full.error for full in fulls)
         rests.append(scope.young * _DEPTH * a / np.array([full.force for full in fulls]) - 0.5 / (planes * a))
     (a, b), h = radii, np.zeros(len(ratios))
     for _ in range(_STEPS):
         bent = [rest + 2 / 45 * planes * h**2 * r**5 for rest, r in zip(rests, radii, strict=True)]
         h = 3 * (bent[1] - bent[0]) / (b**2 - a**2)
     none = np.zeros(len(ratios))
-    return np.stack(
-        [bent[0] - a**2 * h / 3, h, none, none, *_bonded(solver, at, normal, radius, scope, ratios).T], axis=-1
-    ), bars
+    stuck = _bonded(solver, at, normal, radius, scope, ratios)
+    return np.stack([bent[0] - a**2 * h / 3, h, none, none, *stuck.T], axis=-1)
 
 
 def _bonded(
