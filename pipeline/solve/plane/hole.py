@@ -7,6 +7,7 @@ function of the growth of the hole's area, κ² − 1, whose derivative is the p
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,12 +26,20 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.plane.opening import Energies
 from pipeline.stages import stage
 
-# Columns of elements along a factor e of the radius, on the coarse mesh and the fine one: their difference is the bar.
-COLUMNS = (4, 8)
+
+class HoleMesh(NamedTuple):
+    """Columns of elements along a factor e of the radius, and the body's ``extent`` in units of the hole's radius."""
+
+    columns: int
+    extent: float
+
+
+# The coarse mesh and the fine one, whose difference is the bar. A hole that is opened to R lacks a share (R/extent)² of
+# its energy at most. In a wider body round-off is more than that.
+MESHES = (HoleMesh(4, 1e3), HoleMesh(8, 3e3))
 DEGREE = 3
-# The first growth of the area, the factor to the next one, and the radius of the body: a hole that is opened to R lacks
-# a share (R/extent)² of its energy at most. In a wider body round-off is more than that.
-_FIRST, _FACTOR, _EXTENT = 1e-2, 1.5, 3e3
+# The first growth of the area, and the factor to the next one.
+_FIRST, _FACTOR = 1e-2, 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +49,8 @@ class Hole(Energies):
     balance: float
 
 
-def open_hole(law: MaterialLaw, columns: int, is_enough: Callable[[Hole], bool]) -> Hole:
-    """Return the energies of a hole in tissue of one ``law``, on this process alone, on a mesh of so many ``columns``.
+def open_hole(law: MaterialLaw, mesh: HoleMesh, is_enough: Callable[[Hole], bool]) -> Hole:
+    """Return the energies of a hole in tissue of one ``law``, on this process alone, on a ``mesh``.
 
     Its area grows until the energies are enough.
 
@@ -49,9 +58,9 @@ def open_hole(law: MaterialLaw, columns: int, is_enough: Callable[[Hole], bool])
         SolveError: if a state before cannot be solved.
     """
     with stage("meshing"):
-        mesh = meridian_mesh(slice_round_hole(_EXTENT, columns))
+        meshed = meridian_mesh(slice_round_hole(mesh.extent, mesh.columns))
     with stage("assembly"):
-        forms = MeridianForms({0: mesh}, DEGREE, law)
+        forms = MeridianForms({0: meshed}, DEGREE, law)
     dofs, places = forms.on(FACE)
     free = np.setdiff1d(np.arange(forms.dofs), forms.on(LEVEL)[0][:, 1])
     tissue = MeridianTissue(FreeSystem(forms, free), dofs, places)

@@ -20,7 +20,7 @@ from pipeline.solve import SolveError
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.plane.column import Column
 from pipeline.solve.plane.cut import Cut
-from pipeline.solve.plane.hole import COLUMNS, Hole, open_hole
+from pipeline.solve.plane.hole import MESHES, Hole, HoleMesh, open_hole
 
 # Least growth of the hole's area, and least stretch of the column.
 _LEAST = 1e-6
@@ -89,12 +89,12 @@ def ring_cuts(law: MaterialLaw, toughness: float) -> tuple[Cut, Cut]:
     """
     column = Column(law)
 
-    def on(columns: int) -> Cut:
+    def on(mesh: HoleMesh) -> Cut:
         try:
-            hole = open_hole(law, columns, lambda hole: Ring(column, hole, toughness).rises)
+            hole = open_hole(law, mesh, lambda hole: Ring(column, hole, toughness).rises)
         except SolveError as error:
             raise SolveError(f"the ring crack of a punch, with Γ/(μ R) = {toughness:.3g}: {error}") from error
         return Ring(column, hole, toughness).cut()
 
-    coarse, fine = map(on, COLUMNS)
+    coarse, fine = map(on, MESHES)
     return coarse, fine
