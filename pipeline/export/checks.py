@@ -17,8 +17,9 @@ from pipeline.stages import stage
 SIZES, _DEPTH = (0.1, 0.99), 0.02
 # Least factor on the parts of a bar that grow with the tool: few touches are of the largest.
 _LEAST_SHAPE = 0.25
-# Error that full solves have in common, as a share of their error bars.
-_LEAST = 0.25
+# Error that full solves have in common, as a share of their error bars: on facets, meshes of the table and of the
+# checks err alike (docs/realtime.md).
+_LEAST, _LEAST_CURVED = 0.25, 1.0
 # Range of a blade's length over its width.
 _SLENDER = (1.0, 12.0)
 TOOLS = ("disc", "blade", "bonded")
@@ -171,7 +172,8 @@ def narrowest(model: Model, checks: Sequence[Check]) -> tuple[float, float, floa
     bounds = [(0.0, None), (_LEAST_SHAPE, None)]
     fitted = linprog([1.0, shapes.mean()], A_ub=rows, b_ub=-errors, bounds=bounds).x
     floor, factor = margin(len(checks)) * fitted
-    common = _LEAST * float(np.mean([check.full_error for check in checks]))
+    share = _LEAST if model.face.is_flat else _LEAST_CURVED
+    common = share * float(np.mean([check.full_error for check in checks]))
     first, second, third = (float(factor) * part for part in model.bar[:3])
     return first, second, third, max(float(floor), common)
 

@@ -30,7 +30,7 @@ MARGIN, LARGEST = 0.15, 0.4
 # Shares of the accuracy: the table's error in c for the largest disc; full solves of a flat body, of a curved body, and
 # of the two discs for a curved body's table. Error bars before calibration: of c, of h, and of the contact size to the
 # fourth power.
-_SHARE, _PRECISE, _PRECISE_CURVED, _PRECISE_TABLE, _BARS = 0.4, 0.05, 0.1, 0.25, (1e-3, 0.03, 0.1)
+_SHARE, _PRECISE, _PRECISE_CURVED, _PRECISE_TABLE, _BARS = 0.4, 0.05, 0.5, 1.0, (1e-3, 0.03, 0.1)
 _SEEDS = (1, 2)
 _UNSEEN = "at large displacements there is only a force"
 # Largest distance of a query from a flat face, in units of the thickness.

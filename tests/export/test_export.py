@@ -419,8 +419,9 @@ def test_bars_of_few_touches_have_a_margin_for_the_others(count):
     assert np.mean(covered) > 0.94
 
 
-def test_bars_are_no_narrower_than_what_full_solves_have_in_common():
-    model = random_model()
+@pytest.mark.parametrize(("curved", "share"), [(False, 0.25), (True, 1.0)])
+def test_bars_are_no_narrower_than_what_full_solves_have_in_common(curved, share):
+    model = random_model(curved=curved)
     touches = [with_full(model, touch, Full(touch.force, 2e-3, np.zeros(3))) for touch in random_touches(model, 12, 5)]
     least = margin(12) * 0.25 * np.array(model.bar[:3])
-    np.testing.assert_allclose(narrowest(model, touches), [*least, 0.25 * 2e-3])
+    np.testing.assert_allclose(narrowest(model, touches), [*least, share * 2e-3])
