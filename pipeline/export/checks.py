@@ -1,5 +1,6 @@
 """Touches solved in full: a calibration set for a model's error bar, and a test set."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import nan
@@ -69,19 +70,35 @@ def random_touches(model: Model, count: int, seed: int, tools: Sequence[int] = (
 
 
 @stage("checks")
-def check_touches(model: Model, solver: Solver, touches: Sequence[Check], ranks: Ranks = ALONE) -> list[Check]:
-    """Return ``touches`` with their full solves; collective.
+def check_touches(
+    model: Model, solver: Solver, sets: Sequence[Sequence[Check]], ranks: Ranks = ALONE
+) -> list[list[Check]]:
+    """Return ``sets`` of touches with their full solves, without those that failed; collective.
 
     Raises:
-        RuntimeError: if a full solve failed.
+        RuntimeError: if half of the full solves of a set or more failed.
     """
     low, high = model.table.poisson
 
-    def check(asked: Check) -> Check:
-        (found,) = solved(model, solver, asked, [asked.poisson] if low < high else None)
+    def check(asked: Check) -> Check | str:
+        try:
+            (found,) = solved(model, solver, asked, [asked.poisson] if low < high else None)
+        except RuntimeError as error:
+            return str(error)
         return found
 
-    return ranks.in_turn(touches, check, "full solves for the error bar")
+    done = iter(ranks.in_turn([one for each in sets for one in each], check, "full solves for the error bar"))
+    found = []
+    for each in sets:
+        results = list(itertools.islice(done, len(each)))
+        known = [one for one in results if isinstance(one, Check)]
+        failed = [one for one in results if isinstance(one, str)]
+        if failed and 2 * len(known) <= len(each):
+            raise RuntimeError(failed[0])
+        for why in failed:
+            ranks.note(f"a touch is left out: {why}")
+        found.append(known)
+    return found
 
 
 def random_touch(model: Model, rng: np.random.Generator, kind: int) -> Check:

@@ -115,8 +115,7 @@ def export(
     # Discs calibrate the linear part of a law; balls test the whole.
     of_linear = [halves[0], 0] if scope.law else halves
     touches = [random_touches(bare, count, seed, tools) for count, seed in zip(of_linear, _SEEDS, strict=True)]
-    checked = check_touches(bare, solver, [*touches[0], *touches[1]], ranks)
-    fitted, judged = checked[: halves[0]], checked[halves[0] :]
+    fitted, judged = check_touches(bare, solver, touches, ranks)
     # Bonded tools have further errors, and would enlarge the error bars of the others.
     plain = [check for check in fitted if TOOLS[check.kind] != "bonded"]
     model = replace(bare, bar=narrowest(replace(bare, bar=(*_BARS, 0.0)), plain))

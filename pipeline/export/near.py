@@ -126,10 +126,10 @@ def with_near(
     # Balls that have an answer whatever the effect of the support.
     stiff = replace(bare, near=replace(near, support=_MOST_SUPPORT))
     touches = [_random_balls(stiff, count, seed) for count, seed in zip(counts, _SEEDS, strict=True)]
-    checked = check_touches(stiff, solver, [*touches[0], *touches[1]], ranks)
-    model = replace(bare, near=calibrated(bare, near, checked[: counts[0]]))
-    checked = [with_bar(model, check) for check in checked]
-    return model, checked[: counts[0]], checked[counts[0] :]
+    checked = check_touches(stiff, solver, touches, ranks)
+    model = replace(bare, near=calibrated(bare, near, checked[0]))
+    fitted, judged = ([with_bar(model, check) for check in each] for each in checked)
+    return model, fitted, judged
 
 
 def calibrated(bare: Model, near: Near, checks: Sequence[Check]) -> Near:

@@ -11,10 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Table
-from pipeline.export.checks import margin, narrowest, random_touches, with_bar, with_full
+from pipeline.export.checks import check_touches, margin, narrowest, random_touches, with_bar, with_full
 from pipeline.export.compliance import coarse_mesh, compliances
 from pipeline.export.curved import curved_model, upright
 from pipeline.export.full import Full, Solver, Tool
+from pipeline.export.ranks import Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, scope_of
 from pipeline.export.tabulate import tabulate
@@ -417,6 +418,28 @@ def test_bars_of_few_touches_have_a_margin_for_the_others(count):
         *parts, floor = narrowest(bare, solved)
         covered.append(np.mean(np.abs(errors) <= floor + parts[0] / bare.bar[0] * shapes))
     assert np.mean(covered) > 0.94
+
+
+def test_touches_whose_full_solves_fail_are_left_out_and_told():
+    model, said = random_model(), []
+    sets = [random_touches(model, 6, 5), random_touches(model, 4, 6)]
+    wrong = {id(one.tool) for one in (sets[0][1], sets[1][0])}
+
+    class Some:
+        def press_all(self, tool, at, depths, poissons):
+            if id(tool) in wrong:
+                raise RuntimeError("a full solve of a disc failed")
+            return [Full(1e-3, 1e-4, np.zeros(3))]
+
+    ranks = Ranks(MPI.COMM_SELF, said.append)
+    found = check_touches(model, Some(), sets, ranks)
+    assert [[one.tool for one in each] for each in found] == [
+        [one.tool for one in each if id(one.tool) not in wrong] for each in sets
+    ]
+    assert [one for one in said if "left out" in one] == ["a touch is left out: a full solve of a disc failed"] * 2
+    wrong.update(id(one.tool) for one in sets[1][:2])
+    with pytest.raises(RuntimeError, match="a full solve of a disc failed"):
+        check_touches(model, Some(), sets, ranks)
 
 
 @pytest.mark.parametrize(("curved", "share"), [(False, 0.25), (True, 1.0)])

@@ -23,7 +23,7 @@ _PACKAGE, _PROGRAM = "mmgpy", "bin/mmgs_O3"
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
 # No detection of ridges and no smoothing of sizes: both are given.
 _OPTIONS = ("-v", "-1", "-nr", "-hgrad", "-1")
-_LONGEST = 600  # seconds
+_LONGEST = 120  # seconds; usual are one to ten
 # Factor by which elements may be smaller or larger than any given size.
 _ROOM = 3.0
 # Attempts at a divided sheet, in which more and more facets stay around those that would cross others.
