@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from epsmesh_realtime.file import VERSION
 from tests.commands import ENVIRONMENT, ROOT
 from tests.fuzz.conftest import MOST_MEMORY
 from tests.fuzz.profile import IS_CAMPAIGN
@@ -69,7 +70,7 @@ LARGE = {
     "zeros.toml": ("study", sparse(b""), "is larger than 1 MB"),
     "zeros.nc": ("dataset", sparse(b"\x89HDF\r\n\x1a\n"), "cannot be read as netCDF"),
     "zeros.sqlite": ("store", sparse(b"SQLite format 3\0"), "file is not a database"),
-    "zeros.epsm": ("model", sparse(b"epsmesh\0" + bytes([3, 0, 0, 0, 4, 3, 2, 1])), "is cut short"),
+    "zeros.epsm": ("model", sparse(b"epsmesh\0" + bytes([VERSION, 0, 0, 0, 4, 3, 2, 1])), "is cut short"),
     "text.step": ("step", sparse(b"ISO-10303-21;\nDATA;\n#1=A('"), "is truncated"),
 }
 LONGER = {
