@@ -21,8 +21,8 @@ from pipeline.stages import stage
 
 _PACKAGE, _PROGRAM = "mmgpy", "bin/mmgs_O3"
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
-# No detection of ridges and no smoothing of sizes: both are given.
-_OPTIONS = ("-v", "-1", "-nr", "-hgrad", "-1")
+# No detection of ridges and no smoothing of sizes: both are given. At most 2 GB: where it does not end, it takes all.
+_OPTIONS = ("-v", "-1", "-nr", "-hgrad", "-1", "-m", "2000")
 _LONGEST = 120  # seconds; usual are one to ten
 # Factor by which elements may be smaller or larger than any given size.
 _ROOM = 3.0
