@@ -67,16 +67,19 @@ def write_random(path: Path, **kind: bool) -> Model:
     return read(path)
 
 
-def random_surface(*, rank: int = 5, **kind: bool) -> Surface:
-    """A face and a floor of squares, and modes as small as a far field is."""
+def random_surface(*, rank: int = 5, side: int = 9, **kind: bool) -> Surface:
+    """A face and a floor of side × side points, and modes as small as a far field is."""
     model, rng = random_model(**kind), np.random.default_rng(5)
-    x, y = (np.linspace(-side, side, 9) for side in model.sides)
+    x, y = (np.linspace(-half, half, side) for half in model.sides)
     flat = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     heights = np.array([model.spot(x, y).height for x, y in flat.tolist()])
     points = np.vstack([np.column_stack([flat, heights + z]) for z in (0.0, -model.thickness)])
-    corner = np.add.outer(9 * np.arange(8), np.arange(8)).ravel()
+    corner = np.add.outer(side * np.arange(side - 1), np.arange(side - 1)).ravel()
     face = np.vstack(
-        [np.column_stack([corner, corner + 1, corner + 10]), np.column_stack([corner, corner + 10, corner + 9])]
+        [
+            np.column_stack([corner, corner + 1, corner + side + 1]),
+            np.column_stack([corner, corner + side + 1, corner + side]),
+        ]
     )
     triangles = np.vstack([face, face[:, ::-1] + len(flat)]).astype(np.int32)
     modes = rng.integers(-32767, 32768, (len(points), 3, rank)).astype(np.int16)

@@ -173,6 +173,14 @@ def test_the_dent_is_seen_and_outside_the_region_no_number_is(browser, tmp_path)
 
 
 @in_browser
+def test_a_body_of_many_vertices_is_drawn(browser, tmp_path):
+    opened(browser, tmp_path, side=140)  # 39,200 of them
+    change(browser, depth=1)
+    assert browser.messages == []
+    assert told(browser, "legend") == "00.51 mm"
+
+
+@in_browser
 @pytest.mark.parametrize("kind", [{}, {"is_round": True}, {"curved": True, "turned": True}])
 def test_places_without_an_answer_are_shaded_before_one_gets_there(browser, tmp_path, kind):
     surface, _ = opened(browser, tmp_path, **kind)

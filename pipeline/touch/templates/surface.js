@@ -1,7 +1,8 @@
 // What is seen of a touch: realtime/src/surface.c, with triangles made smaller near the tool.
 
-// Edges near the tool are halved until they are shorter than this share of the contact's radius and of the way to its edge.
-const SEEN = { FINE: 0.18, LEVELS: 6, MOST: 30000 };
+// Edges near the tool are halved until they are shorter than this share of the contact's radius and of the way to its edge; so many
+// vertices are added at most.
+const SEEN = { FINE: 0.18, LEVELS: 6, ADDED: 30000 };
 
 // Where the tool presses: a disc of radius `a`, or a rectangle, in the face's own directions.
 class Footprint {
@@ -27,12 +28,13 @@ class Surface {
   constructor(model) {
     const { c } = model;
     const [n, m] = [c.page_vertices(), c.page_triangles()];
-    const rooms = [0, 1, 2].map(() => c.page_room(3 * 8 * SEEN.MOST));
-    const [rest, regular, moved] = rooms.map((at) => model.numbers(at, 3 * SEEN.MOST));
-    Object.assign(this, { model, n, m, rooms, rest, regular, moved });
+    const most = n + SEEN.ADDED;
+    const rooms = [0, 1, 2].map(() => c.page_room(3 * 8 * most));
+    const [rest, regular, moved] = rooms.map((at) => model.numbers(at, 3 * most));
+    Object.assign(this, { model, n, m, most, rooms, rest, regular, moved });
     rest.set(new Float32Array(c.memory.buffer, c.page_points(), 3 * n));
     this.triangles = new Int32Array(c.memory.buffer, c.page_corners(), 3 * m);
-    this.shown = new Int32Array(3 * (m + 2 * SEEN.MOST)); // each new vertex makes two triangles more at most
+    this.shown = new Int32Array(3 * (m + 2 * SEEN.ADDED)); // each new vertex makes two triangles more at most
     this.spans = Float64Array.from({ length: m }, (_, t) => this.spanOf(t));
   }
   // The longest edge of a triangle.
@@ -61,17 +63,17 @@ class Surface {
   }
   // Halve edges by their own length and place alone, so that neighbours agree.
   refined([x, y, z], turn, foot) {
-    const { rest, regular, n, m } = this;
+    const { rest, regular, n, m, most } = this;
     let count = n;
     const between = new Map();
     const middle = (p, q) => {
-      const key = Math.min(p, q) * SEEN.MOST + Math.max(p, q);
+      const key = Math.min(p, q) * most + Math.max(p, q);
       if (between.has(key)) return between.get(key);
       const [mx, my, mz] = [0, 1, 2].map((i) => (rest[3 * p + i] + rest[3 * q + i]) / 2);
       const length = Math.hypot(...[0, 1, 2].map((i) => rest[3 * p + i] - rest[3 * q + i]));
       const away = foot.away(...turn.map((unit) => inner(unit, [mx - x, my - y, mz - z])));
       let found = -1;
-      if (length > SEEN.FINE * Math.max(foot.a, away) + 0.5 * away && count < SEEN.MOST) {
+      if (length > SEEN.FINE * Math.max(foot.a, away) + 0.5 * away && count < most) {
         found = count++;
         rest.set([mx, my, mz], 3 * found);
         for (let i = 0; i < 3; i++) regular[3 * found + i] = (regular[3 * p + i] + regular[3 * q + i]) / 2;
