@@ -29,7 +29,6 @@ SOLVERS: dict[str, dict[str, Any]] = {
     "tangent": _CG | _TANGENT,
     "tangent, mixed": _GCR | _OF_SADDLE,
     "eigenvalues": {"ksp_type": "cg", "ksp_norm_type": "natural", "ksp_rtol": 1e-12, "ksp_max_it": 30},
-    "saddle point": _GCR,
     "mass": {
         "ksp_type": "chebyshev",
         "ksp_norm_type": "none",

@@ -71,6 +71,10 @@ double largest(int count, const double* x);
 void to_single(int count, double scale, const double* x, float* y);
 void to_double(int count, double scale, const float* x, double* y);
 
+/* krylov.c: vectors of a Krylov space in single precision */
+void project(int count, int vectors, const uint64_t* stored, const double* x, double* products);
+void combine(int count, int vectors, const uint64_t* stored, const double* weights, double* x);
+
 /* tangent.c: the tangent at large displacements */
 void evaluate_moduli(int cells, int points, int quadrature, const int* dofs, const double* maps, const double* roots,
                      int step, const double* factors, const double* gradients, const double* u, int count,
