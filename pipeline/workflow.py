@@ -15,12 +15,13 @@ from mpi4py import MPI
 
 from pipeline.insertion.paths import complete
 from pipeline.plan.cost import CostModel
-from pipeline.plan.plan import Plan, make_plan
+from pipeline.plan.plan import Plan, leave_out_stored, make_plan
 from pipeline.plan.shard import Shard
 from pipeline.report.dataset import build
 from pipeline.report.publish import Results, ResultsError, publish
 from pipeline.run.begun import ENDING, Begun, fail_begun
 from pipeline.run.merge import merge
+from pipeline.run.outbox import Outbox
 from pipeline.run.outcome import count_states, failures
 from pipeline.run.progress import Progress, Terminal
 from pipeline.run.reading import open_to_read
@@ -50,6 +51,7 @@ class Opened:
     meshes: Path | None = None
     records: dict[str, Record] = field(default_factory=dict)
     begun: Begun = field(default_factory=Begun)
+    again: frozenset[str] = frozenset()  # cases with which a process ended once: they come last
     notices: tuple[str, ...] = ()  # what the user should know of the store
     is_fresh: bool = False  # nothing is read from it
 
@@ -84,37 +86,39 @@ def prepare(
 
     ``fresh`` computes again what is stored; a timing study always does, but for F_exact. ``without`` names reductions
     that are not to be used. A ``shard`` plans its own part only, and reads the stores ``beside`` its own, too; a whole
-    study takes the records of those, its shards', into its store. Cases with which the process of an earlier run ended
-    have failed, unless their force is read back: this run leaves them out, and the next one tries them again.
+    study takes the records of those, its shards', into its store. A case with which the process of an earlier run ended
+    is tried again, after all others. If a process ended with it twice it has failed: this run leaves it out, and the
+    next one tries it again.
 
     Raises:
         StoreError: on every rank, if the store cannot be used.
     """
     opened, message, cost = Opened(meshes=meshes, begun=Begun(store_path), is_fresh=fresh), "", CostModel()
+    declared = make_plan(study, without=without, shard=shard)
+    own = declared.all_keys if declared.part is None else declared.part
     if comm.rank == 0:
         try:
             opened.store = Store(store_path)
             merged = merge(beside, opened.store) if beside and not (shard or fresh) else ()
             cost = opened.store.cost_model()
-            declared = make_plan(study, without=without, shard=shard)
             if not fresh:
-                keys = () if study.solve.timing else declared.keys
-                wanted = {*keys, *(declared.all_keys - {*declared.keys})}
+                wanted = own - {*declared.keys} if study.solve.timing else own
                 found = opened.store.get(wanted)
                 opened.records = {key: record for key, record in found.items() if record.is_ok}
                 for path in beside if shard else ():
                     opened.records = _known_beside(path, wanted) | opened.records
-            ended = fail_begun(opened.store, declared.all_keys)
-            left_out = _what_ended(len(ended.keys() - opened.records.keys()))
-            opened.records = ended | opened.records
+            ended = fail_begun(opened.store, own)
+            opened.again = ended.again - opened.records.keys()
+            what_ended = _what_ended(len(ended.failed.keys() - opened.records.keys()), len(opened.again))
+            opened.records = ended.failed | opened.records
             problems = [problem for source in merged for problem in source.problems]
-            opened.notices = tuple(filter(None, (opened.store.notice, *problems, left_out)))
+            opened.notices = tuple(filter(None, (opened.store.notice, *problems, what_ended)))
         except StoreError as error:
             message = str(error)
     message, stored, cost = comm.bcast((message, sorted(opened.records), cost))
     if message:
         raise StoreError(message)
-    return replace(make_plan(study, stored, without, shard), cost=cost), opened
+    return replace(leave_out_stored(declared, stored, without), cost=cost), opened
 
 
 def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, show: Show | None = None) -> Outcome:
@@ -246,16 +250,27 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
 
     cache = MeshCache(opened.meshes) if opened.meshes else None
 
+    outbox = Outbox(opened.store, plan) if opened.store else None
+
     def keep(record: Record) -> None:
-        assert opened.store is not None
+        assert outbox is not None
         if record.status != SKIPPED:  # why it was depends on this study
-            opened.store.put(record)
+            outbox.put(record)
         opened.records[record.key] = record
         if signals:
             raise KeyboardInterrupt
 
-    with progress or nullcontext(), opened.begun as begun:
-        execute(plan, comm, keep, progress or Progress(), known=opened.records, cache=cache, begun=begun)
+    with progress or nullcontext(), outbox or nullcontext(), opened.begun as begun:
+        execute(
+            plan,
+            comm,
+            keep,
+            progress or Progress(),
+            known=opened.records,
+            cache=cache,
+            begun=begun,
+            last=opened.again,
+        )
 
 
 @contextmanager
@@ -294,12 +309,16 @@ def _heard_by(handler: Callable[..., None]) -> Iterator[None]:
             signal.signal(number, answer)
 
 
-def _what_ended(count: int) -> str:
-    """Say that the process of an earlier run ended with so many cases, "" if with none."""
-    if not count:
-        return ""
-    what = "the case that it was at has failed" if count == 1 else f"the {count} cases that it was at have failed"
-    return f"the process of an earlier run ended: {what}, and the others go on; the next run tries again"
+def _what_ended(failed: int, again: int) -> str:
+    """Say that the process of an earlier run ended with cases that have ``failed`` or are tried ``again``."""
+    told = []
+    if failed:
+        what = "the case that it was at has failed" if failed == 1 else f"the {failed} cases that it was at have failed"
+        told.append(f"{what}, and the others go on; the next run tries again")
+    if again:
+        what = "the case that it was at is" if again == 1 else f"the {again} cases that it was at are"
+        told.append(f"{what} tried again, after the others")
+    return f"the process of an earlier run ended: {'; '.join(told)}" if told else ""
 
 
 def _known_beside(path: Path, keys: Collection[str]) -> dict[str, Record]:

@@ -18,7 +18,16 @@ from pipeline.study.problems import StudyError
 from pipeline.study.schema import Mesh, Solving
 from pipeline.study.sweep import Study
 
-__all__ = ["EXACT", "Plan", "Struck", "ask_for_exact", "declare", "first_attempts", "make_plan"]
+__all__ = [
+    "EXACT",
+    "Plan",
+    "Struck",
+    "ask_for_exact",
+    "declare",
+    "first_attempts",
+    "leave_out_stored",
+    "make_plan",
+]
 
 # Relative error of F_exact, or its share of the study's accuracy: well below the errors of the study.
 EXACT, _EXACT_SHARE = 1e-3, 0.3
@@ -65,7 +74,13 @@ def make_plan(
                 plan = replace(plan, used=plan.used | {name})
     plan = ask_for_exact(plan)
     plan = take(plan, shard) if shard is not None else ask_for_ends(plan, without)
-    return plan if left_out & {"stored", "all"} else strike_stored(plan, frozenset(stored))
+    return leave_out_stored(plan, stored, without)
+
+
+def leave_out_stored(plan: Plan, stored: Collection[str], without: Collection[str] = ()) -> Plan:
+    """Return ``plan`` without the solves whose records are ``stored``, unless ``without`` or the study keeps them."""
+    kept = {"stored", "all"} & {*without, *plan.study.planning.without}
+    return plan if kept else strike_stored(plan, frozenset(stored))
 
 
 def first_attempts(plan: Plan) -> Plan:

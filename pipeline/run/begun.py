@@ -1,9 +1,10 @@
 """A small file beside the case store with the cases that a process is computing, for the case that it is killed.
 
-Python cannot catch the out-of-memory killer, nor a crash in a library. The next run finds the file, records its cases
-as failed, and computes the others. Each rank has its own file: its lock shows whether the rank still runs, and a write
-takes microseconds because it is not synchronised to disk. Python's signal handler appends the number of each signal,
-even while C code runs: if a process was asked to end, its cases are not to blame.
+Python cannot catch the out-of-memory killer, nor a crash in a library. The next run finds the file, and tries its cases
+again after all others; cases with which a process was killed twice have failed. Each rank has its own file: its lock
+shows whether the rank still runs, and a write takes microseconds because it is not synchronised to disk. Python's
+signal handler appends the number of each signal, even while C code runs: if a process was asked to end, its cases are
+not to blame.
 """
 
 import fcntl
@@ -12,6 +13,7 @@ import os
 import signal
 from collections.abc import Collection
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
@@ -71,15 +73,25 @@ class Begun:
             self._before = signal.set_wakeup_fd(self._file, warn_on_full_buffer=False)
 
 
-def fail_begun(store: Store, keys: Collection[str]) -> dict[str, Record]:
-    """Return the failures, by key, of cases among ``keys`` during which a process was killed, and store them.
+@dataclass(frozen=True)
+class Ended:
+    """The cases during which processes were killed: the ``failed`` ones, by key, and those to try ``again``."""
 
-    Stored forces stay. Files of running processes, and of other studies, are not touched.
+    failed: dict[str, Record]
+    again: frozenset[str]
+
+
+def fail_begun(store: Store, keys: Collection[str]) -> Ended:
+    """Return the cases among ``keys`` during which a process was killed, and store their failures.
+
+    A case that was killed once, for an unknown reason, is to be tried again: a batch system or a person kills at any
+    case. Its stored failure makes the second time the last one. Stored forces stay. Files of running processes, and
+    of other studies, are not touched.
 
     Raises:
         StoreError: if the store cannot be written.
     """
-    failed = {}
+    failed, again = {}, set()
     stem = _stem(store.path)
     for path in [path for path in store.path.parent.iterdir() if path.name.startswith(stem)]:
         begun, why = _read(path)
@@ -87,11 +99,15 @@ def fail_begun(store: Store, keys: Collection[str]) -> dict[str, Record]:
             continue
         known = store.get(begun) if why else {}
         for key in begun if why else ():
-            failed[key] = Record(key, FAILED, why)
-            if key not in known or not known[key].is_ok:
-                store.put(failed[key])
+            record, before = Record(key, FAILED, why), known.get(key)
+            if why == KILLED and (before is None or (before.message != why and not before.is_ok)):
+                again.add(key)
+            else:
+                failed[key] = record
+            if before is None or not before.is_ok:
+                store.put(record)
         path.unlink(missing_ok=True)
-    return {key: record for key, record in failed.items() if key in keys}
+    return Ended({key: record for key, record in failed.items() if key in keys}, frozenset(again & {*keys}))
 
 
 def _stem(store: Path) -> str:

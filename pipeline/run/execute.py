@@ -1,13 +1,13 @@
 """Run a plan on a communicator, and return the record of each case as soon as it exists."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from pipeline.plan.plan import Plan
 from pipeline.plan.schedule import schedule
-from pipeline.plan.steps import Solve, mesh_steps
+from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.run.begun import Begun
 from pipeline.run.compile import prepare
 from pipeline.run.groups import run_phase
@@ -32,14 +32,17 @@ def execute(
     known: Mapping[str, Record] | None = None,
     cache: MeshCache | None = None,
     begun: Begun | None = None,
+    last: Collection[str] = (),
 ) -> int:
     """Run ``plan``; collective. ``keep`` is called on rank 0 with each record, as soon as it arrives there.
 
     ``known`` are rank 0's stored records of the plan; ``cache`` caches meshes; ``begun`` notes the cases under way, on
-    each rank. Returns the number of failed cases, the same on every rank; each has a record with its message.
+    each rank. Steps with keys in ``last`` (rank 0's) run after the others. Returns the number of failed cases, the same
+    on every rank; each has a record with its message.
     """
     keep_imports()
-    desk = _Desk(plan, keep if comm.rank == 0 else None, progress, comm.bcast(dict(known or {})))
+    records, delayed = comm.bcast((dict(known or {}), frozenset(last)))
+    desk = _Desk(plan, keep if comm.rank == 0 else None, progress, records)
 
     def make(group: MPI.Comm, post: Keep) -> StepRunner:
         notes = begun or Begun()
@@ -52,8 +55,9 @@ def execute(
             prepare(comm, todo)
             memory = FreeMemory(comm).available()
             steps = mesh_steps(todo, shared=plan.shared)
-            for phase in schedule(steps, comm.size, plan.cost, memory, apart=plan.study.solve.timing):
-                run_phase(comm, phase, make, desk.take)
+            for group in _apart(steps, delayed):
+                for phase in schedule(group, comm.size, plan.cost, memory, apart=plan.study.solve.timing):
+                    run_phase(comm, phase, make, desk.take)
             desk.records = comm.bcast(desk.records)
     return desk.failed
 
@@ -63,6 +67,13 @@ def compute(plan: Plan, comm: MPI.Comm) -> dict[str, Record]:
     records: dict[str, Record] = {}
     execute(plan, comm, lambda record: records.__setitem__(record.key, record), Progress())
     return comm.bcast(records)
+
+
+def _apart(steps: Sequence[MeshStep], delayed: Collection[str]) -> tuple[list[MeshStep], list[MeshStep]]:
+    """Return the steps without keys in ``delayed``, and those with some."""
+    late = [any(solve.key in delayed for solve in step.solves) for step in steps]
+    first, second = ([s for s, is_late in zip(steps, late, strict=True) if is_late == which] for which in (False, True))
+    return first, second
 
 
 class _Desk:

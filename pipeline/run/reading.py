@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from pipeline.plan.cost import CostModel
-from pipeline.plan.plan import Plan, make_plan
+from pipeline.plan.plan import Plan, leave_out_stored, make_plan
 from pipeline.run.record import Record
 from pipeline.run.store import PATIENCE, SCHEMA, DamagedStoreError, Records, Row, StoreError, damaged, guard, reason
 from pipeline.study.sweep import Study
@@ -61,7 +61,7 @@ def plan_the_rest(study: Study, path: Path, without: Collection[str] = ()) -> tu
     bare = make_plan(study, without=without)
     records, cost = known_of(path, bare)
     done = [key for key, record in records.items() if record.is_ok]
-    return replace(make_plan(study, done, without) if done else bare, cost=cost), records
+    return replace(leave_out_stored(bare, done, without), cost=cost), records
 
 
 def read_rows(path: Path) -> list[Row]:

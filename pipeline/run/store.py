@@ -166,6 +166,12 @@ class Store(Records):
         except sqlite3.Error as error:
             raise StoreError(f"the case store {self.path} cannot be written: {reason(error)}") from error
 
+    @stage("store")
+    def put_all(self, records: Iterable[Record]) -> None:
+        """Write several records in one transaction; see :meth:`put`."""
+        with self.transaction():
+            self.put_rows((record.key, record.to_json(), time.time()) for record in records)
+
     @contextmanager
     def transaction(self) -> Iterator[None]:
         """Combine several writes: all are done or, after an exception, none.

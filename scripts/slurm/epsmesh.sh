@@ -27,10 +27,11 @@ if [[ ! -e $mark ]]; then
 fi
 rm -f "$mark"
 
-# 130: SIGTERM came, before the time limit or from `scancel --signal=TERM`. What is finished is on disk. Plain `scancel`
-# ends this script as well, and after a node's failure or a preemption Slurm itself restarts the job.
-if ((status == 130 && restarts < most_restarts)); then
-    echo "interrupted; the job goes back into the queue"
+# 130: SIGTERM came, before the time limit or from `scancel --signal=TERM`. From 129: a signal ended the program, such as
+# SIGKILL of the out-of-memory killer. What is finished is on disk; a case with which the program was killed twice is left
+# out. Plain `scancel` ends this script as well, and after a node's failure or a preemption Slurm itself restarts the job.
+if ((status > 128 && restarts < most_restarts)); then
+    echo "interrupted (status $status); the job goes back into the queue"
     # Slurm then ends this script; one that ended by itself before could be taken for a job that failed.
     scontrol requeue "$SLURM_JOB_ID" && sleep 300
 fi

@@ -2,6 +2,9 @@
 
 import json
 import shutil
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +12,9 @@ import pytest
 from typer.testing import Result
 
 from pipeline.report.read import read_file
-from tests.commands import epsmesh
-from tests.compare import all_done, assert_same
+from pipeline.run.reading import read_rows
+from tests.commands import ENVIRONMENT, ROOT, epsmesh
+from tests.compare import all_done, assert_same, assert_same_bits
 from tests.studies import small_text
 
 SMALL = small_text(
@@ -18,6 +22,22 @@ SMALL = small_text(
     mesh={"growth": 0.8, "outside": ["coarse", "free"]},
     solve={"exact": False},
 )
+
+
+# The command, killed in its fourth solve.
+KILLED = """
+import os, signal
+from pipeline.run.runner import StepRunner
+solve, count = StepRunner._solve, []
+def fatal(*arguments):
+    count.append(1)
+    if len(count) == 4:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return solve(*arguments)
+StepRunner._solve = fatal
+from pipeline.__main__ import main
+main()
+"""
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +86,26 @@ def test_a_lost_shard_is_told_and_completed(whole, meshes, tmp_path):
     again = run(study, tmp_path, meshes, "--shard", "1/2")
     assert "to do" not in again.stdout
     assert "stored" in again.stdout
+
+
+def test_a_shard_that_was_killed_goes_on_to_the_same_bits(whole, meshes, tmp_path):
+    """Killed in the middle of the cases of a mesh, which begin with each other's solutions."""
+    study, folder = whole
+    options = ("--output", tmp_path, "--meshes", meshes)
+    killed = subprocess.run(
+        [sys.executable, "-c", KILLED, "run", study, "--shard", "1/2", *options],
+        env=ENVIRONMENT, cwd=ROOT, check=False, capture_output=True, text=True,
+    )  # fmt: skip
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    before = len(read_rows(tmp_path / "shards" / "small.1-of-2.sqlite"))
+    assert before > 0
+    assert epsmesh("status", study, "--merge", "--output", tmp_path).exit_code == 1
+    again = run(study, tmp_path, meshes, "--shard", "1/2")
+    assert again.exit_code == 0, again.output
+    assert "tried again, after the others" in again.stderr
+    assert run(study, tmp_path, meshes, "--shard", "2/2").exit_code == 0
+    assert epsmesh("status", study, "--merge", "--output", tmp_path).exit_code == 0
+    assert_same_bits(tmp_path / "small.nc", folder / "small.nc")
 
 
 def test_more_shards_than_steps_and_a_run_of_the_whole_that_takes_them_in(whole, meshes, tmp_path):

@@ -11,7 +11,8 @@ from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
 from pipeline.report.read import read_file
-from pipeline.run.begun import Begun, fail_begun
+from pipeline.run.begun import Begun, Ended, fail_begun
+from pipeline.run.reading import open_to_read
 from pipeline.run.record import Record
 from pipeline.run.store import Store
 from pipeline.workflow import prepare
@@ -60,23 +61,33 @@ def store(tmp_path: Path):
     opened.close()
 
 
-def test_the_cases_of_a_process_that_was_killed_have_failed_but_forces_on_record_stay(store: Store):
+NONE = Ended({}, frozenset())
+
+
+def test_a_case_of_a_process_that_was_killed_is_tried_again_once_but_forces_on_record_stay(store: Store):
     store.put(Record("a", "ok", force=1.0))
     run(BEGIN.format(asked="SIGCONT"), store.path)
-    assert fail_begun(store, {"c"}) == {}  # done by then
-    failed = fail_begun(store, {"a", "b", "c"})
-    assert sorted(failed) == ["a", "b"]
-    assert "the process was killed while it computed this case" in failed["b"].message
+    assert fail_begun(store, {"c"}) == NONE  # done by then
+    ended = fail_begun(store, {"a", "b", "c"})
+    assert (list(ended.failed), ended.again) == (["a"], {"b"})
     found = store.get({"a", "b"})
     assert (found["a"].is_ok, found["b"].status) == (True, "failed")
-    assert fail_begun(store, {"b"}) == {}
+    assert fail_begun(store, {"b"}) == NONE
+    with Begun(store.path) as begun:
+        begun.name(["b"])
+        left = {path: path.read_bytes() for path in store.path.parent.glob(".*")}
+    for path, content in left.items():  # as if the process had been killed
+        path.write_bytes(content)
+    ended = fail_begun(store, {"a", "b", "c"})
+    assert (list(ended.failed), ended.again) == (["b"], set())
+    assert "the process was killed while it computed this case" in ended.failed["b"].message
     assert [path.name for path in store.path.parent.iterdir()] == ["cases.sqlite"]
 
 
 def test_a_process_that_was_asked_to_end_blames_no_case(store: Store):
     """Also where C code computes, and Python cannot answer: Slurm then sends SIGKILL."""
     run(BEGIN.format(asked="SIGTERM"), store.path)
-    assert fail_begun(store, {"a", "b"}) == {}
+    assert fail_begun(store, {"a", "b"}) == NONE
     assert [path.name for path in store.path.parent.iterdir()] == ["cases.sqlite"]
 
 
@@ -84,7 +95,7 @@ def test_what_still_runs_or_has_ended_well_blames_no_case(store: Store):
     with Begun(store.path) as begun:
         begun.name(["a"])
         assert len(list(store.path.parent.iterdir())) == 2
-        assert fail_begun(store, {"a"}) == {}
+        assert fail_begun(store, {"a"}) == NONE
         assert len(list(store.path.parent.iterdir())) == 2
     assert [path.name for path in store.path.parent.iterdir()] == ["cases.sqlite"]
 
@@ -92,7 +103,7 @@ def test_what_still_runs_or_has_ended_well_blames_no_case(store: Store):
 def test_a_reason_that_was_written_is_that_of_the_failure(store: Store):
     with Begun(store.path) as begun:
         begun.name(["a"], "MemoryError: on rank 1")
-    assert fail_begun(store, {"a"})["a"].message == "MemoryError: on rank 1"
+    assert fail_begun(store, {"a"}).failed["a"].message == "MemoryError: on rank 1"
 
 
 @pytest.mark.parametrize("fresh", [False, True])
@@ -114,16 +125,21 @@ def test_a_case_that_ends_its_process_is_left_out_of_a_fresh_run_though_an_older
 def test_a_damaged_file_blames_no_case(store: Store):
     for number, content in enumerate((b"", b"\0\xff", b"[1]\n", b'{"keys": 3, "why": ""}\n')):
         store.path.with_name(f".{store.path.name}-begun-{number}").write_bytes(content)
-    assert fail_begun(store, {"a"}) == {}
+    assert fail_begun(store, {"a"}) == NONE
 
 
-def test_a_case_that_ends_its_process_fails_in_the_next_run_alone(epsmesh, tmp_path: Path):
-    """The third run tries it again."""
+def test_a_case_that_ends_its_process_twice_fails_in_the_next_run_alone(epsmesh, tmp_path: Path):
+    """The second run does it last. The fourth run tries it again."""
     file = tmp_path / "small.toml"
     file.write_text(small_text(mesh={"epsilon": ["4 mm", "6 mm", "full"], "degree": 1}, solve={"exact": False}))
     words = ("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes")
     killed = run(COMMAND.format(ends="os.abort()"), *words, ranks=2)
     assert killed.returncode not in (0, 1, 2)
+    killed = run(COMMAND.format(ends="os.abort()"), *words)
+    assert killed.returncode not in (0, 1, 2)
+    assert "the case that it was at is tried again, after the others" in killed.stderr
+    with open_to_read(tmp_path / "cases.sqlite") as stored:
+        assert sorted(record.status for record in stored.records()) == ["failed", "ok", "ok"]
     following = epsmesh(*words)
     assert following.exit_code == 1, following.stderr
     assert "the process of an earlier run ended: the case that it was at has failed" in following.stderr
