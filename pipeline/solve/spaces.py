@@ -22,6 +22,7 @@ from pipeline.solve.compiled import assemble, fill, vector_space
 from pipeline.solve.conditions import Conditions, Front
 from pipeline.solve.forms import ElasticForms
 from pipeline.solve.kernels.assembly import StraightStiffness, cell_kernel
+from pipeline.solve.kernels.cells import StraightMaps
 from pipeline.solve.kernels.product import DEGREES, CellStiffness
 from pipeline.solve.loads import Applied, apply_loads
 from pipeline.solve.measures import curved_cells, has_curved_cells
@@ -42,13 +43,14 @@ class ElasticSpace:
     """
 
     @stage("spaces, forms")
-    def __init__(self, body: BodyMesh, degree: int, conditions: Conditions):
-        """Make the space; collective.
+    def __init__(self, body: BodyMesh, degree: int, conditions: Conditions, maps: StraightMaps | None = None):
+        """Make the space; ``maps`` are those that the spaces of a mesh share; collective.
 
         Raises:
             SolveError: if footprint and support share a point.
         """
         self.body, self.comm, self.degree, self.conditions = body, body.comm, degree, conditions
+        self._maps = maps
         self.space = space = vector_space(body.mesh, degree)
         index_map = space.dofmap.index_map
         self.owned, self.size = 3 * index_map.size_local, 3 * index_map.size_global
@@ -104,7 +106,8 @@ class ElasticSpace:
     @cached_property
     def cells(self) -> CellStiffness:
         """The cells in the layout of products, made at first use; for degree 2 or more; collective."""
-        return CellStiffness(self.space, curved_cells(self.body.mesh), self.prescribed, self.body.regions)
+        curved = curved_cells(self.body.mesh)
+        return CellStiffness(self.space, curved, self.prescribed, self.body.regions, self._maps)
 
     @cached_property
     def _straight(self) -> StraightStiffness:
@@ -202,6 +205,10 @@ class Spaces:
         self.body = body
         self._conditions: Conditions | None = None
         self._made: dict[int, ElasticSpace] = {}
+        self._maps = self._new_maps()
+
+    def _new_maps(self) -> StraightMaps:
+        return StraightMaps(self.body.mesh, curved_cells(self.body.mesh))
 
     def __enter__(self) -> "Spaces":
         return self
@@ -219,11 +226,12 @@ class Spaces:
             self.close()
             self._conditions = conditions
         if degree not in self._made:
-            self._made[degree] = ElasticSpace(self.body, degree, conditions)
+            self._made[degree] = ElasticSpace(self.body, degree, conditions, self._maps)
         return self._made[degree]
 
     def close(self) -> None:
         """Free the operators of all spaces."""
+        self._maps = self._new_maps()
         while self._made:
             self._made.popitem()
 

@@ -4,6 +4,7 @@ Curved cells use quadrature, as in dolfinx: each stores the gradient of its map 
 ``curved.c`` sums over these. The ghost exchange uses dolfinx's own vectors (:class:`Ghosts`).
 """
 
+from functools import cached_property
 from typing import Any
 
 import basix
@@ -42,6 +43,25 @@ class Lanes:
         of_cells = None if regions is None else regions[self.which]
         lame = [of_regions(values, of_cells, len(self.which)) for values in (law.lame_lambda, law.lame_mu)]
         return self.spread(np.column_stack(lame))
+
+
+class StraightMaps:
+    """The maps of the straight cells of a mesh, the same for spaces of all degrees.
+
+    ``curved`` is a mask of local cells, or None if none is curved.
+    """
+
+    def __init__(self, mesh: Any, curved: BoolArray | None):
+        self._mesh, self._curved = mesh, curved
+
+    @cached_property
+    def both(self) -> dict[str, np.ndarray]:
+        """Maps (batches, 9, lanes) of gradients times the root of the volume, by precision, made at first use."""
+        topology = self._mesh.topology
+        which = straight_cells(self._curved, topology.index_map(topology.dim).size_local)
+        maps = np.zeros((-(-len(which) // LANES), 9, LANES))
+        call("map_cells", len(which), which, corners(self._mesh), maps)
+        return _in_both(maps)
 
 
 class CurvedCells:

@@ -65,39 +65,61 @@ double dot(int count, const float* x, const float* y)
   return sum;
 }
 
-/* x += P e by points; prescribed numbers are neither read nor written. */
-void prolong(int rows, const int* offsets, const int* points, const float* weights, const float* coarse_free,
-             const float* fine_free, const float* e, float* x)
+/* For each owned point the last cell that has it, and its position in that cell: dofs (cells, width). */
+void find_places(int cells, int width, const int* dofs, int owned, int* cell, uint8_t* position)
+{
+  for (int c = 0; c < cells; ++c)
+    for (int i = 0; i < width; ++i)
+    {
+      const int point = dofs[(size_t)width * c + i];
+      if (point < owned)
+      {
+        cell[point] = c;
+        position[point] = (uint8_t)i;
+      }
+    }
+}
+
+/* x += P e by points; prescribed numbers are neither read nor written. Row i of P has the weights of its position in a
+ * fine cell, offsets[position[i]] and so on; columns are positions in the coarse cell, whose points are (cells, width). */
+void prolong(int rows, const int* cell, const uint8_t* position, int width, const int* points, const int* offsets,
+             const int* columns, const float* weights, const float* coarse_free, const float* fine_free,
+             const float* e, float* x)
 {
   for (int i = 0; i < rows; ++i)
   {
+    const int* at = points + (size_t)width * cell[i];
     float s0 = 0, s1 = 0, s2 = 0;
-    for (int k = offsets[i]; k < offsets[i + 1]; ++k)
+    for (int k = offsets[position[i]]; k < offsets[position[i] + 1]; ++k)
     {
-      const int j = 3 * points[k];
+      const size_t j = 3 * (size_t)at[columns[k]];
       s0 += weights[k] * coarse_free[j] * e[j];
       s1 += weights[k] * coarse_free[j + 1] * e[j + 1];
       s2 += weights[k] * coarse_free[j + 2] * e[j + 2];
     }
-    x[3 * i] += fine_free[3 * i] * s0;
-    x[3 * i + 1] += fine_free[3 * i + 1] * s1;
-    x[3 * i + 2] += fine_free[3 * i + 2] * s2;
+    const size_t here = 3 * (size_t)i;
+    x[here] += fine_free[here] * s0;
+    x[here + 1] += fine_free[here + 1] * s1;
+    x[here + 2] += fine_free[here + 2] * s2;
   }
 }
 
 /* g = P^T r */
-void restrict_to(int rows, const int* offsets, const int* points, const float* weights, int coarse_count,
-                 const float* coarse_free, const float* fine_free, const float* r, float* g)
+void restrict_to(int rows, const int* cell, const uint8_t* position, int width, const int* points, const int* offsets,
+                 const int* columns, const float* weights, int coarse_count, const float* coarse_free,
+                 const float* fine_free, const float* r, float* g)
 {
   memset(g, 0, (size_t)coarse_count * sizeof(float));
   for (int i = 0; i < rows; ++i)
   {
-    const float r0 = fine_free[3 * i] * r[3 * i];
-    const float r1 = fine_free[3 * i + 1] * r[3 * i + 1];
-    const float r2 = fine_free[3 * i + 2] * r[3 * i + 2];
-    for (int k = offsets[i]; k < offsets[i + 1]; ++k)
+    const int* at = points + (size_t)width * cell[i];
+    const size_t here = 3 * (size_t)i;
+    const float r0 = fine_free[here] * r[here];
+    const float r1 = fine_free[here + 1] * r[here + 1];
+    const float r2 = fine_free[here + 2] * r[here + 2];
+    for (int k = offsets[position[i]]; k < offsets[position[i] + 1]; ++k)
     {
-      const int j = 3 * points[k];
+      const size_t j = 3 * (size_t)at[columns[k]];
       g[j] += weights[k] * r0;
       g[j + 1] += weights[k] * r1;
       g[j + 2] += weights[k] * r2;

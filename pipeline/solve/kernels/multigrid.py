@@ -6,8 +6,9 @@ precision does not overflow. Each rank smooths its own rows; ghosts are exchange
 """
 
 from dataclasses import dataclass, replace
+from functools import cache
 from math import isfinite
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.arrays import FloatArray, Int32Array, IntArray
+from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve.kernels.cells import Ghosts, summed
 from pipeline.solve.kernels.native import Single, call
 from pipeline.solve.kernels.product import CellOperator
@@ -43,32 +44,45 @@ class Side(Protocol):
     def prescribed(self) -> npt.NDArray[Any]: ...  # noqa: D102
 
 
-@dataclass(frozen=True)
-class Interpolation:
-    """Prolongation from the points of a coarse space to those of a fine one: sparse rows, equal for all components.
-
-    ``coarse_free`` and ``fine_free`` are 0 at prescribed dofs, else 1. Rows belong to the owned points; ``ghosts`` are
-    those of the coarse space. Both maps are collective.
-    """
+class Weights(NamedTuple):
+    """Prolongation weights of the points of a fine cell, as sparse rows: ``columns`` are points of the coarse cell."""
 
     offsets: Int32Array
-    points: Int32Array
+    columns: Int32Array
     weights: Single
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """Prolongation from the points of a coarse space to those of a fine one, equal for all components.
+
+    An owned fine point has its row of ``weights`` by its ``position`` in one of its cells, ``cell``; ``points`` (cells,
+    points of a cell) are the coarse points of all cells. ``coarse_free`` and ``fine_free`` are 0 at prescribed dofs,
+    else 1. ``ghosts`` are those of the coarse space. Both maps are collective.
+    """
+
+    cell: Int32Array
+    position: npt.NDArray[np.uint8]
+    points: Int32Array
+    weights: Weights
     coarse_free: Single
     fine_free: Single
     ghosts: Ghosts
 
     def prolong(self, coarse: Single, fine: Single) -> None:
         """Add the prolongation of ``coarse`` to ``fine``."""
-        rows = len(self.offsets) - 1, self.offsets, self.points, self.weights
-        call("prolong", *rows, self.coarse_free, self.fine_free, self.ghosts.extended(coarse, 3), fine)
+        values = self.ghosts.extended(coarse, 3)
+        call("prolong", *self._rows, self.coarse_free, self.fine_free, values, fine)
 
     def restrict(self, fine: Single, coarse: Single) -> None:
         """Write the restriction of ``fine``, the transposed prolongation, into ``coarse``."""
-        rows = len(self.offsets) - 1, self.offsets, self.points, self.weights
         found = np.empty(len(self.coarse_free), dtype=np.float32)
-        call("restrict_to", *rows, len(found), self.coarse_free, self.fine_free, fine, found)
+        call("restrict_to", *self._rows, len(found), self.coarse_free, self.fine_free, fine, found)
         coarse[:] = self.ghosts.folded(found, 3)
+
+    @property
+    def _rows(self) -> tuple[Any, ...]:
+        return len(self.cell), self.cell, self.position, self.points.shape[1], self.points, *self.weights
 
 
 class SmoothedLevel:
@@ -81,14 +95,16 @@ class SmoothedLevel:
             ArithmeticError: if a diagonal block is not positive definite.
         """
         self._operator, self._comm, rows = operator, operator.comm, operator.rows
-        self._rows, self._blocks = rows, operator.diagonal()
+        self._rows = rows
+        self._blocks: Single | None = operator.diagonal()
         self._inverse = np.empty((rows, 9), dtype=np.float32)
         singular = call("invert_diagonal", rows, self._blocks, self._inverse)
         if summed(self._comm, singular):
             raise ArithmeticError("the operator is not positive definite")
         self.size, self._held = 3 * rows, np.empty(0, dtype=np.int32)
-        self._product, self._direction, self.scratch = (np.zeros(self.size, dtype=np.float32) for _ in range(3))
+        self._product, self._direction = (np.zeros(self.size, dtype=np.float32) for _ in range(2))
         self.hold(self._held)
+        self._blocks = None  # 12 bytes per dof; most solvers do not need them again
         self._most = _RAISED * self._largest_eigenvalue(_LANCZOS_JUMPS if jumps else _LANCZOS)
 
     def refine_eigenvalues(self) -> None:
@@ -102,8 +118,10 @@ class SmoothedLevel:
         """Fix local ``dofs``, and no others, in the smoother alone from now on; the operator ignores them.
 
         Ghosts are left to their owners. The smoother neither reads nor writes fixed dofs: it then smooths for the
-        operator without these rows and columns.
+        operator without these rows and columns. Collective.
         """
+        if self._blocks is None:
+            self._blocks = self._operator.diagonal()
         self._invert(np.unique(self._held // 3), np.zeros(0, dtype=np.int32))
         held = np.union1d(self._operator.prescribed, dofs).astype(np.int32)
         self._held = held[held < self.size]
@@ -114,9 +132,16 @@ class SmoothedLevel:
         free = np.ones((len(rows), 3), dtype=bool)
         free[np.searchsorted(rows, held // 3), held % 3] = False
         both = free[:, :, None] & free[:, None, :]
+        assert self._blocks is not None
         blocks = self._blocks[rows].reshape(-1, 3, 3).astype(np.float64)
         inverse = np.linalg.inv(np.where(both, blocks, np.eye(3)))
         self._inverse[rows] = np.where(both, inverse, 0.0).reshape(-1, 9)
+
+    @property
+    def cleared(self) -> Single:
+        """A work vector of zeros, until the next call of :meth:`smooth`."""
+        self._direction[:] = 0.0
+        return self._direction
 
     def subtract_product(self, x: Single, r: Single) -> None:
         """Subtract A x from ``r``."""
@@ -228,8 +253,7 @@ class Cycle:
         level.subtract_product(level.smooth(x, r), r)
         interpolation.restrict(r, self._r[number - 1])
         self._cycle(number - 1)
-        correction = level.scratch
-        correction[:] = 0.0
+        correction = level.cleared
         interpolation.prolong(self._x[number - 1], correction)
         x += correction
         level.subtract_product(correction, r)
@@ -245,11 +269,12 @@ class Cycle:
 @stage("interpolation")
 def interpolation(coarse: Side, fine: Side) -> Interpolation:
     """Return the interpolation between two spaces; collective."""
-    offsets, points, weights = _point_weights(coarse.space, fine.space)
+    cell, position = _places(fine.space)
     return Interpolation(
-        offsets=offsets.astype(np.int32),
-        points=points,
-        weights=weights.astype(np.float32),
+        cell=cell,
+        position=position,
+        points=compat.cell_dofs(coarse.space),
+        weights=_weights(compat.degree(coarse.space), compat.degree(fine.space)),
         coarse_free=free(coarse),
         fine_free=free(fine),
         ghosts=Ghosts(coarse.space),
@@ -264,27 +289,27 @@ def free(side: Side) -> Single:
     return mask
 
 
-def _point_weights(coarse: Any, fine: Any) -> tuple[IntArray, Int32Array, FloatArray]:
-    """Return the scalar prolongation as sparse rows, one for each owned point of ``fine``.
+def _places(space: Any) -> tuple[Int32Array, npt.NDArray[np.uint8]]:
+    """Return for each owned point one of its cells, and its position among the points of this cell.
 
-    A point may belong to several cells; any of them gives the same row.
+    A point may belong to several cells; any of them gives the same weights.
     """
-    local = _on_one_cell(compat.degree(coarse), compat.degree(fine))
+    owned, dofs = space.dofmap.index_map.size_local, compat.cell_dofs(space)
+    cell, position = np.zeros(owned, dtype=np.int32), np.zeros(owned, dtype=np.uint8)
+    call("find_places", *dofs.shape, dofs, owned, cell, position)
+    return cell, position
+
+
+@cache
+def _weights(coarse: int, fine: int) -> Weights:
+    """Return the weights between two degrees."""
+    local = _on_one_cell(coarse, fine)
     few = [np.flatnonzero(np.abs(row) > _NOTHING) for row in local]
-    coarse_cells, fine_cells = (compat.cell_dofs(space) for space in (coarse, fine))
-    owned = fine.dofmap.index_map.size_local
-    place = np.zeros(owned, dtype=np.int64)
-    flat = fine_cells.reshape(-1)
-    mine = np.flatnonzero(flat < owned)
-    place[flat[mine]] = mine
-    cell, position = np.divmod(place, fine_cells.shape[1])
-    count = np.array([len(columns) for columns in few])[position]
-    offsets = np.concatenate([[0], np.cumsum(count)])
-    first = np.cumsum([0, *(len(columns) for columns in few)])[position]
-    entry = np.repeat(first - offsets[:-1], count) + np.arange(offsets[-1])
-    columns = np.concatenate(few)[entry]
-    weights = np.concatenate([row[columns] for row, columns in zip(local, few, strict=True)])[entry]
-    return offsets, coarse_cells[np.repeat(cell, count), columns], weights
+    return Weights(
+        np.cumsum([0, *map(len, few)]).astype(np.int32),
+        np.concatenate(few).astype(np.int32),
+        np.concatenate([row[columns] for row, columns in zip(local, few, strict=True)]).astype(np.float32),
+    )
 
 
 def _on_one_cell(coarse: int, fine: int) -> FloatArray:

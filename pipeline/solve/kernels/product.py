@@ -19,11 +19,10 @@ from petsc4py import PETSc
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve.kernels.cells import (
-    LANES,
     CurvedCells,
     Ghosts,
     Lanes,
-    corners,
+    StraightMaps,
     owned_cells,
     reference,
     straight_cells,
@@ -84,18 +83,24 @@ class CellStiffness:
     """The cells of this rank, laid out for products: straight ones and curved ones.
 
     ``curved`` is a mask of local cells, or None if none is curved. ``prescribed`` are the local dofs (unrolled) without
-    rows and columns in the operator. ``regions`` are the numbers of the cells' regions.
+    rows and columns in the operator. ``regions`` are the numbers of the cells' regions. ``straight`` are the maps that
+    spaces of one mesh share.
     """
 
-    def __init__(self, space: Any, curved: BoolArray | None, prescribed: Int32Array, regions: Int32Array | None = None):
+    def __init__(
+        self,
+        space: Any,
+        curved: BoolArray | None,
+        prescribed: Int32Array,
+        regions: Int32Array | None = None,
+        straight: StraightMaps | None = None,
+    ):
         """Lay out the cells; collective."""
         self.comm, self.degree, self.ghosts = space.mesh.comm, compat.degree(space), Ghosts(space)
         self.prescribed = prescribed[prescribed < 3 * self.ghosts.owned]
         dofs, self.regions = owned_cells(space), regions
         self.lanes = Lanes(straight_cells(curved, len(dofs)), dofs)
-        maps = np.zeros((self.lanes.batches, 9, LANES))
-        call("map_cells", len(self.lanes.which), self.lanes.which, corners(space.mesh), maps)
-        self.maps: dict[str, np.ndarray] = {"float64": maps, "float32": maps.astype(np.float32)}
+        self.maps = (straight or StraightMaps(space.mesh, curved)).both
         bent = np.empty(0) if curved is None else np.flatnonzero(curved[: len(dofs)])
         self.curved = CurvedCells(space, bent.astype(np.int32), dofs) if len(bent) else None
 
