@@ -27,10 +27,11 @@ from pipeline.shapes.surface import Surface
 from pipeline.stages import stage
 
 # Increase by hand when the same file gives another surface.
-_VERSION = 5
-# Largest deviation from the file's surface in one remeshing, in units of the largest elements. After each remeshing,
-# points are projected back onto the file's surface.
-DEVIATION = 0.02
+_VERSION = 6
+# Largest deviation from the file's surface in one remeshing, in units of the largest elements: for the first growth of
+# sizes, and finest and coarsest. It goes like the square of the growth, as the error of chords goes like that of sizes.
+# After each remeshing points, and the middles of edges, are projected back onto the file's surface.
+_GROWTH_OF_COARSE, FINE, _COARSE = 0.6, 0.02, 0.1
 # Elements per contact radius near a contact, and the growth of their size beyond twice that radius.
 _PER_CONTACT, _GROWTH = 3, 0.3
 # Distance around a tangle within which the file's own facets stay, in units of these facets.
@@ -45,12 +46,14 @@ _TURNED, _ROUNDS = 0.2, 10
 class Base:
     """The coarse ``sheet``, and the true ``faces`` of the body.
 
-    ``as_is`` (k, 3) are the centres of facets that are the file's own.
+    ``as_is`` (k, 3) are the centres of facets that are the file's own. Facets, before their edges are curved, deviate
+    from the faces by up to ``deviation``, in units of the largest elements.
     """
 
     sheet: Sheet
     faces: Faces
     as_is: FloatArray
+    deviation: float
 
     def is_own(self, sheet: Sheet) -> BoolArray:
         """Return a mask of the facets of a remeshed ``sheet`` that are still the file's own."""
@@ -90,13 +93,28 @@ class Kept(Protocol):
         """Return the arrays cached under ``key``; without any, call ``make`` and cache its result."""
 
 
+def deviation_of(growth: float, *, is_rough: bool) -> float:
+    """Return the deviation from the file's surface in units of the largest elements, for a ``growth`` of sizes.
+
+    It ``is_rough`` where not all middles of edges come back to the faces: in elements of degree 1, and at junctions.
+    """
+    return FINE if is_rough else min(max(_COARSE * (growth / _GROWTH_OF_COARSE) ** 2, FINE), _COARSE)
+
+
 def far_surface(
-    body: Scanned, kept: Kept | None = None, finer: float = 1, tangles: Tangles = (), contact: Near | None = None
+    body: Scanned,
+    kept: Kept | None = None,
+    finer: float = 1,
+    tangles: Tangles = (),
+    contact: Near | None = None,
+    *,
+    deviation: float = FINE,
 ) -> Base:
     """Return the surface of ``body`` away from any contact, from the cache ``kept`` if it is there.
 
-    Its elements are smaller than the body's curvature requires, by the factor ``finer``. Around the ``tangles`` of
-    earlier attempts they are the facets of the file. Near a ``contact``, if given, they are small.
+    Its elements are smaller than the body's curvature requires, by the factor ``finer``, and deviate from it by
+    ``deviation`` in units of their largest size. Around the ``tangles`` of earlier attempts they are the facets of the
+    file. Near a ``contact``, if given, they are small.
 
     Raises:
         GeometryError: if nothing, or all, of it is fixed.
@@ -107,7 +125,7 @@ def far_surface(
     parts = body.partition or Complex.around(triangles)
 
     def make() -> Arrays:
-        made = base(parts, skin, below, largest, tangles, contact)
+        made = base(parts, skin, below, largest, tangles, contact, deviation=deviation)
         sheet = made.sheet
         return {
             "points": sheet.points,
@@ -121,11 +139,13 @@ def far_surface(
     if kept is None or tangles or contact:
         found = make()
     else:
-        found = kept.arrays(f"surface {_VERSION} {parts.hash} {below!r} {largest!r} {release()}", make)
+        key = f"surface {_VERSION} {parts.hash} {below!r} {largest!r} {deviation!r} {release()}"
+        found = kept.arrays(key, make)
     return Base(
         sheet=Sheet(found["points"], found["facets"], found["group"], found["sharp"]),
         faces=Faces(skin, found["level"], body.partition),
         as_is=found["as_is"],
+        deviation=deviation,
     )
 
 
@@ -137,10 +157,12 @@ def base(
     largest: float,
     tangles: Tangles = (),
     contact: Near | None = None,
+    *,
+    deviation: float = FINE,
 ) -> Base:
     """Return the surface in elements of at most ``largest`` (m), fixed below the height ``below`` (m).
 
-    ``parts`` are the body's surface, ``skin``, and those between its regions.
+    ``parts`` are the body's surface, ``skin``, and those between its regions. ``deviation`` is that of :class:`Base`.
     Around ``tangles`` the facets stay unchanged. Near a ``contact`` elements are small.
 
     Raises:
@@ -156,7 +178,7 @@ def base(
     faces = Faces(skin, level_line(points, facets[parts.sides[:, 1] == OUTSIDE], below), parts if is_divided else None)
     sheet = Sheet(sheet.points, sheet.facets, sheet.group, sharp_edges(sheet, largest))
     as_is = _round(sheet, tangles)
-    made = Base(sheet, faces, sheet.centres[as_is])
+    made = Base(sheet, faces, sheet.centres[as_is], deviation)
     # Twice with a contact: only in the second pass points are dense enough for sizes that change fast.
     for _ in range(1 if contact is None else 2):
 
@@ -165,9 +187,9 @@ def base(
             return found if contact is None else np.minimum(found, contact.at(points))
 
         if is_divided:
-            sheet = coarsened(sheet, size, DEVIATION * largest, made.is_own)
+            sheet = coarsened(sheet, size, deviation * largest, made.is_own)
         else:
-            sheet = remesh(sheet, size(sheet.points), DEVIATION * largest, as_is=made.is_own(sheet))
+            sheet = remesh(sheet, size(sheet.points), deviation * largest, as_is=made.is_own(sheet))
         own = made.own_points(sheet)
         sheet = put_back(sheet, faces, own, sheet.points[own])
     return replace(made, sheet=sheet)

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError
-from pipeline.mesh.organ.base import DEVIATION, Base, Kept, Near, far_surface, put_back
+from pipeline.mesh.organ.base import FINE, Base, Kept, Near, deviation_of, far_surface, put_back
 from pipeline.mesh.organ.contact import Contact, FoldedError, set_in
 from pipeline.mesh.organ.faces import Faces
 from pipeline.mesh.organ.field import Field
@@ -39,9 +39,9 @@ _SAME = 1e-6
 _MOST_OFF = 0.25
 # The same at junctions, as a factor: facets meet there at all angles, and the image gives their place least exactly.
 _AT_JUNCTION = 4.0
-# Largest change of the body's volume. Chords of elements leave out half a per cent of an organ, which curved edges
-# restore; with folds as fine as elements it is more, and F is not that of the file.
-MOST_EXCESS = 0.03
+# Largest change of the volume. Chords of elements leave out half a per cent of an organ, and a third of what they
+# deviate more, which curved edges restore; with folds as fine as elements it is more, and F is not that of the file.
+MOST_EXCESS, _OF_CHORDS = 0.03, 0.3
 # The same of a region, which is smaller and rounder.
 MOST_OF_REGION = 0.1
 
@@ -58,11 +58,13 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
 
     tangles: list[TangledError] = []
     contact: Near | None = None
+    deviation = deviation_of(sizes.growth, is_rough=scene.straight or body.partition is not None)
     for finer in _FINER:
         smaller = replace(sizes, column=sizes.column / finer)
         for _ in range(_ATTEMPTS):
             try:
-                return mesh_organ(scene, smaller, far_surface(body, kept, finer, tangles, contact))
+                far = far_surface(body, kept, finer, tangles, contact, deviation=deviation)
+                return mesh_organ(scene, smaller, far)
             except TangledError as error:
                 failure: MeshError = error
                 tangles.append(error)
@@ -99,7 +101,7 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     field = Field(sizes, scene.frame, contact.edge, embedded_sizes(scene.body, sizes.growth, scene.frame.point))
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
     sheet = untangled(sheet, np.unique(sheet.facets[sheet.kind == PROBE]))
-    _check_whole(sheet, far.faces, scene.body)
+    _check_whole(sheet, far, scene.body)
     deviation = _deviation(sheet, far.faces, field)
     parts = Complex(sheet.points, sheet.facets, sheet.sides)
     filled = fill_regions(parts, scene.body, field)
@@ -118,20 +120,21 @@ def _check(scene: Scene) -> None:
         raise GeometryError(f"a {scene.body.shape} has no mirror symmetry")
 
 
-def _check_whole(sheet: Sheet, faces: Faces, body: Body) -> None:
+def _check_whole(sheet: Sheet, far: Base, body: Body) -> None:
     """Check that a surface is that of the file, and that all regions have theirs.
 
     Raises:
         MeshError: if it is open, or encloses much more or less.
     """
     edges_of(sheet.skin.facets)
-    if abs(excess := sheet.volume / body.volume - 1) > MOST_EXCESS:
+    most = MOST_EXCESS + _OF_CHORDS * (far.deviation - FINE)
+    if abs(excess := sheet.volume / body.volume - 1) > most:
         amount = "much" if excess > 0 else "little"
         raise MeshError(
             f"the remeshed surface encloses {abs(excess):.2g} times the body's volume too {amount}: "
             "smooth it, or use a smaller `fine`"
         )
-    if (walls := faces.walls) is None:
+    if (walls := far.faces.walls) is None:
         return
     made = Complex(sheet.points, sheet.facets, sheet.sides)
     for region in walls.regions:
@@ -185,7 +188,7 @@ def _to_sizes(contact: Contact, field: Field, truth: _Truth) -> Sheet:
         kept = np.column_stack([rim, np.roll(rim, -1)])
         size = field.at(sheet.points)
         as_is = truth.far.is_own(sheet) & (sheet.extents < _TOO_LARGE * size[sheet.facets].min(axis=1))
-        sheet = remesh(sheet, size, DEVIATION * min(field.sizes.largest, extent), kept, as_is)
+        sheet = remesh(sheet, size, truth.far.deviation * min(field.sizes.largest, extent), kept, as_is)
         found = np.unique(sheet.border(PROBE))
         distance, nearest = cKDTree(sheet.points[found]).query(true_rim)
         rim = found[nearest]

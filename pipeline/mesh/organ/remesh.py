@@ -16,13 +16,17 @@ from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ.sheet import Sheet, compact
 from pipeline.mesh.organ.untangle import crossing_facets
-from pipeline.shapes.triangles import half_edges
+from pipeline.shapes.triangles import doubled_normals, half_edges
 from pipeline.stages import stage
 
 _PACKAGE, _PROGRAM = "mmgpy", "bin/mmgs_O3"
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
-# No detection of ridges and no smoothing of sizes: both are given. At most 2 GB: where it does not end, it takes all.
-_OPTIONS = ("-v", "-1", "-nr", "-hgrad", "-1", "-m", "2000")
+# No detection of ridges and no smoothing of sizes: both are given.
+_OPTIONS = ("-v", "-1", "-nr", "-hgrad", "-1")
+# Memory of `mmgs` in MB. It fills what it is given, which takes longer than a small surface. A facet needs 0.2 kB, and
+# gets five times as much; if that is too little, it gets the second amount: where it does not end, it takes all.
+_LEAST_MEMORY, _MOST_MEMORY, _PER_FACET = 10, 2000, 1e-3
+_TOO_LITTLE = "unable to allocate"
 _LONGEST = 120  # seconds; usual are one to ten
 # Factor by which elements may be smaller or larger than any given size.
 _ROOM = 3.0
@@ -90,16 +94,29 @@ def _remeshed(
         source.with_suffix(".sol").write_text(_size_text(size))
         least, most = float(size.min()) / _ROOM, float(size.max()) * _ROOM
         limits = ("-hmin", repr(least), "-hmax", repr(most), "-hausd", repr(float(deviation)))
-        command = [str(program()), *_OPTIONS, *map(str, limits), "-sol", str(source.with_suffix(".sol")),
-                   str(source), str(result)]  # fmt: skip
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST, check=False)
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise MeshError(f"the remesher of surfaces: {error}") from error
-        if done.returncode or not result.exists():
-            said = " ".join((done.stderr + done.stdout).split())[-300:]
-            raise MeshError(f"the remesher of surfaces failed ({done.returncode}): {said}")
-        return _closed(_read(result.read_text()))
+        command = [str(program()), *_OPTIONS, *map(str, limits), "-sol", str(source.with_suffix(".sol"))]
+        for memory in (_memory(sheet, size), _MOST_MEMORY):
+            code, said = _run([*command, "-m", str(memory), str(source), str(result)])
+            if not code and result.exists() and _TOO_LITTLE not in said:
+                return _closed(_read(result.read_text()))
+            result.unlink(missing_ok=True)
+        raise MeshError(f"the remesher of surfaces failed ({code}): {said[-300:]}")
+
+
+def _run(command: list[str]) -> tuple[int, str]:
+    """Return the status of a command, and what it printed."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise MeshError(f"the remesher of surfaces: {error}") from error
+    return done.returncode, " ".join((done.stderr + done.stdout).split())
+
+
+def _memory(sheet: Sheet, size: FloatArray) -> int:
+    """Return the memory (MB) for remeshing to a ``size`` (n) at the points, by its facets before and after."""
+    areas = np.linalg.norm(doubled_normals(sheet.points, sheet.facets), axis=1) / 2
+    after = (areas / size[sheet.facets].min(axis=1) ** 2).sum() * 4 / np.sqrt(3)
+    return min(_LEAST_MEMORY + int(_PER_FACET * (len(sheet.facets) + after)), _MOST_MEMORY)
 
 
 def _mesh_text(sheet: Sheet, kept: IntArray, as_is: BoolArray | None) -> str:
