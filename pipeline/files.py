@@ -24,8 +24,17 @@ def cache_folder() -> Path:
     """
     if given := os.environ.get("EPSMESH_CACHE"):
         return Path(given)
-    caches = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return (caches if caches.is_absolute() else Path.home() / ".cache") / "epsmesh"
+    return _folder_of("XDG_CACHE_HOME", ".cache")
+
+
+def state_folder() -> Path:
+    """Return the folder of what is known of the user's runs, in the user's state folder ($XDG_STATE_HOME)."""
+    return _folder_of("XDG_STATE_HOME", ".local/state")
+
+
+def _folder_of(variable: str, default: str) -> Path:
+    folder = Path(os.environ.get(variable, ""))
+    return (folder if folder.is_absolute() else Path.home() / default) / "epsmesh"
 
 
 def result_files(folder: Path, name: str) -> list[Path]:

@@ -26,6 +26,7 @@ from pipeline.run.outcome import count_states, failures
 from pipeline.run.progress import Progress, Terminal
 from pipeline.run.reading import open_to_read
 from pipeline.run.record import Record
+from pipeline.run.registry import Registered
 from pipeline.run.store import Store, StoreError
 from pipeline.solve import CompilerError
 from pipeline.stages import stage
@@ -243,8 +244,10 @@ def _lacking(plan: Plan, opened: Opened, comm: MPI.Comm) -> Plan | None:
 
 
 def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None, signals: list[int]) -> None:
+    registered = Registered(opened.store.path, plan, progress or Progress()) if opened.store else None
     if not plan.solves:
-        return
+        with registered or nullcontext():
+            return
     from pipeline.run.execute import execute  # noqa: PLC0415
     from pipeline.run.mesh_cache import MeshCache  # noqa: PLC0415
 
@@ -260,12 +263,12 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
         if signals:
             raise KeyboardInterrupt
 
-    with progress or nullcontext(), outbox or nullcontext(), opened.begun as begun:
+    with progress or nullcontext(), registered or nullcontext(), outbox or nullcontext(), opened.begun as begun:
         execute(
             plan,
             comm,
             keep,
-            progress or Progress(),
+            registered or Progress(),
             known=opened.records,
             cache=cache,
             begun=begun,

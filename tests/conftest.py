@@ -22,6 +22,16 @@ def pytest_ignore_collect(collection_path):
 
 
 @pytest.fixture(scope="session", autouse=True)
+def state(tmp_path_factory):
+    """Runs of the tests are not registered among the user's."""
+    folder = tmp_path_factory.mktemp("state")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(folder))
+        patch.setitem(commands.ENVIRONMENT, "XDG_STATE_HOME", str(folder))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
 def surfaces(tmp_path_factory):
     """Surfaces that earlier code kept are not taken for those of this one."""
     folder = tmp_path_factory.mktemp("cache")

@@ -8,6 +8,7 @@ import typer
 
 from pipeline.cli.console import say, warning
 from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, refusing
+from pipeline.cli.runs import as_data, lines_of, runs_of
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     Json,
@@ -26,6 +27,7 @@ from pipeline.states import FAILED, LOST, OK, PARTIAL, PENDING, SKIPPED
 
 if TYPE_CHECKING:
     from pipeline.run.record import Record
+    from pipeline.run.registry import Run
 
 _MOST_PROBLEMS = 20  # that are listed
 
@@ -35,7 +37,7 @@ def status(
         Path | None,
         typer.Argument(
             metavar="FILE",
-            help="A study file (TOML), or a name in studies/. Without it: the case store.",
+            help="A study file (TOML), or a name in studies/. Without it: all runs, and the case store.",
             show_default=False,
         ),
     ] = None,
@@ -65,7 +67,7 @@ def status(
     yes: Annotated[bool, typer.Option("--yes", "-y", help="With --prune: remove them.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Count a study's cases by state, or check the case store.
+    """Count a study's cases by state, or show all runs and check the case store.
 
     Cases are ok, failed, skipped, lost (no contact) or pending. For a run with --without, give the same --without here.
 
@@ -73,9 +75,10 @@ def status(
     has two records, the one with a force is kept, else the later one. Shards stay unchanged; merging twice is harmless.
     Exit status 1: cases failed or are pending, or a shard's store is damaged.
 
-    Without a study, the store's records are checked and counted by status, origin and versions. Exit status 1: a
-    record cannot be read or is inconsistent. --prune --yes removes records; if the whole file is damaged, it is
-    renamed, and a new store replaces it.
+    Without a study, your runs of the last two weeks are shown, from any folder and machine with this home: done, left,
+    the case in work, the last sign of life, and whether a run was killed. Then the store's records are checked, and
+    counted by status, origin and versions. Exit status 1: a record cannot be read or is inconsistent. --prune --yes
+    removes records; if the whole file is damaged, it is renamed, and a new store replaces it.
 
     Example: epsmesh status studies/figure3.toml
 
@@ -101,7 +104,11 @@ def status(
     elif file:
         _of_study(by_name(file), output, path, check_names(without))
     else:
-        _of_store(path, prune, days, failed=failed, yes=yes)
+        runs = [] if prune else runs_of()
+        if runs and store is None and not path.exists():
+            say({"runs": as_data(runs)}, *lines_of(runs))
+        else:
+            _of_store(path, runs, prune, days, failed=failed, yes=yes)
 
 
 def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) -> None:
@@ -129,16 +136,18 @@ def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) ->
     lines += [f"  failed: {case}: {message}" for case, message in failed]
     if counts[PENDING] and (shards := len(stores_of(output, study))):
         lines.append(f"  {counted(shards, 'shard')} in {output / 'shards'} not counted: --merge merges them")
-    say({"file": str(file), **counts, "failures": [{"case": c, "message": m} for c, m in failed]}, *lines)
+    runs = runs_of(file)
+    told = {"failures": [{"case": c, "message": m} for c, m in failed], "runs": as_data(runs)}
+    say({"file": str(file), **counts, **told}, *lines, *lines_of(runs))
 
 
-def _of_store(path: Path, prune: bool, days: float | None, *, failed: bool, yes: bool) -> None:
-    """Count the records of the case store, and check each; or remove some."""
+def _of_store(path: Path, runs: "list[Run]", prune: bool, days: float | None, *, failed: bool, yes: bool) -> None:
+    """Count the records of the case store, and check each, after the ``runs``; or remove some."""
     if not path.exists():
         fail(of_file(path, "there is no case store here; `epsmesh run STUDY` makes one in its output folder"))
     check_store(path)
     if not prune:
-        _check(path)
+        _check(path, runs)
     from pipeline.run.store import Store, StoreError
 
     older_than, moved = None if days is None else 86400 * days, ""
@@ -154,8 +163,8 @@ def _of_store(path: Path, prune: bool, days: float | None, *, failed: bool, yes:
     say(found | {"done": yes, "notice": moved}, f"{path}: {_removal(found, done=yes)}")
 
 
-def _check(path: Path) -> NoReturn:
-    """Print what the store contains, and its problems; exit."""
+def _check(path: Path, runs: "list[Run]") -> NoReturn:
+    """Print the ``runs``, what the store contains, and its problems; exit."""
     from pipeline.run.reading import open_to_read
     from pipeline.run.store import StoreError
 
@@ -171,10 +180,11 @@ def _check(path: Path) -> NoReturn:
         "seconds": sum(r.time_total for r in rows if r.is_ok),
         "sound": not problems,
         "problems": problems,
+        "runs": as_data(runs),
     }
     size, work = f"{content['bytes'] / 1e6:.2g} MB", f"{content['seconds']:.0f} s of work"
     state = counted(len(problems), "problem") if problems else "sound"
-    lines = [f"{path}: {counted(len(rows), 'record')}, {size}, {work}; {state}"]
+    lines = [*lines_of(runs), f"{path}: {counted(len(rows), 'record')}, {size}, {work}; {state}"]
     for name in ("status", "origin", "versions"):
         lines += [f"  {count:6} {value}" for value, count in content[name].items()]
     lines += problems[:_MOST_PROBLEMS]
