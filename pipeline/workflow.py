@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
-from pipeline.insertion.paths import complete
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, leave_out_stored, make_plan
 from pipeline.plan.shard import Shard
 from pipeline.report.dataset import build
 from pipeline.report.publish import Results, ResultsError, publish
 from pipeline.run.begun import ENDING, Begun, fail_begun
+from pipeline.run.completion import complete
 from pipeline.run.merge import merge
 from pipeline.run.outbox import Outbox
 from pipeline.run.outcome import count_states, failures
@@ -125,7 +125,8 @@ def prepare(
 def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, show: Show | None = None) -> Outcome:
     """Carry out ``plan`` and write ``<study>.nc`` and its figure into ``output``, unless it is a shard's; collective.
 
-    What insertions need besides is planned once their states are solved; ``show`` makes the progress of each plan.
+    What insertions and interpolated paths need besides is planned once their first solves are known; ``show`` makes the
+    progress of each plan.
 
     Ctrl-C, and the request to end that mpirun or a batch system sends, end it with what is finished written.
 
@@ -166,6 +167,8 @@ def solve(study: Study, comm: MPI.Comm, store: Path, progress: Terminal | None =
     plan, opened = prepare(study, comm, store)
     with abort_on_exception(comm):
         interrupted = _compute(plan, opened, comm, progress)
+        while not interrupted and (further := _lacking(plan, opened, comm)):
+            interrupted = _compute(further, opened, comm, None)
         if opened.store is not None:
             opened.store.close()
         if interrupted:
@@ -234,7 +237,7 @@ def _compute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
 
 
 def _lacking(plan: Plan, opened: Opened, comm: MPI.Comm) -> Plan | None:
-    """Return the plan of what insertions need besides their stages, and what is not stored; collective."""
+    """Return the plan of what is needed besides ``plan`` and what is not stored; collective: see ``complete``."""
 
     def get(keys: Collection[str]) -> dict[str, Record]:
         found = opened.store.get(keys) if opened.store and not opened.is_fresh else {}

@@ -116,9 +116,12 @@ def plan(
 
 def _besides(made: "Plan", records: "dict[str, Record]", ranks: int) -> dict[str, Any]:
     """Return the most solves and seconds that paths need besides what is planned: which, is found on the way."""
-    if not made.study.is_insertion:
+    if made.study.is_insertion:
+        from pipeline.insertion.paths import possible
+    elif made.place_paths:
+        from pipeline.run.completion import possible
+    else:
         return {}
-    from pipeline.insertion.paths import possible
     from pipeline.plan.describe import summary
 
     rest = possible(made, records)

@@ -90,8 +90,8 @@ def _stores(study: "Study", given: list[Path] | None, output: Path) -> list[Path
 
 def _merged(paths: list[Path], path: Path, plan: "Plan") -> "tuple[tuple[Source, ...], dict[str, Record]]":
     """Merge into the store at ``path``; return the plan's records, with those of skipped cases."""
-    from pipeline.insertion.paths import complete
     from pipeline.run import merge as merging
+    from pipeline.run.completion import complete
     from pipeline.run.stop import skipped
     from pipeline.run.store import Store, StoreError
 

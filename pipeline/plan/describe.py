@@ -145,7 +145,7 @@ def story(plan: Plan, index: tuple[int, ...]) -> dict[str, Any]:
         "element": f"{case.element}, degree {case.mesh.degree}"
         if case.mesh.accuracy is None
         else "chosen for accuracy",
-        "steps": _steps(plan, solve, step) if solve else ["none: its record is stored"],
+        "steps": _steps(plan, solve, step) if solve else [_without_solve(plan, key)],
         "record_shared_with": [str(c) for c in same],
         "mesh_shared_with": [s.label for s in step.solves if s is not solve] if step else [],
         "reference_key": plan.reference_keys[position] if plan.reference_keys else "",
@@ -188,6 +188,14 @@ def _steps(plan: Plan, solve: Solve, step: MeshStep | None) -> list[str]:
     part = {0: "whole body", 1: "half of the body", 2: "quarter of the body"}[len(solve.mirrors)]
     shared = f", shared by {len(step.solves)} solves" if step and len(step.solves) > 1 else ""
     return [f"mesh of the {part}{shared}", *_solving(plan, solve, step), "error bar"]
+
+
+def _without_solve(plan: Plan, key: str) -> str:
+    """Return why a case is not solved."""
+    along = {solve.key for path in plan.place_paths for solve in path.solves}
+    if key in along - plan.stored:
+        return "none so far: F is interpolated along the path, if its error bar is small enough there"
+    return "none: its record is stored"
 
 
 def _solving(plan: Plan, solve: Solve, step: MeshStep | None) -> list[str]:

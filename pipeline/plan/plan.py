@@ -95,10 +95,11 @@ def first_attempts(plan: Plan) -> Plan:
 def ask_for_exact(plan: Plan) -> Plan:
     """Add F_exact of every scene, once for all meshes, Young's moduli and depths, which F is proportional to.
 
-    It is left out at large displacements, and beside `mesh.accuracy` unless the study has `exact = true`.
+    It is left out at large displacements, beside `mesh.accuracy` unless the study has `exact = true`, and where places
+    of a path are interpolated.
     """
     plan = first_attempts(plan)
-    if not plan.study.solve.exact:
+    if not plan.study.solve.exact or plan.place_paths:
         return plan
     is_asked = "exact" in plan.study.solve.model_fields_set
     accuracy = min([EXACT, *(solve.goal * _EXACT_SHARE for solve in plan.solves if solve.goal)])

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pipeline.plan import estimate
 from pipeline.plan.equivalent_places import EquivalentPlace, Matrix, from_place, image_key, moved_key
 from pipeline.plan.far_fields import far_regions
+from pipeline.plan.interpolation import interpolate_path
 from pipeline.plan.key import case_key, digest
 from pipeline.plan.proportional_depths import ProportionalDepth, depth_key, proportional_to_depth
 from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_steps
@@ -235,6 +236,7 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
     "reuse": reuse_solutions,
     "reduced": use_reduced_basis,
     "condensed": condense_sweeps,
+    "path": interpolate_path,
 }
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from pipeline.plan.cost import CostModel
 from pipeline.plan.equivalent_places import EquivalentPlace
+from pipeline.plan.place_path import PlacePath
 from pipeline.plan.proportional_depths import ProportionalDepth
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.study.case import Case, Scale
@@ -45,6 +46,7 @@ class Plan:
         unasked: the solves for F_exact that are left out because `solve.exact` is off by default.
         equivalent: by index of a case, the equivalent place that is solved instead.
         proportional: by index of a case, the proportional depth that is solved instead.
+        place_paths: paths of which some places are solved, and F at the others is interpolated.
         ends: the plans of the study at the ends of the bars of its material and image; their solves are among these.
     """
 
@@ -63,6 +65,7 @@ class Plan:
     unasked: tuple[Solve, ...] = ()
     equivalent: Mapping[tuple[int, ...], EquivalentPlace] = field(default_factory=dict)
     proportional: Mapping[tuple[int, ...], ProportionalDepth] = field(default_factory=dict)
+    place_paths: tuple[PlacePath, ...] = ()
     ends: tuple["EndPlans", ...] = ()
 
     def scale_of(self, case: Case) -> Scale:

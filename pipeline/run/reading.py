@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, leave_out_stored, make_plan
+from pipeline.run.completion import complete
 from pipeline.run.record import Record
 from pipeline.run.store import PATIENCE, SCHEMA, DamagedStoreError, Records, Row, StoreError, damaged, guard, reason
 from pipeline.study.sweep import Study
@@ -44,10 +45,7 @@ def known_of(path: Path, plan: Plan) -> tuple[dict[str, Record], CostModel]:
         return {}, CostModel()
     with open_to_read(path) as store:
         records = store.get(plan.all_keys)
-        if plan.study.is_insertion:
-            from pipeline.insertion.paths import complete  # noqa: PLC0415 (it loads scipy)
-
-            complete(plan, records, store.get)
+        complete(plan, records, store.get)
         return records, store.cost_model()
 
 

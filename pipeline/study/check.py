@@ -35,7 +35,7 @@ from pipeline.study.insertion_stages import has_insertion
 from pipeline.study.place import place_error
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
-from pipeline.study.schema import Material, Mesh, Solving
+from pipeline.study.schema import Material, Mesh, Planning, Solving
 from pipeline.study.slit import check_slit, check_slit_in
 from pipeline.study.stages import check_history
 
@@ -75,6 +75,9 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     problems.each(check_locking, body=bodies, material=materials, mesh=meshes)
     check_reference(meshes, axes, problems)
     _check_times(probes, axes, problems)
+    for planning in cast(Sequence[Planning], sections["plan"]):
+        if planning.path_error is not None and way is None:
+            problems.error("plan.path_error", planning.path_error, "is for places along [probe.path]: omit it")
     check_same_path(probes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
         if solve.exact and "exact" in solve.model_fields_set and has_insertion(probes):

@@ -248,6 +248,16 @@ class Planning(Section):
         Field(ge=1e-10, le=1e-2),
         Words("Largest relative error of F that a reduced basis over many Poisson's ratios may add.", "1e-6"),
     ] = 1e-6
+    path_error: Annotated[
+        Share | None,
+        Field(ge=1e-4, le=0.1),
+        Words(
+            "Largest relative error of F that interpolation along [probe.path] may add. Places are solved until the "
+            "error bar of the interpolation is below it at all others.",
+            '"1 %"',
+            default="none: every place is solved",
+        ),
+    ] = None
     stop_near_exact: Annotated[
         Share | None,
         Field(gt=0, le=0.5),

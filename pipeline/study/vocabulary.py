@@ -12,6 +12,7 @@ REDUCTIONS = (
     "reuse",
     "reduced",
     "condensed",
+    "path",
     "stored",
     "all",
 )

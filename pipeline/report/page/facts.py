@@ -36,6 +36,7 @@ _ORIGINS = {
     "scaled": "F of another case, in proportion to Young's modulus and depth",
     "image": "F of another place, of which this one is the image",
     "reduced": "from a reduced basis in Poisson's ratio, with a bound on the error",
+    "interpolated": "interpolated between solved places of the path, with an error bar",
     "stored": "read back from the case store",
 }
 

@@ -59,6 +59,15 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "large displacements": "F is not proportional to the depth",
         "outputs": "outputs of a function need the solution of each depth",
     },
+    "path": {
+        "history": "a history needs the solution of each place",
+        "insertion": "an insertion needs the states of each place",
+        "needle that cuts": "an insertion needs the states of each place",
+        "six motions": "the 6 × 6 stiffness needs the solution of each place",
+        "slit": "a slit has results besides F",
+        "loads": "loads have results besides F",
+        "outputs": "outputs need the solution of each place",
+    },
     "F_exact": {
         "time steps": "F_exact is static, and these forces are no multiples of static ones",
         "friction": "with friction, F_exact would not be more accurate than F on a fine mesh",
