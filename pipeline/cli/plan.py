@@ -116,13 +116,10 @@ def plan(
 
 def _besides(made: "Plan", records: "dict[str, Record]", ranks: int) -> dict[str, Any]:
     """Return the most solves and seconds that paths need besides what is planned: which, is found on the way."""
-    if made.study.is_insertion:
-        from pipeline.insertion.paths import possible
-    elif made.place_paths:
-        from pipeline.run.completion import possible
-    else:
+    if not (made.study.is_insertion or made.place_paths):
         return {}
     from pipeline.plan.describe import summary
+    from pipeline.run.completion import possible
 
     rest = possible(made, records)
     found = summary(rest, ranks) if rest else {"solves": 0}

@@ -48,7 +48,11 @@ def lacking(plan: Plan, records: Mapping[str, Record]) -> Plan | None:
 
 
 def possible(plan: Plan, records: Mapping[str, Record]) -> Plan | None:
-    """Return the plan of all places along paths that may have to be solved besides those of ``plan``; None if none."""
+    """Return the plan of all that may have to be solved besides ``plan``; None if that is nothing, or unknown."""
+    if plan.study.is_insertion:
+        from pipeline.insertion.paths import possible as possible_states  # noqa: PLC0415 (it loads scipy)
+
+        return possible_states(plan, records)
     planned = {solve.key for solve in plan.solves}
     if not planned and lacking(plan, records) is None:
         return None
