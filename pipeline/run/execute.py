@@ -11,7 +11,7 @@ from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.run.begun import Begun
 from pipeline.run.compile import prepare
 from pipeline.run.groups import run_phase
-from pipeline.run.memory import FreeMemory, keep_imports
+from pipeline.run.memory import FreeMemory, keep_imports, return_large_arrays
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
@@ -41,6 +41,7 @@ def execute(
     on every rank; each has a record with its message.
     """
     keep_imports()
+    return_large_arrays()
     records, delayed = comm.bcast((dict(known or {}), frozenset(last)))
     desk = _Desk(plan, keep if comm.rank == 0 else None, progress, records)
 

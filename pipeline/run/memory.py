@@ -14,6 +14,10 @@ from pipeline.stages import stage
 
 _C = ctypes.CDLL(None)
 _kept: list[bool] = []
+# M_MMAP_MAX and M_MMAP_THRESHOLD of glibc, and their values: the number of large arrays, and their least bytes.
+# Small arrays stay with the process, which is faster.
+_MOST_MAPPED, _MAPPED_FROM = -4, -3
+_MAPPED_ARRAYS, _LARGE = 65_536, 2**25
 # Garbage collections take at most one part in so many of the time, if waiting does no harm.
 _RARELY = 50
 _next: list[float] = [0.0]  # time (s) of the next one
@@ -25,6 +29,16 @@ def keep_imports() -> None:
         gc.collect()
         gc.freeze()
         _kept.append(True)  # gc.get_freeze_count() takes as long as a collection
+
+
+def return_large_arrays() -> None:
+    """Let the C library return freed memory of large arrays to the system at once.
+
+    libpsm2, which Open MPI loads, switches this off for the whole process: a case then keeps the peak of every stage.
+    """
+    with suppress(AttributeError):  # other C libraries than glibc
+        _C.mallopt(_MOST_MAPPED, _MAPPED_ARRAYS)
+        _C.mallopt(_MAPPED_FROM, _LARGE)
 
 
 @stage("garbage")

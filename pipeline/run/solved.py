@@ -19,7 +19,7 @@ from pipeline.plan.symmetry import model_planes
 from pipeline.run.attempts import Attempts
 from pipeline.run.compile import prepare
 from pipeline.run.measure import record_of
-from pipeline.run.memory import FreeMemory
+from pipeline.run.memory import FreeMemory, return_large_arrays
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import cached_arrays, on_first_rank
 from pipeline.run.problem import (
@@ -97,6 +97,7 @@ def solve_fields(
         MeshError: if the first mesh fails.
         SolveError: if the first solve fails.
     """
+    return_large_arrays()
     run, solve = solve, replace(solve, axisymmetric=False)
     with threadpool_limits(limits=1, user_api="blas"):
         attempts = Attempts()

@@ -32,15 +32,24 @@ class Preconditioner(Protocol):
     def apply(self, pc: Any, residual: PETSc.Vec, result: PETSc.Vec) -> None: ...  # noqa: D102
 
 
+class Unknown(Protocol):
+    """The solution that is improved. Methods are collective."""
+
+    def residual(self, result: PETSc.Vec, work: PETSc.Vec) -> None:
+        """Write the residual into ``result``; ``work`` is overwritten."""
+
+    def add(self, correction: PETSc.Vec) -> None:
+        """Add a correction."""
+
+
 def conjugate_residuals(
     matrix: PETSc.Mat,
     preconditioner: Preconditioner,
-    rhs: PETSc.Vec,
-    solution: PETSc.Vec,
+    unknown: Unknown,
     has_converged: Callable[[int, float], bool],
     restart: int,
 ) -> int:
-    """Improve ``solution`` until ``has_converged``, from the iterations and the norm of the residual; collective.
+    """Improve ``unknown`` until ``has_converged``, from the iterations and the norm of the residual; collective.
 
     Return the iterations. After each ``restart`` of them the stored vectors are dropped.
 
@@ -48,27 +57,23 @@ def conjugate_residuals(
         SolveError: if the preconditioned residual adds nothing to the space.
     """
     with ExitStack() as stack:
-        residual, step, image = (keep(stack, rhs.duplicate()) for _ in range(3))
-        space, iterations = _residual(matrix, rhs, solution, residual), 0
-        norm = residual.norm()
+        residual, step, image = (keep(stack, matrix.createVecLeft()) for _ in range(3))
+        unknown.residual(residual, step)
+        space, iterations, norm = _Space(matrix.comm.tompi4py()), 0, residual.norm()
         while not has_converged(iterations, norm):
             if len(space) == restart:
-                space.add_solution(solution.array)
-                space = _residual(matrix, rhs, solution, residual)
+                space.write_solution(step.array)
+                unknown.add(step)
+                unknown.residual(residual, step)
+                space = _Space(matrix.comm.tompi4py())
             preconditioner.apply(None, residual, step)
             space.store(step.array)
             matrix.mult(step, image)
             space.reduce(residual.array, image.array)
             norm, iterations = residual.norm(), iterations + 1
-        space.add_solution(solution.array)
+        space.write_solution(step.array)
+        unknown.add(step)
     return iterations
-
-
-def _residual(matrix: PETSc.Mat, rhs: PETSc.Vec, solution: PETSc.Vec, residual: PETSc.Vec) -> "_Space":
-    """Write the residual of ``solution``, and return an empty space; collective."""
-    matrix.mult(solution, residual)
-    residual.aypx(-1.0, rhs)
-    return _Space(rhs.comm.tompi4py())
 
 
 class _Space:
@@ -122,16 +127,15 @@ class _Space:
         self._columns.append(np.append(products, length))
         self._shares.append(float(share[0]))
 
-    def add_solution(self, solution: FloatArray) -> None:
-        """Add to ``solution`` the combination of steps that belongs to the reduction of the residual."""
+    def write_solution(self, result: FloatArray) -> None:
+        """Write into ``result`` the combination of steps that belongs to the reduction of the residual."""
         size = len(self)
-        if not size:
-            return
         triangle = np.zeros((size, size))
         for number, column in enumerate(self._columns):
             triangle[: number + 1, number] = column
         weights = np.linalg.solve(triangle, np.array(self._shares))
-        call("combine", len(solution), size, _addresses(self._steps), weights, solution)
+        result[:] = 0.0
+        call("combine", len(result), size, _addresses(self._steps), weights, result)
 
 
 def _addresses(vectors: list[Single]) -> np.ndarray:

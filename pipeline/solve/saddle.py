@@ -13,11 +13,14 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from math import isfinite
 
+import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
+from pipeline.solve.compiled import global_sum
 from pipeline.solve.conjugate_residuals import conjugate_residuals
+from pipeline.solve.kernels.multigrid import Cycle
 from pipeline.solve.krylov import check_converged, explained, factorised, keep, solver_of
 from pipeline.solve.linear_solver import Level, LinearSolver
 from pipeline.stages import stage
@@ -90,20 +93,14 @@ class SaddleSolver:
         iterations, self.first_energies = 0, []
         with ExitStack() as stack, explained():
             matrix = self._matrix(c, stack)
-            b, x = (keep(stack, vector) for vector in matrix.createVecs())
             block = None if self._direct else self._preconditioner(c, stack)
-            factors = self._factors(matrix, stack) if self._direct else PETSc.KSP()
+            factors = self._factors(matrix, stack) if block is None else PETSc.KSP()
             for load, unknown in zip(rhs, unknowns, strict=True):
-                split = load[0].getLocalSize()
-                for whole, (first, second) in ((b, load), (x, unknown)):
-                    whole.array[:split], whole.array[split:] = first.array, second.array
                 if block is None:
-                    factors.solve(b, x)
-                    iterations += check_converged(factors)
+                    iterations += _solve_directly(factors, load, unknown)
                 else:
-                    test = _EnergyTest(block, tolerance, target)
-                    iterations += conjugate_residuals(matrix, block, b, x, test, _RESTART)
-                unknown[0].array[:], unknown[1].array[:] = x.array[:split], x.array[split:]
+                    test, pair = _EnergyTest(block, tolerance, target), _Unknown(matrix, load, unknown)
+                    iterations += conjugate_residuals(matrix, block, pair, test, _RESTART)
                 self.first_energies.append(0.0 if block is None else block.first_energy)
         return iterations
 
@@ -142,7 +139,8 @@ class SaddleSolver:
 
     def _preconditioner(self, c: Weight, stack: ExitStack) -> "_BlockTriangular":
         saddle = self._saddle
-        block = _BlockTriangular(self._multigrid, saddle.coupling, self._mass, c + _SCHUR / saddle.stiffness)
+        assert self._multigrid.cycle is not None  # displacements have degree 2 or more
+        block = _BlockTriangular(self._multigrid.cycle, saddle.coupling, self._mass, c + _SCHUR / saddle.stiffness)
         stack.callback(block.close)
         return block
 
@@ -161,33 +159,35 @@ class _BlockTriangular:
     energy, and the sum of magnitudes a norm of the error that does not depend on units.
     """
 
-    def __init__(self, multigrid: LinearSolver, coupling: PETSc.Mat, mass: PETSc.KSP, schur: Weight):
-        self._multigrid, self._coupling, self._mass, self._schur = multigrid, coupling, mass, schur
-        right, left = (coupling.createVecRight, coupling.createVecLeft)
-        self._vectors = [right(), right(), left(), left()]
+    def __init__(self, cycle: Cycle, coupling: PETSc.Mat, mass: PETSc.KSP, schur: Weight):
+        self._cycle, self._coupling, self._mass, self._schur = cycle, coupling, mass, schur
+        self._rest = coupling.createVecLeft()
         self.energy = self.first_energy = 0.0
 
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Apply the preconditioner; PETSc calls this."""
-        r_u, z_u, rest, z_p = self._vectors
-        split = r_u.getLocalSize()
-        r_u.array[:] = residual.getArray(readonly=True)[:split]
-        self._multigrid.precondition(r_u, z_u)
-        self._coupling.mult(z_u, rest)
-        rest.array[:] = residual.getArray(readonly=True)[split:] - rest.array
-        self._mass.solve(rest, z_p)
-        z_p.array[:] *= -1 / self._schur
-        self.energy = abs(r_u.dot(z_u)) + abs(rest.dot(z_p))
-        result.array[:split], result.array[split:] = z_u.array, z_p.array
+        rest, given, written = self._rest, residual.array_r, result.array_w
+        split = len(given) - len(rest.array_r)
+        self._cycle.correct(given[:split], written[:split])
+        with ExitStack() as stack:  # vectors without memory of their own
+            z_u, z_p = (
+                keep(stack, PETSc.Vec().createWithArray(part, comm=rest.comm))
+                for part in (written[:split], written[split:])
+            )
+            self._coupling.mult(z_u, rest)
+            rest.array[:] = given[split:] - rest.array
+            self._mass.solve(rest, z_p)
+        written[split:] *= -1 / self._schur
+        parts = np.array([given[:split] @ written[:split], rest.array @ written[split:]])
+        self.energy = float(np.abs(global_sum(rest.comm.tompi4py(), parts)).sum())
 
     def refine_eigenvalues(self) -> bool:
         """Return False: GCR needs no definite preconditioner."""
         return False
 
     def close(self) -> None:
-        """Free the work vectors."""
-        while self._vectors:
-            self._vectors.pop().destroy()
+        """Free the work vector."""
+        self._rest.destroy()
 
 
 class _Factors:
@@ -203,6 +203,44 @@ class _Factors:
     def refine_eigenvalues(self) -> bool:
         """Return False: factors are exact."""
         return False
+
+
+class _Unknown:
+    """A displacement and a pressure, with the right-hand side of both."""
+
+    def __init__(self, matrix: PETSc.Mat, load: Pair, unknown: Pair):
+        self._matrix, self._load, self._unknown = matrix, load, unknown
+
+    def residual(self, result: PETSc.Vec, work: PETSc.Vec) -> None:
+        """Write the residual of both equations into ``result``."""
+        _join(self._unknown, work)
+        self._matrix.mult(work, result)
+        _join(self._load, work)
+        result.aypx(-1.0, work)
+
+    def add(self, correction: PETSc.Vec) -> None:
+        """Add a correction of both."""
+        u, p = self._unknown
+        split = u.getLocalSize()
+        u.array[:] += correction.array_r[:split]
+        p.array[:] += correction.array_r[split:]
+
+
+def _join(pair: Pair, whole: PETSc.Vec) -> None:
+    split = pair[0].getLocalSize()
+    whole.array[:split], whole.array[split:] = pair[0].array_r, pair[1].array_r
+
+
+def _solve_directly(factors: PETSc.KSP, load: Pair, unknown: Pair) -> int:
+    """Write the solution for a ``load`` into ``unknown``, and return 1; collective."""
+    matrix, _ = factors.getOperators()
+    with ExitStack() as stack:
+        b, x = (keep(stack, vector) for vector in matrix.createVecs())
+        _join(load, b)
+        factors.solve(b, x)
+        split = unknown[0].getLocalSize()
+        unknown[0].array[:], unknown[1].array[:] = x.array_r[:split], x.array_r[split:]
+    return check_converged(factors)
 
 
 class _EnergyTest:

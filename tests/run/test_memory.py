@@ -1,13 +1,15 @@
 """How much memory there is: the tightest limit counts, and a case that needs more is refused, not killed."""
 
+import platform
 import resource
 from math import inf
 
+import numpy as np
 import psutil
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.memory import FreeMemory
+from pipeline.run.memory import FreeMemory, return_large_arrays
 from pipeline.run.room import container_room, process_room
 from tests.cases import solve
 
@@ -93,3 +95,14 @@ def test_a_case_that_needs_more_than_granted_fails_with_its_reason(outside_slurm
     (record,) = solve().values()
     assert record.status == "failed"
     assert "GB of memory" in record.message
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries have no such setting")
+def test_freed_arrays_go_back_to_the_system():
+    """Although a library that MPI loads keeps the memory of every array with the process."""
+    return_large_arrays()
+    before = psutil.Process().memory_info().rss
+    array = np.ones(2**24)  # 128 MiB
+    assert psutil.Process().memory_info().rss > before + array.nbytes / 2
+    del array
+    assert psutil.Process().memory_info().rss < before + 2**26

@@ -230,12 +230,16 @@ class Cycle:
             level.refine_eigenvalues()
 
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Write the correction of one cycle for ``residual`` into ``result``; collective."""
-        top, given = len(self._levels), residual.array_r
+        """Write the correction of one cycle for ``residual`` into ``result``; PETSc calls this."""
+        self.correct(residual.array_r, result.array_w)
+
+    def correct(self, given: FloatArray, result: FloatArray) -> None:
+        """Write the correction of one cycle for the residual ``given``, owned dofs, into ``result``; collective."""
+        top = len(self._levels)
         scale = summed(self._comm, call("largest", len(given), given), MPI.MAX)
         call("to_single", len(given), 1 / scale if scale else 0.0, given, self._r[top])
         self._cycle(top)
-        call("to_double", len(self._x[top]), scale, self._x[top], result.array_w)
+        call("to_double", len(self._x[top]), scale, self._x[top], result)
 
     def destroy(self, _: PETSc.PC) -> None:
         """Free the vectors of the coarsest level."""
