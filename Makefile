@@ -96,6 +96,7 @@ benchmark: setup ## make every table of docs/performance.md in results/ (on an i
 	$(PYTHON) -m benchmarks.ranks
 	$(PYTHON) -m benchmarks.communication
 	$(PYTHON) -m benchmarks.peers
+	$(PYTHON) -m benchmarks.asked
 	$(PYTHON) -m benchmarks.plain_loop --sample 24
 	$(PYTHON) -m benchmarks.shares
 	$(PYTHON) -m benchmarks.products

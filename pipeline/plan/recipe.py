@@ -70,18 +70,48 @@ _ROUND = (
     Recipe(2, 0.07, 0.25, 6.0e-4),
     *LADDER[5:],
 )
-# Unilateral contact uses degree 2. For tools whose contact width is found, the pressure below them needs small elements
-# as much as the edge of contact.
+# Unilateral contact uses degree 2.
 _FLAT = (*LADDER[:4], Recipe(2, 0.1, 0.4, 9.0e-4), Recipe(2, 0.05, 0.35, 4.5e-4), Recipe(2, 0.025, 0.3, 2.3e-4))
-_FOUND = (
-    Recipe(2, 0.4, 0.6, 1.1e-2),
-    Recipe(2, 0.3, 0.45, 5.5e-3),
-    Recipe(2, 0.25, 0.35, 3.1e-3),
-    Recipe(2, 0.2, 0.3, 1.7e-3),
-    Recipe(2, 0.15, 0.25, 9.0e-4),
-    Recipe(2, 0.12, 0.2, 4.3e-4),
-    Recipe(2, 0.08, 0.17, 2.8e-4),
-    Recipe(2, 0.06, 0.14, 1.8e-4),
+# For tools whose contact width is found, the pressure below them needs small elements as much as the edge of contact.
+# Mixed elements gain less from small ones.
+_FOUND = {
+    "displacement": (
+        Recipe(2, 0.35, 0.525, 7.0e-3),
+        Recipe(2, 0.3, 0.45, 5.0e-3),
+        Recipe(2, 0.25, 0.35, 2.7e-3),
+        Recipe(2, 0.22, 0.32, 2.0e-3),
+        Recipe(2, 0.2, 0.3, 1.6e-3),
+        Recipe(2, 0.17, 0.27, 1.1e-3),
+        Recipe(2, 0.15, 0.25, 7.2e-4),
+        Recipe(2, 0.135, 0.225, 5.2e-4),
+        Recipe(2, 0.12, 0.2, 3.7e-4),
+        Recipe(2, 0.1, 0.185, 2.3e-4),
+        Recipe(2, 0.08, 0.17, 1.4e-4),
+        Recipe(2, 0.06, 0.14, 9.0e-5),
+    ),
+    "mixed": (
+        Recipe(2, 0.35, 0.525, 8.9e-3),
+        Recipe(2, 0.3, 0.45, 6.8e-3),
+        Recipe(2, 0.25, 0.35, 3.9e-3),
+        Recipe(2, 0.22, 0.32, 3.0e-3),
+        Recipe(2, 0.2, 0.3, 2.45e-3),
+        Recipe(2, 0.17, 0.27, 1.8e-3),
+        Recipe(2, 0.15, 0.25, 1.35e-3),
+        Recipe(2, 0.12, 0.2, 8.5e-4),
+        Recipe(2, 0.08, 0.17, 5.0e-4),
+        Recipe(2, 0.06, 0.14, 3.4e-4),
+    ),
+}
+# The same at large displacements, where F is not extrapolated.
+_FOUND_LARGE = (
+    Recipe(2, 0.4, 0.6, 3.3e-2),
+    Recipe(2, 0.3, 0.45, 1.65e-2),
+    Recipe(2, 0.25, 0.35, 9.3e-3),
+    Recipe(2, 0.2, 0.3, 5.1e-3),
+    Recipe(2, 0.15, 0.25, 2.7e-3),
+    Recipe(2, 0.12, 0.2, 1.3e-3),
+    Recipe(2, 0.08, 0.17, 8.4e-4),
+    Recipe(2, 0.06, 0.14, 5.4e-4),
 )
 # At large displacements, elements of degree 3, and very small ones, fold at the probe's edge.
 _LARGE = (
@@ -94,8 +124,6 @@ _LARGE = (
 # Error bars at large displacements, in units of those of linear elasticity: at small depths, and their growth with the
 # depth in units of the half width.
 _OF_LARGE, _BY_DEPTH = 1.8, 6.0
-# The same for found contact, at any depth: F is not extrapolated there.
-_FOUND_LARGE = 3.0
 # Error bars grow by 1 + 10 a/H with the probe's half width a over the body's thickness H, measured up to _THINNEST.
 _THICKNESS, _THINNEST = 10.0, 0.15
 # Error bars of mixed elements, in units of those of displacement elements at ν = 0.3, by degree: if the probe's edge
@@ -140,7 +168,7 @@ def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
 def _ladder(case: Case) -> tuple[Recipe, ...]:
     """Return the recipes for a probe, cheapest first."""
     if isinstance(case.probe, Indenter):
-        return _FOUND
+        return _FOUND_LARGE if case.material.is_large else _FOUND[case.element]
     if case.material.is_large:
         return _LARGE
     if case.probe.is_unilateral:
@@ -170,15 +198,16 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
     is_even = case.is_plain and not case.probe.is_unilateral
     if is_even:
         shape *= _near(case) * (_SEVERAL if case.element == "mixed" and case.movements > 1 else 1.0)
-    if case.material.is_large:
-        deeper = 0.0 if case.probe.is_unilateral else _BY_DEPTH * case.probe.depth / half_width_of(case)
-        shape *= (_FOUND_LARGE if case.probe.is_unilateral else _OF_LARGE) * (1 + deeper)
-    thickness = 1 + _THICKNESS * min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
+    if case.material.is_large and not case.probe.is_unilateral:
+        shape *= _OF_LARGE * (1 + _BY_DEPTH * case.probe.depth / half_width_of(case))
+    locking = 1.0 if case.element == "mixed" else ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
+    if isinstance(case.probe, Indenter) and not case.material.is_large:  # elements in a thin body are small anyway
+        return [float(recipe.bar * shape * locking) for recipe in ladder]
+    shape *= 1 + _THICKNESS * min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
     if case.element == "mixed":
         of_degree = _MIXED_EVEN if is_even else _MIXED
-        return [recipe.bar * shape * thickness * of_degree[recipe.degree] for recipe in ladder]
-    locking = ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
-    return [float(recipe.bar * shape * thickness * locking) for recipe in ladder]
+        return [recipe.bar * shape * of_degree[recipe.degree] for recipe in ladder]
+    return [float(recipe.bar * shape * locking) for recipe in ladder]
 
 
 def _near(case: Case) -> float:

@@ -15,6 +15,7 @@ from pipeline.shapes.body import Layered
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.indenter import Indenter
+from pipeline.shapes.probes.sphere import Sphere
 from pipeline.solve.estimate import is_graded
 from pipeline.solve.history import History
 from pipeline.solve.response import Contact
@@ -52,6 +53,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
             graded=is_graded_to_contact(case),
             elsewhere=not case.is_plain,
             large=case.material.is_large,
+            ball=isinstance(case.probe, Sphere),
         )
     # The solution is in the frame where the probe presses along -z; the record is in the body's coordinates.
     turn, force, bar = case.frame.turn, solution.reaction[2], solution.reaction_bars[2]
@@ -156,12 +158,13 @@ def is_graded_to_contact(case: Case) -> bool:
     """Return whether the mesh of ``case`` is graded to the expected edge of contact."""
     rim = case.mesh.rim_size(case.probe.half_width) / edge_width_of(case)
     # The coarsest recipe equals the limit of `is_graded`: rounding must not exceed it.
-    rim *= 1 - _ROUNDING if isinstance(case.probe, Indenter) else 1.0
+    found = isinstance(case.probe, Indenter)
+    rim *= 1 - _ROUNDING if found else 1.0
     if case.probe.is_unilateral:  # small elements surround the axis, so contact must be there
         *beside, _ = first_touch(case.body, case.probe, case.frame)
         if hypot(*beside) > _BESIDE * half_width_of(case):
             return False
-    return is_graded(rim, case.mesh.growth)
+    return is_graded(rim, case.mesh.growth, found=found)
 
 
 def _front_length(case: Case) -> float:

@@ -63,8 +63,8 @@ class Indenter(Probe):
     has_singular_edge: ClassVar[bool] = False
 
     PROPORTIONAL_TO = ()
-    # Without a singularity, on meshes graded to the edge of contact, the error is at most a disc's.
-    EXPECTED_ERROR = 1.0
+    # Error bars in units of a ball's, whose limit is known best: pipeline/solve/estimate.py.
+    EXPECTED_ERROR = 1.4
     NOT_DRAWN: ClassVar[tuple[str, ...]] = ("action", "contact", "friction", "motion")
     SWEPT = ("depth_range",)
 

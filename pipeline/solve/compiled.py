@@ -11,6 +11,7 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -181,12 +182,18 @@ def _code(comm: MPI.Comm, expression: Any, signature: str) -> compat.Code:
 
 def form_cache() -> Path:
     """Return the cache folder of compiled forms; one for each processor type, since the code is built for it."""
+    return cache_folder() / "forms" / _processor()
+
+
+@cache
+def _processor() -> str:
+    """Return a name of the processor's type."""
     try:
         text = Path("/proc/cpuinfo").read_text()
         features = next(line for line in text.splitlines() if line.startswith(("flags", "Features")))
     except (OSError, StopIteration):
         features = ""
-    return cache_folder() / "forms" / hashlib.sha256(features.encode()).hexdigest()[:12]
+    return hashlib.sha256(features.encode()).hexdigest()[:12]
 
 
 @contextmanager

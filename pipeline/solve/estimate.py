@@ -48,21 +48,32 @@ _LEAST_LARGE = -0.95
 # Energy release of a slit's front: the limit is that of degree p + 1, less (centre ± spread) θ times its last change.
 _RELEASE = (0.45, 0.9)
 # Unilateral contact: |F_2 - F_exact| in units of the decrement of degree 3, of N, and of the squared bar on the area.
-# Then the spread, in bars, once F_2 is corrected by half a bar: on meshes graded to the expected edge of contact, for
-# plain bodies and for others, and on other meshes.
 _FOUND, _FOUND_UNSEEN, _FOUND_OF_AREA = 1.6, 1.4, 1.5
-_FOUND_SPREAD, _FOUND_SPREAD_ELSEWHERE, _FOUND_SPREAD_COARSE = 0.4, 0.5, 0.8
+# The limit of F is F_p - (centre ± spread) bars on meshes graded to the expected edge of contact, by element and
+# degree. With degree 3 the decrement says little, since most of the error is that of the area. Then the values for
+# balls with degree 2, for meshes that are not graded, and for contact that the tool's own edge ends; the factor on the
+# spread for bodies that are not plain.
+_FOUND_LIMITS = {
+    ("displacement", 2): (0.25, 0.45),
+    ("mixed", 2): (0.42, 0.42),
+    ("displacement", 3): (0.0, 0.5),
+    ("mixed", 3): (0.2, 0.6),
+}
+_FOUND_BALL = {("displacement", 2): (0.45, 0.29), ("mixed", 2): (0.56, 0.32)}
+_FOUND_COARSE, _FOUND_ENDED, _FOUND_ELSEWHERE = (0.5, 0.8), (0.43, 0.4), 1.25
 # The same where contact is solved again: in units of the change in one degree more, and of the area's bar.
 _FOUND_AGAIN, _FOUND_AT_EDGE = 2.0, 0.1
 # The same at large displacements, for the area's bar, by degree: docs/accuracy.md.
 AT_EDGE_LARGE = {2: 0.15, 3: 0.075}
-# Limits of a mesh that counts as graded to the edge: rim size relative to the probe's half width, and growth.
-_GRADED = (0.4, 0.7)
+# Limits of a mesh that counts as graded to the edge: rim size relative to the probe's half width, and growth; then
+# those where the width of contact is found.
+_GRADED, _GRADED_FOUND = (0.4, 0.7), (0.35, 0.6)
 
 
-def is_graded(rim: float, growth: float) -> bool:
-    """Return whether a mesh is graded to the probe's edge; ``rim`` in units of the probe's half width."""
-    return rim <= _GRADED[0] and growth <= _GRADED[1]
+def is_graded(rim: float, growth: float, *, found: bool = False) -> bool:
+    """Return whether a mesh is graded to the edge; ``rim`` in units of the half width, of contact if ``found``."""
+    largest, steepest = _GRADED_FOUND if found else _GRADED
+    return rim <= largest and growth <= steepest
 
 
 def error_bar(
@@ -178,19 +189,30 @@ def extrapolate_found(
     stiffness: FloatArray,
     decrements: FloatArray,
     bars: FloatArray,
+    degree: int,
+    element: str,
     *,
     graded: bool = True,
     elsewhere: bool = False,
+    ended: bool = False,
+    ball: bool = False,
     friction: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the limit of F / d (1, 1) of unilateral contact, and its bar: F_2 is about half a bar too large.
+    """Return the limit of F / d (1, 1) of unilateral contact, and its bar.
 
-    ``graded`` says that the mesh is graded to the expected edge of contact, ``elsewhere`` that F has errors from other
-    places, too. ``friction`` is the part of the relative bar that degrees do not reduce.
+    F is lowered by a share of its bar; where one degree more raises it, F and its bar stay. ``graded`` says that the
+    mesh is graded to the expected edge of contact, ``elsewhere`` that F has errors from other places, too, ``ended``
+    that the tool's own edge bounds the contact, ``ball`` that the tool is smooth wherever it touches. ``friction`` is
+    the part of the relative bar that the next degree does not reduce.
     """
-    spread = (_FOUND_SPREAD_ELSEWHERE if elsewhere else _FOUND_SPREAD) if graded else _FOUND_SPREAD_COARSE
+    which = element, degree
+    centre, spread = _FOUND_BALL[which] if ball and which in _FOUND_BALL else _FOUND_LIMITS[which]
+    if not graded or ended:
+        centre, spread = _FOUND_ENDED if graded else _FOUND_COARSE
+    spread *= _FOUND_ELSEWHERE if elsewhere and graded else 1.0
     left = friction * np.abs(stiffness)
-    return stiffness - _FOUND / 2 * decrements, spread * (bars - left) + left
+    own, falls = bars - left, decrements > 0
+    return stiffness - np.where(falls, centre, 0.0) * own, np.where(falls, spread, 1.0) * own + left
 
 
 def _theta(degree: int) -> float:

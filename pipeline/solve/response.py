@@ -38,7 +38,8 @@ class Contact:
     ``slip_area`` (m²) is the part of it that slides along the tool, ``friction_force`` (N) the sum of the sizes of the
     tangential forces, and ``torque`` (N m) that of the tissue on the tool about its advance: NaN without friction.
     ``friction_bar`` is the relative bar on what friction adds to the force. ``sag`` (m) is the displacement of the
-    first touch by loads, ``load_energy`` (J) their strain energy without probe.
+    first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere the
+    tool's own edge bounds the contact, where the pressure is singular.
     """
 
     area: float
@@ -49,6 +50,7 @@ class Contact:
     friction_bar: float = 0.0
     sag: float = nan
     load_energy: float = nan
+    is_ended: bool = False
 
     @property
     def radius(self) -> float:

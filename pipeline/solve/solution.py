@@ -167,12 +167,19 @@ class Solution:
         return any(g < 0 for g, motion in zip(self.front.gains, motions, strict=False) if any(motion.opening))
 
     def extrapolated(
-        self, degree: int, element: str, *, graded: bool = True, elsewhere: bool = False, large: bool = False
+        self,
+        degree: int,
+        element: str,
+        *,
+        graded: bool = True,
+        elsewhere: bool = False,
+        large: bool = False,
+        ball: bool = False,
     ) -> "Solution":
         """Return the limit of the sequence of degrees, on a mesh ``graded`` to the edge or not; unchanged without bars.
 
         ``elsewhere`` says that F has errors from other places than the probe's edge, ``large`` that displacements are
-        large.
+        large, ``ball`` that a tool in unilateral contact is smooth.
         """
         if self.decrements is None or self.bars is None or (large and self.contact is not None):
             return self  # found contact at large displacements has no known limit: F and its bar stay
@@ -181,8 +188,12 @@ class Solution:
                 self.stiffness,
                 self.decrements,
                 self.bars,
+                degree,
+                element,
                 graded=graded,
                 elsewhere=elsewhere,
+                ended=self.contact.is_ended,
+                ball=ball,
                 friction=self.contact.friction_bar,
             )
             return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)

@@ -40,6 +40,6 @@ def test_a_ball_to_which_tissue_sticks_is_within_the_accuracy(law):
 def test_friction_is_no_part_of_what_finer_elements_would_remove():
     """Extrapolation narrows the part of the bar for the mesh, and leaves the part for friction."""
     stiffness, decrements, bars = (np.array([[value]]) for value in (2.0, 0.02, 0.06))
-    _, smooth = extrapolate_found(stiffness, decrements, bars)
-    _, both = extrapolate_found(stiffness, decrements, bars + 0.02, friction=0.01)
+    _, smooth = extrapolate_found(stiffness, decrements, bars, 2, "displacement")
+    _, both = extrapolate_found(stiffness, decrements, bars + 0.02, 2, "displacement", friction=0.01)
     assert both == pytest.approx(smooth + 0.02)

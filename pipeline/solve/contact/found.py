@@ -78,7 +78,12 @@ class FoundContact:
         """Return the area of the whole contact, and the effect of loads; ``sag`` (m) is that of the first touch."""
         whole = 2.0 ** len(self._plug.body.mirrored)
         energy = nan if self.loaded is None else whole * self.loaded.energy / 2
-        return Contact(whole * self._area().value, sag=sag, load_energy=energy)
+        return Contact(whole * self._area().value, sag=sag, load_energy=energy, is_ended=self._is_ended)
+
+    @property
+    def _is_ended(self) -> bool:
+        """Whether the contact of this rank reaches the tool's own edge."""
+        return bool((self.found.active & self.obstacle.candidates.is_edge).any())
 
     def response(self, column: Column, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d; its balance is the largest of all checks."""
@@ -125,7 +130,7 @@ class FoundContact:
             return found_again_bar(_found_again(elements, self.obstacle_above(), found), area_bar)
         taken, unseen = _decrement(elements, candidates.held_facets(found.active))
         share, unseen = taken / found.state.energy, unseen / found.state.energy
-        if (found.active & candidates.is_edge).any():  # the probe ends there, and the pressure is singular
+        if self._is_ended:  # the probe ends there, and the pressure is singular
             degree, element, plain = self._plug.degree, self._plug.element, plain_share(self._plug.body)
             return share, error_bar(share, degree, element, plain=plain, unseen=unseen)
         return share, found_bar(share, unseen, area_bar)

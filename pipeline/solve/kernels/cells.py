@@ -14,7 +14,7 @@ from mpi4py import MPI
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve.compiled import quadrature_degree
-from pipeline.solve.kernels.native import call
+from pipeline.solve.kernels.native import call, precision
 from pipeline.solve.physics import MaterialLaw, of_regions
 
 # Cells per batch, as in product.c.
@@ -97,7 +97,7 @@ class CurvedCells:
     def add_product(self, lame: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
         """Add A x to ``y``, all in one precision and without conditions; ``lame`` is in the layout of the lanes."""
         end = "_double" if x.dtype == np.float64 else ""
-        call(f"add_curved{end}", *self._arguments(lame, x.dtype.name), x, y)
+        call(f"add_curved{end}", *self._arguments(lame, precision(x)), x, y)
 
     def add_diagonal(self, lame: FloatArray, blocks: np.ndarray) -> None:
         """Add the diagonal blocks to ``blocks`` (local, 9)."""

@@ -23,17 +23,32 @@ Single = npt.NDArray[np.float32]
 
 _FLAGS = ("-O3", "-march=native", "-fvisibility=hidden")
 _FOLDER = Path(__file__).parent
+_PRECISIONS = {np.dtype(name): name for name in ("float32", "float64")}
 
 
 def call(name: str, *arguments: Any) -> Any:
     """Call a C function; arrays are passed without copies, and must be contiguous and of the declared type."""
-    module = library()
-    function = getattr(module.lib, name)
+    function, of_array, arrays = _function(name)
     passed = [
-        module.ffi.from_buffer(f"{kind.item.cname}[]", value) if isinstance(value, np.ndarray) else value
-        for kind, value in zip(module.ffi.typeof(function).args, arguments, strict=True)
+        of_array(kind, value) if kind is not None and isinstance(value, np.ndarray) else value
+        for kind, value in zip(arrays, arguments, strict=True)
     ]
     return function(*passed)
+
+
+def precision(values: np.ndarray) -> str:
+    """Return the name of the type of ``values``, "float32" or "float64"; numpy takes 10 µs to write it."""
+    return _PRECISIONS[values.dtype]
+
+
+@cache
+def _function(name: str) -> tuple[Any, Any, tuple[Any, ...]]:
+    """Return a C function, the conversion of arrays, and the array type of each parameter, None for numbers."""
+    module = library()
+    function, ffi = getattr(module.lib, name), module.ffi
+    kinds = ffi.typeof(function).args
+    arrays = tuple(ffi.typeof(f"{kind.item.cname}[]") if kind.kind == "pointer" else None for kind in kinds)
+    return function, ffi.from_buffer, arrays
 
 
 def address(name: str) -> int:

@@ -27,7 +27,7 @@ from pipeline.solve.kernels.cells import (
     reference,
     straight_cells,
 )
-from pipeline.solve.kernels.native import Single, call
+from pipeline.solve.kernels.native import Single, call, precision
 from pipeline.solve.physics import MaterialLaw
 
 DEGREES = (2, 3, 4)
@@ -118,7 +118,7 @@ class CellStiffness:
 
     def add_product(self, lame: list[np.ndarray], x: np.ndarray, y: np.ndarray) -> None:
         """Add the product with ``x``, on local points, to ``y``; all in one precision."""
-        kind = x.dtype.name
+        kind = precision(x)
         end, table = "_double" if kind == "float64" else "", bernstein(self.degree, kind)
         cells = self.degree, self.lanes.batches, self.lanes.dofs, self.maps[kind], lame[0]
         call(f"add_product{end}", *cells, *table.forward, *table.back, table.raised, table.mass, x, y)
@@ -211,7 +211,7 @@ class CellOperator:
         return self._cells.ghosts.folded(blocks.reshape(-1), 9).reshape(-1, 9)
 
     def _write(self, x: np.ndarray, y: np.ndarray) -> None:
-        cells, coefficients = self._cells, self._coefficients[x.dtype.name]
+        cells, coefficients = self._cells, self._coefficients[precision(x)]
         if self.comm.size == 1:
             y[:] = 0.0
             cells.add_product(coefficients, x, y)

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve.kernels.cells import LANES, Lanes, by_points, corners, reference, roots
-from pipeline.solve.kernels.native import Single, call
+from pipeline.solve.kernels.native import Single, call, precision
 from pipeline.solve.kernels.pressure import CellPressures, matrix_of
 from pipeline.solve.kernels.product import CellStiffness
 from pipeline.solve.point_law import SYMMETRIC, PointKernel
@@ -126,7 +126,7 @@ class TangentCells:
 
     def add_product(self, coefficients: list[np.ndarray], x: np.ndarray, y: np.ndarray) -> None:
         """Add the product with ``x``, on local points, to ``y``; both in one precision. ``coefficients`` are moduli."""
-        kind = x.dtype.name
+        kind = precision(x)
         for part, moduli in zip(self._parts, coefficients, strict=True):
             call("add_tangent" if kind == "float32" else "add_tangent_double", *part.laid_out(kind), moduli, x, y)
 
