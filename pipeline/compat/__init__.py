@@ -34,6 +34,7 @@ from pipeline.compat.meshes import (
     gmsh_session,
     inside_face,
     original_cells,
+    partition,
     triangle_nodes,
 )
 
@@ -61,6 +62,7 @@ __all__ = [
     "make_form",
     "mixed_element",
     "original_cells",
+    "partition",
     "reference_element",
     "renumbered_space",
     "triangle_nodes",

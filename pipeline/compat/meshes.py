@@ -71,13 +71,44 @@ def triangle_nodes(order: int) -> np.ndarray:
     return np.asarray(element.points)
 
 
-def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, order: int) -> Any:
-    """Create a distributed mesh of tetrahedra, or in the plane of triangles; collective, arrays only on rank 0."""
+def create_mesh(
+    comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, order: int, beyond: np.ndarray | None = None
+) -> Any:
+    """Create a distributed mesh of tetrahedra, or in the plane of triangles; collective.
+
+    Arrays are on rank 0 only, or, with ``beyond``, on the rank that keeps the cells: the ranks (m, k) that have the
+    cells next to each of them, -1 for none. Points are then numbered rank by rank.
+    """
     dim = comm.bcast(points.shape[1] if comm.rank == 0 else 0)
     domain = ufl.Mesh(_coordinate_element("tetrahedron" if dim == 3 else "triangle", order, dim))
     names = inspect.signature(dolfinx.mesh.create_mesh).parameters
-    keyword = "domain" if "domain" in names else "e"
-    return dolfinx.mesh.create_mesh(comm, cells=cells, x=points, **{keyword: domain})
+    more: dict[str, Any] = {"domain" if "domain" in names else "e": domain}
+    if beyond is not None:
+        destinations = _destinations(comm.rank, beyond)
+        more["partitioner"] = lambda *_: destinations
+    return dolfinx.mesh.create_mesh(comm, cells=cells, x=points, **more)
+
+
+def _destinations(rank: int, beyond: np.ndarray) -> Any:
+    """Return the ranks that get each cell: first that which keeps it, then those that have it as a ghost."""
+    ranks = np.sort(beyond, axis=1)
+    chosen = np.column_stack([ranks[:, :1] >= 0, (ranks[:, 1:] >= 0) & (ranks[:, 1:] != ranks[:, :-1])])
+    chosen = np.column_stack([np.ones(len(ranks), dtype=bool), chosen])
+    ranks = np.column_stack([np.full(len(ranks), rank), ranks]).astype(np.int32)
+    ends = np.concatenate([[0], np.cumsum(chosen.sum(axis=1))]).astype(np.int32)
+    return dolfinx.cpp.graph.AdjacencyList_int32(ranks[chosen], ends)
+
+
+def partition(cells: np.ndarray, parts: int) -> np.ndarray:
+    """Return a part for each tetrahedron (m, 4) of a mesh on this process: few faces between parts of equal size."""
+    none, cells = dolfinx.cpp.mesh.GhostMode.none, np.ascontiguousarray(cells, dtype=np.int64)
+    make = dolfinx.cpp.mesh.create_cell_partitioner
+    try:
+        kinds = [dolfinx.cpp.mesh.CellType.tetrahedron]
+        found = make(none)(MPI.COMM_SELF, parts, kinds, [cells.reshape(-1)])
+    except TypeError:  # before dolfinx 0.9
+        found = make()(MPI.COMM_SELF, parts, 3, dolfinx.cpp.graph.AdjacencyList_int64(cells), none)
+    return np.array(found.array, dtype=np.int32)
 
 
 def geometry_dofs(mesh: Any) -> np.ndarray:

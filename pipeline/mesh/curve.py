@@ -4,12 +4,13 @@ The displacement goes like r^½ at the edge of a probe. A quadratic element repr
 that ends on the rim is at a quarter of its length (R. S. Barsoum, Int. J. Numer. Methods Eng. 10, 1976).
 """
 
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshArrays, MeshError
 from pipeline.scene.model import FIXED, FREE, MIRROR, PROBE, Scene
 from pipeline.shapes.ovoid import Ovoid
@@ -29,10 +30,22 @@ _LEAST_JACOBIAN = 1e-3
 # Alternating projections onto two surfaces, until a point is on both.
 _ALTERNATIONS = 30
 
+# From edges (k, 2) of one part of a mesh, and which of them it has chosen: which of them any part has chosen, and
+# whether any edge is; collective.
+Agree = Callable[[IntArray, BoolArray], tuple[BoolArray, bool]]
+
+
+def _of_one_part(_: IntArray, chosen: BoolArray) -> tuple[BoolArray, bool]:
+    return chosen, bool(chosen.any())
+
 
 @stage("curved rim and sides")
-def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
-    """Return ``mesh`` with ten nodes per cell, on the true rim and sides, with quarter points at a singular rim."""
+def curve(mesh: MeshArrays, scene: Scene, *, is_finest: bool = True, agree: Agree = _of_one_part) -> MeshArrays:
+    """Return ``mesh`` with ten nodes per cell, on the true rim and sides, with quarter points at a singular rim.
+
+    ``agree`` is for parts of a mesh, and collective. A mesh that is not the finest has no quarter points, but those at
+    which its edges are to be halved.
+    """
     mesh = _on_rim_nodes(mesh, scene)
     corners = mesh.cells
     pairs = np.sort(corners[:, EDGES].reshape(-1, 2), axis=1)
@@ -42,17 +55,32 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     edges = pairs[first]
     straight = mesh.points[edges].mean(axis=1)
     of_cell = inverse.reshape(-1, len(EDGES))
-    curved = straight if mesh.bent is None else _on_faces(mesh.bent, edges, straight)
+    middle = straight if is_finest else _graded(mesh.points, edges)
+    curved = middle if mesh.bent is None else _on_faces(mesh.bent, edges, middle)
     curved = _on_embedded(mesh, scene, edges, _on_sides(mesh, scene, edges, curved, keys))
     curved = _on_rim(mesh, scene, edges, curved)
     middle = curved.copy()
-    if scene.probe.has_singular_edge:
-        middle = _quarter_points(mesh, edges, middle)
-    # A folded cell loses its quarter points first: without its arcs the footprint would be smaller.
-    for milder in (curved, straight):
-        _unfold(mesh.points[corners], middle, of_cell, milder)
+    if is_finest:
+        if scene.probe.has_singular_edge:
+            middle = _quarter_points(mesh, edges, middle)
+        # A folded cell loses its quarter points first: without its arcs the footprint would be smaller.
+        for milder in (curved, straight):
+            _unfold(mesh.points[corners], middle, of_cell, milder, partial(agree, edges))
     nodes = np.hstack([corners, len(mesh.points) + of_cell])
     return replace(mesh, points=np.vstack([mesh.points, middle]), cells=nodes, bent=None)
+
+
+def _graded(points: FloatArray, edges: IntArray) -> FloatArray:
+    """Return the points that halve edges (k, 2) in elements: nearer to the end where elements are smaller.
+
+    If the element size is linear along an edge, from a to b, that is at √a / (√a + √b) of its length.
+    """
+    length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+    total = sum(np.bincount(ends, length, len(points)) for ends in edges.T)
+    count = np.bincount(edges.ravel(), minlength=len(points))
+    root = np.sqrt(total / np.maximum(count, 1))[edges]
+    share = (root[:, 0] / root.sum(axis=1))[:, None]
+    return np.asarray((1 - share) * points[edges[:, 0]] + share * points[edges[:, 1]])
 
 
 def _on_faces(bent: tuple[IntArray, FloatArray], edges: IntArray, middle: FloatArray) -> FloatArray:
@@ -152,7 +180,7 @@ def _on_embedded(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatA
     """Move the mid nodes of edges in the surface of an embedded region onto it, and onto a column that cuts it."""
     if not scene.body.embedded:
         return middle
-    inner = [] if mesh.regions is None else [_interface_edges(mesh, mesh.regions)]
+    inner = [] if mesh.regions is None else [edge_keys(interfaces(mesh), len(mesh.points))]
     inner += [_facet_edges(mesh, [FREE])] if scene.body.cavities else []
     between = np.isin(_key(mesh, edges), np.concatenate([*inner, np.empty(0, dtype=np.int64)]))
     used = np.unique(edges[between])
@@ -172,14 +200,15 @@ def _on_embedded(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatA
     return middle
 
 
-def _interface_edges(mesh: MeshArrays, regions: IntArray) -> IntArray:
-    """Return keys of the edges of the triangles between two regions."""
+def interfaces(mesh: MeshArrays) -> IntArray:
+    """Return the triangles (k, 3) between two regions."""
+    if mesh.interfaces is not None or mesh.regions is None:
+        return np.empty((0, 3), dtype=np.int64) if mesh.interfaces is None else mesh.interfaces
     corners = np.sort(mesh.cells[:, [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)]].reshape(-1, 3), axis=1)
     order = np.lexsort(corners.T)
-    sorted_corners, owner = corners[order], np.repeat(regions, 4)[order]
+    sorted_corners, owner = corners[order], np.repeat(mesh.regions, 4)[order]
     twins = np.all(sorted_corners[1:] == sorted_corners[:-1], axis=1) & (owner[1:] != owner[:-1])
-    triangles = sorted_corners[1:][twins]
-    return np.unique(edge_keys(triangles, len(mesh.points)))
+    return np.asarray(sorted_corners[1:][twins])
 
 
 def _key(mesh: MeshArrays, edges: IntArray) -> IntArray:
@@ -204,12 +233,21 @@ def _quarter_points(mesh: MeshArrays, edges: IntArray, middle: FloatArray) -> Fl
     return middle
 
 
-def _unfold(corners: FloatArray, middle: FloatArray, of_cell: IntArray, milder: FloatArray) -> None:
+def _unfold(
+    corners: FloatArray,
+    middle: FloatArray,
+    of_cell: IntArray,
+    milder: FloatArray,
+    agree: Callable[[BoolArray], tuple[BoolArray, bool]],
+) -> None:
     """Replace the mid nodes of folded cells by ``milder`` ones, then those of neighbours that this folds, and so on."""
-    bad = np.zeros(len(corners), dtype=bool)
-    while (folded := _folded(corners, middle[of_cell]) & ~bad).any():
+    bad, are_any = np.zeros(len(corners), dtype=bool), True
+    while are_any:
+        folded, chosen = _folded(corners, middle[of_cell]) & ~bad, np.zeros(len(middle), dtype=bool)
         bad |= folded
-        middle[of_cell[folded]] = milder[of_cell[folded]]
+        chosen[of_cell[folded]] = True
+        chosen, are_any = agree(chosen)
+        middle[chosen] = milder[chosen]
 
 
 def _folded(corners: FloatArray, middle: FloatArray) -> np.ndarray:

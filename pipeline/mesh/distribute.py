@@ -11,6 +11,7 @@ from mpi4py import MPI
 from pipeline import compat
 from pipeline.arrays import Int32Array, IntArray
 from pipeline.mesh.generate import MeshArrays
+from pipeline.mesh.parts import Part, renumbered
 from pipeline.scene.model import MIRROR
 from pipeline.stages import stage
 
@@ -55,14 +56,27 @@ def distribute(comm: MPI.Comm, arrays: MeshArrays | None) -> BodyMesh:
         cells, points, known = np.empty((0, 0), np.int64), np.empty((0, 3)), None
     width, surface, count, deviation = comm.bcast(known)
     mesh = compat.create_mesh(comm, cells.reshape(-1, width), points, order=1 if width == 4 else 2)
-    return BodyMesh(mesh, _find_facets(mesh, surface), count, _find_regions(comm, mesh, arrays), deviation)
-
-
-def _find_regions(comm: MPI.Comm, mesh: Any, arrays: MeshArrays | None) -> Int32Array | None:
-    """Return the region of each local cell, from the arrays on rank 0; collective."""
     # Each rank receives one byte per cell of the whole mesh: less than the coordinates.
     small = None if arrays is None or arrays.regions is None else arrays.regions.astype(np.uint8)
     regions = comm.bcast(small)
+    return BodyMesh(mesh, _find_facets(mesh, surface), count, _of_cells(mesh, regions), deviation)
+
+
+@stage("dolfinx mesh")
+def distribute_parts(comm: MPI.Comm, part: Part) -> BodyMesh:
+    """Create the dolfinx mesh of cells that each rank has; collective."""
+    part, own = renumbered(part, comm)
+    arrays, numbers = part.mesh, part.numbers
+    mesh = compat.create_mesh(comm, numbers[arrays.cells], arrays.points[own], order=2, beyond=part.beyond)
+    surface = {name: numbers[triangles] for name, triangles in arrays.facets.items()}
+    small = None if arrays.regions is None else arrays.regions.astype(np.uint8)
+    regions = None if small is None else np.concatenate(comm.allgather(small))
+    count = comm.allreduce(len(arrays.cells))
+    return BodyMesh(mesh, _find_facets(mesh, surface), count, _of_cells(mesh, regions), arrays.deviation)
+
+
+def _of_cells(mesh: Any, regions: IntArray | None) -> Int32Array | None:
+    """Return the region of each local cell, from those of cells as they were numbered before."""
     return None if regions is None else regions[compat.original_cells(mesh)].astype(np.int32)
 
 

@@ -54,7 +54,7 @@ class MeshArrays:
     ``regions`` (m) are the cells' region numbers of the body; None for a body of one material. A region outside the
     mesh has no cell. ``bent``, until cells are curved, has edges (k, 2) on faces that only the geometry kernel knows,
     and their mid nodes (k, 3), in m. ``deviation`` (m) is the largest distance of points from the surface in a file of
-    triangles; NaN for other bodies.
+    triangles; NaN for other bodies. ``interfaces`` are the triangles (k, 3) between regions, where they are known.
     """
 
     points: FloatArray
@@ -65,6 +65,7 @@ class MeshArrays:
     regions: IntArray | None = None
     bent: tuple[IntArray, FloatArray] | None = None
     deviation: float = nan
+    interfaces: IntArray | None = None
 
 
 def generate(scene: Scene, sizes: Sizes) -> MeshArrays:
@@ -120,9 +121,10 @@ def in_model(
         try:
             if scene.rim_segments and len(rim_curves) == 1 and scene.is_flat:
                 parts = 2 ** len(scene.mirrors)
-                least = ceil(scene.probe.perimeter / parts / longest_at_rim(scene.body))
+                least = ceil(scene.probe.perimeter / parts / (sizes.times * longest_at_rim(scene.body)))
                 edges = max(scene.rim_segments // parts, least)
                 gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], edges + 1)
+            gmsh.option.setNumber("Mesh.MeshSizeFactor", sizes.times)
             local, unit = region_sizes(scene, sizes.growth), 1 / scene.scale
             more = [term for part in local for term in part.terms(unit, gmsh.model.geo)]
             more += rounded_sizes(scene, sizes.growth)

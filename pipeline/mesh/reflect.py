@@ -33,6 +33,11 @@ def reflect_vectors(mesh: MeshArrays, vectors: FloatArray, planes: tuple[str, ..
     return vectors
 
 
+def reflect_labels(mesh: MeshArrays, labels: IntArray, count: int, plane: str) -> IntArray:
+    """Return labels (n), below ``count``, of the points of ``reflect(mesh, (plane,))``: those of images differ."""
+    return np.concatenate([labels, labels[~_on_plane(mesh, plane)] + count])
+
+
 def _reflect_once(mesh: MeshArrays, plane: str) -> MeshArrays:
     axis, name = "xy".index(plane), MIRROR[plane]
     points, on_plane = mesh.points.copy(), _on_plane(mesh, plane)
@@ -48,6 +53,7 @@ def _reflect_once(mesh: MeshArrays, plane: str) -> MeshArrays:
         facets=facets,
         rim=np.union1d(mesh.rim, image[mesh.rim]),
         regions=None if mesh.regions is None else np.tile(mesh.regions, 2),
+        interfaces=None,
     )
 
 

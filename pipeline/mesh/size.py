@@ -28,7 +28,8 @@ class Sizes:
     """Element sizes (m): ``fine`` within ``epsilon`` of the contact, ``rim`` at the probe's edge, else ``coarse``.
 
     ``growth`` is the increase of size per unit of distance, both from the rim and beyond ``epsilon``. A round side,
-    with ``column`` its radius, is resolved over its whole length, also beyond ``epsilon``.
+    with ``column`` its radius, is resolved over its whole length, also beyond ``epsilon``. All elements, those of
+    regions included, are ``times`` as large.
     """
 
     epsilon: float
@@ -37,6 +38,7 @@ class Sizes:
     rim: float
     growth: float
     column: float = inf
+    times: float = 1.0
 
     @property
     def largest(self) -> float:
@@ -70,7 +72,7 @@ class Sizes:
         if not probe.is_curved:
             return 0
         # The footprint's edge may be outside the expected edge of contact, where elements are small.
-        size = min(self.rim + self.growth * probe.rim_offset, max(self.rim, self.fine))
+        size = self.times * min(self.rim + self.growth * probe.rim_offset, max(self.rim, self.fine))
         quarters = ceil(probe.perimeter / size / _SEGMENT_MULTIPLE)
         fewest = _FEWEST_SEGMENTS if probe.has_singular_edge else _FEWEST_REGULAR
         return max(fewest, _SEGMENT_MULTIPLE * quarters)

@@ -7,6 +7,7 @@ from functools import lru_cache
 from math import inf
 from typing import Any
 
+from pipeline.plan.refinement import is_refined
 from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.shapes.body import PIECES, Body
 from pipeline.shapes.probe import Probe
@@ -107,10 +108,11 @@ def reference_key(case: Case, accuracy: float) -> str:
 
 
 def mesh_key(case: Case) -> str:
-    """Return the key of a case's mesh: body, footprint, sizes, and whether elements are straight or curved."""
+    """Return the key of a case's mesh: body, footprint, sizes, whether elements are curved, and whether refined."""
     sizes = _mesh_text(case.mesh, case.is_full, case.probe.half_width, "")
     footprint = text_of(case.probe, case.probe.not_drawn)
-    return digest("\n".join([_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1)]))
+    refined = ["refined"] if is_refined(case) else []
+    return digest("\n".join([_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1), *refined]))
 
 
 def operator_key(case: Case) -> str:

@@ -1,14 +1,19 @@
 """From a case to its distributed mesh: made on the first rank, or read from the cache."""
 
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
 from typing import TypeVar
 
 from mpi4py import MPI
 
 from pipeline.launcher import is_interrupt
-from pipeline.mesh.distribute import BodyMesh, distribute
+from pipeline.mesh.distribute import BodyMesh, distribute, distribute_parts
 from pipeline.mesh.generate import MeshArrays, MeshError
-from pipeline.mesh.of_case import mesh_arrays, upright
+from pipeline.mesh.of_case import coarse_arrays, refined_arrays, refined_part, unrefined_arrays, upright
+from pipeline.mesh.parts import split
+from pipeline.plan.refinement import is_refined
+from pipeline.plan.symmetry import mirror_planes
 from pipeline.run.failure import describe
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.stages import Times, recharge, stage
@@ -26,18 +31,40 @@ def mesh_case(case: Case, mirrors: tuple[str, ...], comm: MPI.Comm, cache: MeshC
     Raises:
         MeshError: on every rank.
     """
+    if is_refined(case):
+        with suppress(MeshError):
+            parts = on_first_rank(comm, lambda: split(_cached_coarse(case, cache), comm.size))
+            part = refined_part(case, mirrors, comm.scatter(parts or ()), comm)
+            return distribute_parts(comm, replace(part, mesh=upright(case, part.mesh)))
     arrays = on_first_rank(comm, lambda: cached_arrays(case, mirrors, cache))
     return distribute(comm, arrays and upright(case, arrays))
 
 
 def cached_arrays(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None) -> MeshArrays:
     """Return the mesh of a case from the cache, with the time of its making, or make and cache it."""
+    if is_refined(case):
+        with suppress(MeshError):
+            return refined_arrays(case, mirrors, _cached_coarse(case, cache))
+    return _cached_unrefined(case, mirrors, cache)
+
+
+def _cached_coarse(case: Case, cache: MeshCache | None) -> MeshArrays:
+    return _cached(case, mirror_planes(case), cache, coarse_arrays)
+
+
+def _cached_unrefined(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None) -> MeshArrays:
+    return _cached(case, mirrors, cache, lambda case: unrefined_arrays(case, mirrors, cache))
+
+
+def _cached(
+    case: Case, mirrors: tuple[str, ...], cache: MeshCache | None, make: Callable[[Case], MeshArrays]
+) -> MeshArrays:
     if cache is None:
-        return mesh_arrays(case, mirrors)
+        return make(case)
     path = cache.path(case, mirrors)
     found = cache.get(path)
     if found is None:
-        found = mesh_arrays(case, mirrors, cache)
+        found = make(case)
         cache.put(path, found)
     else:
         recharge(Times(mesh=found.seconds))

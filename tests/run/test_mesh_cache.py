@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from pipeline.mesh.of_case import mesh_arrays
 from pipeline.run.mesh_cache import MeshCache
-from pipeline.run.meshing import mesh_arrays, mesh_case
+from pipeline.run.meshing import mesh_case
 from pipeline.stages import recorded
 from tests.cases import study
 

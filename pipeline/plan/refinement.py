@@ -1,0 +1,46 @@
+"""Which meshes are refined: gmsh makes one of larger elements, which are then cut into eight each."""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from math import inf
+
+from pipeline.plan import estimate
+from pipeline.plan.symmetry import mirror_planes
+from pipeline.shapes.body import Body, Drawn
+from pipeline.shapes.probe import Probe
+from pipeline.study.case import Case
+from pipeline.study.schema import Mesh
+
+# Estimated number of tetrahedra of the modelled part from which on meshes are refined.
+LEAST = 40_000
+_MANY = 200_000  # scenes of a large study
+
+
+@dataclass(frozen=True, slots=True)
+class _Scene:
+    """What the mesh of a ``case`` depends on."""
+
+    body: Body
+    probe: Probe
+    mesh: Mesh
+    case: Case = field(compare=False)
+
+
+def is_refined(case: Case) -> bool:
+    """Return whether the mesh of a case is refined.
+
+    Points of a refined mesh are placed on surfaces that a formula gives. Bodies from files are therefore not refined,
+    nor are curved bodies cut at ε, because two such surfaces meet there, nor slits. Nor are inclusions: some of their
+    elements would fold.
+    """
+    return case.mesh.degree > 1 and _is_refined(_Scene(case.body, case.probe, case.mesh, case))
+
+
+@lru_cache(_MANY)
+def _is_refined(scene: _Scene) -> bool:
+    body, case = scene.body, scene.case
+    if not isinstance(body, Drawn) or body.embedded or scene.probe.slit is not None or scene.probe.crack:
+        return False
+    if estimate.cells(case) * 0.5 ** len(mirror_planes(case)) < LEAST:
+        return False
+    return case.column == inf or not any(surface.is_curved for group in body.surfaces().values() for surface in group)

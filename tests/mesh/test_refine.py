@@ -1,0 +1,121 @@
+"""Refined meshes: they fit the body as those of gmsh do, and are the same on any number of ranks."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.mesh.generate import MeshArrays
+from pipeline.mesh.of_case import coarse_arrays, mesh_arrays, refined_arrays, unrefined_arrays
+from pipeline.plan import refinement
+from pipeline.plan.key import mesh_key
+from pipeline.plan.symmetry import mirror_planes
+from pipeline.study.case import Case
+from tests.cases import BLADE, solve, study
+from tests.mesh.test_mesh import area
+
+WORLD = MPI.COMM_WORLD
+CYLINDER = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm", "fixed": "bottom"}
+OVOID = {"shape": "ellipsoid", "axes": ["60 mm", "50 mm", "40 mm"], "fixed": {"below": "-5 mm"}}
+SKIN = {"name": "skin", "thickness": "2 mm", "young": "50 kPa", "poisson": 0.3}
+OFF = {"at": ["4 mm", "3 mm"]}
+SCENES = {
+    "quarter": {},
+    "cylinder": {"body": CYLINDER, "probe": OFF},
+    "side": {"body": CYLINDER, "probe": {"at": ["20 mm", "0 mm", "-10 mm"]}},
+    "ellipsoid": {"body": OVOID},
+    "layers": {"body": {"layer": [SKIN]}},
+    "blade": {"probe": BLADE},
+    "coarse": {"mesh": {"epsilon": "8 mm"}, "probe": OFF},
+}
+
+
+@pytest.fixture
+def refine_all(monkeypatch: pytest.MonkeyPatch):
+    """Refine meshes of any size."""
+    monkeypatch.setattr(refinement, "LEAST", 0)
+    refinement._is_refined.cache_clear()
+    yield
+    refinement._is_refined.cache_clear()
+
+
+def case_of(changes: dict) -> Case:
+    return study(**changes).case(())
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_refined_mesh_fills_the_body_and_has_the_groups_of_an_unrefined_one(name):
+    case = case_of(SCENES[name])
+    planes = mirror_planes(case)
+    coarse, plain = coarse_arrays(case), unrefined_arrays(case, planes)
+    fine = refined_arrays(case, planes, coarse)
+    assert len(fine.cells) == 8 * len(coarse.cells)
+    corners = fine.points[fine.cells[:, :4]]
+    assert np.linalg.det(corners[:, 1:] - corners[:, :1]).min() > 0
+    # Each face is that of two cells, or of one and of one group.
+    faces = np.sort(fine.cells[:, [(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)]].reshape(-1, 3), axis=1)
+    unique, times = np.unique(faces, axis=0, return_counts=True)
+    groups = np.sort(np.concatenate(list(fine.facets.values())), axis=1)
+    assert times.max() == 2
+    assert np.array_equal(unique[times == 1], np.unique(groups, axis=0))
+    assert len(np.unique(groups, axis=0)) == len(groups)
+    assert set(fine.facets) == set(plain.facets)
+    for group in plain.facets:
+        assert area(fine, group) == pytest.approx(area(plain, group), rel=0.02)
+    # Boundary points, mid nodes included, are on the body's curved surfaces, as are those of the unrefined mesh.
+    for surface in (surface for group in case.body.surfaces().values() for surface in group if surface.is_curved):
+        off = [np.abs(surface.distance(mesh.points)) < 1e-9 for mesh in (fine, plain)]
+        shares = [
+            np.count_nonzero(some) / len(mesh.points) ** (2 / 3) for some, mesh in zip(off, (fine, plain), strict=True)
+        ]
+        assert shares[0] == pytest.approx(shares[1], rel=0.4)
+    if plain.regions is not None:
+        shares = [_share_of_first(mesh) for mesh in (fine, plain)]
+        assert shares[0] == pytest.approx(shares[1], rel=1e-9)
+
+
+def _share_of_first(mesh: MeshArrays) -> float:
+    corners = mesh.points[mesh.cells[:, :4]]
+    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1])
+    return float(volumes[mesh.regions == 0].sum() / volumes.sum())
+
+
+@pytest.mark.usefixtures("refine_all")
+def test_refined_points_are_on_the_rim():
+    fine = mesh_arrays(case_of({"probe": OFF}), ())
+    radius = np.linalg.norm(fine.points[fine.rim] - [4e-3, 3e-3, 0], axis=1)
+    assert radius == pytest.approx(3e-3, rel=1e-9)
+    assert len(fine.rim) >= 24
+    assert area(fine, "probe") == pytest.approx(pi * 9e-6, rel=0.02)
+
+
+@pytest.mark.usefixtures("refine_all")
+def test_a_part_and_its_reflection_have_the_same_force():
+    part, whole = (solve(mesh={"model": model})[()] for model in ("auto", "3d"))
+    assert part.force == pytest.approx(whole.force, rel=1e-7)
+    assert part.cells == whole.cells
+
+
+def test_the_force_agrees_with_that_of_an_unrefined_mesh(monkeypatch):
+    changes = {"mesh": {"fine": "3 mm", "rim": "0.4 mm", "growth": 0.5}, "probe": OFF}
+    plain, plain_key = solve(**changes)[()], mesh_key(case_of(changes))
+    monkeypatch.setattr(refinement, "LEAST", 0)
+    refinement._is_refined.cache_clear()
+    fine, key = solve(**changes)[()], mesh_key(case_of(changes))
+    refinement._is_refined.cache_clear()
+    assert key != plain_key
+    assert fine.force == pytest.approx(plain.force, rel=max(fine.force_error, plain.force_error))
+    # At equal unknowns, the error bar is no larger: it falls like unknowns to the power -2/3.
+    assert fine.force_error < 1.15 * plain.force_error * (plain.dofs / fine.dofs) ** (2 / 3)
+
+
+@pytest.mark.mpi
+@pytest.mark.usefixtures("refine_all")
+@pytest.mark.parametrize("name", ["cylinder", "layers", "blade"])
+def test_the_mesh_does_not_depend_on_the_number_of_ranks(name):
+    changes = SCENES[name] | {"mesh": {"model": "3d"}}
+    together, alone = (solve(comm, **changes)[()] for comm in (WORLD, MPI.COMM_SELF))
+    together = WORLD.bcast(together)
+    assert together.force == pytest.approx(alone.force, rel=1e-9)
+    assert (together.cells, together.dofs) == (alone.cells, alone.dofs)
