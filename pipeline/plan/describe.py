@@ -2,16 +2,17 @@
 
 import heapq
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pipeline.plan.cost import speed_up
 from pipeline.plan.estimate import on_ranks
-from pipeline.plan.plan import Plan
+from pipeline.plan.plan import Plan, first_attempts, of_unit_scene
 from pipeline.plan.proportional_depths import depth_key
 from pipeline.plan.schedule import schedule
-from pipeline.plan.steps import MeshStep, Solve, mesh_steps
+from pipeline.plan.steps import MeshStep, Solve
 from pipeline.printable import counted
 from pipeline.shapes.regions import Embedded
 from pipeline.shapes.scanned import Scanned
@@ -118,7 +119,7 @@ def _of_large_displacements(plan: Plan) -> list[str]:
 
 def _unasked(plan: Plan) -> dict[str, float]:
     """Return the number of scenes without F_exact because `solve.exact` is off by default, and its time (s)."""
-    steps = mesh_steps(plan.unasked, shared=plan.shared)
+    steps = first_attempts(replace(plan, solves=tuple(map(of_unit_scene, plan.unasked)))).meshes
     return {"scenes": len(plan.unasked), "seconds": sum(plan.cost.step(step).seconds for step in steps)}
 
 

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import lru_cache
 from math import inf
 from typing import Any
@@ -14,7 +14,7 @@ from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.capabilities.obstacles import obstacle
-from pipeline.study.case import Case
+from pipeline.study.case import Case, of_scene
 from pipeline.study.loads import Load
 from pipeline.study.output import Output
 from pipeline.study.schema import Material, Mesh
@@ -36,12 +36,10 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     ``folded`` replaces every ε beyond the body by the full order; ``scaled`` leaves out the inputs that the force is
     proportional to. Each timed case has a key of its own.
     """
-    scene = _Scene(case.body, case.material, case.probe, case.load, bool(case.outputs), case)
-    head, tail, poisson = _scene_texts(scene, scaled)
-    element = case.mesh.element_for(poisson, is_large=case.material.is_large)
+    head, tail, half_width = _scene_texts(case, scaled)
     parts = [
         *head,
-        "" if case.probe.crack else _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, element),
+        "" if half_width is None else _mesh_text(case.mesh, folded and case.is_full, half_width, case.element),
         text_of(case.solve, ("timing", "repeats", "exact")),
         *tail,
         *map(_output_text, case.outputs),
@@ -51,25 +49,15 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     return digest("\n".join(parts))
 
 
-@dataclass(frozen=True, slots=True)
-class _Scene:
-    """What cases have in common that differ in the mesh only; ``case`` is one of them."""
+@of_scene
+def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, ...], float | None]:
+    """Return the parts of a key before and after the mesh, and the half width (m) of the probe.
 
-    body: Body
-    material: Material
-    probe: Probe
-    load: Load
-    has_outputs: bool
-    case: Case = field(compare=False)
-
-
-@lru_cache(_MANY)
-def _scene_texts(scene: _Scene, scaled: bool) -> tuple[tuple[str, ...], tuple[str, ...], float]:
-    """Return the parts of a key before and after the mesh, and the largest Poisson's ratio."""
-    case = scene.case
+    Deep in tissue, neither the body nor the end of the tool has an effect: without a mesh, the half width is None.
+    """
     scaled = scaled and not obstacle("scaling", case)
-    if crack := case.probe.crack:  # deep in tissue, neither the body nor the end of the tool has an effect
-        return (str(PHYSICS_VERSION), _material_text(case.material, scaled=False), str(crack)), (), case.poisson
+    if crack := case.probe.crack:
+        return (str(PHYSICS_VERSION), _material_text(case.material, scaled=False), str(crack)), (), None
     head = (
         str(PHYSICS_VERSION),
         _body_text(case.body, case.scale.stress if scaled else 1.0),
@@ -79,7 +67,7 @@ def _scene_texts(scene: _Scene, scaled: bool) -> tuple[tuple[str, ...], tuple[st
     )
     tail = [_load_text(case.load, case.densities)] if case.load.acts else []
     tail += [_time_text(case)] if case.is_stepped else []
-    return head, tuple(tail), case.poisson
+    return head, tuple(tail), case.probe.half_width
 
 
 def _output_text(output: Output) -> str:
@@ -93,7 +81,7 @@ def _output_text(output: Output) -> str:
 
 def reference_key(case: Case, accuracy: float) -> str:
     """Return the key of F_exact of a case's scene for E = 1 and depth = 1: the inputs of F / (E d), without mesh."""
-    probe = case.probe.model_copy(update=_pressed(case.probe))
+    probe = _as_pressed(case.probe)
     ratios = "0.0" if _slides_across_a_mirror(case) else _ratios_text(probe)
     parts = [
         f"{PHYSICS_VERSION} exact {accuracy!r}",
@@ -116,12 +104,12 @@ def mesh_key(case: Case) -> str:
 
 
 def operator_key(case: Case) -> str:
-    """Return the key of a case's spaces and boundary conditions: all inputs but the moduli.
+    """Return the key of a case's spaces and boundary conditions on its mesh: all further inputs but the moduli.
 
     The depth is left out, too, if contact is found or displacements are large.
     """
     probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.is_followed else _UNPHYSICAL)
-    return digest("\n".join([mesh_key(case), probe, str(case.mesh.degree), case.formulation]))
+    return "\n".join([probe, str(case.mesh.degree), case.formulation])
 
 
 def normalised(case: Case) -> Case:
@@ -143,6 +131,11 @@ def normalised(case: Case) -> Case:
 def _pressed(probe: Probe) -> dict[str, Any]:
     """Return the changes of a probe's keys for one press, on a mesh of its own."""
     return {"motion": "press", **dict.fromkeys(probe.SWEPT)}
+
+
+@lru_cache(_MANY)
+def _as_pressed(probe: Probe) -> Probe:
+    return probe.model_copy(update=_pressed(probe))
 
 
 @lru_cache(_MANY)
@@ -231,7 +224,8 @@ def text_of(section: Section, without: tuple[str, ...] = ()) -> str:
 def _mesh_text(mesh: Mesh, is_full: bool, half_width: float, element: str) -> str:
     """Return a mesh section in canonical form; without an ``element``, only the inputs of the mesh itself."""
     # Equal sections may differ in which keys the file gives; beside an accuracy the given keys count.
-    return _written(mesh, frozenset(mesh.model_fields_set - {"name"}), is_full, half_width, element)
+    given = frozenset() if mesh.accuracy is None else frozenset(mesh.model_fields_set - {"name"})
+    return _written(mesh, given, is_full, half_width, element)
 
 
 @lru_cache(_MANY)
@@ -254,6 +248,8 @@ def _written(mesh: Mesh, given_keys: frozenset[str], is_full: bool, half_width: 
 
 def _slides_across_a_mirror(case: Case) -> bool:
     """Return whether a blade moves across a plane of symmetry: that movement has no force along the axis."""
+    if case.probe.motion == "press":
+        return mirror_planes(case) != movement_planes(case)
     pressed = replace(case, probe=case.probe.model_copy(update={"motion": "press"}))
     return mirror_planes(case) != movement_planes(pressed)
 

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Collection, Hashable
 from dataclasses import replace
+from math import isnan
 
 from pipeline.plan.key import case_key, normalised, reference_key
 from pipeline.plan.recipe import rungs_for
@@ -27,6 +28,7 @@ __all__ = [
     "first_attempts",
     "leave_out_stored",
     "make_plan",
+    "of_unit_scene",
 ]
 
 # Relative error of F_exact, or its share of the study's accuracy: well below the errors of the study.
@@ -49,7 +51,10 @@ def _declared(case: Case) -> Solve:
 
 
 def make_plan(
-    study: Study, stored: Collection[str] = (), without: Collection[str] = (), shard: Shard | None = None
+    study: Study,
+    stored: Collection[str] = (),
+    without: Collection[str] = (),
+    shard: Shard | None = None,
 ) -> Plan:
     """Return the plan of ``study`` after all reductions; ``stored`` are the keys of stored records.
 
@@ -73,8 +78,8 @@ def make_plan(
                 plan = reduction(plan)
                 plan = replace(plan, used=plan.used | {name})
     plan = ask_for_exact(plan)
-    plan = take(plan, shard) if shard is not None else ask_for_ends(plan, without)
-    return leave_out_stored(plan, stored, without)
+    plan = take(first_attempts(plan), shard) if shard is not None else ask_for_ends(plan, without)
+    return first_attempts(leave_out_stored(plan, stored, without))
 
 
 def leave_out_stored(plan: Plan, stored: Collection[str], without: Collection[str] = ()) -> Plan:
@@ -85,11 +90,13 @@ def leave_out_stored(plan: Plan, stored: Collection[str], without: Collection[st
 
 def first_attempts(plan: Plan) -> Plan:
     """Return the plan in which every solve with an accuracy has its first mesh, and further ones to try later."""
-    solves = (
-        replace(solve, later=rungs_for(solve.case, solve.goal)).again() if solve.goal and not solve.later else solve
-        for solve in plan.solves
-    )
-    return replace(plan, solves=tuple(solves))
+    return replace(plan, solves=tuple(map(_first_attempt, plan.solves)))
+
+
+def _first_attempt(solve: Solve) -> Solve:
+    if solve.goal is None or not isnan(solve.expected):
+        return solve
+    return replace(solve, later=rungs_for(solve.case, solve.goal)).again()
 
 
 def ask_for_exact(plan: Plan) -> Plan:
@@ -98,47 +105,62 @@ def ask_for_exact(plan: Plan) -> Plan:
     It is left out at large displacements, beside `mesh.accuracy` unless the study has `exact = true`, and where places
     of a path are interpolated.
     """
-    plan = first_attempts(plan)
-    if not plan.study.solve.exact or plan.place_paths:
+    study = plan.study
+    if not study.solve.exact or plan.place_paths:
         return plan
-    is_asked = "exact" in plan.study.solve.model_fields_set
+    is_asked = "exact" in study.solve.model_fields_set
     accuracy = min([EXACT, *(solve.goal * _EXACT_SHARE for solve in plan.solves if solve.goal)])
     found: dict[str, Solve] = {}
     unasked: dict[str, Solve] = {}
+    first: dict[str, Solve] = {}
     keys, without = [], Counter[str]()
-    # Meshes of a scene share what keeps F_exact from it, and its key.
-    reasons: dict[Hashable, str] = {}
-    of_scene: dict[Hashable, str] = {}
-    for case in plan.study.cases():
-        if case.lost_contact:
+    # Meshes of a scene share F_exact, and what keeps it from the scene.
+    of_scenes: dict[Hashable, tuple[str, Solve | None]] = {}
+    for index in study.indices():
+        source = image.of if (image := plan.equivalent.get(index)) and image.of_scene else index
+        source = deeper.of if (deeper := plan.proportional.get(source)) else source
+        scenes = study.scene(index), study.scene(source)
+        if scenes not in of_scenes:
+            reason, solve = _exact_of(study, index, source, accuracy)
+            of_scenes[scenes] = reason, solve and first.setdefault(solve.key, solve)
+        reason, solve = of_scenes[scenes]
+        if solve is None:
             keys.append(NO_RECORD)
+            without[reason] += bool(reason)
             continue
-        scene = case.body, case.material, case.probe, case.load
-        if (reason := reasons.get(scene)) is None:
-            reason = reasons[scene] = obstacle("F_exact", case)
-        if reason:
-            keys.append(NO_RECORD)
-            without[reason] += 1
-            continue
-        if (image := plan.equivalent.get(case.index)) and image.of_scene:
-            case = plan.study.case(image.of)  # noqa: PLW2901
-        if deeper := plan.proportional.get(case.index):
-            case = plan.study.case(deeper.of)  # noqa: PLW2901
-        enough = max(accuracy, EXACT_OF_SLIT) if case.probe.slit else accuracy
-        scene = case.body, case.material, case.probe, case.load
-        if (key := of_scene.get(scene)) is None:
-            key = of_scene[scene] = reference_key(case, enough)
-        is_wanted = is_asked or case.mesh.accuracy is None
-        wanted = found if is_wanted else unasked
-        keys.append(key if is_wanted else NO_RECORD)
-        if key not in wanted:
-            wanted[key] = _reference(key, case, enough)
+        is_wanted = is_asked or study.mesh(index).accuracy is None
+        keys.append(solve.key if is_wanted else NO_RECORD)
+        (found if is_wanted else unasked).setdefault(solve.key, solve)
     for reason, count in without.items():
         plan = plan.struck_by("exact", count, f"F_exact is not computed: {reason}.")
     plan = replace(plan, unasked=tuple(unasked.values()))
     if not any(keys):
         return plan
-    return replace(plan, solves=(*plan.solves, *found.values()), reference_keys=tuple(keys))
+    return replace(plan, solves=(*plan.solves, *map(of_unit_scene, found.values())), reference_keys=tuple(keys))
+
+
+def _exact_of(
+    study: Study, index: tuple[int, ...], source: tuple[int, ...], accuracy: float
+) -> tuple[str, Solve | None]:
+    """Return the solve for F_exact of the case at ``index``, whose force is that of ``source``; or why there is none.
+
+    There is no reason to tell where the tool has lost contact.
+    """
+    case = study.case(index)
+    if case.lost_contact or (reason := obstacle("F_exact", case)):
+        return "" if case.lost_contact else reason, None
+    case = study.case(source)
+    enough = max(accuracy, EXACT_OF_SLIT) if case.probe.slit else accuracy
+    return "", Solve(reference_key(case, enough), case, goal=enough, is_reference=True)
+
+
+def of_unit_scene(solve: Solve) -> Solve:
+    """Return the solve for F_exact with the scene for E = 1 and depth = 1, in three dimensions or on the meridian."""
+    mesh = Mesh.model_construct({"accuracy"}, accuracy=solve.goal)
+    solve = replace(solve, case=replace(normalised(solve.case), mesh=mesh, solve=Solving(), outputs=()))
+    if is_round(solve.case):
+        return replace(solve, axisymmetric=True)
+    return replace(solve, mirrors=model_planes(solve.case))
 
 
 def ask_for_ends(plan: Plan, without: Collection[str] = ()) -> Plan:
@@ -152,12 +174,3 @@ def ask_for_ends(plan: Plan, without: Collection[str] = ()) -> Plan:
             for solve in found.solves if found else ():
                 solves.setdefault(solve.key, replace(solve, serves=(), end_of=end.unknown))
     return replace(plan, solves=tuple(solves.values()), ends=tuple(ends)) if ends else plan
-
-
-def _reference(key: str, case: Case, accuracy: float) -> Solve:
-    mesh = Mesh.model_construct({"accuracy"}, accuracy=accuracy)
-    whole = replace(normalised(case), mesh=mesh, solve=Solving(), outputs=())
-    solve = Solve(key, whole, goal=accuracy, later=rungs_for(whole, accuracy), is_reference=True).again()
-    if is_round(whole):
-        return replace(solve, axisymmetric=True)
-    return replace(solve, mirrors=model_planes(whole))

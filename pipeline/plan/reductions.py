@@ -1,6 +1,6 @@
 """Reductions: functions from plan to plan that strike out work. Users read their docstrings as the reasons."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from pipeline.plan import estimate
@@ -27,15 +27,13 @@ _LONE_DEPTHS = (
 
 def strike_past_body(plan: Plan) -> Plan:
     """If ε extends beyond the body, the case is the full order, for every `outside`."""
-    solves = [
-        replace(solve, key=case_key(solve.case, folded=True)) if solve.case.is_full else solve for solve in plan.solves
-    ]
-    return _merged(plan.with_solves(solves), "full", reason_of(strike_past_body))
+    keys = [case_key(solve.case, folded=True) if solve.case.is_full else solve.key for solve in plan.solves]
+    return _merged(plan, keys, "full", reason_of(strike_past_body))
 
 
 def strike_duplicates(plan: Plan) -> Plan:
     """Equal cases are solved once. Histories of the depth and relaxation need no solve of their own."""
-    return _merged(plan, "duplicates", reason_of(strike_duplicates))
+    return _merged(plan, [solve.key for solve in plan.solves], "duplicates", reason_of(strike_duplicates))
 
 
 def strike_scaled(plan: Plan) -> Plan:
@@ -45,19 +43,15 @@ def strike_scaled(plan: Plan) -> Plan:
     """
     first: dict[str, Case] = {}
     deeper: dict[tuple[int, ...], ProportionalDepth] = {}
+    keys = []
     for solve in plan.solves:
-        text = depth_key(solve.case)
-        if text and (other := first.setdefault(text, solve.case)).probe.depth != solve.case.probe.depth:
-            deeper |= dict.fromkeys(solve.serves, proportional_to_depth(solve.case, other))
-
-    def key(case: Case) -> str:
         # A record belongs to one depth: the study's first one is solved for the others.
-        text = depth_key(case)
-        return case_key(first[text] if text else case, folded=True, scaled=True)
-
-    plan = replace(plan, proportional=deeper)
-    plan = plan.with_solves([replace(solve, key=key(solve.case)) for solve in plan.solves])
-    return _merged(plan, "scaling", reason_of(strike_scaled))
+        text = depth_key(solve.case)
+        case = first.setdefault(text, solve.case) if text else solve.case
+        if case.probe.depth != solve.case.probe.depth:
+            deeper |= dict.fromkeys(solve.serves, proportional_to_depth(solve.case, case))
+        keys.append(case_key(case, folded=True, scaled=True))
+    return _merged(replace(plan, proportional=deeper), keys, "scaling", reason_of(strike_scaled))
 
 
 def strike_images(plan: Plan) -> Plan:
@@ -84,18 +78,18 @@ def _struck_places(
     """
     first: dict[str, tuple[Solve, Matrix]] = {}
     places: dict[tuple[int, ...], EquivalentPlace] = {}
-    solves = list(plan.solves)
+    keys = [solve.key for solve in plan.solves]
     for number, solve in enumerate(plan.solves if _sweeps_places(plan) else ()):
         if (found := key_of(solve.case, "scaling" in plan.used)) is None:
             continue
         text, matrix = found
         other, there = first.setdefault(text, (solve, matrix))
         if other is not solve:
-            solves[number] = replace(solve, key=other.key)
+            keys[number] = other.key
             place = EquivalentPlace(other.case.index, from_place(there, matrix), of_scene)
             places |= dict.fromkeys(solve.serves, place)
-    plan = replace(plan.with_solves(solves), equivalent=places | dict(plan.equivalent))
-    return _merged(plan, name, reason_of(reduction))
+    plan = replace(plan, equivalent=places | dict(plan.equivalent))
+    return _merged(plan, keys, name, reason_of(reduction))
 
 
 def _sweeps_places(plan: Plan) -> bool:
@@ -240,16 +234,22 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
 }
 
 
-def _merged(plan: Plan, name: str, reason: str) -> Plan:
-    unique: dict[str, list[Solve]] = {}
-    for solve in plan.solves:
-        unique.setdefault(solve.key, []).append(solve)
-    merged = tuple(replace(same[0], serves=_joined(same)) if len(same) > 1 else same[0] for same in unique.values())
-    return replace(plan, solves=merged).struck_by(name, len(plan.solves) - len(merged), reason)
+def _merged(plan: Plan, keys: Sequence[str], name: str, reason: str) -> Plan:
+    """Return the plan in which solves of the same one of ``keys`` are one, the first, which serves the cases of all."""
+    same: dict[str, list[Solve]] = {}
+    for solve, key in zip(plan.solves, keys, strict=True):
+        same.setdefault(key, []).append(solve)
+    changed = {solve.key: key for solve, key in zip(plan.solves, keys, strict=True) if solve.key != key}
+    merged = tuple(_joined(key, solves) for key, solves in same.items())
+    of_cases = tuple(changed.get(key, key) for key in plan.keys) if changed else plan.keys
+    return replace(plan, solves=merged, keys=of_cases).struck_by(name, len(plan.solves) - len(merged), reason)
 
 
-def _joined(solves: Iterable[Solve]) -> tuple[tuple[int, ...], ...]:
-    return tuple(index for solve in solves for index in solve.serves)
+def _joined(key: str, solves: Sequence[Solve]) -> Solve:
+    first, *others = solves
+    if not others and first.key == key:
+        return first
+    return replace(first, key=key, serves=tuple(index for solve in solves for index in solve.serves))
 
 
 def _mirrored(solve: Solve) -> Solve:

@@ -43,7 +43,8 @@ class Plan:
         condensed: whether many depths of found contact on a small body use condensation.
         cost: the cost model of steps.
         part: the keys of a shard; None for a whole study.
-        unasked: the solves for F_exact that are left out because `solve.exact` is off by default.
+        unasked: the solves for F_exact that are left out because `solve.exact` is off by default, with the study's
+            scenes: see :func:`pipeline.plan.plan.of_unit_scene`.
         equivalent: by index of a case, the equivalent place that is solved instead.
         proportional: by index of a case, the proportional depth that is solved instead.
         place_paths: paths of which some places are solved, and F at the others is interpolated.

@@ -1,7 +1,7 @@
 """Base class of all sections of a study file, and the texts of their keys."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -37,6 +37,20 @@ class Section(BaseModel):
         Field(exclude=True),
         Words("Label of the table in an array of tables: its value along the dimension of the sweep.", '"first"'),
     ] = ""
+
+    # Not in `__dict__`: what compares and copies a model leaves it alone.
+    __slots__ = ("_hash",)
+    if TYPE_CHECKING:
+        _hash: int
+
+    def __hash__(self) -> int:
+        """Return the hash of its values, which is computed once: many cases of a study have the same section."""
+        try:
+            return self._hash
+        except AttributeError:
+            found = hash((type(self), *(self.__dict__.get(name) for name in type(self).model_fields)))
+            object.__setattr__(self, "_hash", found)
+            return found
 
 
 class Problems(Protocol):

@@ -1,7 +1,10 @@
 """A case: one scene with one mesh setting, and what its sections together imply."""
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
+from functools import wraps
 from math import inf
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from pipeline.shapes.body import Body
 from pipeline.shapes.contact import is_level
@@ -18,8 +21,30 @@ from pipeline.study.place import CLEAR, is_clear, place_error
 from pipeline.study.schema import Material, Mesh, Solving
 from pipeline.viscoelastic import Terms
 
+Rest = ParamSpec("Rest")
+Value = TypeVar("Value")
+
 # Thickness over reach up to which a body without support below the probe is a plate (docs/accuracy.md).
 _PLATE = 0.1
+
+
+def of_scene(find: "Callable[Concatenate[Case, Rest], Value]") -> "Callable[Concatenate[Case, Rest], Value]":
+    """Let the cases of one scene share what ``find`` returns for one of them and further, hashable arguments.
+
+    The result must not depend on the mesh, the solver or the index of the case.
+    """
+
+    name = find.__qualname__
+
+    @wraps(find)
+    def found(case: "Case", *rest: Rest.args, **named: Rest.kwargs) -> Value:
+        known, key = case.shared, (name, *rest, *named.items()) if rest or named else name
+        if key not in known:
+            known[key] = find(case, *rest, **named)
+        result: Value = known[key]
+        return result
+
+    return found
 
 
 @dataclass(frozen=True)
@@ -35,6 +60,8 @@ class Case:
     """One scene with one mesh setting: yields one force.
 
     ``far_region`` is set where the body's far field is found on a mesh that many places share; None if on its own.
+    ``shared`` has what is known of the scene (:func:`of_scene`): all meshes of a study's scene have one; a case that
+    was changed begins anew.
     """
 
     index: tuple[int, ...]
@@ -47,6 +74,7 @@ class Case:
     load: Load = field(default_factory=Load)
     far_region: FarRegion | None = None
     outputs: tuple[Output, ...] = ()
+    shared: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def labels(self) -> tuple[tuple[str, float | int | str], ...]:
@@ -59,6 +87,7 @@ class Case:
         return {axis.name: axis.write(axis.labels[i]) for axis, i in zip(self.axes, self.index, strict=True)}
 
     @property
+    @of_scene
     def frame(self) -> Frame:
         """Where the probe meets the body."""
         return self.probe.frame_on(self.body)
@@ -69,6 +98,7 @@ class Case:
         return features_of(self)
 
     @property
+    @of_scene
     def lost_contact(self) -> str:
         """Why there is no contact at this place of a path that may leave the body; "" if there is."""
         if not any(axis.off == "lost" for axis in self.axes):
@@ -77,6 +107,7 @@ class Case:
         return "" if error is None else CLEAR if is_clear(self.body, self.probe) else f"the tool does not fit: {error}"
 
     @property
+    @of_scene
     def travel(self) -> Vector:
         """Prescribed displacement (m) of the footprint."""
         return self.probe.travel(self.frame)
@@ -90,6 +121,7 @@ class Case:
         return motions + self.load.acts
 
     @property
+    @of_scene
     def tissues(self) -> tuple[Tissue, ...]:
         """What the regions of the body are made of, in the order of their numbers in meshes.
 
@@ -104,21 +136,25 @@ class Case:
         return (*names, *(f"{name}, linear" for name in names)) if self.is_linear_beyond else names
 
     @property
+    @of_scene
     def relaxations(self) -> tuple[Terms, ...]:
         """Terms of the relaxation of the regions of the body; where a region has none, the material's."""
         return tuple(tissue.prony or self.material.prony for tissue in self.tissues)
 
     @property
+    @of_scene
     def is_stepped(self) -> bool:
         """Whether its history is computed in time steps."""
         return needs_time_steps(self)
 
     @property
+    @of_scene
     def densities(self) -> tuple[float | None, ...]:
         """Densities (kg/m³) of the regions of the body, in the order of their numbers; None where there is none."""
         return tuple(tissue.density if tissue.density is not None else self.material.density for tissue in self.tissues)
 
     @property
+    @of_scene
     def poisson(self) -> float:
         """The largest Poisson's ratio of all regions."""
         return max(tissue.poisson for tissue in self.tissues)
@@ -137,6 +173,7 @@ class Case:
         return () if self.material.is_large or self.is_stepped else self.probe.proportional_to
 
     @property
+    @of_scene
     def scale(self) -> Scale:
         """The units in which its results do not depend on what they are proportional to."""
         if self.is_bent:
@@ -154,20 +191,34 @@ class Case:
         return self.is_even and not self.is_plate
 
     @property
+    @of_scene
     def is_even(self) -> bool:
         """Whether a body of one material is pressed straight down on a plane face."""
         return not self.body.pieces and self.probe.slit is None and is_level(self.body, self.frame)
 
     @property
+    @of_scene
     def is_plate(self) -> bool:
         """Whether the body has no support below the probe, and is so thin that it bends."""
-        thickness, reach = self.body.thickness(self.frame), self.body.reach(self.frame)
-        return not self.body.support.holds_column() and thickness < _PLATE * reach
+        thickness = self.body.thickness(self.frame)
+        return not self.body.support.holds_column() and thickness < _PLATE * self.reach
+
+    @property
+    @of_scene
+    def farthest(self) -> float:
+        """Distance (m) from the point of contact to the farthest point of the body."""
+        return self.body.farthest(self.frame)
+
+    @property
+    @of_scene
+    def reach(self) -> float:
+        """Largest distance (m) of the body from the probe's axis."""
+        return self.body.reach(self.frame)
 
     @property
     def is_full(self) -> bool:
         """Whether the mesh is fine everywhere: ε is "full", or reaches past the whole body."""
-        return self.mesh.epsilon == inf or self.mesh.epsilon >= self.body.farthest(self.frame)
+        return self.mesh.epsilon == inf or self.mesh.epsilon >= self.farthest
 
     @property
     def column(self) -> float:
@@ -175,7 +226,7 @@ class Case:
 
         Infinite if all of it is kept.
         """
-        return self.mesh.column(self.body.reach(self.frame))
+        return self.mesh.column(self.reach)
 
     @property
     def is_truncated(self) -> bool:

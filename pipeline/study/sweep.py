@@ -1,10 +1,11 @@
 """Sweeps: a study file's axes, and the cases that they become."""
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import prod
+from operator import itemgetter
 from typing import Any, TypeVar, cast
 
 from pipeline.shapes.body import Body
@@ -20,10 +21,9 @@ from pipeline.study.loads import Load
 from pipeline.study.measurement import Measurement
 from pipeline.study.output import Output
 from pipeline.study.problems import Problem
-from pipeline.study.schema import Drawing, Material, Planning, Solving, material_of
+from pipeline.study.schema import Drawing, Material, Mesh, Planning, Solving, material_of
 from pipeline.study.sensitivity import Spread
 
-_PARTS = ("body", "material", "probe", "mesh", "solve", "load")
 Value = TypeVar("Value")
 
 
@@ -121,15 +121,18 @@ class Study:
         assert isinstance(drawing, Drawing)
         return drawing
 
+    def indices(self) -> Iterator[tuple[int, ...]]:
+        """Yield the index of every case, one number for each axis, the last axis fastest."""
+        return itertools.product(*(range(n) for n in self.shape))
+
     def cases(self) -> Iterator[Case]:
-        """Yield every case, the last axis fastest."""
-        for index in itertools.product(*(range(n) for n in self.shape)):
-            yield self.case(index)
+        """Yield every case, in the order of the indices."""
+        return map(self.case, self.indices())
 
     def by_case(self, values: Sequence[Value]) -> list[list[Value]]:
         """Return ``values``, one for each case and stage, as one list for each case of the dataset."""
         found: dict[tuple[int, ...], list[Value]] = {}
-        for index, value in zip(itertools.product(*(range(n) for n in self.shape)), values, strict=True):
+        for index, value in zip(self.indices(), values, strict=True):
             own = tuple(i for i, axis in zip(index, self.axes, strict=True) if not axis.is_stage)
             found.setdefault(own, []).append(value)
         return list(found.values())
@@ -143,36 +146,73 @@ class Study:
 
     def case(self, index: tuple[int, ...]) -> Case:
         """Return the case at ``index``, one number for each axis."""
-        places: dict[str, int] = {}
-        for name, own in self._layout.items():
-            flat = 0
-            for position, length in own:
-                flat = flat * length + index[position]
-            places[name] = flat
-        chosen: Any = {name: self.sections[name][flat] for name, flat in places.items()}
-        together = places["body"], places["material"], places["load"]
-        if together not in self._in_use:
-            self._in_use[together] = _in_use(chosen["body"], chosen["material"], chosen["load"])
-        return Case(index, self.axes, outputs=self.outputs, **chosen | self._in_use[together])
+        scene = self.scene(index)
+        if (known := self._scenes.get(scene)) is None:
+            known = self._scenes[scene] = *self._parts(index), {}
+        body, material, probe, load, shared = known
+        case = Case(index, self.axes, body, material, probe, self.mesh(index), self.solve, load, None, self.outputs)
+        object.__setattr__(case, "shared", shared)
+        return case
+
+    def scene(self, index: tuple[int, ...]) -> Hashable:
+        """Return what is the same for the cases that differ in the mesh alone."""
+        return self._axes_of_scene(index)
+
+    def mesh(self, index: tuple[int, ...]) -> Mesh:
+        """Return the mesh section of the case at ``index``."""
+        return self._meshes[self._axes_of_mesh(index)]
 
     @cached_property
-    def _in_use(self) -> dict[tuple[int, int, int], dict[str, Section]]:
+    def _axes_of_scene(self) -> Callable[[tuple[int, ...]], Hashable]:
+        return _chosen([number for number, axis in enumerate(self.axes) if axis.section != "mesh"])
+
+    @cached_property
+    def _axes_of_mesh(self) -> Callable[[tuple[int, ...]], Hashable]:
+        return _chosen([number for number, axis in enumerate(self.axes) if axis.section == "mesh"])
+
+    @cached_property
+    def _meshes(self) -> dict[Hashable, Mesh]:
+        shape = [len(axis) if axis.section == "mesh" else 1 for axis in self.axes]
+        indices = itertools.product(*map(range, shape))
+        meshes = cast("Sequence[Mesh]", self.sections["mesh"])
+        return {self._axes_of_mesh(index): mesh for index, mesh in zip(indices, meshes, strict=True)}
+
+    @cached_property
+    def _scenes(self) -> dict[Hashable, tuple[Body, Material, Probe, Load, dict[Hashable, Any]]]:
+        """Body, material, probe and load of each scene, and what its cases share."""
+        return {}
+
+    def _parts(self, index: tuple[int, ...]) -> tuple[Body, Material, Probe, Load]:
+        numbers = {}
+        for name in ("body", "material", "load", "probe"):
+            flat = 0
+            for axis, number in zip(self.axes, index, strict=True):
+                flat = flat * len(axis) + number if axis.section == name else flat
+            numbers[name] = flat
+        chosen: Any = {name: self.sections[name][number] for name, number in numbers.items()}
+        probe, _ = chosen.pop("probe"), numbers.pop("probe")
+        together = tuple(numbers.values())
+        if together not in self._in_use:
+            self._in_use[together] = _in_use(**chosen)
+        body, material, load = self._in_use[together]
+        return body, material, probe, load
+
+    @cached_property
+    def _in_use(self) -> dict[tuple[int, ...], tuple[Body, Material, Load]]:
         """What cases have of body, material and load, by the numbers of the three; most cases share it."""
         return {}
 
-    @cached_property
-    def _layout(self) -> dict[str, tuple[tuple[int, int], ...]]:
-        """For each part of a case, position and length of the axes that choose among its variants."""
-        return {
-            name: tuple((i, len(axis)) for i, axis in enumerate(self.axes) if axis.section == name) for name in _PARTS
-        }
+
+def _chosen(axes: Sequence[int]) -> Callable[[tuple[int, ...]], Hashable]:
+    """Return the function that returns the part of an index for some ``axes``."""
+    return itemgetter(*axes) if axes else lambda _: ()
 
 
-def _in_use(body: Body, material: Material, load: Load) -> dict[str, Section]:
+def _in_use(body: Body, material: Material, load: Load) -> tuple[Body, Material, Load]:
     """Return the parts of a case that depend on each other.
 
     A body that layers fill has the first one's material, not the section's. Regions without a law have that of the
     material. Pressures in hollow regions are tractions of the load.
     """
     material = material_of(body.regions[0]) if body.is_filled else material
-    return {"body": body.with_law_of(material), "material": material, "load": load.with_pressures(body.pressures)}
+    return body.with_law_of(material), material, load.with_pressures(body.pressures)
