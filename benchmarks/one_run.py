@@ -77,9 +77,10 @@ def measure(
         "bar": bars,
         "peak": comm.allreduce(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss),
         "cases": len(records),
-        "solved": len(plan.solves),
+        "solved": sum(record.origin != "interpolated" for record in records.values()),
         "message": next((record.message for record in records.values() if not record.is_ok), ""),
         "force_error": max(record.force_error for record in records.values()),
+        "forces": [(records[key].force, records[key].force_error) for key in plan.keys if key in records],
         "record": first.to_json(),
         **{name: getattr(first, name) for name in _OF_A_CASE},
     }

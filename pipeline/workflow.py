@@ -19,7 +19,7 @@ from pipeline.plan.shard import Shard
 from pipeline.report.dataset import build
 from pipeline.report.publish import Results, ResultsError, publish
 from pipeline.run.begun import ENDING, Begun, fail_begun
-from pipeline.run.completion import complete
+from pipeline.run.completion import complete, places_of
 from pipeline.run.merge import merge
 from pipeline.run.outbox import Outbox
 from pipeline.run.outcome import count_states, failures
@@ -243,7 +243,11 @@ def _lacking(plan: Plan, opened: Opened, comm: MPI.Comm) -> Plan | None:
         found = opened.store.get(keys) if opened.store and not opened.is_fresh else {}
         return {key: record for key, record in found.items() if record.is_ok}
 
-    return comm.bcast(complete(plan, opened.records, get) if comm.rank == 0 else None)
+    further = complete(plan, opened.records, get) if comm.rank == 0 else None
+    if plan.study.is_insertion:
+        return comm.bcast(further)
+    # A body with search trees cannot be sent; each rank has the plan.
+    return places_of(plan, comm.bcast(further.keys if further else ()))
 
 
 def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None, signals: list[int]) -> None:

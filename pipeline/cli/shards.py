@@ -35,7 +35,7 @@ def merge_shards(
     check_store(target)
     check_output(target, *result_files(output, study.name))
     plan = make_plan(study, without=check_names(without))
-    sources, records = _merged(paths, target, plan)
+    sources, records, further = _merged(paths, target, plan)
     problems = [problem for source in sources for problem in source.problems]
     for problem in problems:
         error(problem)
@@ -50,7 +50,11 @@ def merge_shards(
         fault, status = of_results(wrong, study.file)
         fail(fault, status=status)
     missing = frozenset(solve.key for solve in plan.solves if solve.key not in records)
-    again = _completing(plan, missing, paths, [word for name in without or () for word in ("--without", name)])
+    options = [word for name in without or () for word in ("--without", name)]
+    again = _completing(plan, missing, paths, options)
+    if further and not missing:  # not of any shard: earlier results decide it
+        plan, missing = further, frozenset(solve.key for solve in further.solves)
+        again = [" ".join(["epsmesh", "run", quote(study.file), *map(quote, options)])]
     totals = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
     say(
         {
@@ -88,8 +92,8 @@ def _stores(study: "Study", given: list[Path] | None, output: Path) -> list[Path
     return found
 
 
-def _merged(paths: list[Path], path: Path, plan: "Plan") -> "tuple[tuple[Source, ...], dict[str, Record]]":
-    """Merge into the store at ``path``; return the plan's records, with those of skipped cases."""
+def _merged(paths: list[Path], path: Path, plan: "Plan") -> "tuple[tuple[Source, ...], dict[str, Record], Plan | None]":
+    """Merge into the store at ``path``; return the records of the plan and of skipped cases, and the further plan."""
     from pipeline.run import merge as merging
     from pipeline.run.completion import complete
     from pipeline.run.stop import skipped
@@ -103,9 +107,9 @@ def _merged(paths: list[Path], path: Path, plan: "Plan") -> "tuple[tuple[Source,
             error(store.notice)
         sources = merging.merge(paths, store)
         records = store.get(plan.all_keys)
-        complete(plan, records, store.get)
+        further = complete(plan, records, store.get)
         store.close()
-    return sources, records | skipped(plan, records)
+    return sources, records | skipped(plan, records), further
 
 
 def _dates(records: dict[str, "Record"]) -> dict[str, str]:

@@ -10,6 +10,7 @@ from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.run.begun import Begun
 from pipeline.run.compile import prepare
+from pipeline.run.completion import complete
 from pipeline.run.groups import run_phase
 from pipeline.run.memory import FreeMemory, keep_imports, return_large_arrays
 from pipeline.run.mesh_cache import MeshCache
@@ -64,10 +65,21 @@ def execute(
 
 
 def compute(plan: Plan, comm: MPI.Comm) -> dict[str, Record]:
-    """Run ``plan`` without a store and return its records by key, on every rank; collective."""
+    """Run ``plan`` without a store and return its records by key, on every rank; collective.
+
+    Further places along paths are solved, too, and the others interpolated; not the further states of insertions.
+    """
     records: dict[str, Record] = {}
-    execute(plan, comm, lambda record: records.__setitem__(record.key, record), Progress())
-    return comm.bcast(records)
+
+    def keep(record: Record) -> None:
+        records[record.key] = record
+
+    todo: Plan | None = plan
+    while todo:
+        execute(todo, comm, keep, Progress())
+        records.update(comm.bcast(records))
+        todo = complete(plan, records, lambda _: {}) if plan.place_paths else None
+    return records
 
 
 def _apart(steps: Sequence[MeshStep], delayed: Collection[str]) -> tuple[list[MeshStep], list[MeshStep]]:

@@ -5,7 +5,7 @@ piece.
 """
 
 from functools import lru_cache
-from math import hypot, isfinite, radians, tan
+from math import hypot, inf, isfinite, radians, tan
 
 import numpy as np
 
@@ -44,11 +44,11 @@ def outline_points(probe: Probe, count: int = _ALONG) -> FloatArray:
         at = np.linspace(0.0, along[-1], count + 1)[:-1]
         return np.column_stack([np.interp(at, along, line[:, axis]) for axis in (0, 1)])
     pieces = np.maximum(1, np.rint(count * lengths / lengths.sum())).astype(int)
-    parts = [
-        start + np.linspace(0, 1, n, endpoint=False)[:, None] * (end - start)
-        for start, end, n in zip(line[:-1], line[1:], pieces, strict=True)
-    ]
-    return np.vstack(parts)
+    number = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    share = number * np.repeat(1 / pieces, pieces)
+    return np.asarray(
+        np.repeat(line[:-1], pieces, axis=0) + share[:, None] * np.repeat(np.diff(line, axis=0), pieces, axis=0)
+    )
 
 
 def lifted_edge(body: Body, probe: Probe, frame: Frame) -> FloatArray:
@@ -58,6 +58,8 @@ def lifted_edge(body: Body, probe: Probe, frame: Frame) -> FloatArray:
 
 def edge_gap(body: Body, probe: Probe, frame: Frame) -> float:
     """Return the distance (m) from a footprint to the edge of its face, negative if it reaches over the edge."""
+    if body.gap(frame.point) == inf:
+        return inf
     return min(body.gap((float(x), float(y), float(z))) for x, y, z in lifted_edge(body, probe, frame))
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from mpi4py import MPI
 
 from pipeline.plan.describe import story
@@ -14,10 +15,13 @@ from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.states import FAILED, OK
 from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from pipeline.study.read import parse, read_study
+from pipeline.study.toml import to_toml
 
 LINE = {"line": {"from": ["-11 mm", "2 mm"], "to": ["9 mm", "3 mm"], "steps": 41}}
 TUMOUR = {"name": "tumour", "at": ["1 mm", "2 mm", "-7 mm"], "radius": "4 mm", "young": "80 kPa", "poisson": 0.3}
+
+NEAR = TUMOUR | {"at": ["1 mm", "1 mm", "-3.5 mm"], "radius": "2 mm"}
 
 
 def scene(error="1 %", path=LINE, tumour=TUMOUR, **changes):
@@ -154,3 +158,37 @@ def test_the_error_is_for_a_path():
                 "mesh": {"accuracy": "1 %"},
             }
         )
+
+
+def test_shards_solve_the_first_places_and_a_run_on_two_ranks_the_rest(epsmesh, spawn, tmp_path):
+    """Whole again, the dataset is that of one run; ``status --merge`` names the command that is lacking."""
+    content = {"title": "map", "body": {"shape": "box", "size": ["20 mm", "20 mm", "10 mm"], "inclusion": [NEAR]}}
+    content |= {
+        "material": {"young": "10 kPa", "poisson": 0.3},
+        "solve": {"exact": False},
+        "plan": {"path_error": "0.5 %"},
+    }
+    line = {"line": {"from": ["-5 mm", "1 mm"], "to": ["5 mm", "1.5 mm"], "steps": 15}}
+    content |= {"probe": {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "path": line}}
+    content |= {
+        "mesh": {"epsilon": "4 mm", "fine": "2 mm", "coarse": "4 mm", "rim": "0.9 mm", "growth": 0.9, "degree": 2}
+    }
+    file, out = tmp_path / "map.toml", tmp_path / "out"
+    file.write_text(to_toml(content, "map"))
+    for number in (1, 2):
+        done = epsmesh("run", file, "--output", out, "--shard", f"{number}/2", "-q")
+        assert done.exit_code == 0, done.output
+    merged = epsmesh("status", file, "--output", out, "--merge")
+    assert merged.exit_code == 1
+    assert f"epsmesh run {file}" in merged.output
+    assert "--shard" not in merged.output.split("compute them")[-1]
+    spawn("run", file, "--output", out, "-q", ranks=2)
+    assert epsmesh("status", file, "--output", out).exit_code == 0
+    whole = xr.load_dataset(out / "map.nc")
+    assert bool((whole["status"] == 0).all())
+    origins = xr.load_dataset(out / "map.nc", group="run")["origin"].values
+    solved_here, interpolated = (sum(one.startswith(how) for one in origins) for how in ("solved", "interpolated"))
+    assert solved_here >= 8
+    assert solved_here + interpolated == 15
+    alone = build(*solved(read_study(file)))
+    np.testing.assert_allclose(whole["force"], alone["force"], rtol=1e-6)
