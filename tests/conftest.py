@@ -1,10 +1,12 @@
 """What tests of the command line share: `epsmesh` in this process, `spawn` in one of its own, and a small study."""
 
 import os
+from math import inf
 
 import pytest
 
 from pipeline.shapes.files import checked
+from pipeline.study import case
 from tests import commands
 from tests.studies import small_text
 
@@ -58,3 +60,9 @@ def small(tmp_path):
     file = tmp_path / "small.toml"
     file.write_text(SMALL)
     return file
+
+
+@pytest.fixture
+def folding(monkeypatch):
+    """Give deep probes the quarter-point elements of shallow ones, which fold."""
+    monkeypatch.setattr(case, "_SHALLOW", inf)

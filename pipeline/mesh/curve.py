@@ -41,7 +41,7 @@ def _of_one_part(_: IntArray, chosen: BoolArray) -> tuple[BoolArray, bool]:
 
 @stage("curved rim and sides")
 def curve(mesh: MeshArrays, scene: Scene, *, is_finest: bool = True, agree: Agree = _of_one_part) -> MeshArrays:
-    """Return ``mesh`` with ten nodes per cell, on the true rim and sides, with quarter points at a singular rim.
+    """Return ``mesh`` with ten nodes per cell, on the true rim and sides, with the scene's quarter points.
 
     ``agree`` is for parts of a mesh, and collective. A mesh that is not the finest has no quarter points, but those at
     which its edges are to be halved.
@@ -61,7 +61,7 @@ def curve(mesh: MeshArrays, scene: Scene, *, is_finest: bool = True, agree: Agre
     curved = _on_rim(mesh, scene, edges, curved)
     middle = curved.copy()
     if is_finest:
-        if scene.probe.has_singular_edge:
+        if scene.has_quarter_points:
             middle = _quarter_points(mesh, edges, middle)
         # A folded cell loses its quarter points first: without its arcs the footprint would be smaller.
         for milder in (curved, straight):

@@ -102,7 +102,8 @@ def _scene(case: Case, *, is_coarse: bool) -> tuple[Scene, Sizes]:
         sizes = replace(sizes, times=_COARSER, rim=_AT_RIM * sizes.rim, column=sizes.column / _COARSER)
     segments = sizes.rim_segments(case.probe)
     held, ball = not (case.mesh.keeps_all or case.mesh.outside == "free"), case.is_closed
-    return Scene(case.body, case.probe, _column(case), held, segments, straight, planes, ball), sizes
+    folds = not case.has_quarter_points
+    return Scene(case.body, case.probe, _column(case), held, segments, straight, planes, ball, folds), sizes
 
 
 def _beyond(case: Case, mirrors: tuple[str, ...]) -> tuple[str, ...]:

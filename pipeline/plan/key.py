@@ -43,6 +43,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
         text_of(case.solve, ("timing", "repeats", "exact")),
         *tail,
         *map(_output_text, case.outputs),
+        *_rim_text(case),
     ]
     if case.solve.timing:
         parts += [str(case.labels), str(case.solve.repeats)]
@@ -100,7 +101,12 @@ def mesh_key(case: Case) -> str:
     sizes = _mesh_text(case.mesh, case.is_full, case.probe.half_width, "")
     footprint = text_of(case.probe, case.probe.not_drawn)
     refined = ["refined"] if is_refined(case) else []
-    return digest("\n".join([_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1), *refined]))
+    parts = [_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1), *refined, *_rim_text(case)]
+    return digest("\n".join(parts))
+
+
+def _rim_text(case: Case) -> tuple[str, ...]:
+    return () if case.has_quarter_points else ("no quarter points",)
 
 
 def operator_key(case: Case) -> str:

@@ -121,6 +121,15 @@ _LARGE = (
     Recipe(2, 0.07, 0.35, 6.5e-4),
     Recipe(2, 0.05, 0.3, 4.4e-4),
 )
+# Deep probes at large displacements: no quarter points, and rims that do not fold. Bars hardly depend on the depth.
+_DEEP = (
+    Recipe(2, 0.4, 0.7, 9.5e-3),
+    Recipe(2, 0.3, 0.6, 7.5e-3),
+    Recipe(2, 0.2, 0.5, 5.5e-3),
+    Recipe(2, 0.15, 0.45, 4.3e-3),
+    Recipe(2, 0.1, 0.4, 3.1e-3),
+    Recipe(2, 0.07, 0.35, 2.4e-3),
+)
 # Error bars at large displacements, in units of those of linear elasticity: at small depths, and their growth with the
 # depth in units of the half width.
 _OF_LARGE, _BY_DEPTH = 1.8, 6.0
@@ -169,6 +178,8 @@ def _ladder(case: Case) -> tuple[Recipe, ...]:
     """Return the recipes for a probe, cheapest first."""
     if isinstance(case.probe, Indenter):
         return _FOUND_LARGE if case.material.is_large else _FOUND[case.element]
+    if not case.has_quarter_points:
+        return _DEEP
     if case.material.is_large:
         return _LARGE
     if case.probe.is_unilateral:
@@ -198,7 +209,7 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
     is_even = case.is_plain and not case.probe.is_unilateral
     if is_even:
         shape *= _near(case) * (_SEVERAL if case.element == "mixed" and case.movements > 1 else 1.0)
-    if case.material.is_large and not case.probe.is_unilateral:
+    if case.material.is_large and case.has_quarter_points and not case.probe.is_unilateral:
         shape *= _OF_LARGE * (1 + _BY_DEPTH * case.probe.depth / half_width_of(case))
     locking = 1.0 if case.element == "mixed" else ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
     if isinstance(case.probe, Indenter) and not case.material.is_large:  # elements in a thin body are small anyway

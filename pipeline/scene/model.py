@@ -47,6 +47,7 @@ class Scene:
     ``column`` is the radius (m) of the part kept around the probe's axis, or infinite; with ``is_ball`` the part within
     that distance of the contact is kept. ``rim_segments`` is the number of edges along a round rim, for ``straight``
     elements, which cannot be curved. ``mirrors`` are the planes of symmetry; only their positive side is modelled.
+    ``rim_folds``: quarter-point elements at the rim would fold.
     """
 
     body: Body
@@ -57,6 +58,12 @@ class Scene:
     straight: bool = False
     mirrors: tuple[str, ...] = ()
     is_ball: bool = False
+    rim_folds: bool = False
+
+    @property
+    def has_quarter_points(self) -> bool:
+        """Whether elements at the rim have quarter points."""
+        return self.probe.has_singular_edge and not self.rim_folds
 
     @property
     def frame(self) -> Frame:

@@ -39,6 +39,8 @@ _LIMITS_SEVERAL = (0.5, 0.35)
 # s, while N contains both.
 _APART = {2: 0.3, 3: 0.15}
 _LIMITS_COARSE, _LIMITS_PLAIN = (0.4, 1.0), (0.85, 0.85)
+# The same at large displacements, where contact is bonded and one degree more was solved: docs/accuracy.md.
+_LIMITS_SOLVED = (0.9, 0.5)
 # Interfaces between materials, curved surfaces and thin plates add errors. The next degree removes another share of
 # these errors than of those at the probe's edge.
 _LIMITS_ELSEWHERE = {"displacement": (0.4, 0.4), "mixed": (0.5, 0.9)}
@@ -76,6 +78,11 @@ def is_graded(rim: float, growth: float, *, found: bool = False) -> bool:
     return rim <= largest and growth <= steepest
 
 
+def is_plain(share: float) -> bool:
+    """Return whether a mesh counts as one without quarter points, from the share of edges at the rim without them."""
+    return share >= _PLAIN
+
+
 def error_bar(
     decrement: float, degree: int, element: str = "displacement", *, plain: float = 0.0, unseen: float = 0.0
 ) -> float:
@@ -109,26 +116,30 @@ def extrapolate(
     graded: bool = True,
     elsewhere: bool = False,
     large: bool = False,
+    solved: bool = False,
     unseen: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the limit of the stiffness (n, n) in the sequence of degrees, and the bars on its entries.
 
     ``decrements`` is K_p - K_{p+1}, ``bars`` are those on K_p. All entries get the same relative correction. The bar is
     wider where ``unseen`` (n), N of a mixed element in units of the diagonal stiffnesses, demands it. ``elsewhere``
-    says that F has errors from other places than the probe's edge, ``large`` that displacements are large.
+    says that F has errors from other places than the probe's edge, ``large`` that displacements are large, and
+    ``solved`` that the decrements there are not those of a linearisation.
     """
     theta = _theta(degree)
     centre, spread = _limits(
         degree, element, plain=plain, graded=graded, elsewhere=elsewhere, several=len(stiffness) > 1
     )
-    if large:
+    if large and solved and degree > 1:
+        centre, spread = _LIMITS_SOLVED
+    elif large:
         most = centre + spread
         least = min(_LEAST_LARGE, centre - spread)
         centre, spread = (most + least) / 2, (most - least) / 2
     relative = np.diag(bars) / np.abs(np.diag(stiffness))
     share = 1 / np.sqrt(1 + relative)
     left = bars * np.outer(share, share) * spread * theta / (1 + _left(degree, element, plain) * theta)
-    if unseen is not None and not elsewhere and plain < _PLAIN:
+    if unseen is not None and not elsewhere and not is_plain(plain):
         scale = np.abs(np.diag(stiffness))
         least = _APART[degree] * theta * (unseen - np.abs(np.diag(decrements)) / scale) * scale
         found = np.diag(left)
@@ -141,7 +152,7 @@ def _limits(
     degree: int, element: str, *, plain: float, graded: bool, elsewhere: bool, several: bool
 ) -> tuple[float, float]:
     """Return centre and spread of the error that degree p + 1 leaves, in units of θ s."""
-    if plain >= _PLAIN:
+    if is_plain(plain):
         return _LIMITS_PLAIN
     if not graded:
         return _LIMITS_COARSE

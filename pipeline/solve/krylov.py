@@ -63,6 +63,7 @@ _ENLARGE, _RESULT, _TOO_SMALL = 14, 1, (-8, -9)
 
 _prefixes = itertools.count()
 INDEFINITE = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC
+INDEFINITE_MATRIX = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT
 
 
 @contextmanager

@@ -23,9 +23,13 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.solve.compiled import assemble
 from pipeline.solve.elements.base import Elements, Fields, Linearised
+from pipeline.solve.elements.fields import Column
 from pipeline.solve.movement import Loads
-from pipeline.solve.newton import HyperelasticBody, LargeError
+from pipeline.solve.newton import HyperelasticBody, LargeError, Preconditioner
 from pipeline.solve.physics import MaterialLaw
+
+# Residual of the solution in one degree more, relative to the forces at prescribed dofs.
+_AGAIN = 1e-6
 
 
 class FinerResiduals:
@@ -90,6 +94,37 @@ def combine(own: float, fields: Fields, share: float, other: Fields) -> Fields:
     for part, added in zip(fields, other, strict=True):
         part.axpby(share, own, added)
     return fields
+
+
+def force_again(
+    elements: Elements,
+    body: HyperelasticBody,
+    state: PETSc.Vec,
+    finer: Elements,
+    law: MaterialLaw,
+    column: Column,
+    preconditioner: Preconditioner,
+) -> float:
+    """Return the force (N) on the modelled part in the elements ``finer``, by Newton's method from a ``state``.
+
+    The ``column`` has the prescribed displacement of these elements per unit of the motion. Collective.
+
+    Raises:
+        LargeError: if it does not converge.
+    """
+    with ExitStack() as stack:
+        above = HyperelasticBody(finer, law, preconditioner)
+        stack.callback(above.close)
+        found, unit, forces = (stack.enter_context(above.state()) for _ in range(3))
+        body.show(state)
+        finer.interpolate(elements)
+        finer.set_law(law)
+        found.array[:] = finer.values
+        above.equilibrate(found, above.held_of(found), _AGAIN)
+        above.forces(found, forces)
+        owned = finer.displacements.owned
+        unit.array[:owned] = column.prescribed[:owned]
+        return float(forces.dot(unit))
 
 
 class Decrements:

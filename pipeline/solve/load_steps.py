@@ -15,12 +15,14 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.cell_values import plain_share
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.dead_loads import HeldTool, hold_tool
 from pipeline.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Products, Solver
 from pipeline.solve.elements.fields import Column, Fields
 from pipeline.solve.ended import ended
-from pipeline.solve.large_estimate import Decrements, FinerResiduals, combine
+from pipeline.solve.estimate import is_plain
+from pipeline.solve.large_estimate import Decrements, FinerResiduals, combine, force_again
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.newton import LEFT, ON_THE_WAY, HyperelasticBody, LargeError
@@ -186,6 +188,10 @@ class LoadSteps(Solver):
             LargeError: if the elements of one degree more fail.
         """
         column, held, finer = columns[0], self._load_path.held, self._linear.finer()
+        if held is None and is_plain(plain_share(self.elements.body)):
+            force = self._force_again(finer, column, movement, stack)
+            decrement = (self._load_path.path[-1][1] - force) / column.amount
+            return HierarchicalEstimate(finer, [], decrements=np.array([[decrement]]), is_solved=True)
         residuals = FinerResiduals(self.elements, self._body, finer, self._law, movement.loads, stack)
         state, unit, rate = (stack.enter_context(self._body.state()) for _ in range(3))
         self._put_unit(column, unit)
@@ -223,6 +229,20 @@ class LoadSteps(Solver):
             decrements=decrements,
             unseen=None if estimate.is_bound else unseen,
         )
+
+    def _force_again(self, finer: Elements, column: Column, movement: Movement, stack: ExitStack) -> float:
+        """Return the force (N) on the modelled part in elements of one degree more."""
+        (above,) = finer.columns(movement, stack)
+        with self._body.state() as state:
+            self._at(column, state)
+            preconditioner = self._linear.finer_preconditioner()
+            try:
+                return force_again(self.elements, self._body, state, finer, self._law, above, preconditioner)
+            except LargeError as error:
+                raise LargeError(
+                    f"no error bar: elements of degree {finer.degree} fail at the probe's edge ({error}); "
+                    "use a larger rim, or a smaller depth"
+                ) from error
 
     def _at(self, column: Column, state: PETSc.Vec) -> None:
         """Write the solution at the depth of a column into ``state``."""

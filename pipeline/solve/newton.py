@@ -22,7 +22,7 @@ from pipeline.solve.elements.base import Elements
 from pipeline.solve.elements.fields import Fields
 from pipeline.solve.elements.tangent import Prestress, Tangent
 from pipeline.solve.kernels.tangent import TangentCells
-from pipeline.solve.krylov import INDEFINITE, explain, solver_of
+from pipeline.solve.krylov import INDEFINITE, INDEFINITE_MATRIX, explain, solver_of
 from pipeline.solve.loads import Applied
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace
@@ -242,21 +242,38 @@ class HyperelasticBody:
                     return iteration
                 ksp.setTolerances(rtol=forcing(norm / before, left * scale / norm) if is_there else _ROUGH)
                 before = norm if is_there else inf
-                self._newton_step(ksp, state, residual, todo, step)
+                self._newton_step(ksp, state, residual, todo, step, is_there=is_there)
                 stored = self._advance(state, stored, residual, step, there, is_there=is_there)
         raise LargeError(f"no equilibrium after {_MOST} iterations")
 
     def _newton_step(
-        self, ksp: PETSc.KSP, state: PETSc.Vec, residual: PETSc.Vec, todo: FloatArray, step: PETSc.Vec
+        self,
+        ksp: PETSc.KSP,
+        state: PETSc.Vec,
+        residual: PETSc.Vec,
+        todo: FloatArray,
+        step: PETSc.Vec,
+        *,
+        is_there: bool,
     ) -> None:
-        """Write the step from ``state``, with the change ``todo`` of prescribed dofs, into ``step``."""
+        """Write the step from ``state``, with the change ``todo`` of prescribed dofs, into ``step``.
+
+        Where prescribed dofs are at their goal (``is_there``) and the tangent is indefinite, the step ends at the first
+        direction of negative curvature. What conjugate gradients found before reduces the energy (R. S. Dembo and
+        T. Steihaug, Math. Program. 26, 190, 1983).
+        """
         self.assemble(state)
         with self.state() as load:
             step.set(0.0)
             step.array[self._held] = todo
             load.array[:] = -residual.array - self._tangent.whole(step.array[: self._space.owned])
             load.array[self._held] = todo
-            self._run(ksp, lambda: ksp.solve(load, step))
+            try:
+                self._run(ksp, lambda: ksp.solve(load, step))
+            except LargeError:
+                is_truncated = is_there and ksp.getConvergedReason() == INDEFINITE_MATRIX
+                if not (is_truncated and step.norm() > 0):
+                    raise
 
     def _advance(
         self, state: PETSc.Vec, stored: float, residual: PETSc.Vec, step: PETSc.Vec, there: PETSc.Vec, *, is_there: bool

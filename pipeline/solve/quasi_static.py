@@ -194,6 +194,7 @@ class QuasiStaticProblem(Problem):
             solution,
             contact=found.contact and replace(found.contact, bar=finer.area_bar, friction_bar=finer.friction_bar),
             plain=plain,
+            is_solved=finer.is_solved,
             unseen=None if unseen is None else unseen[: len(movement.motions)],
             front=front,
             tip=tip,

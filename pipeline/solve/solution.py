@@ -37,10 +37,11 @@ class Solution:
 
     # Error bar (pipeline.solve.estimate): decrements of the stiffness (n, n) in one degree more, 95 % bars on its
     # entries, share of edges at the rim without quarter points, and N of mixed elements, in units of the energies on
-    # the diagonal (n).
+    # the diagonal (n). With ``is_solved``, decrements at large displacements are not those of a linearisation.
     decrements: FloatArray | None = None
     bars: FloatArray | None = None
     plain: float = nan
+    is_solved: bool = False
     unseen: FloatArray | None = None
 
     contact: Contact | None = None  # unilateral contact only
@@ -207,6 +208,7 @@ class Solution:
             graded=graded,
             elsewhere=elsewhere,
             large=large,
+            solved=self.is_solved,
             unseen=self.unseen,
         )
         best = replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)

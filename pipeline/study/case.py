@@ -26,6 +26,8 @@ Value = TypeVar("Value")
 
 # Thickness over reach up to which a body without support below the probe is a plate (docs/accuracy.md).
 _PLATE = 0.1
+# Depth, in units of the footprint's half width, up to which quarter-point elements do not fold at large displacements.
+_SHALLOW = 0.1
 
 
 def of_scene(find: "Callable[Concatenate[Case, Rest], Value]") -> "Callable[Concatenate[Case, Rest], Value]":
@@ -219,6 +221,13 @@ class Case:
     def is_full(self) -> bool:
         """Whether the mesh is fine everywhere: ε is "full", or reaches past the whole body."""
         return self.mesh.epsilon == inf or self.mesh.epsilon >= self.farthest
+
+    @property
+    def has_quarter_points(self) -> bool:
+        """Whether elements at a singular edge of the probe have quarter points; deep in tissue they would fold."""
+        if not (self.material.is_large and self.probe.has_singular_edge):
+            return True
+        return self.probe.depth <= _SHALLOW * self.probe.half_width
 
     @property
     def column(self) -> float:

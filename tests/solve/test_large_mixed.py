@@ -199,6 +199,7 @@ def test_depths_of_a_sweep_share_one_load_path(monkeypatch):
         assert record.force_error == pytest.approx(alone.force_error, rel=2e-2)
 
 
+@pytest.mark.usefixtures("folding")
 def test_a_depth_that_is_not_reached_is_partial_and_says_where():
     (record,) = solve(material=soft(0.5), probe={"depth": "9 mm"}).values()
     assert record.status == "partial"

@@ -50,6 +50,7 @@ class HierarchicalEstimate:
     reduction of the energies, None if the columns give it. ``unseen`` (n), J, are N of mixed elements. ``relative`` (n)
     are 95 % bars, None if they follow from both. ``area_bar`` is that on the area of unilateral contact.
     ``friction_bar`` is the part of ``relative`` for what friction adds to the force, which is not from the next degree.
+    ``is_solved`` says that the nonlinear problem was solved in that degree, and not its linearisation.
     """
 
     elements: "Elements"
@@ -59,6 +60,7 @@ class HierarchicalEstimate:
     relative: FloatArray | None = None
     area_bar: float = nan
     friction_bar: float = 0.0
+    is_solved: bool = False
 
 
 class HierarchicalEstimator(Protocol):
@@ -146,6 +148,10 @@ class Linearised(ABC):
     @abstractmethod
     def finer(self) -> "Elements":
         """Return the elements of one degree more."""
+
+    @abstractmethod
+    def finer_preconditioner(self) -> Any:
+        """Return the preconditioner of the elements of one degree more, after :meth:`finer`."""
 
     @abstractmethod
     def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, FloatArray | None]:

@@ -177,6 +177,10 @@ class LinearisedDisplacement(Linearised):
         finer, self._above = self._elements.finer(self._law, self._levels, self._stack)
         return finer
 
+    def finer_preconditioner(self) -> LinearSolver:
+        """Return the preconditioner of the elements of one degree more."""
+        return self._above
+
     def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, None]:
         """Return decrements."""
         found, *_ = energy_decrements(self._above, [residual[0] for residual in residuals])

@@ -286,11 +286,17 @@ class LinearisedMixed(Linearised):
         """Return the elements of one degree more."""
         return self._elements.finer()
 
+    def finer_preconditioner(self) -> Any:
+        """Return the preconditioner of the elements of one degree more."""
+        return self._finer_saddle().preconditioner(self._elements.finer().compliance(self._law), self._stack)
+
+    def _finer_saddle(self) -> SaddleSolver:
+        below = self._elements._solvers.get(False, (None, None))[0]
+        return self._elements.finer()._solver(self._elements.elastic(self._law), direct=False, below=below)
+
     def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, FloatArray]:
         """Return decrements and N."""
-        finer, law = self._elements.finer(), self._law
-        below = self._elements._solvers.get(False, (None, None))[0]
-        saddle = finer._solver(self._elements.elastic(law), direct=False, below=below)
+        finer, law, saddle = self._elements.finer(), self._law, self._finer_saddle()
         fixed = np.zeros(len(finer.displacements.forms.displacement.x.array))
         found = [Column(fixed, None, residual, self._stack.enter_context(finer.fields())) for residual in residuals]
         MixedSolver(finer, law, saddle, is_exact=False).solve(found, _ESTIMATE_TOLERANCE)
