@@ -14,7 +14,6 @@ from scipy.spatial import cKDTree
 from pipeline.arrays import FloatArray
 from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body
-from pipeline.shapes.closed import ON_SURFACE
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.regions import Embedded
@@ -144,13 +143,19 @@ class EmbeddedSizes:
 
 @dataclass(frozen=True, eq=False)
 class OvoidSizes(EmbeddedSizes):
-    """Those of an ellipsoid."""
+    """Those of an ellipsoid, for a tool at ``contact``."""
 
     surface: Ovoid
+    contact: Vector
+
+    @cached_property
+    def _size(self) -> float:
+        """The size (m) on the surface."""
+        return float(self.surface.sizes(self.contact)[1][0])
 
     def on_surface(self, points: FloatArray) -> FloatArray:
         """Return the size (m) at points (n, 3) by the factor that scales the surface to them."""
-        return self.surface.least * (ON_SURFACE + self.growth * np.abs(self.surface.level(points) - 1))
+        return self._size + self.growth * self.surface.least * np.abs(self.surface.level(points) - 1)
 
     def terms_on_surface(self, unit: float, kernel: Any) -> Iterator[str]:
         """Yield the same as text for gmsh."""
@@ -159,7 +164,7 @@ class OvoidSizes(EmbeddedSizes):
             f"((({name})-({unit * c:.12g}))/{unit * a:.12g})^2"
             for name, c, a in zip("xyz", surface.centre, surface.axes, strict=True)
         )
-        yield f"{unit * surface.least:.12g}*({ON_SURFACE}+{self.growth:.12g}*Abs(Sqrt({level})-1))"
+        yield f"{unit * self._size:.12g}+{self.growth * unit * surface.least:.12g}*Abs(Sqrt({level})-1)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +201,7 @@ def embedded_sizes(body: Body, growth: float, contact: Vector) -> tuple[Embedded
         if isinstance(surface := piece.surface, Shell):
             return ShellSizes(nearest, room, growth, surface, contact)
         assert isinstance(surface, Ovoid)
-        return OvoidSizes(nearest, room, growth, surface)
+        return OvoidSizes(nearest, room, growth, surface, contact)
 
     return tuple(map(sizes, body.embedded))
 

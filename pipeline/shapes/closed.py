@@ -3,6 +3,8 @@
 from abc import abstractmethod
 from typing import ClassVar
 
+import numpy as np
+
 from pipeline.arrays import FloatArray
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.surface import Surface
@@ -10,6 +12,17 @@ from pipeline.shapes.surface import Surface
 # Element size on the surface in units of half of the thickness inside it. With elements of degree 2, F is then within
 # .1 % of its value for half these sizes (docs/accuracy.md), and the error bar accounts for the rest.
 ON_SURFACE = 0.4
+# Far from the contact, element sizes are this share of the distance from it, up to the second in units of half of the
+# thickness.
+_OF_DISTANCE, _LARGEST = 0.15, 0.8
+
+
+def size_on(half: FloatArray, away: FloatArray) -> FloatArray:
+    """Return the size (n) of elements on a surface by ``half`` of its thickness (n), ``away`` from a contact (n), in m.
+
+    Far from the contact elements are larger: they need only follow the surface.
+    """
+    return np.clip(_OF_DISTANCE * away, ON_SURFACE * half, _LARGEST * half)
 
 
 class Closed(Surface):

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.shapes.closed import ON_SURFACE, Closed
+from pipeline.shapes.closed import Closed, size_on
 from pipeline.shapes.frame import Vector
 
 # Newton's method from the left converges monotonically; points near the centre of flat ellipsoids need most steps.
@@ -54,7 +54,8 @@ class Ovoid(Closed):
 
     def sizes(self, contact: Vector) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return its centre (m), the size (m) of elements by its smallest semi-axis, and its area (m²)."""
-        return np.array([self.centre]), np.array([ON_SURFACE * self.least]), np.array([self.area])
+        away = np.abs(self.distance(np.array([contact])))
+        return np.array([self.centre]), size_on(np.array([self.least]), away), np.array([self.area])
 
     def has_axis(self, within: float) -> bool:
         """Return whether it is centred on the z axis, within ``within`` (m), and round about it."""

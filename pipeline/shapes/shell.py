@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.shapes.closed import ON_SURFACE, Closed
+from pipeline.shapes.closed import Closed, size_on
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.skin import Skin
 from pipeline.shapes.triangles import Triangles, doubled_normals
@@ -20,9 +20,6 @@ _THIN_PART = 0.4
 _ROUNDS = 30
 # A ball ends at points of which its centre sees the first one under a larger angle (cosine); nearer ones are noise.
 _APART, _SAME = 0.5, 1e-6
-# Far from the contact, element sizes are this share of the distance from it, up to the second in units of half of the
-# thickness.
-_OF_DISTANCE, _LARGEST = 0.15, 0.8
 # A surface is thin if its area is so many squares of its thickness: a sheet 10, a thread 60 times as long as thick.
 _SHEET = 200.0
 # Fractions of a low-discrepancy sequence in two dimensions (M. Roberts, 2018).
@@ -155,14 +152,10 @@ class Shell(Closed):
         return x, y, z
 
     def sizes(self, contact: Vector) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return points (n, 3), element sizes (n) by the thickness there, and equal areas (n) of parts around them.
-
-        Far from the contact elements are larger: they need only follow the surface.
-        """
+        """Return points (n, 3), element sizes (n) by the thickness there, and equal areas (n) of parts around them."""
         points, half = self.thin
         away = np.linalg.norm(points - np.array(contact), axis=1)
-        sizes = np.clip(_OF_DISTANCE * away, ON_SURFACE * half, _LARGEST * half)
-        return points, sizes, np.full(len(half), self.triangles.area / len(half))
+        return points, size_on(half, away), np.full(len(half), self.triangles.area / len(half))
 
     # ---- symmetry -------------------------------------------------------------------------------------
 

@@ -58,7 +58,8 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
 
     tangles: list[TangledError] = []
     contact: Near | None = None
-    deviation = deviation_of(sizes.growth, is_rough=scene.straight or body.partition is not None)
+    is_rough, is_found = scene.straight or body.partition is not None, not scene.probe.has_singular_edge
+    deviation = deviation_of(sizes.growth, is_found=is_found, is_rough=is_rough)
     for finer in _FINER:
         smaller = replace(sizes, column=sizes.column / finer)
         for _ in range(_ATTEMPTS):
