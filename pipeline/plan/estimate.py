@@ -3,6 +3,7 @@
 from math import inf, log, pi
 
 from pipeline.shapes.indenter import Indenter
+from pipeline.shapes.scanned import FINE, Scanned
 from pipeline.study.case import Case
 
 # Mean volume of gmsh's tetrahedra, in units of the cube of the element size: measured, docs/performance.md.
@@ -33,7 +34,7 @@ _DOFS_PER_CELL = {1: 0.55, 2: 4.4, 3: 15.0, 4: 35.0}
 # Bytes per tetrahedron of gmsh and the arrays while meshing.
 _BYTES_PER_CELL = 1000
 # Curved sides: far element size in units of the radius; additional tetrahedra per boundary triangle; additional
-# tetrahedra per unit of a surface's curvature, for elements of unit size.
+# tetrahedra per unit of a surface's curvature, for elements of unit size whose facets deviate least.
 _OF_BEND, _ON_BOUNDARY, _FOLLOW = 0.5, 1.4, 30.0
 _TRIANGLE = 0.43
 # Element size in a layer, in its thickness (mesh/regions.py); factor on the number of elements of regions, because
@@ -79,7 +80,10 @@ def _of_bend(case: Case) -> float:
     if case.column < inf or far == inf:
         return 0.0
     triangles = 6 * body.volume ** (2 / 3) / (_TRIANGLE * far**2)
-    return body.volume / far**3 + _TETRAHEDRON * (_ON_BOUNDARY * triangles + _FOLLOW * body.curvature / far)
+    follow = _FOLLOW * body.curvature / far
+    if isinstance(body, Scanned):
+        follow *= FINE / body.deviation(case.mesh.growth, case.probe, straight=case.mesh.degree == 1)
+    return body.volume / far**3 + _TETRAHEDRON * (_ON_BOUNDARY * triangles + follow)
 
 
 def _of_regions(case: Case) -> float:

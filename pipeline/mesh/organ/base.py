@@ -22,18 +22,12 @@ from pipeline.mesh.organ.untangle import crossing_facets
 from pipeline.mesh.size import EDGES_PER_RADIUS
 from pipeline.shapes.complex import OUTSIDE, Complex
 from pipeline.shapes.frame import Vector
-from pipeline.shapes.scanned import Scanned
+from pipeline.shapes.scanned import FINE, Scanned
 from pipeline.shapes.surface import Surface
 from pipeline.stages import stage
 
 # Increase by hand when the same file gives another surface.
 _VERSION = 6
-# Finest and coarsest deviation from the file's surface in one remeshing, in units of the largest elements. It goes like
-# the square of the growth of sizes, as the error of chords goes like that of sizes. It is coarsest at the growth for an
-# error bar of 2 %, of a prescribed displacement and of contact that is found. After each remeshing points, and the
-# middles of edges, are projected back onto the file's surface.
-FINE, _COARSE = 0.02, 0.1
-_GROWTH_OF_COARSE, _GROWTH_OF_FOUND = 0.6, 0.38
 # Elements per contact radius near a contact, and the growth of their size beyond twice that radius.
 _PER_CONTACT, _GROWTH = 3, 0.3
 # Distance around a tangle within which the file's own facets stay, in units of these facets.
@@ -93,16 +87,6 @@ class Kept(Protocol):
 
     def arrays(self, key: str, make: Callable[[], Arrays]) -> Arrays:
         """Return the arrays cached under ``key``; without any, call ``make`` and cache its result."""
-
-
-def deviation_of(growth: float, *, is_found: bool, is_rough: bool) -> float:
-    """Return the deviation from the file's surface in units of the largest elements, for a ``growth`` of sizes.
-
-    It ``is_found`` where contact needs smaller elements than F elsewhere. It ``is_rough`` where not all middles of
-    edges come back to the faces: in elements of degree 1, and at junctions.
-    """
-    coarse = _GROWTH_OF_FOUND if is_found else _GROWTH_OF_COARSE
-    return FINE if is_rough else min(max(_COARSE * (growth / coarse) ** 2, FINE), _COARSE)
 
 
 def far_surface(

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError
-from pipeline.mesh.organ.base import FINE, Base, Kept, Near, deviation_of, far_surface, put_back
+from pipeline.mesh.organ.base import Base, Kept, Near, far_surface, put_back
 from pipeline.mesh.organ.contact import Contact, FoldedError, set_in
 from pipeline.mesh.organ.faces import Faces
 from pipeline.mesh.organ.field import Field
@@ -22,7 +22,7 @@ from pipeline.mesh.size import Sizes
 from pipeline.scene.model import FREE, Scene
 from pipeline.shapes.body import Body
 from pipeline.shapes.complex import Complex
-from pipeline.shapes.scanned import Scanned
+from pipeline.shapes.scanned import FINE, Scanned
 
 # Passes of surface meshing: only in the second pass points are dense where sizes change fast.
 _PASSES = 2
@@ -58,8 +58,7 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
 
     tangles: list[TangledError] = []
     contact: Near | None = None
-    is_rough, is_found = scene.straight or body.partition is not None, not scene.probe.has_singular_edge
-    deviation = deviation_of(sizes.growth, is_found=is_found, is_rough=is_rough)
+    deviation = body.deviation(sizes.growth, scene.probe, straight=scene.straight)
     for finer in _FINER:
         smaller = replace(sizes, column=sizes.column / finer)
         for _ in range(_ATTEMPTS):
