@@ -25,7 +25,7 @@ def many_small(cases: int, on_a_mesh: int = 10) -> dict[str, Any]:
     body = BOX | {"size": ["30 mm", "30 mm", "15 mm"]}
     probe = DISC | {"radius": [f"{2 + i / meshes:.6f} mm" for i in range(meshes)], "depth": "0.1 mm"}
     mesh = graded("6 mm", "6 mm", "1 mm", 0.9, degree=1, model="3d")
-    ratios = [0.04 * number for number in range(on_a_mesh)]
+    ratios = [0.4 * number / on_a_mesh for number in range(on_a_mesh)]
     return study(body, ratios, probe, mesh) | {"plan": {"without": ["reduced"]}}
 
 
