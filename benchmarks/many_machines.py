@@ -2,10 +2,10 @@
 
     python -m benchmarks.many_machines [--cases 10000] [--jobs 20] [--seed 1]
 
-It needs root, and installs and starts the Slurm of the tests: two virtual nodes of two processors each, on this machine's
-cores. First one undisturbed process runs the study. Then the jobs run. At random moments a random running job
-is killed, in one of three ways: its program; all processes of its step; its script, too, so that it is not restarted.
-Half way a node is drained. The merge job completes the study.
+It needs root, and installs and starts the Slurm of the tests: two virtual nodes of two processors each, on the cores of
+this machine. First one undisturbed process runs the study. Then the jobs run. At random moments a random running job is
+killed, in one of three ways: its program; all processes of its step; its script, too, so that it is not restarted. Half
+way a node is drained. The merge job completes the study.
 
 The exit status is 1 if the dataset is not whole, or differs from that of the single process by one bit. Efficiency is
 the processor time of the single process over that of all jobs.
@@ -30,7 +30,7 @@ from benchmarks.scenes import many_small
 from benchmarks.tables import markdown, options, write
 from pipeline.run.registry import RUNNING, runs
 from pipeline.study.toml import to_toml
-from tests.cluster.slurm import JOBS, ROOT, Cluster, started
+from tests.cluster.slurm import HERE, JOBS, ROOT, Cluster, started
 from tests.compare import all_done, assert_same_bits
 
 CASES, MACHINES, ON_A_MESH = 10_000, 20, 20
@@ -115,6 +115,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if os.geteuid() != 0:
         print("many_machines needs root, which starts Slurm: left out")
         return 0
+    with TemporaryDirectory() as name:
+        if subprocess.run([HERE / "start-slurm.sh", name], check=False).returncode:
+            print("many_machines: no Slurm can be installed or started here: left out")
+            return 0
+        subprocess.run([HERE / "stop-slurm.sh", name], check=True)
     with TemporaryDirectory(prefix="epsmesh-machines-") as name:
         folder = Path(name)
         os.environ |= MPI_ENVIRONMENT | {"XDG_STATE_HOME": str(folder / "state"), "PYTHONPATH": str(ROOT)}

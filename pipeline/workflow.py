@@ -16,7 +16,6 @@ from mpi4py import MPI
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, leave_out_stored, make_plan
 from pipeline.plan.shard import Shard
-from pipeline.report.dataset import build
 from pipeline.report.publish import Results, ResultsError, publish
 from pipeline.run.begun import ENDING, Begun, fail_begun
 from pipeline.run.completion import complete, places_of
@@ -164,6 +163,8 @@ def solve(study: Study, comm: MPI.Comm, store: Path, progress: Terminal | None =
         StoreError: on every rank, if the store cannot be used.
         KeyboardInterrupt: if it was interrupted; what was finished is on record.
     """
+    from pipeline.report.dataset import build  # noqa: PLC0415 (it loads xarray)
+
     plan, opened = prepare(study, comm, store)
     with abort_on_exception(comm):
         interrupted = _compute(plan, opened, comm, progress)

@@ -7,8 +7,6 @@ from typing import NamedTuple
 from pipeline.files import result_files
 from pipeline.launcher import is_interrupt
 from pipeline.plan.plan import Plan
-from pipeline.report.dataset import build, write
-from pipeline.report.drawn import are_drawn, mark_of
 from pipeline.run.record import Record
 
 
@@ -47,6 +45,9 @@ def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, 
     Raises:
         ResultsError: whatever keeps them from being made.
     """
+    from pipeline.report.dataset import build, write  # noqa: PLC0415 (xarray is slow to load, and no shard needs it)
+    from pipeline.report.drawn import are_drawn, mark_of  # noqa: PLC0415
+
     what = f"{output}: the results of {plan.study.file} cannot be"
     path, *figures = result_files(output, plan.study.name)
     try:

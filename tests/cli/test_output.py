@@ -75,7 +75,7 @@ def test_a_disk_that_fills_while_results_are_written_loses_no_record(epsmesh, tm
     file.write_text(small_text(mesh={"epsilon": "full"}, solve={"exact": False}), encoding="utf-8")
     options = ("--output", tmp_path / "out", "--meshes", tmp_path / "meshes")
     with monkeypatch.context() as patched:
-        patched.setattr("pipeline.report.publish.write", full)
+        patched.setattr("pipeline.report.dataset.write", full)
         done = epsmesh("run", file, *options)
     assert done.exit_code == 2
     (line,) = [line for line in done.stderr.splitlines() if "cannot be written" in line]

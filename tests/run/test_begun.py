@@ -175,7 +175,7 @@ def test_results_that_cannot_be_built_are_told_in_words(epsmesh, small, monkeypa
     def broken(*_):
         raise ValueError("dimension `load` against variable `load`")
 
-    monkeypatch.setattr("pipeline.report.publish.build", broken)
+    monkeypatch.setattr("pipeline.report.dataset.build", broken)
     done = epsmesh("run", small, "--output", tmp_path / "out", "--json")
     assert done.exit_code == 1
     told = json.loads(done.stdout)
