@@ -68,10 +68,12 @@ class Trial:
 
 
 def trials(tool: str, count: int, seed: int) -> Iterator[Trial]:
-    """Yield the trials of ``count`` random scenes of a tool, for each accuracy."""
+    """Yield the trials of ``count`` random scenes of a tool, for each accuracy; without those that have no truth."""
     random = np.random.default_rng(seed)
     for scene in _scenes(TOOLS[tool], count, random):
         truth, _ = _solve(scene, TOOLS[tool].truth, ())
+        if not truth.is_ok:
+            continue
         for asked in ASKED:
             found, seconds = _solve(scene, f"{100 * asked:g} %", ("axisymmetric",))
             error = abs(found.force / truth.force - 1)

@@ -52,15 +52,23 @@ LADDER = (
     Recipe(3, 0.05, 0.35, 1.0e-4),
     Recipe(3, 0.025, 0.3, 5.0e-5),
 )
-# If the probe's edge dominates the error, error bars are predictable enough for rungs in between. None has degree 3 and
-# a larger rim: few quadratic arcs approximate a circle poorly, and the force is too low (docs/accuracy.md).
-_BETWEEN = (
-    Recipe(2, 0.25, 0.55, 2.6e-3),
-    Recipe(3, 0.25, 0.55, 7.0e-4),
-    Recipe(3, 0.125, 0.425, 2.7e-4),
-    Recipe(3, 0.07, 0.37, 1.4e-4),
+# If the probe's edge dominates the error, error bars are predictable: rungs are closer. None has degree 3 and a larger
+# rim: few quadratic arcs approximate a circle poorly, and the force is too low (docs/accuracy.md).
+_EVEN = (
+    Recipe(2, 0.4, 0.7, 7.0e-3),
+    Recipe(2, 0.3, 0.6, 4.1e-3),
+    Recipe(2, 0.25, 0.55, 3.1e-3),
+    Recipe(2, 0.2, 0.5, 2.3e-3),
+    Recipe(3, 0.3, 0.6, 1.8e-3),
+    Recipe(3, 0.25, 0.55, 1.25e-3),
+    Recipe(3, 0.2, 0.5, 9.5e-4),
+    Recipe(3, 0.15, 0.45, 7.0e-4),
+    Recipe(3, 0.125, 0.425, 5.2e-4),
+    Recipe(3, 0.1, 0.4, 3.8e-4),
+    Recipe(3, 0.07, 0.37, 2.7e-4),
+    Recipe(3, 0.05, 0.35, 1.9e-4),
+    Recipe(3, 0.025, 0.3, 1.0e-4),
 )
-_EVEN = tuple(sorted((*LADDER, *_BETWEEN), key=lambda recipe: -recipe.bar))
 # On a curved surface, smaller elements of degree 2 have a smaller error bar than the first rung of degree 3, in the
 # same time (docs/decisions.md).
 _ROUND = (
@@ -133,13 +141,14 @@ _DEEP = (
 # Error bars at large displacements, in units of those of linear elasticity: at small depths, and their growth with the
 # depth in units of the half width.
 _OF_LARGE, _BY_DEPTH = 1.8, 6.0
-# Error bars grow by 1 + 10 a/H with the probe's half width a over the body's thickness H, measured up to _THINNEST.
-_THICKNESS, _THINNEST = 10.0, 0.15
-# Error bars of mixed elements, in units of those of displacement elements at ν = 0.3, by degree: if the probe's edge
-# dominates, and otherwise.
-_MIXED_EVEN, _MIXED = {2: 1.0, 3: 1.05}, {2: 1.2, 3: 1.05}
-# Error bars of mixed elements with several movements, in units of those with one.
-_SEVERAL = 1.15
+# Error bars grow by 1 + 10 a/H with the probe's half width a over the body's thickness H, measured up to _THINNEST;
+# where the probe's edge dominates, by 1 + a/H.
+_THICKNESS, _THICKNESS_EVEN, _THINNEST = 10.0, 1.0, 0.15
+# Error bars of mixed elements, in units of those of displacement elements at ν = 0.3, by degree, and the same at large
+# displacements.
+_MIXED, _MIXED_LARGE = {2: 1.2, 3: 1.05}, {2: 1.0, 3: 1.05}
+# Error bars with several movements, or of a column, in units of those with one in a whole body, by degree.
+_SEVERAL = {2: 1.5, 3: 1.15}
 # Factor for several materials, curved surfaces, and plates, by element (solve/estimate.py).
 _ELSEWHERE = {"displacement": 1.6, "mixed": 2.6}
 # Error bars of displacement elements grow like (1 - 2 ν)^-0.35 (locking), measured from ν = 0.3 to 0.49.
@@ -206,19 +215,22 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
         shape *= 1 + _SLIDE * _slide(case)
     if not case.is_plain:
         shape *= _ELSEWHERE[case.element]
-    is_even = case.is_plain and not case.probe.is_unilateral
-    if is_even:
-        shape *= _near(case) * (_SEVERAL if case.element == "mixed" and case.movements > 1 else 1.0)
+    if case.is_plain and not case.probe.is_unilateral:
+        shape *= _near(case)
     if case.material.is_large and case.has_quarter_points and not case.probe.is_unilateral:
         shape *= _OF_LARGE * (1 + _BY_DEPTH * case.probe.depth / half_width_of(case))
     locking = 1.0 if case.element == "mixed" else ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
     if isinstance(case.probe, Indenter) and not case.material.is_large:  # elements in a thin body are small anyway
         return [float(recipe.bar * shape * locking) for recipe in ladder]
-    shape *= 1 + _THICKNESS * min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
-    if case.element == "mixed":
-        of_degree = _MIXED_EVEN if is_even else _MIXED
-        return [recipe.bar * shape * of_degree[recipe.degree] for recipe in ladder]
-    return [float(recipe.bar * shape * locking) for recipe in ladder]
+    is_even = ladder is _EVEN
+    thin = min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
+    shape *= locking * (1 + (_THICKNESS_EVEN if is_even else _THICKNESS) * thin)
+    of_degree = _MIXED_LARGE if case.material.is_large else _MIXED
+    if case.element == "displacement":
+        of_degree = dict.fromkeys(_MIXED, 1.0)
+    if is_even and (case.movements > 1 or case.is_truncated):
+        of_degree = {degree: factor * _SEVERAL[degree] for degree, factor in of_degree.items()}
+    return [float(recipe.bar * shape * of_degree[recipe.degree]) for recipe in ladder]
 
 
 def _near(case: Case) -> float:

@@ -16,7 +16,7 @@ from pipeline.shapes.contact import first_touch
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probes.sphere import Sphere
-from pipeline.solve.estimate import is_graded
+from pipeline.solve.estimate import is_fine, is_graded
 from pipeline.solve.history import History
 from pipeline.solve.response import Contact
 from pipeline.solve.solution import Solution
@@ -51,6 +51,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
             case.mesh.degree,
             case.element,
             graded=is_graded_to_contact(case),
+            fine=case.is_plain and not case.is_truncated and is_fine(_rim(case), case.mesh.growth),
             elsewhere=not case.is_plain,
             large=case.material.is_large,
             ball=isinstance(case.probe, Sphere),
@@ -156,7 +157,7 @@ def _known_of(case: Case, force: Vector) -> Vector:
 
 def is_graded_to_contact(case: Case) -> bool:
     """Return whether the mesh of ``case`` is graded to the expected edge of contact."""
-    rim = case.mesh.rim_size(case.probe.half_width) / edge_width_of(case)
+    rim = _rim(case)
     # The coarsest recipe equals the limit of `is_graded`: rounding must not exceed it.
     found = isinstance(case.probe, Indenter)
     rim *= 1 - _ROUNDING if found else 1.0
@@ -165,6 +166,11 @@ def is_graded_to_contact(case: Case) -> bool:
         if hypot(*beside) > _BESIDE * half_width_of(case):
             return False
     return is_graded(rim, case.mesh.growth, found=found)
+
+
+def _rim(case: Case) -> float:
+    """Return the size of elements at the edge of contact, in units of the width that they resolve."""
+    return case.mesh.rim_size(case.probe.half_width) / edge_width_of(case)
 
 
 def _front_length(case: Case) -> float:

@@ -173,14 +173,16 @@ class Solution:
         element: str,
         *,
         graded: bool = True,
+        fine: bool = False,
         elsewhere: bool = False,
         large: bool = False,
         ball: bool = False,
     ) -> "Solution":
         """Return the limit of the sequence of degrees, on a mesh ``graded`` to the edge or not; unchanged without bars.
 
-        ``elsewhere`` says that F has errors from other places than the probe's edge, ``large`` that displacements are
-        large, ``ball`` that a tool in unilateral contact is smooth.
+        ``fine`` says that elements at the edge are small, on a plain body, ``elsewhere`` that F has errors from other
+        places than the probe's edge, ``large`` that displacements are large, ``ball`` that a tool in unilateral contact
+        is smooth.
         """
         if self.decrements is None or self.bars is None or (large and self.contact is not None):
             return self  # found contact at large displacements has no known limit: F and its bar stay
@@ -206,6 +208,7 @@ class Solution:
             element,
             plain=self.plain,
             graded=graded,
+            fine=fine,
             elsewhere=elsewhere,
             large=large,
             solved=self.is_solved,

@@ -109,6 +109,21 @@ def test_extrapolation_from_a_graded_mesh(element, centre, spread):
     assert extrapolated(s, error_bar(s, 2, element, plain=0.5), element, plain=0.5)[1] > 2 * left
 
 
+@pytest.mark.parametrize("element", ["displacement", "mixed"])
+def test_the_limit_is_known_better_on_small_elements(element):
+    """That holds for one motion on a plain body: with several, or at large displacements, bars stay wide."""
+    s = 0.01
+    bar = error_bar(s, 2, element)
+    factor, left = extrapolated(s, bar, element)
+    near, narrow = extrapolated(s, bar, element, fine=True)
+    assert narrow < 0.85 * left
+    assert factor * (1 - left) < near * (1 - narrow) < near * (1 + narrow) < factor * (1 + left)
+    assert extrapolated(s, bar, element, fine=True, large=True) == extrapolated(s, bar, element, large=True)
+    stiffness, decrements, bars = (value * np.eye(2) for value in (1.0, s, bar))
+    several = (extrapolate(stiffness, decrements, bars, 2, element, fine=fine) for fine in (True, False))
+    assert all(np.array_equal(*pair) for pair in zip(*several, strict=True))
+
+
 @pytest.mark.parametrize("s", [0.01, -0.01, 1e-4, 0.0])
 def test_errors_of_opposite_sign_do_not_make_the_bar_small(s):
     """The energy of the correction, N, contains both errors; s alone decides where N is at most twice s."""
