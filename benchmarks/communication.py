@@ -1,10 +1,13 @@
-"""Communication and load balance of one iteration: one large case on 1 to 8 ranks.
+"""Communication and load balance of one iteration: one large case on 1 to 8 ranks, and as many unknowns on each rank.
 
     python -m benchmarks.communication [--ranks 1 2 4 8] [--fine "3 mm"] [--degree 2]
 
 Messages, bytes and reductions are counted at MPI's profiling interface (``communication.c``). Processor time outside
 MPI is measured there, too: it is the computation of each rank, also on a machine that is busy or has fewer cores than
-ranks. The forces must agree.
+ranks. The forces of the one case must agree.
+
+The last table is no measurement: the time of an iteration on up to 1,000 ranks, from the counts of the largest run and
+an assumed network.
 """
 
 import ctypes
@@ -12,6 +15,7 @@ import json
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import log2
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -35,6 +39,12 @@ from pipeline.solve.spaces import Spaces
 from pipeline.study.read import parse
 
 _TOLERANCE = 1e-8
+# Assumed network: seconds of a message, bytes a second of a rank.
+_LATENCY, _BANDWIDTH = 2e-6, 1e9
+# Neighbours of a rank among many, and its surface in that of one of eight, whose other half is the body's.
+_NEIGHBOURS, _EIGHT, _INTERIOR = 14, 8, 2.0
+# Unknowns and ranks on paper.
+_LARGE, _ON_PAPER = (1e7, 1e8), (1, 8, 64, 512, 1000)
 _MPI = ("messages", "bytes", "reductions")
 _BAR = "error bar"
 # Reported times, and the prefixes of their stages' names.
@@ -124,6 +134,71 @@ def table(runs: list[dict[str, Any]]) -> str:
     return markdown(rows, dict(zip(rows[0], ("d", "d", ".0f", ".0f", ".0f", ".1f", *4 * (".2f",)), strict=True)))
 
 
+def finer(fine: str, share: float) -> str:
+    """Return the element size for a ``share`` of the unknowns of a mesh of size ``fine``."""
+    length, unit = fine.split()
+    return f"{float(length) / share ** (1 / 3):.4g} {unit}"
+
+
+def weak_table(runs: list[dict[str, Any]]) -> str:
+    """Return runs with as many unknowns on each rank as a table; values are those of the busiest rank."""
+    rows = [
+        {
+            "ranks": run["ranks"],
+            "unknowns": run["dofs"],
+            "unknowns a rank": run["dofs"] / run["ranks"],
+            "iterations": run["iterations"],
+            "kB an iteration": run["most"]["bytes"] / 1e3,
+            "computation of an iteration and unknown, relative": _work(run) / _work(runs[0]),
+        }
+        for run in runs
+    ]
+    return markdown(rows, dict(zip(rows[0], ("d", ",d", ",.0f", "d", ".0f", ".2f"), strict=True)))
+
+
+def _work(run: dict[str, Any]) -> float:
+    """Return the seconds of the busiest rank in an iteration, for each unknown of a rank."""
+    return float(run["most"]["iterating"] * run["ranks"] / run["dofs"] / run["iterations"])
+
+
+def constants(strong: list[dict[str, Any]]) -> dict[str, float]:
+    """Return the constants of the model of an iteration, from runs of one case on ranks, the last one on the most.
+
+    With N unknowns on each of P ranks, of which each has k neighbours, an iteration takes
+
+        work N  +  exchanges k latency  +  surface N^(2/3) / bandwidth  +  reductions latency log₂ P.
+
+    ``work`` is that of one rank alone; ``exchanges`` are the messages to a neighbour, on all levels; ``surface`` is of
+    the bytes to all neighbours.
+    """
+    alone, last = strong[0], strong[-1]
+    each = last["dofs"] / last["ranks"]
+    return {
+        "work": _work(alone),
+        "exchanges": last["most"]["messages"] / (last["ranks"] - 1),
+        "surface": last["most"]["bytes"] / each ** (2 / 3),
+        "reductions": last["most"]["reductions"],
+    }
+
+
+def on_paper(found: dict[str, float]) -> str:
+    """Return the time of an iteration on many ranks, by the model of :func:`constants`, as a table."""
+    rows = []
+    for dofs in _LARGE:
+        for ranks in _ON_PAPER:
+            each, many = dofs / ranks, ranks > 1
+            surface = found["surface"] * (_INTERIOR if ranks > _EIGHT else 1.0)
+            parts = {
+                "computation (ms)": 1e3 * found["work"] * each,
+                "messages (ms)": many * 1e3 * found["exchanges"] * min(ranks - 1, _NEIGHBOURS) * _LATENCY,
+                "bytes (ms)": many * 1e3 * surface * each ** (2 / 3) / _BANDWIDTH,
+                "reductions (ms)": 1e3 * found["reductions"] * _LATENCY * log2(ranks),
+            }
+            efficiency = parts["computation (ms)"] / sum(parts.values())
+            rows.append({"unknowns": dofs, "ranks": ranks} | parts | {"efficiency": efficiency})
+    return markdown(rows, dict(zip(rows[0], (",.0f", "d", *4 * (".3g",), ".0%"), strict=True)))
+
+
 def main() -> None:
     """Measure, print and write."""
     parser = options(__doc__)
@@ -137,18 +212,25 @@ def main() -> None:
         if MPI.COMM_WORLD.rank == 0:
             print(json.dumps(found))
         return
-    words = ["-m", "benchmarks.communication", "--worker", "--fine", asked.fine, "--degree", str(asked.degree)]
+    words = ["-m", "benchmarks.communication", "--worker", "--degree", str(asked.degree), "--fine"]
     with TemporaryDirectory() as folder:
         library = Path(folder) / "communication.so"
         source = Path(__file__).with_suffix(".c")
         subprocess.run(["mpicc", "-O2", "-shared", "-fPIC", "-o", str(library), str(source)], check=True)
         launcher = ["--mca", "mpi_yield_when_idle", "1", "-x", f"LD_PRELOAD={library}"]
-        runs = [ask(words, count, launcher=launcher) for count in asked.ranks]
-    text = table(runs)
-    print(f"{runs[0]['dofs']} dofs of degree {asked.degree}\n{text}")
+        runs = [ask([*words, asked.fine], count, launcher=launcher) for count in asked.ranks]
+        text = table(runs)
+        print(f"{runs[0]['dofs']} dofs of degree {asked.degree}\n{text}", flush=True)
+        most = max(asked.ranks)
+        sizes = {count: finer(asked.fine, count / most) for count in asked.ranks}
+        weak = [ask([*words, sizes[count]], count, launcher=launcher) for count in asked.ranks]
+    grown, known = weak_table(weak), constants(runs)
+    paper = on_paper(known)
+    print(grown, known, paper, sep="\n")
+    text = "\n".join((text, grown, paper))
     forces = [run["force"] for run in runs]
     print(f"forces differ by {max(forces) / min(forces) - 1:.1e}")
-    write("communication", asked.output, {"machine": machine(), "runs": runs}, text)
+    write("communication", asked.output, {"machine": machine(), "runs": runs, "weak": weak, "constants": known}, text)
     if max(forces) / min(forces) - 1 > _TOLERANCE:
         raise SystemExit("the forces do not agree")
 

@@ -1,9 +1,10 @@
 """The cost model: time of each stage of a step, fitted to the times of stored cases.
 
-    log t = a + b log(tetrahedra) + c log(1 - 2 ν)
+    log t = a + b log(n) + c log(1 - 2 ν) + (1 - b₀) log(1 + n / n₁)
 
-for meshing, solving and the error bar, for each kind of element. The constants below are the prior; ridge regression
-about the prior fits stored cases, so that few of them change it little, and many determine it.
+for meshing, solving and the error bar of n tetrahedra, for each kind of element. The last term is not fitted; b₀ is the
+exponent of the prior. Time grows slowly with few cells, and in proportion to n ≫ n₁. The constants below are the prior;
+ridge regression about the prior fits stored cases, so that few of them change it little, and many determine it.
 """
 
 from collections.abc import Hashable, Iterable, Mapping
@@ -24,6 +25,8 @@ _PARALLEL = 0.8
 _MESH = (0.35, 0.66)
 _SOLVE = {1: (0.04, 0.75), 2: (0.165, 0.75), 3: (0.4, 0.8)}
 _BAR = {1: (0.03, 0.8), 2: (0.105, 0.8), 3: (0.3, 0.85)}
+# Tetrahedra above which time grows in proportion to them. Measured from 20,000 to two million.
+_PROPORTIONAL = {"mesh": 27_000.0, "solve": 5_000.0, "bar": 5_000.0}
 # Large strains, all load steps and Newton iterations together; their error bar. Factor of mixed elements.
 _LARGE, _MIXED_LARGE = {"solve": (9.7, 1.1), "bar": (0.48, 0.8)}, 2.5
 # A body with _FOLDED times the curvature of a ball of its volume counts as folded: its surface mesh intersects itself
@@ -94,7 +97,8 @@ class CostModel:
     def seconds(self, stage: str, kind: str, cells: float, poisson: float) -> float:
         """Return the seconds on one rank of a stage."""
         law = self.laws.get((stage, kind)) or _prior(stage, kind)
-        return exp(sum(a * b for a, b in zip(law, _row(cells, poisson), strict=True)))
+        rest = _beyond(stage, kind, cells)
+        return exp(rest + sum(a * b for a, b in zip(law, _row(cells, poisson), strict=True)))
 
     def step(self, step: MeshStep) -> StepEstimate:
         """Return the estimate of a mesh step: mesh, assemblies, solves and error bars."""
@@ -179,7 +183,8 @@ def fit(observations: Iterable[Observation]) -> CostModel:
         count += 1
         for stage, seconds in seen.seconds.items():
             if seconds > 0:
-                groups.setdefault((stage, seen.kind), []).append((_row(seen.cells, seen.poisson), log(seconds)))
+                value = log(seconds) - _beyond(stage, seen.kind, seen.cells)
+                groups.setdefault((stage, seen.kind), []).append((_row(seen.cells, seen.poisson), value))
     for (stage, kind), found in groups.items():
         laws[stage, kind], residuals = _ridge(_prior(stage, kind), found)
         if stage == "solve":
@@ -201,6 +206,13 @@ def _ridge(prior: _Numbers, found: list[tuple[_Numbers, float]]) -> tuple[_Numbe
 
 def _row(cells: float, poisson: float) -> _Numbers:
     return 1.0, log(cells / 1e4), log((1 - 2 * poisson) / 0.4)
+
+
+def _beyond(stage: str, kind: str, cells: float) -> float:
+    """Return the last term of the law, zero at 10,000 tetrahedra."""
+    _, power, _ = _prior(stage, kind)
+    first = _PROPORTIONAL[stage]
+    return max(0.0, 1 - power) * log((first + cells) / (first + 1e4)) if power else 0.0
 
 
 def _poisson(case: Case) -> float:

@@ -11,14 +11,14 @@ _TETRAHEDRON = 0.21
 # Peak bytes per dof by degree: of a multigrid solve with displacement or mixed elements, or at large displacements; of
 # an error bar, which needs little accuracy; of a factorisation with 50,000 dofs. Measured: docs/solvers.md.
 _BYTES_PER_DOF = {
-    "displacement": {1: 3000, 2: 700, 3: 420, 4: 420},
-    "mixed": {2: 1450, 3: 1200, 4: 1200},
+    "displacement": {1: 3000, 2: 620, 3: 400, 4: 400},
+    "mixed": {2: 900, 3: 800, 4: 800},
     "large": {1: 3000, 2: 1900, 3: 2000, 4: 2800},
     "large-mixed": {2: 3600, 3: 3600, 4: 4400},
 }
 _OF_BAR = {
-    "displacement": {2: 700, 3: 420, 4: 420},
-    "mixed": {3: 850, 4: 850},
+    "displacement": {2: 620, 3: 315, 4: 315},
+    "mixed": {3: 440, 4: 440},
     "large": {2: 600, 3: 600, 4: 600},
     "large-mixed": {3: 1000, 4: 1000},
 }

@@ -32,6 +32,8 @@ from pipeline.stages import stage
 
 _ORIGIN = np.zeros((1, 3))
 _NO_DOFS = np.empty(0, dtype=np.int32)
+# The layout of a matrix is kept for the next law up to this size.
+_KEPT_BYTES = 100_000_000
 
 
 class ElasticSpace:
@@ -125,6 +127,8 @@ class ElasticSpace:
             matrix = compat.assemble_matrix(self.forms.stiffness, dirichlet, diagonal)
         else:
             matrix = self._straight.matrix(law, _NO_DOFS if whole else self.prescribed, diagonal)
+            if self._straight.nbytes > _KEPT_BYTES:
+                del self._straight
             if has_curved_cells(self.body.mesh):
                 compat.add_matrix(matrix, self.forms.curved_stiffness, dirichlet, diagonal)
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)

@@ -55,6 +55,11 @@ class StraightStiffness:
         matrix.setBlockSizes(3, 3)  # this halves BoomerAMG's iterations
         return matrix
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the layout, which all laws share."""
+        return sum(each.nbytes for each in (self._corners, self._columns, self._places, *self._unrolled))
+
     @cached_property
     def _unrolled(self) -> tuple[np.ndarray, np.ndarray, Int32Array]:
         """Unblocked sparse rows: offsets, columns, and positions of the entries of each block, (blocks, 9)."""

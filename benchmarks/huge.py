@@ -1,0 +1,91 @@
+"""Ten million unknowns on one rank, and what ``epsmesh plan`` says of them: ``python -m benchmarks.huge``.
+
+A disc off the planes of symmetry of a box, full order, degree 2, with the error bar: displacement elements (ν = .3) and
+mixed ones (.49), of a tenth of a million, one and ten million unknowns. Each case is a process of its own. Its time is
+processor seconds, from the geometry to the error bar. Its memory is the peak of one process, libraries included.
+
+Forecasts are those of a plan before the mesh exists. The times of a plan follow stored cases: a forecast knows those of
+the smaller cases, the first one none. Ten million unknowns in mixed elements (about five minutes and
+14 GB) are left out unless asked for by ``--mixed``.
+"""
+
+from typing import Any
+
+from benchmarks.processor import run
+from benchmarks.scenes import BOX, DISC, graded, study
+from benchmarks.tables import Table, options
+from pipeline.plan.cost import CostModel, Observation, StepEstimate, fit
+from pipeline.plan.plan import make_plan
+from pipeline.run.record import Record
+from pipeline.study.read import parse
+
+# Poisson's ratio by element; element size (mm) by millions of unknowns.
+POISSON = {"displacement": 0.3, "mixed": 0.49}
+SIZES = {"0.1": 2.6, "1": 1.12, "10": 0.507}
+_LIMIT = "10"
+COLUMNS = {
+    "element": "",
+    "unknowns": ",d",
+    "iterations": "d",
+    "error bar": ".2%",
+    "memory (GB)": ".2f",
+    "forecast (GB)": ".2f",
+    "time (s)": ".1f",
+    "forecast (s)": ".1f",
+    "mesh (s)": ".1f",
+    "of the bar (s)": ".1f",
+}
+
+
+def scene(element: str, size: str) -> dict[str, Any]:
+    """Return the study of one case."""
+    mesh = graded(f"{SIZES[size]} mm", "8 mm", "0.2 mm", 0.5, degree=2)
+    return study(BOX, POISSON[element], DISC | {"at": ["3 mm", "5 mm"]}, mesh)
+
+
+def forecast(asked: dict[str, Any], model: CostModel) -> StepEstimate:
+    """Return what a plan estimates of a study of one case."""
+    (step,) = make_plan(parse(asked)).meshes
+    return model.step(step)
+
+
+def measure(element: str, size: str, known: list[Observation]) -> dict[str, Any]:
+    """Return the row of one case, and add its times to those that are ``known``."""
+    asked = scene(element, size)
+    expected, found = forecast(asked, fit(known)), run(asked)
+    record = Record.from_json(found["record"])
+    observation = record.observation()
+    assert observation is not None
+    known.append(observation)
+    return {
+        "element": element,
+        "unknowns": record.dofs,
+        "iterations": record.iterations,
+        "error bar": record.force_error,
+        "memory (GB)": found["peak"] / 1e9,
+        "forecast (GB)": expected.memory / 1e9,
+        "time (s)": record.time_total + record.time_error,
+        "forecast (s)": expected.seconds,
+        "mesh (s)": record.time_mesh,
+        "of the bar (s)": record.time_error,
+    }
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = options(__doc__)
+    parser.add_argument("--elements", nargs="+", choices=POISSON, default=list(POISSON))
+    parser.add_argument("--sizes", nargs="+", choices=SIZES, default=list(SIZES), help="millions of unknowns")
+    parser.add_argument("--mixed", action="store_true", help="the largest size in mixed elements, too")
+    asked = parser.parse_args()
+    table = Table(COLUMNS)
+    for element in asked.elements:
+        known: list[Observation] = []
+        for size in asked.sizes:
+            if asked.mixed or (element, size) != ("mixed", _LIMIT):
+                table.add(measure(element, size, known))
+    table.write("huge", asked.output)
+
+
+if __name__ == "__main__":
+    main()
