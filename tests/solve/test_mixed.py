@@ -8,7 +8,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.mesh.distribute import BodyMesh, distribute
-from pipeline.run.meshing import mesh_arrays, mesh_case
+from pipeline.mesh.of_case import mesh_arrays
+from pipeline.run.meshing import mesh_case
 from pipeline.solve import SolveError
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.estimate import error_bar
