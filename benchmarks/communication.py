@@ -10,6 +10,7 @@ The last table is no measurement: the time of an iteration on up to 1,000 ranks,
 an assumed network.
 """
 
+import argparse
 import ctypes
 import json
 import subprocess
@@ -56,10 +57,14 @@ _STAGES: dict[str, tuple[str, ...]] = {
 }
 
 
-def measure(fine: str, degree: int) -> dict[str, Any]:
-    """Solve the case on all ranks; return the counts, the largest of all ranks and their sum; collective."""
+def measure(fine: str, degree: int, scale: float) -> dict[str, Any]:
+    """Solve the case on all ranks, with all element sizes times a ``scale``; collective.
+
+    Return the counts, the largest of all ranks and their sum.
+    """
     comm = MPI.COMM_WORLD
-    study = LARGE | {"mesh": LARGE["mesh"] | {"fine": fine, "degree": degree}}
+    sizes = {"fine": scaled(fine, scale), "coarse": scaled(fine, scale), "rim": scaled(LARGE["mesh"]["rim"], scale)}
+    study = LARGE | {"mesh": LARGE["mesh"] | sizes | {"degree": degree}}
     case = parse(study).case(())
     body = mesh_case(case, (), comm)
     law, movement = MaterialLaw.of_moduli(10e3, 0.3), Movement.along((0.0, 0.0, -0.2e-3))
@@ -134,10 +139,10 @@ def table(runs: list[dict[str, Any]]) -> str:
     return markdown(rows, dict(zip(rows[0], ("d", "d", ".0f", ".0f", ".0f", ".1f", *4 * (".2f",)), strict=True)))
 
 
-def finer(fine: str, share: float) -> str:
-    """Return the element size for a ``share`` of the unknowns of a mesh of size ``fine``."""
-    length, unit = fine.split()
-    return f"{float(length) / share ** (1 / 3):.4g} {unit}"
+def scaled(length: str, factor: float) -> str:
+    """Return a length with its unit times a factor."""
+    value, unit = length.split()
+    return f"{float(value) * factor:.6g} {unit}"
 
 
 def weak_table(runs: list[dict[str, Any]]) -> str:
@@ -205,25 +210,26 @@ def main() -> None:
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2, 4, 8])
     parser.add_argument("--fine", default="3 mm")
     parser.add_argument("--degree", type=int, default=2)
+    parser.add_argument("--scale", type=float, default=1.0, help=argparse.SUPPRESS)
     parser.add_argument("--worker", action="store_true", help="on all ranks of this run")
     asked = parser.parse_args()
     if asked.worker:
-        found = measure(asked.fine, asked.degree)
+        found = measure(asked.fine, asked.degree, asked.scale)
         if MPI.COMM_WORLD.rank == 0:
             print(json.dumps(found))
         return
-    words = ["-m", "benchmarks.communication", "--worker", "--degree", str(asked.degree), "--fine"]
+    words = ["-m", "benchmarks.communication", "--worker", "--degree", str(asked.degree), "--fine", asked.fine]
     with TemporaryDirectory() as folder:
         library = Path(folder) / "communication.so"
         source = Path(__file__).with_suffix(".c")
         subprocess.run(["mpicc", "-O2", "-shared", "-fPIC", "-o", str(library), str(source)], check=True)
         launcher = ["--mca", "mpi_yield_when_idle", "1", "-x", f"LD_PRELOAD={library}"]
-        runs = [ask([*words, asked.fine], count, launcher=launcher) for count in asked.ranks]
+        runs = [ask(words, count, launcher=launcher) for count in asked.ranks]
         text = table(runs)
         print(f"{runs[0]['dofs']} dofs of degree {asked.degree}\n{text}", flush=True)
         most = max(asked.ranks)
-        sizes = {count: finer(asked.fine, count / most) for count in asked.ranks}
-        weak = [ask([*words, sizes[count]], count, launcher=launcher) for count in asked.ranks]
+        scales = [(count, ["--scale", f"{(most / count) ** (1 / 3):.6g}"]) for count in asked.ranks]
+        weak = [ask([*words, *scale], count, launcher=launcher) for count, scale in scales]
     grown, known = weak_table(weak), constants(runs)
     paper = on_paper(known)
     print(grown, known, paper, sep="\n")
