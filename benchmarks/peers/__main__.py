@@ -14,7 +14,16 @@ from benchmarks.machine import machine
 from benchmarks.peers.figure import draw
 from benchmarks.peers.processes import MODULES, ask
 from benchmarks.peers.results import TARGETS, Run, breakdown, medians, standings, table, to_json, truths_table
-from benchmarks.peers.settings import CONTACT_GRID, GRIDS, LADDERS, MERIDIAN, PROGRAM, Settings
+from benchmarks.peers.settings import (
+    CONTACT_GRID,
+    GRIDS,
+    LADDERS,
+    LARGE_GRID,
+    LARGE_PROGRAM,
+    MERIDIAN,
+    PROGRAM,
+    Settings,
+)
 from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth, converge, known
 from benchmarks.tables import options, write
@@ -85,6 +94,8 @@ def _name(program: str, job: dict[str, Any], setting: dict[str, Any]) -> str:
 def _settings(program: str, scene: str, threads: int) -> Settings:
     if program != "program":
         return LADDERS[program].get(scene, ())
+    if TASKS[scene].is_large:
+        return LARGE_PROGRAM
     return PROGRAM + (MERIDIAN if TASKS[scene].body[0] == "cylinder" and threads == 1 else ())
 
 
@@ -122,6 +133,8 @@ def _scan(asked: argparse.Namespace, truths: dict[str, Truth]) -> None:
 
 
 def _grid(program: str, scene: str) -> Settings:
+    if TASKS[scene].is_large:
+        return LARGE_GRID
     return CONTACT_GRID if TASKS[scene].probe[0] == "ball" else GRIDS[program]
 
 

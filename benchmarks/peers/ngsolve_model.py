@@ -10,6 +10,7 @@ import ngsolve as ng
 from netgen.occ import Axes, Box, Cylinder, Glue, OCCGeometry, Pnt, WorkPlane, X, Z
 
 from benchmarks.peers.ngsolve_contact import REACH, contact_force
+from benchmarks.peers.ngsolve_large import large_force
 from benchmarks.peers.tasks import Task
 from benchmarks.peers.worker import Answer, Parts, serve
 
@@ -31,12 +32,14 @@ def solve(
     solver: str = "sparsecholesky",
     gamma: float = 5.0,
     tolerance: float = 1e-3,
+    steps: int = 2,
 ) -> Answer:
     """Return F: order p, elements of ``rim`` half widths at the probe's edge, growing by ``grading`` to ``maxh`` mm.
 
     The edge, and with ``corners`` a blade's corners, are then refined geometrically ``levels`` times by ``factor``.
     ``solver`` is "sparsecholesky", or "bddc" for conjugate gradients with that preconditioner. Below a ball all
-    elements have the rim's size; ``gamma`` and ``tolerance`` are those of :func:`contact_force`.
+    elements have the rim's size; ``gamma`` and ``tolerance`` are those of :func:`contact_force`, and with load
+    ``steps`` those of :func:`large_force`.
 
     Lengths are in mm.
     """
@@ -47,6 +50,8 @@ def solve(
         mesh.RefineHP(levels, factor)
     mesh.Curve(order)
     parts.end("mesh")
+    if scene.is_large:
+        return large_force(scene, mesh, order, steps, gamma, tolerance, parts)
     if scene.probe[0] == "ball":
         return contact_force(scene, mesh, order, gamma, tolerance, parts)
     if threads == 1:

@@ -19,7 +19,7 @@ from pipeline.study.sweep import Study
 
 YOUNG = 1e4  # Pa: F is proportional to it
 _MM = 1e-3
-# Depth in units of the task's: F is proportional to it, except for a ball.
+# Depth, in mm, where F is proportional to it.
 _SMALL = 0.1
 
 
@@ -57,7 +57,7 @@ def study(scene: Task, mesh: dict[str, Any]) -> Study:
         {
             "body": body,
             "probe": probe,
-            "material": {"young": f"{YOUNG} Pa", "poisson": scene.poisson},
+            "material": {"young": f"{YOUNG} Pa", "poisson": scene.poisson, "law": scene.law},
             "mesh": mesh,
             "solve": {"exact": False},
         }
@@ -66,7 +66,7 @@ def study(scene: Task, mesh: dict[str, Any]) -> Study:
 
 def _depth(scene: Task) -> float:
     """Return the depth of the probe, in mm."""
-    return scene.depth if scene.probe[0] == "ball" else _SMALL
+    return scene.depth if scene.probe[0] == "ball" or scene.is_large else _SMALL
 
 
 def _mm(*lengths: float) -> list[str]:
@@ -78,7 +78,7 @@ def _named(shape: tuple[Any, ...], *names: str) -> dict[str, str]:
 
 
 _PROBES: dict[str, Callable[[tuple[Any, ...]], dict[str, str]]] = {
-    "disc": lambda probe: _named(probe, "radius"),
+    "disc": lambda probe: _named(probe[:2], "radius"),
     "blade": lambda probe: _named(probe, "length", "width"),
     "ball": lambda probe: {"shape": "sphere", "contact": "unilateral", **_named(probe[:2], "radius")},
 }

@@ -7,6 +7,8 @@ Settings = tuple[dict[str, Any], ...]
 
 # Accuracies required of this program. The first three are the targets; the others show the cost of a tighter one.
 PROGRAM: Settings = tuple({"accuracy": f"{percent} %"} for percent in ("3", "2", "1", "0.5", "0.3", "0.2", "0.1"))
+# The same at large displacements.
+LARGE_PROGRAM: Settings = tuple({"accuracy": f"{percent} %"} for percent in ("3", "2", "1"))
 # Axisymmetric scenes, in two dimensions: the same for every accuracy above 1e-5.
 MERIDIAN: Settings = ({"accuracy": "0.1 %", "model": "auto"},)
 
@@ -44,6 +46,19 @@ CONTACT_GRID: Settings = _grid(
     tolerance=(1e-3, 1e-2),
 )
 
+LARGE_GRID: Settings = _grid(
+    order=(2, 3),
+    rim=(0.07, 0.35, 0.4, 0.5, 1),
+    maxh=(30,),
+    grading=(0.4, 0.5, 0.7),
+    levels=(0, 1, 2),
+    factor=(0.2,),
+    safety=(1.0,),
+    gamma=(20.0,),
+    tolerance=(1e-3,),
+    steps=(1, 2),
+)
+
 _NAMES = ("order", "rim", "maxh", "grading", "levels", "safety", "corners", "solver")
 
 
@@ -54,6 +69,12 @@ def _ngsolve(*rows: tuple[float | str, ...]) -> Settings:
 def _contact(*rows: tuple[float, ...]) -> Settings:
     names = ("order", "rim", "maxh", "grading", "gamma", "tolerance")
     return tuple(dict(zip(names, row, strict=True)) | {"levels": 0, "safety": 1.0} for row in rows)
+
+
+def _large(*rows: tuple[float, ...]) -> Settings:
+    names = ("order", "rim", "grading", "levels", "steps")
+    others = {"maxh": 30, "factor": 0.2, "safety": 1.0, "gamma": 20.0, "tolerance": 1e-3}
+    return tuple(dict(zip(names, row, strict=True)) | others for row in rows)
 
 
 def _skfem(*rows: tuple[float, float]) -> Settings:
@@ -103,6 +124,8 @@ LADDERS: dict[str, dict[str, Settings]] = {
             (3, 0.4, 15, 0.4, 5.0, 1e-3),
             (3, 0.3, 15, 0.4, 5.0, 1e-3),
         ),
+        "deep-disc": _large((3, 0.5, 0.5, 1, 2), (3, 0.5, 0.4, 1, 2), (3, 0.4, 0.5, 1, 2), (3, 0.07, 0.5, 0, 2)),
+        "deep-ball": _large((3, 0.4, 0.7, 0, 1), (3, 0.4, 0.5, 0, 1), (3, 0.35, 0.7, 0, 1)),
     },
     "scikit-fem": {
         "disc": _skfem((0.2, 0.35), (0.1, 0.25), (0.05, 0.25)),

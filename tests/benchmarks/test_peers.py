@@ -7,7 +7,7 @@ import pytest
 from benchmarks.peers import figure, program, results
 from benchmarks.peers.processes import PEERS_PYTHON, ask
 from benchmarks.peers.results import Run, medians, standings
-from benchmarks.peers.settings import CONTACT_GRID, GRIDS, LADDERS
+from benchmarks.peers.settings import CONTACT_GRID, GRIDS, LADDERS, LARGE_GRID
 from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth
 from benchmarks.peers.worker import Answer, answers
@@ -98,7 +98,7 @@ def test_the_meridian_is_used_where_it_may_be():
 
 
 @NEEDS_PEERS
-@pytest.mark.parametrize("name", [name for name in TASKS if name != "ball"])
+@pytest.mark.parametrize("name", [name for name, task in TASKS.items() if name != "ball" and not task.is_large])
 @pytest.mark.parametrize(
     ("peer", "setting", "error"),
     [
@@ -120,8 +120,16 @@ def test_the_peer_finds_the_contact_of_a_ball():
     assert answer["force"] == pytest.approx(TASKS["ball"].truth[0], rel=3e-3)
 
 
+@NEEDS_PEERS
+@pytest.mark.parametrize("name", ["deep-disc", "deep-ball"])
+def test_the_peer_has_the_same_large_displacements(name):
+    setting = LADDERS["NGSolve"][name][0]
+    (answer,) = ask("NGSolve", {"scene": name, "settings": [setting], "warm": False})
+    assert answer["force"] == pytest.approx(TASKS[name].truth[0], rel=0.02)
+
+
 def test_every_ladder_is_of_settings_that_exist():
     for peer, ladders in LADDERS.items():
-        known = {key for setting in (*GRIDS[peer], *CONTACT_GRID) for key in setting}
-        assert set(ladders) | {"ball"} == set(TASKS)
+        known = {key for setting in (*GRIDS[peer], *CONTACT_GRID, *LARGE_GRID) for key in setting}
+        assert set(ladders) | {"ball", "deep-disc", "deep-ball"} == set(TASKS)
         assert all(set(setting) <= known for ladder in ladders.values() for setting in ladder)
