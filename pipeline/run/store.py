@@ -26,6 +26,8 @@ _STORED = "coalesce(CAST(stored AS REAL), 0.0)"
 _RECORDS, _PLAIN = f"CREATE TABLE {_COLUMNS}", re.compile(r"CREATE (TABLE|(UNIQUE )?INDEX) ", re.IGNORECASE)
 # Seconds to wait for another run's write, which takes milliseconds: after so long, something hangs.
 PATIENCE = 30.0
+# SQLite's setting: when a write returns, it is on disk.
+SYNCHRONOUS = "FULL"
 # The cost model is fitted to so many of the newest records.
 _RECENT = 500
 
@@ -238,7 +240,7 @@ def _open(path: Path) -> sqlite3.Connection:
     database = sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)
     try:
         guard(database)
-        database.execute("PRAGMA synchronous = FULL")
+        database.execute(f"PRAGMA synchronous = {SYNCHRONOUS}")
         database.execute(SCHEMA)
         database.execute("SELECT count(*) FROM records").fetchone()
     except BaseException:
