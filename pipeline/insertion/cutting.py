@@ -8,7 +8,7 @@ that is stored, and the work of fracture.
 from dataclasses import dataclass, replace
 from typing import Self
 
-from scipy.interpolate import CubicHermiteSpline
+import scipy
 
 from pipeline.insertion.near_tip import EXTENSION_ERROR, NearTip, strength
 from pipeline.insertion.states import SHORT, Cut, Scene, Tissue
@@ -87,7 +87,7 @@ def between(before: Cutting, after: Cutting, depth: float) -> Cutting:
     numbers = [name for name, value in vars(before).items() if isinstance(value, float)]
     mixed = {name: (1 - share) * getattr(before, name) + share * getattr(after, name) for name in numbers}
     ends = [before.depth, after.depth]
-    stored = CubicHermiteSpline(ends, [before.stored, after.stored], [before.elastic, after.elastic])
+    stored = scipy.interpolate.CubicHermiteSpline(ends, [before.stored, after.stored], [before.elastic, after.elastic])
     return replace(after, **(mixed | {"depth": depth, "stored": float(stored(depth))}))
 
 

@@ -8,7 +8,7 @@ energy. At the body's surface F₀ and U₀ are zero. At an interface F₀ is th
 from dataclasses import dataclass, replace
 from typing import Self
 
-from scipy.optimize import brentq
+import scipy
 
 from pipeline.insertion.cutting import Cutting, between
 from pipeline.insertion.near_tip import NearTip
@@ -88,7 +88,7 @@ class Indentation:
         low = max(first.depth, first.crack_depth - after.ahead) if before is None else before.depth
         if excess(low) >= 0:
             return None
-        depth = float(brentq(excess, low, after.depth, xtol=1e-9))
+        depth = float(scipy.optimize.brentq(excess, low, after.depth, xtol=1e-9))
         intact, torn = self.at(depth), cut(depth)
         missed = before.defect(after) * (after.depth - before.depth) if before else 0.0
         error = intact.stored_error + torn.stored_error + missed

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from pipeline.insertion.pressing import Press, Pressed
 from pipeline.insertion.shaft import NeedleCut, ShaftCut
@@ -183,7 +183,11 @@ class NeedleScene(InsertionScene[Needle]):
             return None
         if _excess(cut, press, touch) >= 0:
             return touch
-        return float(brentq(lambda depth: _excess(cut, press, depth), touch, deepest, xtol=_TINY * self.tool.limit))
+        return float(
+            scipy.optimize.brentq(
+                lambda depth: _excess(cut, press, depth), touch, deepest, xtol=_TINY * self.tool.limit
+            )
+        )
 
     def _presses(self, press: Press, end: float) -> list[Step]:
         """Return the steps of indentation down to a depth (m)."""
@@ -208,6 +212,10 @@ def _puncture(cut: NeedleCut, press: Press, depth: float) -> Puncture:
     # The tissue's force grows, that of the cut does not: the excess reaches any error.
     far = depth + cut.needle.limit * 2.0 ** np.arange(_DOUBLINGS)
     end = next((at for at in far.tolist() if _excess(cut, press, at) >= error), None)
-    below = float(brentq(lambda at: _excess(cut, press, at) - error, depth, end)) - depth if end else float(far[-1])
+    below = (
+        float(scipy.optimize.brentq(lambda at: _excess(cut, press, at) - error, depth, end)) - depth
+        if end
+        else float(far[-1])
+    )
     bar = max(below, min(error / max(gap, _TINY * before.elastic), depth - low))
     return Puncture(before, after, bar, before.error + press.force(depth + bar)[0] - before.elastic)

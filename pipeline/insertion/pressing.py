@@ -11,8 +11,7 @@ from functools import cached_property
 from math import inf
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
-from scipy.optimize import brentq
+import scipy
 
 from pipeline.arrays import FloatArray
 from pipeline.insertion.states import Solved
@@ -53,10 +52,10 @@ class Pressed:
         return float(self.depths[-1])
 
     @cached_property
-    def _logarithm(self) -> CubicHermiteSpline | None:
+    def _logarithm(self) -> "scipy.interpolate.CubicHermiteSpline | None":
         if len(self.depths) < 2:
             return None
-        return CubicHermiteSpline(np.log(self.depths), np.log(self.energies), self._exponents)
+        return scipy.interpolate.CubicHermiteSpline(np.log(self.depths), np.log(self.energies), self._exponents)
 
     @property
     def _exponents(self) -> FloatArray:
@@ -78,7 +77,9 @@ class Pressed:
             return 0.0
         if force >= self.forces[-1]:
             return inf
-        return float(brentq(lambda depth: self.at(depth)[1] - force, _TINY * self.depths[0], self.deepest))
+        return float(
+            scipy.optimize.brentq(lambda depth: self.at(depth)[1] - force, _TINY * self.depths[0], self.deepest)
+        )
 
 
 @dataclass(frozen=True)
