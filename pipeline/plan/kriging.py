@@ -26,18 +26,22 @@ _DIMENSIONS = 3
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """Values (n,) at ``places`` (n, 3), in m, with the length scales (m) of the field there, shape (n,)."""
+    """Values (n,) at ``places`` (n, 3), in m, with the length scales (m) of the field there, shape (n,).
+
+    ``scatter`` is the least standard deviation of a value about the field.
+    """
 
     places: FloatArray
     scales: FloatArray
     values: FloatArray
+    scatter: float = 0.0
 
     @cached_property
-    def _fit(self) -> tuple[float, float, FloatArray]:
-        """Length, variance of the field, and the inverse of the correlation between the values, of most likelihood."""
+    def _fit(self) -> tuple[float, float, float, FloatArray]:
+        """Length, noise, variance, and the inverse of the correlation between the values, of the largest likelihood."""
         count, ones = len(self.values), np.ones(len(self.values))
         least = inf
-        best: tuple[float, float, FloatArray] = (0.0, 0.0, np.zeros((0, 0)))
+        best: tuple[float, float, float, FloatArray] = (0.0, 0.0, 0.0, np.zeros((0, 0)))
         for length in _LENGTHS:
             plain = correlation(length, self.places, self.scales, self.places, self.scales)
             for noise in _NOISES:
@@ -48,13 +52,13 @@ class Field:
                 spread = 2 * float(np.log(np.diag(factor[0])).sum())
                 cost = (count - 1) * log(variance) + spread + log(float(weights.sum()))
                 if cost < least:
-                    least, best = cost, (length, variance, cho_solve(factor, np.eye(count)))
+                    least, best = cost, (length, noise, variance, cho_solve(factor, np.eye(count)))
         return best
 
     @cached_property
     def _projected(self) -> FloatArray:
         """The inverse of the correlation, without the constant."""
-        inverse = self._fit[2]
+        *_, inverse = self._fit
         ones = inverse.sum(axis=1)
         return np.asarray(inverse - np.outer(ones, ones) / ones.sum())
 
@@ -64,26 +68,27 @@ class Field:
 
         O. Dubrule (1983) has the values left out from one inverse.
         """
-        _, variance, _ = self._fit
+        _, _, variance, _ = self._fit
         projected = self._projected
-        missed = np.abs(projected @ self.values) / np.sqrt(variance * np.diag(projected))
+        own = np.diag(projected)
+        missed = np.abs(projected @ self.values) / own / np.sqrt(variance / own + self.scatter**2)
         return max(_DEVIATIONS, float(missed.max()))
 
     def weights(self, places: FloatArray, scales: FloatArray) -> FloatArray:
         """Return the weights (m, n) of the values at ``places`` (m, 3); each row has the sum 1."""
-        length, _, inverse = self._fit
+        length, _, _, inverse = self._fit
         near = correlation(length, places, scales, self.places, self.scales)
         ones = inverse.sum(axis=1)
         lacking = (1 - near @ ones) / ones.sum()
         return np.asarray(near @ inverse + np.outer(lacking, ones))
 
     def bars(self, places: FloatArray, scales: FloatArray) -> FloatArray:
-        """Return the error bars (m,) of interpolated values at ``places`` (m, 3)."""
-        length, variance, inverse = self._fit
+        """Return the error bars (m,) of interpolated values at ``places`` (m, 3), the noise of a value included."""
+        length, noise, variance, inverse = self._fit
         near = correlation(length, places, scales, self.places, self.scales)
         ones = inverse.sum(axis=1)
-        left = 1 - np.einsum("mi,ij,mj->m", near, inverse, near) + (1 - near @ ones) ** 2 / ones.sum()
-        return np.asarray(self.factor * np.sqrt(variance * np.maximum(left, 0.0)))
+        left = 1 + noise - np.einsum("mi,ij,mj->m", near, inverse, near) + (1 - near @ ones) ** 2 / ones.sum()
+        return np.asarray(self.factor * np.sqrt(variance * np.maximum(left, 0.0) + self.scatter**2))
 
 
 def correlation(

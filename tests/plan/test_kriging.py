@@ -23,7 +23,7 @@ def test_bars_contain_what_is_held_out_and_the_bump_is_found(depth, radius, heig
     scales = away + 2.0
     known = cover(PLACES, 0.5 * scales, np.zeros(0, int), np.ones(len(PLACES), bool))
     assert len(known) < 100
-    field = Field(PLACES[known], scales[known], values[known] + 5e-4 * random.standard_normal(len(known)))
+    field = Field(PLACES[known], scales[known], values[known] + 5e-4 * random.standard_normal(len(known)), 5e-4)
     held_out = np.setdiff1d(np.arange(len(PLACES)), known)
     weights = field.weights(PLACES[held_out], scales[held_out])
     np.testing.assert_allclose(weights.sum(axis=1), 1, rtol=1e-9)
