@@ -15,6 +15,7 @@ _MANY = 200_000  # pairs of body and probe of a large study
 _ON_AXIS = (0.0, 0.0)
 _SAME = 1e-9  # relative difference at which two heights are equal
 _STIFFER = 1.25  # ratio of shear moduli
+_FOLDS = 0.25  # depth over half width beyond which the meridian's elements fold at the edge of a bonded tool
 
 
 def mirror_planes(case: Case) -> tuple[str, ...]:
@@ -37,12 +38,16 @@ def is_round(case: Case) -> bool:
     """Return whether the scene is axisymmetric: body, support, probe and movement, and no loads."""
     body, probe, frame = case.body, case.probe, case.frame
     half_plane = body.half_plane()
-    if half_plane is None or obstacle("meridian", case):
+    if half_plane is None or obstacle("meridian", case) or _folds(case):
         return False
     upright = frame.is_upright and frame.point[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
     is_same = probe.is_round and is_body_round(body)
     is_whole = not case.is_truncated or not half_plane.is_curved
     return upright and is_same and is_whole and not _is_held_below_stiffer(case)
+
+
+def _folds(case: Case) -> bool:
+    return not case.has_quarter_points and case.probe.depth > _FOLDS * case.probe.half_width
 
 
 def _is_held_below_stiffer(case: Case) -> bool:

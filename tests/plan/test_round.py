@@ -46,3 +46,11 @@ def test_layers_reach_the_meridian():
     whole, part = (meridian_of(case(body={"layer": layers})) for layers in ([SKIN, FAT], [SKIN]))
     assert (whole.interfaces, whole.is_filled) == ((-0.002,), True)
     assert (part.interfaces, part.is_filled) == ((-0.002,), False)
+
+
+def test_deep_bonded_tools_are_not_pressed_on_the_meridian():
+    """Its elements fold at the edge of a disc of 3 mm; linear ones do not."""
+    law = {"law": "neo-hookean"}
+    assert is_round(case(material=law, probe={"depth": "0.7 mm"}))
+    assert not is_round(case(material=law, probe={"depth": "0.8 mm"}))
+    assert is_round(case(probe={"depth": "0.8 mm"}))
