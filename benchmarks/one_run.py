@@ -74,6 +74,7 @@ def measure(
     return {
         "wall": wall,
         "processor": comm.allreduce(spent),
+        "busiest": comm.allreduce(spent, op=MPI.MAX),  # of the ranks
         "bar": bars,
         "peak": comm.allreduce(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss),
         "cases": len(records),

@@ -1,7 +1,8 @@
-"""Speed-up by a second rank: a study of many small cases, and one large solve: ``python -m benchmarks.ranks``.
+"""Speed-up by ranks: a study of many small cases, and one case of a million unknowns: ``python -m benchmarks.ranks``.
 
-Run it on an idle machine with at least two cores. Each figure is the median of runs that alternate between one rank and
-two. Start-up is not counted; the mesh of the large case, which gmsh makes on one rank, is reported separately.
+Run it on an idle machine with at least two cores. Each figure is the median of runs that alternate between numbers of
+ranks. Start-up is not counted. Four ranks share the cores of the machine: their speed-up is that of the processor time
+of the busiest rank, as on a machine with a core for each.
 """
 
 import statistics
@@ -9,20 +10,22 @@ from functools import partial
 from typing import Any
 
 from benchmarks.processor import by_turns, run
-from benchmarks.scenes import LARGE, many_small
+from benchmarks.scenes import BOX, DISC, graded, many_small, study
 from benchmarks.tables import options, write
 
 _REPEATS, _CASES = 3, 60
-STUDIES = {"many": many_small(_CASES), "large": LARGE}
-_TIMES = ("wall", "mesh", "solve", "bar")
+_MILLION = study(BOX, 0.3, DISC | {"at": ["3 mm", "5 mm"]}, graded("1.08 mm", "4 mm", "0.072 mm", 0.296, degree=2))
+STUDIES = {"many": (many_small(_CASES, on_a_mesh=1), (1, 2)), "large": (_MILLION, (1, 2, 4))}
+_TIMES = ("wall", "busiest", "mesh", "solve", "bar")
 
 
 def measure(study: dict[str, Any], ranks: int) -> dict[str, float]:
     """Return the seconds of a study on some ranks, and those of its first case by part."""
     found = run(study, ranks, by_processor=False)
+    print(f"  {ranks} ranks: {found['wall']:.1f} s, busiest rank {found['busiest']:.1f} s", flush=True)
     solve = found["time_assemble"] + found["time_setup"] + found["time_solve"]
     return {"mesh": found["time_mesh"], "solve": solve} | {
-        name: found[name] for name in ("wall", "bar", "dofs", "cases", "force")
+        name: found[name] for name in ("wall", "busiest", "bar", "dofs", "cases", "force")
     }
 
 
@@ -30,13 +33,20 @@ def main() -> None:
     """Measure, print and write the speed-ups."""
     output = options(__doc__).parse_args().output
     result: dict[str, Any] = {}
-    for name, study in STUDIES.items():
-        runs = by_turns({str(ranks): partial(measure, study, ranks) for ranks in (1, 2)}, _REPEATS)
-        one, two = ({key: statistics.median(run[key] for run in same) for key in same[0]} for same in runs.values())
-        speedup = {key: one[key] / two[key] for key in _TIMES}
-        result[name] = {"one": one, "two": two, "speedup": speedup}
-        ups = ", ".join(f"{key} × {value:.2f}" for key, value in speedup.items())
-        print(f"{name}: {one['cases']:.0f} cases, {one['wall']:.1f} s on one rank, {two['wall']:.1f} s on two: {ups}")
+    for name, (one_study, ranks) in STUDIES.items():
+        runs = by_turns({str(count): partial(measure, one_study, count) for count in ranks}, _REPEATS)
+        medians = {
+            count: {key: statistics.median(one[key] for one in same) for key in same[0]} for count, same in runs.items()
+        }
+        one = medians["1"]
+        speedups = {
+            count: {key: one[key] / found[key] for key in _TIMES} for count, found in medians.items() if count != "1"
+        }
+        result[name] = {"medians": medians, "speedup": speedups}
+        print(f"{name}: {one['cases']:.0f} cases, {one['dofs']:.0f} unknowns, {one['wall']:.1f} s on one rank")
+        for count, speedup in speedups.items():
+            ups = ", ".join(f"{key} × {value:.2f}" for key, value in speedup.items())
+            print(f"  {count} ranks, {medians[count]['wall']:.1f} s: {ups}")
     write("ranks", output, result)
 
 
