@@ -63,7 +63,7 @@ class Indenter(Probe):
     has_singular_edge: ClassVar[bool] = False
 
     PROPORTIONAL_TO = ()
-    # Error bars in units of a ball's, whose limit is known best: pipeline/solve/estimate.py.
+    # In units of a ball's, whose limit is known best (pipeline/solve/estimate.py).
     EXPECTED_ERROR = 1.4
     NOT_DRAWN: ClassVar[tuple[str, ...]] = ("action", "contact", "friction", "motion")
     SWEPT = ("depth_range",)

@@ -14,6 +14,7 @@ class Sphere(RoundIndenter):
     REALTIME = ("unilateral",)
     # 3/2 (H. Hertz), while contact is small compared with the ball.
     force_exponent: ClassVar[float | None] = 1.5
+    EXPECTED_ERROR = 1.0
 
     shape: Literal["sphere"]
     radius: Annotated[Length, Words("Radius of the ball.", '"6 mm"', is_used=True)]
