@@ -72,7 +72,7 @@ _FOUND_AGAIN, _FOUND_AT_EDGE = 2.0, 0.1
 AT_EDGE_LARGE = {2: 0.15, 3: 0.075}
 # Limits of a mesh that counts as graded to the edge: rim size relative to the probe's half width, and growth; then
 # those where the width of contact is found.
-_GRADED, _GRADED_FOUND = (0.4, 0.7), (0.35, 0.6)
+_GRADED, _GRADED_FOUND = (0.4, 0.7), (0.26, 0.41)
 # The same for small elements, below those of the coarsest recipe.
 _FINE = (0.31, 0.61)
 
