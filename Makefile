@@ -44,7 +44,9 @@ help: ## list the targets
 setup: ## install everything (root or sudo for Debian's packages); EXTRAS=view adds PNG pictures of cases
 	@scripts/setup.sh
 
-study: setup ## run one study: make study STUDY=studies/quick.toml NP=2
+# Without the packages for tests and documentation, which take as long to install as all others.
+study: ## run one study: make study STUDY=studies/quick.toml NP=2
+	@EXTRAS=run scripts/setup.sh
 ifeq ($(NP),1)
 	$(EPSMESH) run $(STUDY)
 else

@@ -1,5 +1,7 @@
 """Start-up of the commands that need no solver: processor seconds, and number of modules loaded.
 
+Two are of stored results and of many cases: a run whose records are all stored, and the plan of 100,000 cases.
+
 python -m benchmarks.start_up                  this program
 python -m benchmarks.start_up ../earlier ...   and other checkouts, alternating, on the studies of the last one
 
@@ -25,7 +27,26 @@ COMMANDS = {
     "plan figure3": ["plan", "studies/figure3.toml"],
     "status": ["status", "studies/quick.toml"],
     "plan of a case": ["plan", "studies/quick.toml", "0"],
+    "plan of 100,000": ["plan", "studies/many.toml", "--quiet"],
+    "run, stored": ["run", "studies/quick.toml", "--output", "../stored"],
 }
+_MANY = """
+[body]
+shape = "cylinder"
+radius = "30 mm"
+height = "30 mm"
+[material]
+young = {from = "1 kPa", to = "10 kPa", steps = 10}
+poisson = {from = 0.2, to = 0.398, steps = 100}
+[probe]
+shape = "disc"
+radius = {from = "1 mm", to = "2.9 mm", steps = 20}
+depth = "0.02 mm"
+[mesh]
+epsilon = ["5 mm", "6 mm", "7 mm", "8 mm", "full"]
+fine = "0.5 mm"
+coarse = "5 mm"
+"""
 _REPEATS = 15
 
 
@@ -44,6 +65,9 @@ def main() -> None:
                 for tree in trees:
                     place = Path(folder) / "place"
                     shutil.copytree(trees[-1] / "studies", place / "studies", ignore=shutil.ignore_patterns("results"))
+                    (place / "studies" / "many.toml").write_text(_MANY, encoding="utf-8")
+                    if not turn:
+                        _run(tree, ["-m", "pipeline", *arguments], place)  # what it stores is there from then on
                     if turn:
                         seconds[tree, name].append(_seconds(tree, arguments, place))
                     else:  # this run also writes the bytecode
