@@ -108,6 +108,7 @@ benchmark: setup ## make every table of docs/performance.md in results/ (on an i
 	$(PYTHON) -m benchmarks.organs
 	$(PYTHON) -m benchmarks.paths
 	$(PYTHON) -m benchmarks.scaling
+	$(PYTHON) -m benchmarks.huge
 	$(PYTHON) -m benchmarks.work_precision
 	$(PYTHON) -m benchmarks.many_machines
 	$(PYTHON) -m benchmarks.drag --minutes 5

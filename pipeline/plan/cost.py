@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from math import exp, log
 from statistics import median
 
-from pipeline.plan import estimate
+from pipeline.plan import estimate, refinement
 from pipeline.plan.steps import MeshStep, Solve
 from pipeline.plan.symmetry import model_planes
 from pipeline.shapes.body import Layered
@@ -138,7 +138,8 @@ def _memory(solve: Solve) -> float:
     """Return the bytes of a solve with its error bar; a timed case computes the bar separately, by symmetry."""
     apart = solve.case.solve.timing and solve.goal is None
     planes = model_planes(solve.case) if apart else solve.mirrors
-    share, of_bar = 0.5 ** len(solve.mirrors), 0.5 ** len(planes)
+    fewer = refinement.cells(solve.case) / estimate.cells(solve.case)
+    share, of_bar = fewer * 0.5 ** len(solve.mirrors), fewer * 0.5 ** len(planes)
     return estimate.peak_memory(solve.case, share, of_bar, reduced=solve.reduced)
 
 
@@ -167,7 +168,7 @@ def features(solve: Solve) -> tuple[str, float, float]:
     """Return the inputs of the cost model for a solve: its kind, the estimated tetrahedra of the modelled part, ν."""
     if solve.axisymmetric:
         return kind_of(solve), 1.0, 0.0
-    return kind_of(solve), estimate.cells(solve.case) * 0.5 ** len(solve.mirrors), _poisson(solve.case)
+    return kind_of(solve), refinement.cells(solve.case) * 0.5 ** len(solve.mirrors), _poisson(solve.case)
 
 
 def speed_up(ranks: int) -> float:

@@ -13,6 +13,8 @@ from pipeline.study.schema import Mesh
 
 # Estimated number of tetrahedra of the modelled part from which on meshes are refined.
 LEAST = 40_000
+# Tetrahedra of a refined mesh, in units of the estimate: .71 to .86 on four scenes.
+_FEWER = 0.8
 _MANY = 200_000  # scenes of a large study
 
 
@@ -34,6 +36,11 @@ def is_refined(case: Case) -> bool:
     elements would fold.
     """
     return case.mesh.degree > 1 and _is_refined(_Scene(case.body, case.probe, case.mesh, case))
+
+
+def cells(case: Case) -> float:
+    """Return the estimated number of tetrahedra of a case, of which a refined mesh has fewer."""
+    return estimate.cells(case) * (_FEWER if is_refined(case) else 1.0)
 
 
 @lru_cache(_MANY)
