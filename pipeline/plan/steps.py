@@ -6,8 +6,12 @@ from math import nan
 
 from pipeline.plan.key import mesh_key, operator_key
 from pipeline.plan.recipe import MARGIN, Rung
+from pipeline.shapes.indenter import Indenter
 from pipeline.study.case import Case
 
+# A first mesh may be coarse for a contact on a bump, which is smaller than on a plane. The ratio of its bar to the
+# expected one then falls with the elements: more than this is not expected of finer meshes.
+_WORSE = 2.9
 # The middle of the top face.
 CENTRE = (0.0, 0.0)
 # With at least so many depths of found contact, a small body is condensed to the possible contact surface.
@@ -58,6 +62,8 @@ class Solve:
         meshes, and the first that should reach the goal is chosen.
         """
         more, goal = bar / self.expected, self.goal or 0.0
+        if isinstance(self.case.probe, Indenter):
+            more = min(more, _WORSE)
         serves = (number for number, rung in enumerate(self.later) if more * rung.bar <= MARGIN * goal)
         number = next(serves, 0)
         rung = self.later[number]
