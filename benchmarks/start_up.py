@@ -66,7 +66,7 @@ def main() -> None:
                     place = Path(folder) / "place"
                     shutil.copytree(trees[-1] / "studies", place / "studies", ignore=shutil.ignore_patterns("results"))
                     (place / "studies" / "many.toml").write_text(_MANY, encoding="utf-8")
-                    if not turn:
+                    if not turn and arguments[0] == "run":
                         _run(tree, ["-m", "pipeline", *arguments], place)  # what it stores is there from then on
                     if turn:
                         seconds[tree, name].append(_seconds(tree, arguments, place))
