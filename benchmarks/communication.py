@@ -40,6 +40,8 @@ from pipeline.solve.spaces import Spaces
 from pipeline.study.read import parse
 
 _TOLERANCE = 1e-8
+# Rim, in units of the elements, and growth of a mesh whose elements are nearly as large everywhere.
+_RIM, _GROWTH = 0.5, 0.9
 # Assumed network: seconds of a message, bytes a second of a rank.
 _LATENCY, _BANDWIDTH = 2e-6, 1e9
 # Neighbours of a rank among many, and its surface in that of one of eight, whose other half is the body's.
@@ -57,14 +59,16 @@ _STAGES: dict[str, tuple[str, ...]] = {
 }
 
 
-def measure(fine: str, degree: int, scale: float) -> dict[str, Any]:
-    """Solve the case on all ranks, with all element sizes times a ``scale``; collective.
+def measure(fine: str, degree: int, scale: float | None) -> dict[str, Any]:
+    """Solve the case on all ranks; return the counts, the largest of all ranks and their sum; collective.
 
-    Return the counts, the largest of all ranks and their sum.
+    With a ``scale`` elements are as large everywhere, ``fine`` times it: unknowns then go like its third power.
     """
     comm = MPI.COMM_WORLD
-    sizes = {"fine": scaled(fine, scale), "coarse": scaled(fine, scale), "rim": scaled(LARGE["mesh"]["rim"], scale)}
-    study = LARGE | {"mesh": LARGE["mesh"] | sizes | {"degree": degree}}
+    sizes = {"fine": scaled(fine, scale or 1.0), "coarse": scaled(fine, scale or 1.0), "degree": degree}
+    if scale is not None:
+        sizes |= {"rim": scaled(fine, _RIM * scale), "growth": _GROWTH}
+    study = LARGE | {"mesh": LARGE["mesh"] | sizes}
     case = parse(study).case(())
     body = mesh_case(case, (), comm)
     law, movement = MaterialLaw.of_moduli(10e3, 0.3), Movement.along((0.0, 0.0, -0.2e-3))
@@ -210,7 +214,7 @@ def main() -> None:
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2, 4, 8])
     parser.add_argument("--fine", default="3 mm")
     parser.add_argument("--degree", type=int, default=2)
-    parser.add_argument("--scale", type=float, default=1.0, help=argparse.SUPPRESS)
+    parser.add_argument("--scale", type=float, help=argparse.SUPPRESS)
     parser.add_argument("--worker", action="store_true", help="on all ranks of this run")
     asked = parser.parse_args()
     if asked.worker:

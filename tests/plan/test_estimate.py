@@ -62,7 +62,7 @@ def test_memory_of_a_solve_is_not_underestimated(method):
 
 def test_a_step_takes_what_the_largest_of_its_solves_takes():
     """Poisson's ratios of one mesh need other elements; large displacements need matrices."""
-    ratios = study(material={"poisson": [0.3, 0.49]}, mesh={"fine": "1 mm"})
+    ratios = study(material={"poisson": [0.3, 0.49]}, mesh={"fine": "0.5 mm", "rim": "0.5 mm"})
     (step,) = mesh_steps(make_plan(ratios).solves)
     each = [CostModel().step(MeshStep((OperatorStep((solve,)),))).memory for solve in step.solves]
     assert [solve.case.element for solve in step.solves] == ["displacement", "mixed"]
