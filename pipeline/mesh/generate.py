@@ -30,6 +30,8 @@ _ON_EDGES = 1e-6
 # A tetrahedron is flat if its volume is below this share of that of a box of its extent. In one mesh with a flat cell,
 # the strain in it was 80 times that beside it, F erred by more than its error bar, and iterations did not converge.
 _FLAT = 1e-5
+# Triangles of a surface overlap if their area exceeds its own by this factor: they are chords, and mostly smaller.
+_OVERLAP = 1.2
 # If gmsh fails, a round side gets the resolution of a side with the body's extent divided by this.
 _RETRIES = (4, 8)
 
@@ -133,8 +135,11 @@ def in_model(
             if scene.body.region:
                 gmsh.model.geo.synchronize()  # points to which sizes refer
             gmsh.model.mesh.generate(dim)
+            folded = _folded()
         except Exception as error:  # gmsh raises bare Exception
             raise MeshError(f"gmsh: {reason(error)}") from error
+        if folded:
+            raise MeshError(f"gmsh folded the triangles of {folded} curved surfaces: use a smaller `coarse` or `fine`")
         taken = take(rim_curves, local)
         _clear(last)
         return taken
@@ -145,6 +150,30 @@ def _clear(last: int) -> None:
     gmsh.model.mesh.clear()
     for field in range(1, last + 1):
         gmsh.model.mesh.field.remove(field)
+
+
+def _folded() -> int:
+    """Return the number of curved surfaces of gmsh's current model whose triangles overlap.
+
+    gmsh sometimes folds the triangles of a side where they are large: tetrahedra then leave out a part of the body.
+    """
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    points = np.zeros((int(tags.max()) + 1, 3))
+    points[np.asarray(tags, dtype=np.int64)] = coordinates.reshape(-1, 3)
+    count = 0
+    for dim, tag in gmsh.model.getEntities(2):
+        if gmsh.model.getType(dim, tag) == "Plane":
+            continue
+        corners = points[_triangles(tag)]
+        sides = corners[:, 1:] - corners[:, :1]
+        area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum() / 2
+        count += bool(area > _OVERLAP * gmsh.model.occ.getMass(dim, tag))
+    return count
+
+
+def _triangles(surface: int) -> IntArray:
+    nodes = [part for part in gmsh.model.mesh.getElements(2, surface)[2] if len(part)]
+    return np.concatenate(nodes).astype(np.int64).reshape(-1, 3) if nodes else np.empty((0, 3), dtype=np.int64)
 
 
 def _built(scene: Scene) -> list[int]:

@@ -115,6 +115,16 @@ def test_a_free_column_a_hair_wider_than_the_disc_is_meshed(gap, rim):
     assert area(mesh, "probe") == pytest.approx(pi * 1e-6, rel=0.01)  # a polygon's
 
 
+@pytest.mark.parametrize("rim, growth", [("0.25 mm", 0.55), ("0.2 mm", 0.5)])
+def test_a_thin_cylinder_with_large_elements_at_its_side_is_whole(rim, growth):
+    """gmsh folded triangles of the side: a half or a third of the body was left out, and F was 2.3 times as large."""
+    body = {"shape": "cylinder", "radius": "4.609 mm", "height": "1.175 mm", "fixed": "bottom+sides"}
+    sizes = {"epsilon": "2.175 mm", "fine": "0.5875 mm", "coarse": "7.8 mm", "rim": rim, "growth": growth}
+    probe = {"radius": "1 mm", "depth": "0.01 mm", "at": ["2.043 mm", "0 mm"]}
+    mesh = mesh_arrays(study(body=body, probe=probe, mesh={**sizes, "outside": "coarse"}).case(()), ("y",))
+    assert volume(mesh) == pytest.approx(pi * 4.609e-3**2 * 1.175e-3 / 2, rel=0.02)
+
+
 def test_curved_rim_and_sides_are_round():
     mesh = scene(column=10e-3)
     curved = curve(generate(mesh, SIZES), mesh)
