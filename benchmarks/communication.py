@@ -175,15 +175,16 @@ def constants(strong: list[dict[str, Any]]) -> dict[str, float]:
 
     With N unknowns on each of P ranks, of which each has k neighbours, an iteration takes
 
-        work N  +  exchanges k latency  +  surface N^(2/3) / bandwidth  +  reductions latency log₂ P.
+        work N  +  fixed  +  exchanges k latency  +  surface N^(2/3) / bandwidth  +  reductions latency log₂ P.
 
-    ``work`` is that of one rank alone; ``exchanges`` are the messages to a neighbour, on all levels; ``surface`` is of
-    the bytes to all neighbours.
+    ``work`` is that of one rank alone, ``fixed`` what the busiest of many computes besides; ``exchanges`` are the
+    messages to a neighbour, on all levels; ``surface`` is of the bytes to all neighbours.
     """
     alone, last = strong[0], strong[-1]
     each = last["dofs"] / last["ranks"]
     return {
         "work": _work(alone),
+        "fixed": max(0.0, last["most"]["iterating"] / last["iterations"] - _work(alone) * each),
         "exchanges": last["most"]["messages"] / (last["ranks"] - 1),
         "surface": last["most"]["bytes"] / each ** (2 / 3),
         "reductions": last["most"]["reductions"],
@@ -199,13 +200,14 @@ def on_paper(found: dict[str, float]) -> str:
             surface = found["surface"] * (_INTERIOR if ranks > _EIGHT else 1.0)
             parts = {
                 "computation (ms)": 1e3 * found["work"] * each,
+                "fixed (ms)": many * 1e3 * found["fixed"],
                 "messages (ms)": many * 1e3 * found["exchanges"] * min(ranks - 1, _NEIGHBOURS) * _LATENCY,
                 "bytes (ms)": many * 1e3 * surface * each ** (2 / 3) / _BANDWIDTH,
                 "reductions (ms)": 1e3 * found["reductions"] * _LATENCY * log2(ranks),
             }
             efficiency = parts["computation (ms)"] / sum(parts.values())
             rows.append({"unknowns": dofs, "ranks": ranks} | parts | {"efficiency": efficiency})
-    return markdown(rows, dict(zip(rows[0], (",.0f", "d", *4 * (".3g",), ".0%"), strict=True)))
+    return markdown(rows, dict(zip(rows[0], (",.0f", "d", *5 * (".3g",), ".0%"), strict=True)))
 
 
 def main() -> None:
