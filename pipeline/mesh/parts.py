@@ -86,7 +86,7 @@ def _part(mesh: MeshArrays, chosen: IntArray, beyond: Int32Array) -> Part:
 
 
 @stage("refinement")
-def refine(part: Part, scene: Scene, comm: MPI.Comm, *, is_finest: bool = True) -> Part:
+def refine(part: Part, scene: Scene, comm: MPI.Comm) -> Part:
     """Return a part whose cells are cut into eight each, with curved edges and new numbers; collective.
 
     Raises:
@@ -102,7 +102,7 @@ def refine(part: Part, scene: Scene, comm: MPI.Comm, *, is_finest: bool = True) 
         raise NotRefined(next(filter(None, messages)))
     beyond = np.take_along_axis(np.repeat(part.beyond, 8, axis=0), np.maximum(carriers, 0), axis=1)
     beyond[carriers < 0] = -1
-    curved = curve(fine, scene, is_finest=is_finest, agree=partial(_agree, part, comm))
+    curved = curve(fine, scene, agree=partial(_agree, part, comm))
     return Part(curved, _labels(part, curved), part.count**2, beyond)
 
 

@@ -29,9 +29,13 @@ class MeshCache:
     def __init__(self, folder: Path, limit: float = LIMIT):
         self._folder, self._limit = folder, limit
 
-    def path(self, case: Case, mirrors: tuple[str, ...]) -> Path:
-        """Return the file of a case's mesh, of the part bounded by the planes ``mirrors``."""
-        key = digest(f"{MESH_VERSION} {versions()['gmsh']} {mesh_key(case)} {mirrors}")
+    def path(self, case: Case, mirrors: tuple[str, ...], *, is_coarse: bool = False) -> Path:
+        """Return the file of a case's mesh, of the part bounded by the planes ``mirrors``.
+
+        A mesh that is to be refined, ``is_coarse``, has a file of its own: where that fails, gmsh makes the fine one.
+        """
+        coarse = ["coarse"] if is_coarse else []
+        key = digest(" ".join([str(MESH_VERSION), versions()["gmsh"], mesh_key(case), str(mirrors), *coarse]))
         return self._folder / f"{key}.npz"
 
     @stage("mesh cache")

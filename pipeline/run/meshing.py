@@ -49,7 +49,7 @@ def cached_arrays(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None)
 
 
 def _cached_coarse(case: Case, cache: MeshCache | None) -> MeshArrays:
-    return _cached(case, mirror_planes(case), cache, coarse_arrays)
+    return _cached(case, mirror_planes(case), cache, coarse_arrays, is_coarse=True)
 
 
 def _cached_unrefined(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None) -> MeshArrays:
@@ -57,11 +57,16 @@ def _cached_unrefined(case: Case, mirrors: tuple[str, ...], cache: MeshCache | N
 
 
 def _cached(
-    case: Case, mirrors: tuple[str, ...], cache: MeshCache | None, make: Callable[[Case], MeshArrays]
+    case: Case,
+    mirrors: tuple[str, ...],
+    cache: MeshCache | None,
+    make: Callable[[Case], MeshArrays],
+    *,
+    is_coarse: bool = False,
 ) -> MeshArrays:
     if cache is None:
         return make(case)
-    path = cache.path(case, mirrors)
+    path = cache.path(case, mirrors, is_coarse=is_coarse)
     found = cache.get(path)
     if found is None:
         found = make(case)

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.mesh.of_case import mesh_arrays
+from pipeline.mesh import parts
+from pipeline.mesh.of_case import mesh_arrays, unrefined_arrays
+from pipeline.mesh.refine import NotRefined
+from pipeline.plan import refinement
 from pipeline.run.mesh_cache import MeshCache
-from pipeline.run.meshing import mesh_case
+from pipeline.run.meshing import cached_arrays, mesh_case
 from pipeline.stages import recorded
 from tests.cases import study
 
@@ -30,6 +33,20 @@ def test_same_mesh_comes_back(tmp_path):
     assert path != cache.path(CASE, ("x",))
     assert path != cache.path(study(mesh={"rim": "0.9 mm"}).case(()), PLANES)
     assert path == cache.path(study(material={"poisson": 0.4}, probe={"depth": "0.1 mm"}).case(()), PLANES)
+
+
+def test_a_mesh_that_cannot_be_refined_is_that_of_gmsh(tmp_path, monkeypatch):
+    def fails(*_):
+        raise NotRefined("flat")
+
+    monkeypatch.setattr(parts, "refined", fails)
+    monkeypatch.setattr(refinement, "LEAST", 0)
+    refinement._is_refined.cache_clear()
+    cache, wanted = MeshCache(tmp_path), len(unrefined_arrays(CASE, PLANES).cells)
+    found = [mesh_case(CASE, PLANES, MPI.COMM_SELF, cache).cells for _ in range(2)]
+    found.append(len(cached_arrays(CASE, PLANES, cache).cells))
+    refinement._is_refined.cache_clear()
+    assert found == 3 * [wanted]
 
 
 def test_damaged_file_is_made_again(tmp_path):

@@ -1,6 +1,6 @@
 """Surface away from the contact: cut at the edge of the support, and meshed as coarsely as its curvature allows.
 
-It depends on the body alone, so that every place, tool and mesh on it shares it.
+It depends on the body, and on how closely it is followed, so that places, tools and most meshes on it share it.
 """
 
 from collections.abc import Callable, Sequence
