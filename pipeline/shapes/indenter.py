@@ -99,6 +99,10 @@ class Indenter(Probe):
     def section(self) -> Rounded:
         """Its section: the profile of revolution, or the cross-section of an edge."""
 
+    @abstractmethod
+    def touching(self, half_width: float) -> Probe:
+        """Return the flat tool whose footprint is contact of a ``half_width`` (m)."""
+
     @property
     @abstractmethod
     def footprint(self) -> Probe:

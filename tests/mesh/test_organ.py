@@ -27,7 +27,8 @@ from pipeline.shapes.bodies.surface import FromSurface
 from pipeline.shapes.files.stl import written
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.surface import Surface
-from tests.cases import study
+from pipeline.study.read import parse
+from tests.cases import raw, study
 from tests.mesh.test_mesh import area, volume
 from tests.organs import AXES, box, ellipsoid, sphere, write_stl
 from tests.sampling import sampled
@@ -284,6 +285,24 @@ def test_a_folded_surface_is_meshed(tmp_path, seed):
     assert np.quantile(qualities(mesh), 0.01) > 0.1
     assert np.quantile(off, 0.9) < 1e-9
     assert mesh.deviation == pytest.approx(off.max())
+
+
+@pytest.mark.parametrize(
+    "tool", [{"shape": "sphere", "radius": "8 mm"}, {"shape": "cone", "angle": "75 deg", "radius": "9 mm"}], ids=str
+)
+def test_elements_are_small_where_found_contact_is_expected_to_end(file, tool):
+    """And not at the edge of all that the tool may touch."""
+    body = {"shape": "surface", "file": str(file), "unit": "mm", "fixed": {"below": "-10 mm"}}
+    ball = tool | {"depth": "0.5 mm", "at": ["5 mm", "3 mm"], "contact": "unilateral"}
+    case = make_plan(parse({**raw(body=body, probe=ball), "mesh": {"accuracy": "2 %"}})).solves[0].case
+    mesh = mesh_arrays(case, ())
+    corners = case.frame.local(mesh.points)[mesh.facets["probe"]]
+    size = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1)
+    radius = np.hypot(*corners.mean(axis=1)[:, :2].T)
+    at_end = np.abs(radius / np.mean(case.probe.edge_band) - 1) < 0.2
+    at_edge = radius > 0.8 * case.probe.footprint.half_width
+    assert size[at_end].mean() < 1.6 * case.mesh.rim
+    assert size[at_edge].mean() > 1.5 * size[at_end].mean()
 
 
 def test_a_footprint_next_to_a_fold_is_set_in_with_a_narrower_collar(tmp_path):

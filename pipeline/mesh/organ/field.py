@@ -1,4 +1,4 @@
-"""Size field around a footprint on a curved surface, from distances in space to its true edge."""
+"""Size field around a contact on a curved surface, from distances in space to its true or expected edge."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +17,7 @@ from pipeline.shapes.frame import Frame
 class Field:
     """``sizes`` around a ``frame``, and those of the body's regions.
 
-    ``edge`` (n, 3), in m, are dense points along the footprint's edge.
+    ``edge`` (n, 3), in m, are dense points along the edge of contact, where it is expected to end if it is found.
     """
 
     sizes: Sizes
@@ -50,5 +50,5 @@ class Field:
         return np.asarray(self._tree.query(points)[0])
 
     def _rim_text(self, unit: float, kernel: Any) -> str:
-        """Return the same as text for gmsh: the distance from points along the footprint's edge."""
+        """Return the same as text for gmsh: the distance from points along that edge."""
         return f"F{distance_field(unit * self.edge, kernel)}"

@@ -38,11 +38,14 @@ class RoundIndenter(Indenter, Needle):
         """Its section."""
         return Revolved(self.section.slope, self.limit, self.section.flat, self.kinks)
 
+    def touching(self, half_width: float) -> Probe:
+        """Return the disc of that radius."""
+        return Disc.model_construct(shape="disc", radius=half_width, depth=self.depth, at=self.at, axis=self.axis)
+
     @property
     def footprint(self) -> Probe:
         """The disc that contains all that it may touch."""
-        radius = min(self.candidate_width, self.limit)
-        return Disc.model_construct(shape="disc", radius=radius, depth=self.depth, at=self.at, axis=self.axis)
+        return self.touching(min(self.candidate_width, self.limit))
 
     @property
     def pressed(self) -> float:

@@ -44,11 +44,15 @@ class RoundedBlade(Indenter):
         """Return half the length and half the width (m) of the part up to ``beyond`` (m) outside of the flat face."""
         return np.array([self.length, self.width]) / 2 - self.edge + min(beyond, self.edge)
 
+    def touching(self, half_width: float) -> Probe:
+        """Return the rectangle of that half width across its shorter side."""
+        length, width = 2 * self._sides(half_width - self.section.flat)
+        return Blade.below(self, self.direction, float(length), float(width))
+
     @property
     def footprint(self) -> Probe:
         """The rectangle that contains all that it may touch."""
-        length, width = 2 * self._sides(self.candidate_width - self.section.flat)
-        return Blade.below(self, self.direction, float(length), float(width))
+        return self.touching(self.candidate_width)
 
     @property
     def half_length(self) -> float:

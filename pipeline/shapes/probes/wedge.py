@@ -43,10 +43,14 @@ class Wedge(Indenter):
         """A straight flank, rounded at the edge."""
         return Rounded(self.angle, self.tip)
 
+    def touching(self, half_width: float) -> Probe:
+        """Return the rectangle of that half width, as long as the edge."""
+        return Blade.below(self, self.direction, self.length, 2 * half_width)
+
     @property
     def footprint(self) -> Probe:
         """The rectangle, as long as the edge, that contains all that it may touch."""
-        return Blade.below(self, self.direction, self.length, 2 * self.candidate_width)
+        return self.touching(self.candidate_width)
 
     @property
     def half_length(self) -> float:
