@@ -143,7 +143,7 @@ _THICKNESS, _THICKNESS_EVEN, _THINNEST = 10.0, 1.0, 0.15
 # Error bars of mixed elements, in units of those of displacement elements at ν = 0.3, by degree, and the same at large
 # displacements.
 _MIXED, _MIXED_LARGE = {2: 1.2, 3: 1.05}, {2: 1.0, 3: 1.05}
-# Error bars with several movements, or of a column, in units of those with one in a whole body, by degree.
+# Error bars with several movements, of a column, or of a tool that is not round, in units of those without, by degree.
 _SEVERAL = {2: 1.5, 3: 1.15}
 # Factor for several materials, curved surfaces, and plates, by element (solve/estimate.py).
 _ELSEWHERE = {"displacement": 1.6, "mixed": 2.6}
@@ -224,9 +224,17 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
     of_degree = _MIXED_LARGE if case.material.is_large else _MIXED
     if case.element == "displacement":
         of_degree = dict.fromkeys(_MIXED, 1.0)
-    if is_even and (case.movements > 1 or case.is_truncated):
+    if is_even and not has_sure_limit(case):
         of_degree = {degree: factor * _SEVERAL[degree] for degree, factor in of_degree.items()}
     return [float(recipe.bar * shape * of_degree[recipe.degree]) for recipe in ladder]
+
+
+def has_sure_limit(case: Case) -> bool:
+    """Return whether the limit of F is known well on small elements: :mod:`pipeline.solve.estimate`.
+
+    It is for one movement of a disc on a whole plain body. Below blades, one degree more removes less of the error.
+    """
+    return case.is_plain and case.probe.is_round and case.movements == 1 and not case.is_truncated
 
 
 def _near(case: Case) -> float:

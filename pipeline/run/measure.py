@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.plan.cost import features
-from pipeline.plan.recipe import edge_width_of, half_width_of
+from pipeline.plan.recipe import edge_width_of, half_width_of, has_sure_limit
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
 from pipeline.shapes.body import Layered
@@ -51,7 +51,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
             case.mesh.degree,
             case.element,
             graded=is_graded_to_contact(case),
-            fine=case.is_plain and not case.is_truncated and is_fine(_rim(case), case.mesh.growth),
+            fine=has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
             elsewhere=not case.is_plain,
             large=case.material.is_large,
             ball=isinstance(case.probe, Sphere),

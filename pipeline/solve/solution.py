@@ -180,9 +180,9 @@ class Solution:
     ) -> "Solution":
         """Return the limit of the sequence of degrees, on a mesh ``graded`` to the edge or not; unchanged without bars.
 
-        ``fine`` says that elements at the edge are small, on a plain body, ``elsewhere`` that F has errors from other
-        places than the probe's edge, ``large`` that displacements are large, ``ball`` that a tool in unilateral contact
-        is smooth.
+        ``fine`` says that elements are small at the edge of a disc, on a plain body, ``elsewhere`` that F has
+        errors from other places than the probe's edge, ``large`` that displacements are large, ``ball`` that a tool in
+        unilateral contact is smooth.
         """
         if self.decrements is None or self.bars is None or (large and self.contact is not None):
             return self  # found contact at large displacements has no known limit: F and its bar stay

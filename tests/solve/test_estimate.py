@@ -124,6 +124,44 @@ def test_the_limit_is_known_better_on_small_elements(element):
     assert all(np.array_equal(*pair) for pair in zip(*several, strict=True))
 
 
+def test_the_limit_is_not_known_better_below_a_long_blade():
+    """Its corners add errors that one degree more hardly removes; the truth is that of an accuracy of 0.012 %."""
+    body = {"shape": "cylinder", "radius": "13.206 mm", "height": "1.037 mm", "fixed": "bottom"}
+    blade = {"shape": "blade", "length": "6.226 mm", "width": "2 mm", "depth": "0.01 mm", "contact": "bonded"}
+    content = {"body": body, "material": {"young": "10 kPa", "poisson": 0.2}, "probe": blade, "solve": {"exact": False}}
+    found = force(content, {"rim": "0.25 mm", "growth": 0.55, "degree": 2, "accuracy": "1 %"}, solid=True)
+    assert abs(found.force / 1.70547e-3 - 1) <= found.force_error <= 0.003
+
+
+# Balls with so few elements that F is too small already: radius, height (mm), ν; the ball's radius, depth; rim, growth,
+# degree.
+FEW = [
+    (
+        3.782,
+        14.961,
+        0.47,
+        "5.661 mm",
+        "0.176647 mm",
+        {"rim": "0.5458 mm", "fine": "1.08 mm", "growth": 0.286, "degree": 2},
+    ),
+    (8.237, 0.739, 0.3, "27.722 mm", "0.0360724 mm", {"rim": "0.3205 mm", "growth": 0.561, "degree": 3}),
+]
+
+
+@sampled("case", [(case,) for case in FEW], by_day=1)
+def test_limits_of_contact_on_few_elements_hold_the_truth(case):
+    radius, height, poisson, ball, depth, mesh = case
+    content = {
+        "body": {"shape": "cylinder", "radius": f"{radius} mm", "height": f"{height} mm", "fixed": "bottom+sides"},
+        "material": {"young": "10 kPa", "poisson": poisson},
+        "probe": {"shape": "sphere", "radius": ball, "depth": depth, "contact": "unilateral"},
+        "solve": {"exact": False},
+    }
+    found = force(content, {**mesh, "accuracy": "20 %"}, solid=True)
+    truth = force(content, {"accuracy": "0.1 %"}, solid=False)
+    assert abs(found.force / truth.force - 1) <= found.force_error
+
+
 @pytest.mark.parametrize("s", [0.01, -0.01, 1e-4, 0.0])
 def test_errors_of_opposite_sign_do_not_make_the_bar_small(s):
     """The energy of the correction, N, contains both errors; s alone decides where N is at most twice s."""
