@@ -33,14 +33,14 @@ class Cutting:
     depth: float
     ahead: float
     field: NearTip
-    stored: float
-    stored_error: float
-    fracture: float
-    elastic: float
-    elastic_error: float
-    cutting: float
-    squeeze: float
-    squeeze_error: float
+    stored: float = 0.0
+    stored_error: float = 0.0
+    fracture: float = 0.0
+    elastic: float = 0.0
+    elastic_error: float = 0.0
+    cutting: float = 0.0
+    squeeze: float = 0.0
+    squeeze_error: float = 0.0
     phase: str = CUTTING
 
     @property

@@ -38,24 +38,7 @@ class Indentation:
     @classmethod
     def of_surface(cls, stiffness: float, error: float) -> Self:
         """Return the indentation of the intact body."""
-        return cls(
-            Cutting(
-                depth=0.0,
-                ahead=0.0,
-                field=NearTip(0.0, 0.0),
-                stored=0.0,
-                stored_error=0.0,
-                fracture=0.0,
-                elastic=0.0,
-                elastic_error=0.0,
-                cutting=0.0,
-                squeeze=0.0,
-                squeeze_error=0.0,
-                phase=INDENTATION,
-            ),
-            stiffness,
-            error,
-        )
+        return cls(Cutting(0.0, 0.0, NearTip(0.0, 0.0), phase=INDENTATION), stiffness, error)
 
     def at(self, depth: float) -> Cutting:
         """Return the blade at a depth (m)."""

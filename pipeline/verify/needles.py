@@ -37,37 +37,42 @@ def _rows() -> Iterator[Row]:
     thin, short = float(fine.ratios[_SMALL]), float(min(coarse.ratios[-1], fine.ratios[-1]))
     gentle, tough = fine.release(thin), 0.99 * min(each.released[1] for each in (coarse, fine))
 
-    def row(scene: str, of: Callable[[Opening], float], reference: float, source: str) -> Row:
+    # The closed forms leave out terms of the square of the thickness, or of one over the length.
+    cavity = "cavity in an infinite body"
+    table: tuple[tuple[str, Callable[[Opening], float], float, str, float], ...] = (
+        (
+            "crack that a thin cylinder opens, ν = 0.5: energy release",
+            lambda opening: opening.release(thin),
+            # K = P/√(πb) for two forces P at its middle (H. Tada), G = K² (1 − ν²)/E.
+            float(fine.thrusts[_SMALL]) ** 2 / (4 * pi * thin),
+            "concentrated forces on its faces",
+            thin,
+        ),
+        (
+            "thin needle that cuts, ν = 0.5: pressure on its shaft",
+            lambda opening: shaft_pressure(opening, gentle),
+            known.thin_needle(gentle)[1],
+            "Hertz' contact in a crack, after A. Spagnoli et al. 2022",
+            thin,
+        ),
+        (
+            "short crack round a cylinder, neo-Hookean: energy release",
+            lambda opening: opening.release(short),
+            pi * short / 2,
+            cavity,
+            1 / short,
+        ),
+        (
+            "needle that cuts tough neo-Hookean tissue: pressure on its shaft",
+            lambda opening: shaft_pressure(opening, tough),
+            known.tough_needle(tough)[1],
+            cavity,
+            1 / short,
+        ),
+    )
+    for scene, of, reference, source, order in table:
         value = of(fine)
-        # The closed forms leave out terms of the square.
-        order = thin if "thin" in scene else 1 / short
-        return Row(scene, "plane strain", reference, source, value, abs(of(coarse) / value - 1), order**2)
-
-    yield row(
-        "crack that a thin cylinder opens, ν = 0.5: energy release",
-        lambda opening: opening.release(thin),
-        # K = P/√(πb) for two forces P at its middle (H. Tada), G = K² (1 − ν²)/E.
-        float(fine.thrusts[_SMALL]) ** 2 / (4 * pi * thin),
-        "concentrated forces on its faces",
-    )
-    yield row(
-        "thin needle that cuts, ν = 0.5: pressure on its shaft",
-        lambda opening: shaft_pressure(opening, gentle),
-        known.thin_needle(gentle)[1],
-        "Hertz' contact in a crack, after A. Spagnoli et al. 2022",
-    )
-    yield row(
-        "short crack round a cylinder, neo-Hookean: energy release",
-        lambda opening: opening.release(short),
-        pi * short / 2,
-        "cavity in an infinite body",
-    )
-    yield row(
-        "needle that cuts tough neo-Hookean tissue: pressure on its shaft",
-        lambda opening: shaft_pressure(opening, tough),
-        known.tough_needle(tough)[1],
-        "cavity in an infinite body",
-    )
+        yield Row(scene, "plane strain", reference, source, value, abs(of(coarse) / value - 1), order**2)
     low, high = ring_cuts(_INCOMPRESSIBLE, _TOUGHNESS)
     yield Row(
         "ring crack under a flat punch, neo-Hookean, ν = 0.5: pressure on it",
