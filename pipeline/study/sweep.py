@@ -205,7 +205,11 @@ class Study:
 
 def _chosen(axes: Sequence[int]) -> Callable[[tuple[int, ...]], Hashable]:
     """Return the function that returns the part of an index for some ``axes``."""
-    return itemgetter(*axes) if axes else lambda _: ()
+    return itemgetter(*axes) if axes else _nothing
+
+
+def _nothing(_index: tuple[int, ...]) -> Hashable:
+    return ()
 
 
 def _in_use(body: Body, material: Material, load: Load) -> tuple[Body, Material, Load]:
