@@ -123,14 +123,11 @@ class ElasticSpace:
     def _assemble(self, law: MaterialLaw, *, whole: bool) -> PETSc.Mat:
         self.forms.set_law(law)
         dirichlet, diagonal = [] if whole else self.dirichlet, law.lame_mu[0]
-        if self.comm.size > 1:
-            matrix = compat.assemble_matrix(self.forms.stiffness, dirichlet, diagonal)
-        else:
-            matrix = self._straight.matrix(law, _NO_DOFS if whole else self.prescribed, diagonal)
-            if self._straight.nbytes > _KEPT_BYTES:
-                del self._straight
-            if has_curved_cells(self.body.mesh):
-                compat.add_matrix(matrix, self.forms.curved_stiffness, dirichlet, diagonal)
+        matrix = self._straight.matrix(law, _NO_DOFS if whole else self.prescribed, diagonal)
+        if self.comm.allreduce(self._straight.nbytes, op=MPI.MAX) > _KEPT_BYTES:
+            del self._straight
+        if has_curved_cells(self.body.mesh):
+            compat.add_matrix(matrix, self.forms.curved_stiffness, dirichlet, diagonal)
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         return matrix

@@ -90,6 +90,10 @@ def test_operators_are_those_that_dolfinx_assembles(degree, mirrors, changes, ke
             theirs.mult(x, z)
             y.array[space.prescribed_owned] = z.array[space.prescribed_owned]
             assert (y - z).norm() < 1e-12 * z.norm()
+        assert ours.getInfo()["nz_used"] == theirs.getInfo()["nz_used"]
+        size = theirs.norm()
+        theirs.axpy(-1.0, ours)
+        assert theirs.norm() < (1e-14 if kernel else 1e-13) * size
 
 
 @pytest.mark.mpi

@@ -1,7 +1,7 @@
 """Assembled stiffness λ A_λ + μ A_μ of straight cells, in 3 × 3 blocks: ``assembly.c``.
 
-Straight cells need no quadrature, and the position of every entry is known. On one process the matrix is assembled
-here, in a third of dolfinx's time. On several processes dolfinx assembles, with the cell kernel from here.
+Straight cells need no quadrature, and the position of every entry is known: assembly takes a third of dolfinx's time.
+On several ranks, each adds up its own cells, and sends rows of other ranks' points to them (:mod:`shared_rows`).
 """
 
 from functools import cache, cached_property
@@ -15,59 +15,69 @@ from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve.kernels.cells import corners, owned_cells, reference, straight_cells
 from pipeline.solve.kernels.native import address, call, point_at
+from pipeline.solve.kernels.shared_rows import SharedRows
 from pipeline.solve.physics import MaterialLaw
 
 
 class StraightStiffness:
-    """Straight cells of a space of displacements on one process, and the sparsity pattern of all cells.
+    """Straight cells of a space of displacements, and the sparsity pattern of all cells.
 
-    ``curved`` is a mask of the cells that others assemble, or None; ``regions`` are the numbers of the cells' regions.
+    ``curved`` is a mask of the local cells that others assemble, or None; ``regions`` are the numbers of the cells'
+    regions.
     """
 
     def __init__(self, space: Any, curved: BoolArray | None, regions: Int32Array | None = None):
+        """Find the pattern; collective."""
+        index_map = space.dofmap.index_map
+        self._points = index_map.size_local + index_map.num_ghosts
         self._dofs = owned_cells(space)
         self._which = straight_cells(curved, len(self._dofs))
         self._regions = np.zeros(len(self._dofs), dtype=np.int32) if regions is None else regions
         self._corners, self._tensors = corners(space.mesh), _reference_tensors(compat.degree(space))
-        self._offsets, self._columns, self._places = _pattern(self._dofs, space.dofmap.index_map.size_local)
+        offsets, columns, self._places = _pattern(self._dofs, self._points)
+        self._entries, self._rows = len(columns), SharedRows(space.mesh.comm, index_map, offsets, columns)
 
     def matrix(self, law: MaterialLaw, prescribed: Int32Array, diagonal: float) -> PETSc.Mat:
-        """Return the matrix of the straight cells, with the pattern of all; the caller destroys it.
+        """Return the matrix of the straight cells, with the pattern of all; the caller destroys it; collective.
 
-        Rows and columns of ``prescribed`` dofs (unrolled) are zero but for the ``diagonal``.
+        Rows and columns of ``prescribed`` dofs (local, unrolled) are zero but for the ``diagonal``.
         """
-        free = np.ones(3 * (len(self._offsets) - 1))
+        free = np.ones(3 * self._points)
         free[prescribed] = 0.0
         regions = np.zeros_like(self._regions) if law.is_uniform else self._regions
-        blocks = np.zeros((len(self._columns), 9))
+        blocks = np.zeros((self._entries, 9))
         cells = len(self._which), self._which, self._dofs.shape[1], self._corners, self._dofs, self._places
         lame = (np.array(values, dtype=float) for values in (law.lame_lambda, law.lame_mu))
         call("add_stiffness", *cells, self._tensors, free, regions, *lame, blocks)
-        row = np.repeat(np.arange(len(self._offsets) - 1, dtype=np.int32), np.diff(self._offsets))
-        on_diagonal = np.flatnonzero(self._columns == row)
-        blocks[on_diagonal[prescribed // 3], 4 * (prescribed % 3)] = diagonal
+        rows = self._rows
+        blocks = rows.summed(blocks)
+        row = np.repeat(np.arange(rows.owned, dtype=np.int32), np.diff(rows.offsets))
+        on_diagonal = np.flatnonzero(rows.columns == rows.first + row)
+        own = prescribed[prescribed < 3 * rows.owned]
+        blocks[on_diagonal[own // 3], 4 * (own % 3)] = diagonal
         offsets, columns, places = self._unrolled
         values = np.empty(blocks.size)
         values[places] = blocks
-        size = 3 * (len(self._offsets) - 1)
-        csr = offsets, columns, values
-        matrix = PETSc.Mat().createAIJWithArrays((size, size), csr, comm=PETSc.COMM_SELF)
+        size = 3 * rows.owned, 3 * rows.size
+        matrix = PETSc.Mat().createAIJWithArrays((size, size), (offsets, columns, values), comm=rows.comm)
         matrix.setBlockSizes(3, 3)  # this halves BoomerAMG's iterations
+        matrix.setLGMap(rows.numbering, rows.numbering)
         return matrix
 
     @property
     def nbytes(self) -> int:
         """Bytes of the layout, which all laws share."""
-        return sum(each.nbytes for each in (self._corners, self._columns, self._places, *self._unrolled))
+        return sum(each.nbytes for each in (self._corners, self._rows.columns, self._places, *self._unrolled))
 
     @cached_property
     def _unrolled(self) -> tuple[np.ndarray, np.ndarray, Int32Array]:
         """Unblocked sparse rows: offsets, columns, and positions of the entries of each block, (blocks, 9)."""
-        places = _unblocked(self._offsets)
-        columns = np.empty(9 * len(self._columns), dtype=PETSc.IntType)
-        columns[places] = np.repeat(3 * self._columns[:, None] + np.arange(3, dtype=np.int32), 3, axis=1)
-        rows = np.repeat(3 * np.diff(self._offsets), 3)
-        return np.concatenate([[0], np.cumsum(rows)]).astype(PETSc.IntType), columns, places
+        rows = self._rows
+        places = _unblocked(rows.offsets)
+        columns = np.empty(9 * len(rows.columns), dtype=PETSc.IntType)
+        columns[places] = np.repeat(3 * rows.columns[:, None] + np.arange(3, dtype=np.int32), 3, axis=1)
+        lengths = np.repeat(3 * np.diff(rows.offsets), 3)
+        return np.concatenate([[0], np.cumsum(lengths)]).astype(PETSc.IntType), columns, places
 
 
 def _pattern(dofs: Int32Array, points: int) -> tuple[Int32Array, Int32Array, Int32Array]:
