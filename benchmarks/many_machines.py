@@ -87,7 +87,7 @@ class Campaign:
             else:
                 self.lost += used.user + used.system
                 full = ["--full"] if way == SCRIPT else []
-                self.cluster.call("scancel", "--signal=KILL", *full, run.job_id)
+                self.cluster.call("scancel", "--signal=KILL", *full, run.job)
             self.struck.append(f"{way} of shard {run.shard} ({run.done} of {run.total} done)")
             print(f"killed: {self.struck[-1]}", flush=True)
             return True

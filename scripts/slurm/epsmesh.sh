@@ -32,7 +32,9 @@ rm -f "$mark"
 # out. Plain `scancel` ends this script as well, and after a node's failure or a preemption Slurm itself restarts the job.
 if ((status > 128 && restarts < most_restarts)); then
     echo "interrupted (status $status); the job goes back into the queue"
+    # One task of an array has the number of the whole array: by that number, every task would be restarted.
+    task=${SLURM_ARRAY_JOB_ID:+${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID}
     # Slurm then ends this script; one that ended by itself before could be taken for a job that failed.
-    scontrol requeue "$SLURM_JOB_ID" && sleep 300
+    scontrol requeue "${task:-$SLURM_JOB_ID}" && sleep 300
 fi
 exit "$status"

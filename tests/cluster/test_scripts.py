@@ -86,6 +86,13 @@ def test_what_is_interrupted_goes_back_into_the_queue(tmp_path, status):
     assert ("scontrol requeue 7" in calls) == (int(status) > 128)
 
 
+def test_a_task_of_an_array_goes_back_into_the_queue_alone(tmp_path):
+    """The last task's number is that of the whole array."""
+    task = {"SLURM_ARRAY_JOB_ID": "7", "SLURM_ARRAY_TASK_ID": "3", "SLURM_ARRAY_TASK_COUNT": "4"}
+    _, calls = start("shards.sbatch", tmp_path, "s.toml", STATUS="137", **task)
+    assert calls[-1] == "scontrol requeue 7_3"
+
+
 def test_a_step_that_did_not_start_is_no_success(tmp_path):
     found, calls = start("study.sbatch", tmp_path, "s.toml", CANNOT_START="1")
     assert found != 0
