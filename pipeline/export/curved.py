@@ -14,6 +14,7 @@ from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
 from pipeline.export.tabulate import Places, ratios_of, tabulate
+from pipeline.shapes.contact import mean_curvature, paraboloid
 from pipeline.shapes.frame import PlaceError, Vector
 
 # Radii of the two discs, in units of the study's; the larger one is close to the model's largest contact.
@@ -248,21 +249,13 @@ def _bends(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArr
 
 def _paraboloid(away: FloatArray, reach: float) -> float:
     """Return the mean curvature (1/m) at the apex of a paraboloid fitted to points (n, 3), in m, within ``reach``."""
-    x, y, z = away[away[:, 0] ** 2 + away[:, 1] ** 2 <= reach**2].T
-    terms = np.column_stack([np.ones_like(x), x, y, x**2 / 2, x * y, y**2 / 2])
-    _, *slope, xx, xy, yy = np.linalg.lstsq(terms, z, rcond=None)[0].tolist()
-    return _mean_curvature(np.array(slope), np.array([[xx, xy], [xy, yy]]))
+    return paraboloid(away[away[:, 0] ** 2 + away[:, 1] ** 2 <= reach**2])
 
 
 def _bend(face: Evaluator, x: float, y: float) -> float:
     """Return the mean curvature (1/m), positive on a dome."""
     spot = face.spot(x, y)
-    return _mean_curvature(spot.slope, spot.second)
-
-
-def _mean_curvature(slope: FloatArray, second: FloatArray) -> float:
-    metric = np.eye(2) + np.outer(slope, slope)
-    return float(-0.5 * np.trace(np.linalg.solve(metric, second)) / np.sqrt(1 + np.dot(slope, slope)))
+    return mean_curvature(spot.slope, spot.second)
 
 
 def _fitted(rows: FloatArray, columns: FloatArray, values: FloatArray) -> FloatArray:

@@ -100,10 +100,10 @@ def _scene(case: Case, *, is_coarse: bool) -> tuple[Scene, Sizes]:
     straight, planes, sizes = case.mesh.degree == 1, mirror_planes(case), sizes_of(case)
     if is_coarse:
         sizes = replace(sizes, times=_COARSER, rim=_AT_RIM * sizes.rim, column=sizes.column / _COARSER)
-    segments = sizes.rim_segments(case.probe)
+    segments = sizes.rim_segments(case.expected)
     held, ball = not (case.mesh.keeps_all or case.mesh.outside == "free"), case.is_closed
     folds = not case.has_quarter_points
-    return Scene(case.body, case.probe, _column(case), held, segments, straight, planes, ball, folds), sizes
+    return Scene(case.body, case.expected, _column(case), held, segments, straight, planes, ball, folds), sizes
 
 
 def _beyond(case: Case, mirrors: tuple[str, ...]) -> tuple[str, ...]:

@@ -44,7 +44,7 @@ _IN_LAYER, _MEETING = 0.5, 1.75
 
 def cells(case: Case) -> float:
     """Return the estimated number of tetrahedra of a case, within about a factor of two."""
-    mesh, probe, body = case.mesh, case.probe, case.body
+    mesh, probe, body = case.mesh, case.expected, case.body
     rim, growth, thickness = mesh.rim_size(probe.half_width), mesh.growth, body.thickness(case.frame)
     length, area = probe.rim_size
     # Half discs round the rim: ∫ π s / (rim + growth s)³ ds up to the distance where the size is fine.

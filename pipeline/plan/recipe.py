@@ -196,12 +196,12 @@ def _ladder(case: Case) -> tuple[Recipe, ...]:
 
 def half_width_of(case: Case) -> float:
     """Return the half width (m) of contact, estimated if contact is found."""
-    return case.probe.contact_width if isinstance(case.probe, Indenter) else case.probe.half_width
+    return case.expected.contact_width if isinstance(case.expected, Indenter) else case.probe.half_width
 
 
 def edge_width_of(case: Case) -> float:
     """Return the length (m) that elements at the edge of contact resolve, to which ``rim`` of a recipe is relative."""
-    return case.probe.edge_width if isinstance(case.probe, Indenter) else case.probe.half_width
+    return case.expected.edge_width if isinstance(case.expected, Indenter) else case.probe.half_width
 
 
 def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:

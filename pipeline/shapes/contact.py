@@ -33,6 +33,8 @@ _CLOSER = 0.6
 _MANY = 256
 # A surface counts as plane within this distance, in units of the footprint.
 _FLAT = 1e-9
+# Curvature times the footprint's radius below which it is rounding.
+_LEAST_BENT = 1e-6
 
 
 def outline_points(probe: Probe, count: int = _ALONG) -> FloatArray:
@@ -78,6 +80,34 @@ def is_flat(body: Body, probe: Probe, frame: Frame) -> bool:
     points, _ = body.lift(frame, np.concatenate([rim, *(share * rim for share in _WITHIN)]))
     heights = frame.local(points)[:, 2]
     return bool(np.all(np.abs(heights) < _FLAT * probe.circumradius))
+
+
+@lru_cache(_MANY)
+def curvature_below(body: Body, probe: Probe, frame: Frame) -> float:
+    """Return the mean curvature (1/m) of the surface below a footprint, positive on a dome; exactly 0 on a plane.
+
+    It is that of a paraboloid fitted to the surface within three quarters of the footprint.
+    """
+    if is_level(body, frame):
+        return 0.0
+    rim = outline_points(probe)
+    points, _ = body.lift(frame, np.concatenate([share * rim for share in _WITHIN[:-1]]))
+    found = paraboloid(frame.local(points[np.isfinite(points).all(axis=1)]))
+    return found if abs(found) * probe.circumradius > _LEAST_BENT else 0.0
+
+
+def paraboloid(points: FloatArray) -> float:
+    """Return the mean curvature (1/m) at the apex of a paraboloid fitted to points (n, 3), in m."""
+    x, y, z = points.T
+    terms = np.column_stack([np.ones_like(x), x, y, x**2 / 2, x * y, y**2 / 2])
+    _, *slope, xx, xy, yy = np.linalg.lstsq(terms, z, rcond=None)[0].tolist()
+    return mean_curvature(np.array(slope), np.array([[xx, xy], [xy, yy]]))
+
+
+def mean_curvature(slope: FloatArray, second: FloatArray) -> float:
+    """Return the mean curvature (1/m), positive on a dome, from a height's derivatives (2,) and (2, 2), in 1/m."""
+    metric = np.eye(2) + np.outer(slope, slope)
+    return float(-0.5 * np.trace(np.linalg.solve(metric, second)) / np.sqrt(1 + np.dot(slope, slope)))
 
 
 def check_contact(body: Body, probe: Probe, frame: Frame) -> None:

@@ -6,10 +6,10 @@ to end; nothing is singular at the edge of the candidates.
 """
 
 from abc import abstractmethod
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, PrivateAttr
 from pydantic_core import PydanticCustomError
 
 from pipeline.arrays import FloatArray
@@ -92,6 +92,9 @@ class Indenter(Probe):
         Words("Contact: tissue slides along the tool and may lift off. The contact area is computed.", '"unilateral"'),
     ] = "unilateral"
 
+    # Mean curvature (1/m) of the surface, where contact is expected: it is known with the body alone.
+    _bump: float = PrivateAttr(default=0.0)
+
     # ---- for each indenter to define --------------------------------------------------------------------
 
     @property
@@ -134,6 +137,15 @@ class Indenter(Probe):
     edge_distance: ClassVar[Any] = _OfFootprint()
     to_edge: ClassVar[Any] = _OfFootprint()
     outline: ClassVar[Any] = _OfFootprint()
+
+    def on_bump(self, curvature: float) -> Self:
+        """Return the tool that expects contact with a surface of this mean ``curvature`` (1/m), positive on a dome.
+
+        Contact with straight edges is expected as on a plane.
+        """
+        tool = self.model_copy()
+        tool._bump = curvature
+        return tool
 
     # ---- derived properties -----------------------------------------------------------------------------
 

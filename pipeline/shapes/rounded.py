@@ -70,12 +70,13 @@ class Rounded:
             return self.flat + within
         return self.tangent + (depth - end) * tan(self.angle)
 
-    def contact_radius(self, depth: float) -> float:
+    def contact_radius(self, depth: float, bump: float = 0.0) -> float:
         """Return the contact radius (m) of the body of revolution, pressed ``depth`` (m) into an elastic half-space.
 
-        I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965): d = a ∫ f'(a sin t) dt over a quarter turn.
+        I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965): d = a ∫ f'(a sin t) dt over a quarter turn. On a surface of mean
+        curvature ``bump`` (1/m), positive on a dome, the gap f has the term ``bump`` r²/2 more (H. Hertz, 1882).
         """
-        return _solved(self, depth, inf)
+        return _solved(self, depth, inf, bump)
 
     def contact_width(self, depth: float, length: float) -> float:
         """Return half the contact width (m), approximately, at the middle of an edge of a given ``length`` (m).
@@ -83,7 +84,7 @@ class Rounded:
         The line load is that of plane strain, E* b ∫ sin t f'(b sin t) dt. Under this load over that length the
         surface of a half-space moves by 2/(π E*) (ln(length / b) + 1 + ln 2) times it.
         """
-        return _solved(self, depth, length)
+        return _solved(self, depth, length, 0.0)
 
 
 def rise(beside: FloatArray, radius: float | FloatArray) -> FloatArray:
@@ -107,14 +108,14 @@ def quarter_turn(least: float = 0.0) -> tuple[FloatArray, FloatArray]:
 
 
 @lru_cache(_MANY)
-def _solved(section: Rounded, depth: float, length: float) -> float:
+def _solved(section: Rounded, depth: float, length: float, bump: float) -> float:
     def indented(half: float) -> float:
         if half <= section.flat:
             return 0.0
         sine, weight = quarter_turn(section.flat / half)
         slope = section.slope(half * sine)
         if length == inf:
-            return half * float(weight @ slope)
+            return half * float(weight @ slope) + bump * half**2
         line_load = half * float(weight @ (sine * slope))
         return 2 / pi * line_load * (max(log(length / half), 0.0) + _WEDGE)
 

@@ -7,8 +7,9 @@ from math import inf
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from pipeline.shapes.body import Body
-from pipeline.shapes.contact import is_level
+from pipeline.shapes.contact import curvature_below, is_level
 from pipeline.shapes.frame import Frame, Vector
+from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.axis import Axis
@@ -93,6 +94,16 @@ class Case:
     def frame(self) -> Frame:
         """Where the probe meets the body."""
         return self.probe.frame_on(self.body)
+
+    @property
+    @of_scene
+    def expected(self) -> Probe:
+        """The probe; if contact is found, as it is expected to end on a surface that is curved below it."""
+        probe = self.probe
+        if not isinstance(probe, Indenter):
+            return probe
+        bump = curvature_below(self.body, probe, self.frame)
+        return probe.on_bump(bump) if bump else probe
 
     @property
     def features(self) -> frozenset[str]:

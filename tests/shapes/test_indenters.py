@@ -51,6 +51,30 @@ def test_the_contact_on_a_half_space_is_that_of_closed_forms():
     assert b == pytest.approx(radius * cos(pi / 3))
 
 
+def test_contact_on_a_dome_is_smaller():
+    """H. Hertz: curvatures add up; a cone's share is Love's."""
+    bump = 1 / 6e-3
+    assert Rounded(0.0, 3e-3).contact_radius(1e-7, bump) == pytest.approx(sqrt(1e-7 / (1 / 3e-3 + bump)), rel=1e-4)
+    a = Rounded(pi / 3).contact_radius(1e-3, bump)
+    assert pi / 2 * a / tan(pi / 3) + bump * a**2 == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize("axes", [(20, 20, 20), (40, 20, 20), (20, 30, 10)])
+def test_contact_is_expected_on_the_surface_below_the_tool(axes):
+    """On top of an ellipsoid, with its mean curvature there."""
+    body = {"shape": "ellipsoid", "axes": [f"{axis} mm" for axis in axes], "fixed": {"below": "-4 mm"}}
+    case = study(body=body, probe=SPHERE | {"depth": "0.01 mm"}).case(())
+    a, b, c = axes
+    ratio = case.probe.contact_width / case.expected.contact_width
+    assert ratio**2 == pytest.approx(1 + 3 * (c / a**2 + c / b**2) / 2, rel=0.01)
+    assert case.expected.footprint == case.probe.footprint
+
+
+def test_contact_on_a_plane_is_expected_as_on_a_half_space():
+    case = study(probe=SPHERE).case(())
+    assert case.expected is case.probe
+
+
 def test_a_sharp_edge_touches_less_than_a_cone():
     wedge = Rounded(pi / 3)
     assert 0.2 < wedge.contact_width(1e-4, 6e-3) / wedge.reach(1e-4) < 0.64

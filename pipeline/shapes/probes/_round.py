@@ -54,8 +54,8 @@ class RoundIndenter(Indenter, Needle):
 
     @property
     def contact_width(self) -> float:
-        """Contact radius (m) on an elastic half-space."""
-        return min(self.section.contact_radius(self.depth), self.limit)
+        """Contact radius (m) on an elastic half-space, bent as the surface is."""
+        return min(self.section.contact_radius(self.depth, self._bump), self.limit)
 
     @property
     def expected_radius(self) -> float:
