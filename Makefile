@@ -114,7 +114,7 @@ benchmark: setup ## make every table of docs/performance.md in results/ (on an i
 	$(PYTHON) -m benchmarks.drag --minutes 5
 	$(EPSMESH) run studies/speedup.toml --fresh
 
-peers: setup ## compare the time for a true error with NGSolve and scikit-fem (on an idle machine): results/peers.md
+peers: setup ## compare the time for a true error with NGSolve, scikit-fem and CalculiX (on an idle machine): results/peers.md
 	@scripts/peers.sh
 	$(PYTHON) -m benchmarks.peers $(PEERS_ARGS)
 

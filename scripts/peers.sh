@@ -1,5 +1,5 @@
 #!/bin/bash
-# Make .venv-peers with the programs for `make peers`. They come from PyPI, with their own numpy.
+# Make .venv-peers with the programs for `make peers`. They come from PyPI, with their own numpy; CalculiX from Debian.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -7,6 +7,10 @@ venv=.venv-peers
 wanted=(ngsolve==6.2.2608 scikit-fem==12.0.2 scipy gmsh pypardiso cvxopt pyamg)
 stamp=$venv/.epsmesh-peers
 
+if ! command -v ccx >/dev/null; then
+    # Without it, the other programs are compared.
+    apt-get install -qq -y --no-install-recommends calculix-ccx >/dev/null || echo "peers: no CalculiX: apt-get failed" >&2
+fi
 state=$(sha256sum <scripts/peers.sh)
 [[ -f $stamp && $(<"$stamp") == "$state" ]] && exit 0
 echo "peers: making $venv"

@@ -1,4 +1,4 @@
-"""Time to a true error of F in this program, NGSolve and scikit-fem: ``python -m benchmarks.peers``.
+"""Time to a true error of F in this program, NGSolve, scikit-fem and CalculiX: ``python -m benchmarks.peers``.
 
 Run it on an idle machine. It writes peers.json, peers.md and peers.png into the folder of results.
 """
@@ -12,7 +12,7 @@ from typing import Any
 
 from benchmarks.machine import machine
 from benchmarks.peers.figure import draw
-from benchmarks.peers.processes import MODULES, ask
+from benchmarks.peers.processes import MODULES, SERIAL, ask, installed
 from benchmarks.peers.results import TARGETS, Run, breakdown, medians, standings, table, to_json, truths_table
 from benchmarks.peers.settings import (
     CONTACT_GRID,
@@ -68,7 +68,7 @@ def main() -> int:
 def _options() -> argparse.Namespace:
     parser = options(__doc__)
     parser.add_argument("--scenes", nargs="+", choices=TASKS, default=list(TASKS))
-    parser.add_argument("--programs", nargs="+", choices=MODULES, default=list(MODULES))
+    parser.add_argument("--programs", nargs="+", choices=MODULES, default=installed())
     parser.add_argument("--repeats", type=int, default=3, help="runs of each setting; the median counts")
     parser.add_argument("--truth", action="store_true", help="converge every scene again, in two programs")
     parser.add_argument("--two", action="store_true", help="also on two ranks, NGSolve on two threads")
@@ -83,7 +83,7 @@ def _jobs(asked: argparse.Namespace) -> Iterator[tuple[str, dict[str, Any]]]:
         for program in asked.programs:
             if not _settings(program, name, 1):
                 continue
-            for threads in (1, 2) if asked.two and program != "scikit-fem" else (1,):
+            for threads in (1, 2) if asked.two and program not in SERIAL else (1,):
                 yield program, {"scene": name, "threads": threads, "settings": _settings(program, name, threads)}
 
 
@@ -133,9 +133,11 @@ def _scan(asked: argparse.Namespace, truths: dict[str, Truth]) -> None:
 
 
 def _grid(program: str, scene: str) -> Settings:
+    if program != "NGSolve":
+        return GRIDS[program]
     if TASKS[scene].is_large:
         return LARGE_GRID
-    return CONTACT_GRID if TASKS[scene].probe[0] == "ball" else GRIDS[program]
+    return CONTACT_GRID if TASKS[scene].probe[0] == "ball" else GRIDS["NGSolve"]
 
 
 if __name__ == "__main__":

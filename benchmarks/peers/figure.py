@@ -19,6 +19,7 @@ _LOOKS = {
     "this program, meridian": ("#2a9d8f", "-", "D"),
     "NGSolve": ("#1f5fa8", "-", "o"),
     "scikit-fem": ("#c98a00", "-", "s"),
+    "CalculiX": ("#7b4fa3", "-", "^"),
 }
 
 

@@ -5,14 +5,17 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from shutil import which
 from tempfile import TemporaryFile
 from typing import Any
 
 from benchmarks.processor import MPIRUN, ROOT
 
 PEERS_PYTHON = ROOT / ".venv-peers" / "bin" / "python"
-MODULES = {"program": "program", "NGSolve": "ngsolve_model", "scikit-fem": "skfem_model"}
-PEERS = ("NGSolve", "scikit-fem")
+MODULES = {"program": "program", "NGSolve": "ngsolve_model", "scikit-fem": "skfem_model", "CalculiX": "ccx_model"}
+PEERS = ("NGSolve", "scikit-fem", "CalculiX")
+# Programs of one thread here.
+SERIAL = ("scikit-fem", "CalculiX")
 
 
 def ask(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -48,6 +51,11 @@ def ask(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
         if process.wait():
             errors.seek(0)
             raise RuntimeError(f"{program} ended with status {process.returncode}: {errors.read()[-2000:]}")
+
+
+def installed() -> list[str]:
+    """Return the programs without those that scripts/peers.sh could not install."""
+    return [program for program in MODULES if program != "CalculiX" or which("ccx")]
 
 
 def _environment() -> dict[str, str]:

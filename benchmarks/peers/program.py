@@ -57,11 +57,18 @@ def study(scene: Task, mesh: dict[str, Any]) -> Study:
         {
             "body": body,
             "probe": probe,
-            "material": {"young": f"{YOUNG} Pa", "poisson": scene.poisson, "law": scene.law},
+            "material": {"young": f"{YOUNG} Pa", "poisson": scene.poisson} | _LAWS[scene.law],
             "mesh": mesh,
             "solve": {"exact": False},
         }
     )
+
+
+_LAWS: dict[str, dict[str, Any]] = {
+    "linear": {},
+    "neo-hookean": {"law": "neo-hookean"},
+    "mooney-rivlin": {"law": "mooney-rivlin", "c2": 0.0},
+}
 
 
 def _depth(scene: Task) -> float:

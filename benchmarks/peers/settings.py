@@ -34,6 +34,13 @@ GRIDS: dict[str, Settings] = {
         quarter=(True, False),
         solver=("pardiso", "cholmod", "amg"),
     ),
+    "CalculiX": _grid(
+        rim=(0.5, 0.4, 0.3, 0.2),
+        growth=(0.7, 0.5),
+        steps=(1, 2),
+        stiff=(10.0, 20.0, 50.0),
+        solver=("SPOOLES", "ITERATIVE CHOLESKY"),
+    ),
 }
 CONTACT_GRID: Settings = _grid(
     order=(2, 3, 4),
@@ -75,6 +82,10 @@ def _large(*rows: tuple[float, ...]) -> Settings:
     names = ("order", "rim", "grading", "levels", "steps")
     others = {"maxh": 30, "factor": 0.2, "safety": 1.0, "gamma": 20.0, "tolerance": 1e-3}
     return tuple(dict(zip(names, row, strict=True)) | others for row in rows)
+
+
+def _ccx(*rows: tuple[float, ...]) -> Settings:
+    return tuple(dict(zip(("rim", "growth", "steps", "stiff"), row, strict=True)) for row in rows)
 
 
 def _skfem(*rows: tuple[float, float]) -> Settings:
@@ -127,6 +138,7 @@ LADDERS: dict[str, dict[str, Settings]] = {
         "deep-disc": _large((3, 0.5, 0.5, 1, 2), (3, 0.5, 0.4, 1, 2), (3, 0.4, 0.5, 1, 2)),
         "deep-ball": _large((3, 0.4, 0.7, 0, 1), (3, 0.35, 0.7, 0, 1)),
     },
+    "CalculiX": {"ccx-ball": _ccx((0.5, 0.7, 1, 10.0), (0.4, 0.7, 1, 10.0), (0.3, 0.7, 1, 10.0), (0.2, 0.5, 1, 20.0))},
     "scikit-fem": {
         "disc": _skfem((0.2, 0.35), (0.1, 0.25), (0.05, 0.25)),
         "blade": _skfem((0.2, 0.35), (0.1, 0.25), (0.05, 0.25), (0.05, 0.2)),

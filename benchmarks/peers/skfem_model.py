@@ -4,22 +4,16 @@
 """
 
 from functools import cache
-from math import ceil
 from typing import Any
 
-import gmsh
 import numpy as np
 import scipy.sparse as sp
 from skfem import Basis, BilinearForm, ElementTetP2, MeshTet2
 
+from benchmarks.peers.gmsh_mesh import CLOSE, mesh_of
 from benchmarks.peers.tasks import Task
 from benchmarks.peers.worker import Answer, Parts, serve
 
-_CLOSE = 1e-6
-_HXT = 10
-_TET10 = 11  # gmsh's number for tetrahedra of order 2
-# gmsh's mid nodes are those of the edges 01 12 02 03 23 13; scikit-fem's of 01 12 02 03 13 23.
-_ORDER = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 _EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]
 _PAIRS = [(i, j) for i in range(3) for j in range(i, 3)]
 
@@ -34,9 +28,9 @@ def solve(
     """
     assert threads == 1
     parts = Parts()
-    points, cells, on_rim = _mesh(scene, rim * scene.half_width, growth)
+    points, cells = mesh_of(scene, rim * scene.half_width, growth)
     if quarter:
-        _quarter_points(points, cells, on_rim)
+        _quarter_points(points, cells, _on_rim(scene, points))
     parts.end("mesh")
     mesh = MeshTet2(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T), sort_t=False, validate=False)
     basis = Basis(mesh, ElementTetP2(), intorder=4)
@@ -53,86 +47,13 @@ def solve(
     return Answer(2 ** len(scene.planes) * float(work), len(displacement), parts.seconds)
 
 
-def _mesh(scene: Task, rim: float, growth: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points (n, 3), cells (m, 10), and a mask of the points on the probe's edge."""
-    if not gmsh.isInitialized():
-        gmsh.initialize([""], readConfigFiles=False)
-        options = {
-            "General.Terminal": 0,
-            "General.NumThreads": 1,
-            "Mesh.Algorithm3D": _HXT,
-            "Mesh.MeshSizeFromPoints": 0,
-            "Mesh.MeshSizeExtendFromBoundary": 0,
-            "Mesh.ElementOrder": 2,
-        }
-        for name, value in options.items():
-            gmsh.option.setNumber(name, value)
-    gmsh.clear()
-    for curve in _geometry(scene):
-        (start,), (end,) = gmsh.model.getParametrizationBounds(1, curve)
-        if scene.probe[0] == "disc":
-            edges = ceil(abs(end - start) * scene.probe[1] / rim)
-            gmsh.model.mesh.setTransfiniteCurve(curve, edges + 1)
-    field = gmsh.model.mesh.field
-    tag = field.add("MathEval")
-    field.setString(tag, "F", f"{rim:.15g}+{growth:.15g}*{_rim_distance(scene)}")
-    field.setAsBackgroundMesh(tag)
-    gmsh.model.mesh.generate(3)
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    _, nodes = gmsh.model.mesh.getElementsByType(_TET10)
-    used, cells = np.unique(nodes, return_inverse=True)
-    position = np.empty(int(tags.max()) + 1, dtype=np.int64)
-    position[tags] = np.arange(len(tags))
-    points = coordinates.reshape(-1, 3)[position[used]]
-    return points, cells.reshape(-1, 10)[:, _ORDER], _on_rim(scene, points)
-
-
-def _geometry(scene: Task) -> list[int]:
-    """Build the part of the body that symmetry leaves; return the curves of the probe's edge."""
-    occ, height = gmsh.model.occ, scene.height
-    if scene.body[0] == "box":
-        _, length, width, _ = scene.body
-        body = (3, occ.addBox(-length / 2, -width / 2, -height, length, width, height))
-    else:
-        body = (3, occ.addCylinder(0, 0, -height, 0, 0, height, scene.body[1]))
-    x, y = scene.at
-    if scene.probe[0] == "disc":
-        face = (2, occ.addDisk(x, y, 0, scene.probe[1], scene.probe[1]))
-    else:
-        _, length, width = scene.probe
-        face = (2, occ.addRectangle(x - length / 2, y - width / 2, 0, length, width))
-    low = [0.0 if axis in scene.planes else -1e3 for axis in "xy"]
-    if scene.planes:
-        for dim_tag in (body, face):
-            half = (3, occ.addBox(*low, -1e3, 1e3 - low[0], 1e3 - low[1], 2e3))
-            occ.intersect([dim_tag], [half])
-    _, children = occ.fragment([body], [face])
-    occ.synchronize()
-    edge = gmsh.model.getBoundary(children[1], oriented=False)
-    centres = {tag: _middle(tag) for _, tag in edge}
-    return [t for t, c in centres.items() if all(c["xy".index(axis)] > _CLOSE for axis in scene.planes)]
-
-
-def _middle(curve: int) -> np.ndarray:
-    (start,), (end,) = gmsh.model.getParametrizationBounds(1, curve)
-    return np.array(gmsh.model.getValue(1, curve, [(start + end) / 2]))
-
-
-def _rim_distance(scene: Task) -> str:
-    x, y = (f"({c}-({a}))" for c, a in zip("xy", scene.at, strict=True))
-    if scene.probe[0] == "disc":
-        return f"Sqrt((Sqrt({x}^2+{y}^2)-{scene.probe[1]})^2+z^2)"
-    p, q = (f"(Fabs({c})-{size / 2})" for c, size in zip((x, y), scene.probe[1:], strict=True))
-    return f"Sqrt((Sqrt(Max({p},0)^2+Max({q},0)^2)+Min(Max({p},{q}),0))^2+z^2)"
-
-
 def _on_rim(scene: Task, points: np.ndarray) -> np.ndarray:
     p = np.abs(points[:, :2] - scene.at)
     if scene.probe[0] == "disc":
         distance = np.hypot(*p.T) - scene.probe[1]
     else:
         distance = (p - np.array(scene.probe[1:]) / 2).max(axis=1)
-    return (np.abs(distance) < _CLOSE) & (np.abs(points[:, 2]) < _CLOSE)
+    return (np.abs(distance) < CLOSE) & (np.abs(points[:, 2]) < CLOSE)
 
 
 def _quarter_points(points: np.ndarray, cells: np.ndarray, on_rim: np.ndarray) -> None:
@@ -176,15 +97,15 @@ def _prescribed(scene: Task, basis: Basis) -> tuple[np.ndarray, np.ndarray]:
     x, y, z = basis.doflocs
     offset = np.abs(np.array([x - scene.at[0], y - scene.at[1]]))
     if scene.probe[0] == "disc":
-        below = np.hypot(*offset) < scene.probe[1] + _CLOSE
+        below = np.hypot(*offset) < scene.probe[1] + CLOSE
     else:
-        below = (np.array(scene.probe[1:]) / 2 + _CLOSE > offset.T).all(axis=1)
-    probe = below & (np.abs(z) < _CLOSE)
+        below = (np.array(scene.probe[1:]) / 2 + CLOSE > offset.T).all(axis=1)
+    probe = below & (np.abs(z) < CLOSE)
     held = np.zeros((len(z), 3), dtype=bool)
-    held[probe | (z < -scene.height + _CLOSE)] = True
+    held[probe | (z < -scene.height + CLOSE)] = True
     for axis in scene.planes:
         number = "xy".index(axis)
-        held[np.abs(basis.doflocs[number]) < _CLOSE, number] = True
+        held[np.abs(basis.doflocs[number]) < CLOSE, number] = True
     displacement = np.zeros((len(z), 3))
     displacement[probe, 2] = -1.0
     return displacement.reshape(-1), held.reshape(-1)

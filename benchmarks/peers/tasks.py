@@ -12,7 +12,9 @@ class Task:
 
     ``body`` is ("box", length, width, height), centred on the z axis, or ("cylinder", radius, height); ``probe`` is
     ("disc", radius), ("blade", length along x, width) or ("ball", radius, depth); ``truth`` is F, converged, and its
-    relative bar. With the ``law`` "neo-hookean" displacements are large, and a disc has a depth, too.
+    relative bar. With a ``law`` displacements are large, and a disc has a depth, too: "neo-hookean",
+    μ/2 (A : A − 3) − μ ln J + λ/2 (J − 1)², or "mooney-rivlin", μ/2 (Ī₁ − 3) + K/2 (J − 1)², its c₂ = 0: the
+    neo-Hookean law of CalculiX.
     """
 
     name: str
@@ -57,6 +59,8 @@ _DEEP = ("cylinder", 30, 30)
 # NGSolve's axisymmetric elements of degrees 2, 3 and 4 on three nested meshes, extrapolated in their size at the edge
 # (9.562, 9.563, 9.569), and this program's own ones, in which contact is found.
 _DISC, _BALL = (9.565, 2e-3), (4.34673, 1e-4)
+# By the same axisymmetric elements, with the other law.
+_CCX_BALL = (4.56248, 1e-4)
 TASKS = {
     scene.name: scene
     for scene in (
@@ -66,5 +70,6 @@ TASKS = {
         Task("ball", "ball on a cylinder", ("cylinder", 30, 30), ("ball", 4, 0.3), 0.3, known.CYLINDER_BALL),
         Task("deep-disc", "disc pressed by half its radius", _DEEP, ("disc", 4, 2), 0.3, _DISC, law="neo-hookean"),
         Task("deep-ball", "ball pressed by half its radius", _DEEP, ("ball", 4, 2), 0.3, _BALL, law="neo-hookean"),
+        Task("ccx-ball", "the same, CalculiX's law", _DEEP, ("ball", 4, 2), 0.3, _CCX_BALL, law="mooney-rivlin"),
     )
 }

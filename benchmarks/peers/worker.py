@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from benchmarks.peers.tasks import TASKS, Task
+from benchmarks.processor import processor_seconds
 
 
 @dataclass(frozen=True)
@@ -45,9 +46,9 @@ def answers(solve: Solve, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _timed(solve: Solve, scene: Task, threads: int, setting: dict[str, Any]) -> dict[str, Any]:
     gc.collect()
-    start, cpu = time.perf_counter(), time.process_time()
+    start, cpu = time.perf_counter(), processor_seconds()
     answer = solve(scene, threads, **setting)
-    return {"seconds": time.perf_counter() - start, "cpu": time.process_time() - cpu, **asdict(answer)}
+    return {"seconds": time.perf_counter() - start, "cpu": processor_seconds() - cpu, **asdict(answer)}
 
 
 def serve(solve: Solve, share: Callable[[Any], Any] = lambda job: job, *, speaks: bool = True) -> None:
