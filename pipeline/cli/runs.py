@@ -34,7 +34,7 @@ def lines_of(runs: "Iterable[Run]") -> "Iterator[str]":
     for (study, folder), group in groupby(runs, lambda run: (run.study, _folder(run))):
         found = list(group)
         states = ", ".join(f"{count} {state}" for state, count in Counter(run.state for run in found).items())
-        solves = f"{sum(run.done for run in found)} of {sum(run.total for run in found)} solves done"
+        solves = f"solves done: {sum(run.done for run in found)} of {sum(run.total for run in found)}"
         parts = f"{len(found)} of {found[0].shard.partition('/')[2]} shards begun, " if found[0].shard else ""
         yield printable(f"{study} -> {folder}: {parts}{states}; {solves}")
         names = [f"shard {run.shard}" if run.shard else "run" for run in found]

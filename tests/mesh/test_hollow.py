@@ -51,7 +51,8 @@ def test_the_cells_of_a_hollow_region_are_left_out(folder):
     middle = np.linalg.norm(mesh.points[mesh.cells[:, :4]].mean(axis=1), axis=1)
     assert mesh.regions is None and middle.min() > 0.97 * INNER
     cavity = case.body.region[0].surface
-    assert volume(mesh) == pytest.approx(case.body.volume - cavity.volume, rel=0.02)
+    # Facets follow the file by curved edges; straight ones leave out more.
+    assert volume(mesh) == pytest.approx(case.body.volume - cavity.volume, rel=0.03)
     wall = np.unique(mesh.facets[FREE])
     on_wall = wall[np.linalg.norm(mesh.points[wall], axis=1) < 1.5 * INNER]
     assert len(on_wall) > 50 and np.abs(cavity.distance(mesh.points[on_wall])).max() < 1e-9

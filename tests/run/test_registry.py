@@ -53,7 +53,7 @@ def test_a_run_is_alive_until_it_is_killed_and_the_next_one_takes_its_place(stor
         process.send_signal(signal.SIGKILL)
     assert [run.state for run in runs()] == ["killed"]
     told = "\n".join(lines_of(runs()))
-    assert "1 of 20 shards begun, 1 killed; 0 of 1 solves done" in told
+    assert "1 of 20 shards begun, 1 killed; solves done: 0 of 1" in told
     with Registered(store, make_plan(study()), Progress()) as registered:
         registered.done("the case", "too large")
     (run,) = runs()
