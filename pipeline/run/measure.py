@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.plan.cost import features
 from pipeline.plan.recipe import edge_width_of, half_width_of, has_sure_limit
+from pipeline.plan.refinement import is_refined
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
 from pipeline.shapes.body import Layered
@@ -47,12 +48,14 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     case = solve.case
     kind, planned_cells, poisson = features(solve)
     if solve.goal is not None and not solve.axisymmetric:
+        # Refined meshes have larger elements away from the edge: F has more of the errors of other places.
+        is_plain = case.is_plain and not is_refined(solve.meshed_case)
         solution = solution.extrapolated(
             case.mesh.degree,
             case.element,
             graded=is_graded_to_contact(case),
-            fine=has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
-            elsewhere=not case.is_plain,
+            fine=is_plain and has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
+            elsewhere=not is_plain,
             large=case.material.is_large,
             ball=isinstance(case.probe, Sphere),
         )

@@ -110,6 +110,18 @@ def test_the_force_agrees_with_that_of_an_unrefined_mesh(monkeypatch):
     assert fine.force_error < 1.15 * plain.force_error * (plain.dofs / fine.dofs) ** (2 / 3)
 
 
+@pytest.mark.usefixtures("refine_all")
+def test_bars_on_refined_meshes_cover_errors_away_from_the_edge():
+    body = {"shape": "cylinder", "radius": "25 mm", "height": "20 mm", "fixed": "bottom"}
+    keys = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
+    mesh = {**keys, "accuracy": "0.3 %", "model": "3d"}
+    found = solve(body=body, probe={"radius": "6 mm"}, mesh=mesh)[()]
+    mesh |= {"accuracy": "0.1 %", "model": "auto"}
+    true = solve(body=body, probe={"radius": "6 mm"}, mesh=mesh, plan={"without": None})[()]
+    assert true.origin == "axisymmetric"
+    assert abs(found.force / true.force - 1) < found.force_error
+
+
 @pytest.mark.mpi
 @pytest.mark.usefixtures("refine_all")
 @pytest.mark.parametrize("name", ["cylinder", "layers", "blade"])
