@@ -63,7 +63,7 @@ def synthetic(plan):
 
 def test_forces_at_places_that_are_not_solved_are_within_their_bars():
     """At most 15 of 41 places are solved; F of the others differs from their own solves by less than the bars."""
-    plan, records = solved(scene())
+    plan, records = solved(scene("2 %"))
     mapped = build(plan, records)
     is_solved = mapped["origin"].values == "solved"
     assert 8 <= is_solved.sum() <= 15
@@ -79,7 +79,7 @@ def test_forces_at_places_that_are_not_solved_are_within_their_bars():
     missed = np.abs(mapped["force"].values[held_out] - truth["force"].values)
     assert (missed < mapped["force_error"].values[held_out]).all()
     bars = (mapped["force_error"] / mapped["force"]).values
-    assert 1 + bars[~is_solved].max() <= 1.0101 * (1 + bars[is_solved].max())
+    assert 1 + bars[~is_solved].max() <= np.exp(0.02) * (1 + bars[is_solved].max())
     assert np.isnan(mapped["energy"].values[~is_solved]).all()
 
 
