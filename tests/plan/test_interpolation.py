@@ -72,7 +72,7 @@ def test_forces_at_places_that_are_not_solved_are_within_their_bars():
     assert float(mapped["force"].max() / mapped["force"].min()) > 1.05
     held_out = np.flatnonzero(~is_solved)[1::5]
     places = [
-        [f"{x!r} m", f"{y!r} m"]
+        [f"{float(x)} m", f"{float(y)} m"]
         for x, y in zip(mapped["at_x"].values[held_out], mapped["at_y"].values[held_out], strict=True)
     ]
     truth = build(*solved(scene(error=None, path={"points": places})))
