@@ -157,13 +157,14 @@ def _folded() -> int:
 
     gmsh sometimes folds the triangles of a side where they are large: tetrahedra then leave out a part of the body.
     """
+    curved = [(dim, tag) for dim, tag in gmsh.model.getEntities(2) if gmsh.model.getType(dim, tag) != "Plane"]
+    if not curved:
+        return 0
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     points = np.zeros((int(tags.max()) + 1, 3))
     points[np.asarray(tags, dtype=np.int64)] = coordinates.reshape(-1, 3)
     count = 0
-    for dim, tag in gmsh.model.getEntities(2):
-        if gmsh.model.getType(dim, tag) == "Plane":
-            continue
+    for dim, tag in curved:
         corners = points[_triangles(tag)]
         sides = corners[:, 1:] - corners[:, :1]
         area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum() / 2
