@@ -16,7 +16,7 @@ from pipeline.shapes.body import Layered
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.indenter import Indenter
-from pipeline.shapes.probes.sphere import Sphere
+from pipeline.solve.convergence import Convergence
 from pipeline.solve.estimate import is_fine, is_graded
 from pipeline.solve.history import History
 from pipeline.solve.response import Contact
@@ -50,15 +50,16 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     if solve.goal is not None and not solve.axisymmetric:
         # Refined meshes have larger elements away from the edge: F has more of the errors of other places.
         is_plain = case.is_plain and not is_refined(solve.meshed_case)
-        solution = solution.extrapolated(
-            case.mesh.degree,
-            case.element,
-            graded=is_graded_to_contact(case),
-            fine=is_plain and has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
-            elsewhere=not is_plain,
-            large=case.material.is_large,
-            ball=isinstance(case.probe, Sphere),
+        known = Convergence(
+            degree=case.mesh.degree,
+            element=case.element,
+            is_graded=is_graded_to_contact(case),
+            is_fine=is_plain and has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
+            has_others=not is_plain,
+            is_large=case.material.is_large,
+            is_ball=case.probe.hertz_radius is not None,
         )
+        solution = solution.extrapolated(known)
     # The solution is in the frame where the probe presses along -z; the record is in the body's coordinates.
     turn, force, bar = case.frame.turn, solution.reaction[2], solution.reaction_bars[2]
     return Record(

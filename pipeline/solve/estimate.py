@@ -16,6 +16,7 @@ energy: the error is a symmetric form within ± c'Bc for every movement c. By po
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.convergence import Convergence
 
 # Largest error that degree p + 1 leaves, in units of θ s: with quarter points, without, and for straight elements.
 _LEFT = {"displacement": 1.0, "mixed": 1.25}
@@ -120,60 +121,47 @@ def extrapolate(
     stiffness: FloatArray,
     decrements: FloatArray,
     bars: FloatArray,
-    degree: int,
-    element: str,
-    *,
-    plain: float = 0.0,
-    graded: bool = True,
-    fine: bool = False,
-    elsewhere: bool = False,
-    large: bool = False,
-    solved: bool = False,
+    known: Convergence,
     unseen: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the limit of the stiffness (n, n) in the sequence of degrees, and the bars on its entries.
 
     ``decrements`` is K_p - K_{p+1}, ``bars`` are those on K_p. All entries get the same relative correction. The bar is
-    wider where ``unseen`` (n), N of a mixed element in units of the diagonal stiffnesses, demands it. ``fine`` says
-    that elements are small at the edge of a disc, on a plain body, ``elsewhere`` that F has errors from other
-    places than the probe's edge, ``large`` that displacements are large, and ``solved`` that the decrements there are
-    not those of a linearisation.
+    wider where ``unseen`` (n), N of a mixed element in units of the diagonal stiffnesses, demands it.
     """
-    theta, is_one = _theta(degree), len(stiffness) == 1
-    centre, spread = _limits(degree, element, plain=plain, graded=graded, elsewhere=elsewhere, several=not is_one)
-    fine = fine and is_one and not large and not is_plain(plain) and (element, degree) in _LIMITS_FINE
-    if fine:
-        centre, spread = _LIMITS_FINE[element, degree]
-    if large and solved and degree > 1:
+    theta, is_one = _theta(known.degree), len(stiffness) == 1
+    is_fine = known.is_fine and is_one and not known.is_large and not is_plain(known.plain)
+    is_fine = is_fine and (known.element, known.degree) in _LIMITS_FINE
+    centre, spread = _LIMITS_FINE[known.element, known.degree] if is_fine else _limits(known, several=not is_one)
+    if known.is_large and known.is_solved and known.degree > 1:
         centre, spread = _LIMITS_SOLVED
-    elif large:
+    elif known.is_large:
         most = centre + spread
         least = min(_LEAST_LARGE, centre - spread)
         centre, spread = (most + least) / 2, (most - least) / 2
     relative = np.diag(bars) / np.abs(np.diag(stiffness))
     share = 1 / np.sqrt(1 + relative)
-    left = bars * np.outer(share, share) * spread * theta / (1 + _left(degree, element, plain) * theta)
-    if unseen is not None and not elsewhere and not is_plain(plain):
+    covered = 1 + _left(known.degree, known.element, known.plain) * theta
+    left = bars * np.outer(share, share) * spread * theta / covered
+    if unseen is not None and not known.has_others and not is_plain(known.plain):
         scale = np.abs(np.diag(stiffness))
-        seen = np.abs(np.diag(decrements)) / scale * (_APART_FINE if fine else 1.0)
-        least = _APART[degree] * theta * (unseen - seen) * scale
+        seen = np.abs(np.diag(decrements)) / scale * (_APART_FINE if is_fine else 1.0)
+        least = _APART[known.degree] * theta * (unseen - seen) * scale
         found = np.diag(left)
         wider = np.sqrt(np.maximum(1.0, np.divide(least, found, out=np.ones_like(found), where=found > 0)))
         left = left * np.outer(wider, wider)
     return stiffness - (1 + centre * theta) * decrements, left
 
 
-def _limits(
-    degree: int, element: str, *, plain: float, graded: bool, elsewhere: bool, several: bool
-) -> tuple[float, float]:
-    """Return centre and spread of the error that degree p + 1 leaves, in units of θ s."""
-    if is_plain(plain):
+def _limits(known: Convergence, *, several: bool) -> tuple[float, float]:
+    """Return centre and spread of the error that degree p + 1 leaves, in units of θ s, of one motion or ``several``."""
+    if is_plain(known.plain):
         return _LIMITS_PLAIN
-    if not graded:
+    if not known.is_graded:
         return _LIMITS_COARSE
-    if elsewhere:
-        return _LIMITS_ELSEWHERE[element]
-    return _LIMITS_SEVERAL if several and element == "mixed" else _LIMITS[element, degree]
+    if known.has_others:
+        return _LIMITS_ELSEWHERE[known.element]
+    return _LIMITS_SEVERAL if several and known.element == "mixed" else _LIMITS[known.element, known.degree]
 
 
 def release_bar(released: float, finer: float, degree: int, *, extrapolated: bool = False) -> float:
@@ -212,31 +200,18 @@ def found_again_bar(share: float, area_bar: float, at_edge: float = _FOUND_AT_ED
 
 
 def extrapolate_found(
-    stiffness: FloatArray,
-    decrements: FloatArray,
-    bars: FloatArray,
-    degree: int,
-    element: str,
-    *,
-    graded: bool = True,
-    elsewhere: bool = False,
-    ended: bool = False,
-    ball: bool = False,
-    friction: float = 0.0,
+    stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, known: Convergence
 ) -> tuple[FloatArray, FloatArray]:
     """Return the limit of F / d (1, 1) of unilateral contact, and its bar.
 
-    F is lowered by a share of its bar; where one degree more raises it, F and its bar stay. ``graded`` says that the
-    mesh is graded to the expected edge of contact, ``elsewhere`` that F has errors from other places, too, ``ended``
-    that the tool's own edge bounds the contact, ``ball`` that the tool is smooth wherever it touches. ``friction`` is
-    the part of the relative bar that the next degree does not reduce.
+    F is lowered by a share of its bar; where one degree more raises it, F and its bar stay.
     """
-    which = element, degree
-    centre, spread = _FOUND_BALL[which] if ball and which in _FOUND_BALL else _FOUND_LIMITS[which]
-    if not graded or ended:
-        centre, spread = _FOUND_ENDED if graded else _FOUND_COARSE[degree]
-    spread *= _FOUND_ELSEWHERE if elsewhere and graded else 1.0
-    left = friction * np.abs(stiffness)
+    which = known.element, known.degree
+    centre, spread = _FOUND_BALL[which] if known.is_ball and which in _FOUND_BALL else _FOUND_LIMITS[which]
+    if not known.is_graded or known.is_ended:
+        centre, spread = _FOUND_ENDED if known.is_graded else _FOUND_COARSE[known.degree]
+    spread *= _FOUND_ELSEWHERE if known.has_others and known.is_graded else 1.0
+    left = known.friction * np.abs(stiffness)
     own, falls = bars - left, decrements > 0
     return stiffness - np.where(falls, centre, 0.0) * own, np.where(falls, spread, 1.0) * own + left
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
+from pipeline.solve.convergence import Convergence
 from pipeline.solve.estimate import extrapolate
 from pipeline.solve.movement import Movement, Vector
 
@@ -162,13 +163,17 @@ class LoadResponse:
         cosines = [abs(np.dot(motion.direction, direction)) for motion in self.movement.motions]
         return next((number for number, cosine in enumerate(cosines) if abs(cosine - 1) < _SAME), None)
 
-    def extrapolated(self, degree: int, element: str, *, plain: float, graded: bool) -> "LoadResponse":
-        """Return the limit of the sequence of degrees; unchanged without bars."""
+    def extrapolated(self, known: Convergence) -> "LoadResponse":
+        """Return the limit of the sequence of degrees; unchanged without bars.
+
+        Loads act on the whole body: their effect has errors from everywhere.
+        """
         if self.decrements is None or self.bars is None:
             return self
-        form, bars = extrapolate(
-            self.form, self.decrements, self.bars, degree, element, plain=plain, graded=graded, elsewhere=True
+        everywhere = Convergence(
+            degree=known.degree, element=known.element, is_graded=known.is_graded, has_others=True, plain=known.plain
         )
+        form, bars = extrapolate(self.form, self.decrements, self.bars, everywhere)
         return replace(self, form=form, bars=bars)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.balance import TOLERANCE
+from pipeline.solve.convergence import Convergence
 from pipeline.solve.crack import Advance
 from pipeline.solve.estimate import extrapolate, extrapolate_found
 from pipeline.solve.history import Course, History
@@ -167,57 +168,25 @@ class Solution:
         motions = self.response.movement.motions
         return any(g < 0 for g, motion in zip(self.front.gains, motions, strict=False) if any(motion.opening))
 
-    def extrapolated(
-        self,
-        degree: int,
-        element: str,
-        *,
-        graded: bool = True,
-        fine: bool = False,
-        elsewhere: bool = False,
-        large: bool = False,
-        ball: bool = False,
-    ) -> "Solution":
-        """Return the limit of the sequence of degrees, on a mesh ``graded`` to the edge or not; unchanged without bars.
+    def extrapolated(self, known: Convergence) -> "Solution":
+        """Return the limit of the sequence of degrees; unchanged without bars.
 
-        ``fine`` says that elements are small at the edge of a disc, on a plain body, ``elsewhere`` that F has
-        errors from other places than the probe's edge, ``large`` that displacements are large, ``ball`` that a tool in
-        unilateral contact is smooth.
+        ``known`` is what the case says; the solution adds the rest.
         """
-        if self.decrements is None or self.bars is None or (large and self.contact is not None):
+        if self.decrements is None or self.bars is None or (known.is_large and self.contact is not None):
             return self  # found contact at large displacements has no known limit: F and its bar stay
+        known = replace(known, plain=self.plain, is_solved=self.is_solved)
         if self.contact is not None:
-            stiffness, bars = extrapolate_found(
-                self.stiffness,
-                self.decrements,
-                self.bars,
-                degree,
-                element,
-                graded=graded,
-                elsewhere=elsewhere,
-                ended=self.contact.is_ended,
-                ball=ball,
-                friction=self.contact.friction_bar,
-            )
+            known = replace(known, is_ended=self.contact.is_ended, friction=self.contact.friction_bar)
+            stiffness, bars = extrapolate_found(self.stiffness, self.decrements, self.bars, known)
             return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
-        stiffness, bars = extrapolate(
-            self.stiffness,
-            self.decrements,
-            self.bars,
-            degree,
-            element,
-            plain=self.plain,
-            graded=graded,
-            fine=fine,
-            elsewhere=elsewhere,
-            large=large,
-            solved=self.is_solved,
-            unseen=self.unseen,
+        stiffness, bars = extrapolate(self.stiffness, self.decrements, self.bars, known, self.unseen)
+        best = replace(
+            self,
+            response=replace(self.response, stiffness=stiffness),
+            bars=bars,
+            load_response=self.load_response and self.load_response.extrapolated(known),
         )
-        best = replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
-        if self.load_response is not None:
-            loaded = self.load_response.extrapolated(degree, element, plain=self.plain, graded=graded)
-            best = replace(best, load_response=loaded)
         return replace(
             best,
             front=self.front and self.front.extrapolated(best.energy_bar),

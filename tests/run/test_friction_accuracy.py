@@ -1,11 +1,14 @@
 """Accuracy with friction: F is within its bar of the meridian's frictionless force times the closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
+from pipeline.solve.convergence import Convergence
 from pipeline.solve.estimate import extrapolate_found
 from pipeline.study.read import parse
 from pipeline.verify import known
@@ -40,6 +43,7 @@ def test_a_ball_to_which_tissue_sticks_is_within_the_accuracy(law):
 def test_friction_is_no_part_of_what_finer_elements_would_remove():
     """Extrapolation narrows the part of the bar for the mesh, and leaves the part for friction."""
     stiffness, decrements, bars = (np.array([[value]]) for value in (2.0, 0.02, 0.06))
-    _, smooth = extrapolate_found(stiffness, decrements, bars, 2, "displacement")
-    _, both = extrapolate_found(stiffness, decrements, bars + 0.02, 2, "displacement", friction=0.01)
+    ball = Convergence(degree=2, element="displacement")
+    _, smooth = extrapolate_found(stiffness, decrements, bars, ball)
+    _, both = extrapolate_found(stiffness, decrements, bars + 0.02, replace(ball, friction=0.01))
     assert both == pytest.approx(smooth + 0.02)

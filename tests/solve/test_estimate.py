@@ -8,6 +8,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.meshing import mesh_case
 from pipeline.solve.cell_values import plain_share
+from pipeline.solve.convergence import Convergence
 from pipeline.solve.estimate import error_bar, extrapolate, is_graded
 from pipeline.study.read import parse
 from tests.cases import BLADE, solve, study
@@ -94,7 +95,7 @@ def extrapolated(s, bar, element="displacement", **options):
     """Return the limit of the sequence of degrees for degree 2 and F = 1, and its relative bar."""
     unseen = np.array([options.pop("unseen")]) if "unseen" in options else None
     one = (np.full((1, 1), value) for value in (1.0, s, bar))
-    stiffness, left = extrapolate(*one, 2, element, unseen=unseen, **options)
+    stiffness, left = extrapolate(*one, Convergence(degree=2, element=element, **options), unseen)
     return stiffness.item(), (left / stiffness).item()
 
 
@@ -105,7 +106,7 @@ def test_extrapolation_from_a_graded_mesh(element, centre, spread):
     factor, left = extrapolated(s, error_bar(s, 2, element), element)
     assert factor == pytest.approx(1 - s * (1 + centre * theta))
     assert left == pytest.approx(spread * theta * s / factor)
-    assert extrapolated(s, error_bar(s, 2, element), element, graded=False)[1] > 2 * left
+    assert extrapolated(s, error_bar(s, 2, element), element, is_graded=False)[1] > 2 * left
     assert extrapolated(s, error_bar(s, 2, element, plain=0.5), element, plain=0.5)[1] > 2 * left
 
 
@@ -115,12 +116,15 @@ def test_the_limit_is_known_better_on_small_elements(element):
     s = 0.01
     bar = error_bar(s, 2, element)
     factor, left = extrapolated(s, bar, element)
-    near, narrow = extrapolated(s, bar, element, fine=True)
+    near, narrow = extrapolated(s, bar, element, is_fine=True)
     assert narrow < 0.85 * left
     assert factor * (1 - left) < near * (1 - narrow) < near * (1 + narrow) < factor * (1 + left)
-    assert extrapolated(s, bar, element, fine=True, large=True) == extrapolated(s, bar, element, large=True)
+    assert extrapolated(s, bar, element, is_fine=True, is_large=True) == extrapolated(s, bar, element, is_large=True)
     stiffness, decrements, bars = (value * np.eye(2) for value in (1.0, s, bar))
-    several = (extrapolate(stiffness, decrements, bars, 2, element, fine=fine) for fine in (True, False))
+    several = (
+        extrapolate(stiffness, decrements, bars, Convergence(degree=2, element=element, is_fine=fine))
+        for fine in (True, False)
+    )
     assert all(np.array_equal(*pair) for pair in zip(*several, strict=True))
 
 

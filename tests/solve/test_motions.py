@@ -12,6 +12,7 @@ from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.solve.balance import Sums
 from pipeline.solve.conditions import Conditions
+from pipeline.solve.convergence import Convergence
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
@@ -92,7 +93,9 @@ def on_half_space(poisson):
     material = MaterialLaw.of_moduli(2 * (1 + poisson), poisson)
     with spaces, QuasiStaticProblem(spaces, 2, Conditions()) as problem:
         movement = Movement.all((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))
-        solution = problem.solve(material, movement, estimate=True).extrapolated(2, "displacement")
+        solution = problem.solve(material, movement, estimate=True).extrapolated(
+            Convergence(degree=2, element="displacement")
+        )
     unit = 1e-3 * np.outer([1, 1, 1, 1e-3, 1e-3, 1e-3], [1, 1, 1, 1e-3, 1e-3, 1e-3])
     return solution.stiffness / unit, solution.bars / unit
 
@@ -128,7 +131,9 @@ def test_slide_and_tilt_of_a_bonded_disc():
     spaces = Spaces(make_mesh(mirrors=(), **changes))
     with spaces, QuasiStaticProblem(spaces, 2, Conditions(), "mixed") as problem:
         movement = Movement.all((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))
-        solution = problem.solve(MaterialLaw.of_moduli(3.0, 0.5), movement, estimate=True).extrapolated(2, "mixed")
+        solution = problem.solve(MaterialLaw.of_moduli(3.0, 0.5), movement, estimate=True).extrapolated(
+            Convergence(degree=2, element="mixed")
+        )
     unit = 1e-3 * np.outer([1, 1, 1, 1e-3, 1e-3, 1e-3], [1, 1, 1, 1e-3, 1e-3, 1e-3])
     stiffness, bars = solution.stiffness / unit, solution.bars / unit
     assert stiffness[3, 3] == pytest.approx(16 / 3, abs=bars[3, 3] + 1e-4)
@@ -144,7 +149,7 @@ def test_bars_of_movements_hold_those_of_finer_meshes(kind, poisson):
     coarse, fine = (make_mesh(mirrors=(), mesh={"rim": rim}, **OFF) for rim in ("1.5 mm", "0.5 mm"))
     rough = run(kind, all_six(), poisson, mesh=coarse, estimate=True)
     with Spaces(fine) as spaces, QuasiStaticProblem(spaces, 3, Conditions(), kind) as problem:
-        exact = problem.solve(law(poisson), all_six(), estimate=True).extrapolated(3, kind)
+        exact = problem.solve(law(poisson), all_six(), estimate=True).extrapolated(Convergence(degree=3, element=kind))
     assert np.all(np.abs(rough.stiffness - exact.stiffness) <= rough.bars + exact.bars)
     gaps, bars = np.subtract(rough.reaction, exact.reaction), np.add(rough.reaction_bars, exact.reaction_bars)
     assert np.all(np.abs(gaps) <= bars)

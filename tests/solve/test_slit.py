@@ -10,6 +10,7 @@ from pipeline import compat
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import conditions_of, movement_of
 from pipeline.solve.cell_values import clear_cells
+from pipeline.solve.convergence import Convergence
 from pipeline.solve.crack import Release, moved_on
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
@@ -155,7 +156,7 @@ def test_flanks_that_slide():
     assert -float(amounts @ here.tip.finer @ amounts) == pytest.approx(slope, rel=0.03)
     assert here.reaction[2] == pytest.approx(slope, rel=here.tip.bar)
     assert 0.02 < here.tip.bar < 0.1
-    best = here.extrapolated(2, "displacement", elsewhere=True)
+    best = here.extrapolated(Convergence(degree=2, element="displacement", has_others=True))
     assert best.reaction[2] == pytest.approx(slope, rel=0.03)
     assert here.balance < 1e-6
 
@@ -193,9 +194,9 @@ def test_mixed_elements():
 def test_bar_of_release():
     """The bars cover the truth, from elements of degree 3 on a finer mesh, and are of the same order."""
     fine = run(case_of({"rim": "0.2 mm", "growth": 0.6, "fine": "3 mm", "degree": 3}), estimate=True)
-    truth = fine.extrapolated(3, "displacement")
+    truth = fine.extrapolated(Convergence(degree=3, element="displacement"))
     found = quarter()
-    best = found.extrapolated(2, "displacement", elsewhere=True)
+    best = found.extrapolated(Convergence(degree=2, element="displacement", has_others=True))
     for solution in (found, best):
         error = abs(solution.release / truth.release - 1)
         assert error < solution.release_bar < 0.15

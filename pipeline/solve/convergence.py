@@ -1,0 +1,30 @@
+"""What is known of how F converges with the degree of elements: of the mesh, the tool and the solve."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Convergence:
+    """What the limit of F in the sequence of degrees, and its bar, depend on besides the change in one degree more.
+
+    ``degree`` and ``element``, "displacement" or "mixed", are those of F. Of the mesh, ``is_graded`` says that it is
+    graded to the expected edge of contact, and ``is_fine`` that elements are small at the edge of a disc on a plain
+    body. ``has_others`` says that F has errors from other places than the probe's edge, ``is_large`` that displacements
+    are large, and ``is_ball`` that the tool is a ball in unilateral contact.
+
+    The solve adds the share ``plain`` of edges at the rim without quarter points. ``is_solved`` says
+    that decrements at large displacements are not those of a linearisation, and ``is_ended`` that the tool's own edge
+    bounds the contact. ``friction`` is the part of the relative bar that the next degree does not reduce.
+    """
+
+    degree: int
+    element: str
+    is_graded: bool = True
+    is_fine: bool = False
+    has_others: bool = False
+    is_large: bool = False
+    is_ball: bool = False
+    plain: float = 0.0
+    is_solved: bool = False
+    is_ended: bool = False
+    friction: float = 0.0
