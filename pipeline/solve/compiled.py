@@ -27,6 +27,8 @@ from pipeline.files import cache_folder
 # Integrands of large displacements are no polynomials: quadrature degrees added to those of linear elasticity.
 MORE = 2
 _known: dict[tuple[str, str], compat.Code] = {}
+# The cache folders whose lock this process has.
+_locked: set[Path] = set()
 
 
 def form(expression: Any, kernels: dict[int, int] | None = None) -> Any:
@@ -172,7 +174,7 @@ def _code(comm: MPI.Comm, expression: Any, signature: str) -> compat.Code:
     options = {"cache_dir": folder, "cffi_extra_compile_args": ["-O2", "-march=native"], "timeout": 120}
     key = folder, signature
     if comm.size > 1 or key not in _known:
-        with quiet_compiler():
+        with quiet_compiler(), _sources_stay(comm):
             found = compat.compile_code(comm, expression, options)
         if comm.size > 1:
             return found
@@ -213,4 +215,21 @@ def compiling() -> Iterator[None]:
         for mark in folder.glob("*.c.cached"):
             if not mark.with_suffix("").exists():
                 mark.unlink()
+        _locked.add(folder)
+        try:
+            yield
+        finally:
+            _locked.remove(folder)
+
+
+@contextmanager
+def _sources_stay(comm: MPI.Comm) -> Iterator[None]:
+    """Share the lock of the cache on the rank that compiles: nobody then removes the source file that it works on."""
+    folder = form_cache()
+    if comm.rank or folder in _locked:
+        yield
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_SH)
         yield

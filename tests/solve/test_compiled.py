@@ -3,6 +3,7 @@
 import inspect
 import subprocess
 import sys
+from threading import Thread
 
 import cffi
 import pytest
@@ -10,6 +11,7 @@ import ufl
 from dolfinx import fem
 
 from pipeline import compat
+from pipeline.solve import compiled
 from pipeline.solve.compiled import compiling, form, form_cache, scalar_space, vector_space
 from pipeline.solve.kernels.assembly import cell_kernel
 from tests.solve.test_mixed import make_mesh
@@ -109,3 +111,27 @@ def test_code_is_looked_up_once(monkeypatch):
     made.append(form(u * v * ufl.dx))
     norms = [compat.assemble_matrix(f, [], 1.0).norm() for f in made]
     assert norms[0] == norms[1]
+
+
+def test_the_source_of_a_form_being_compiled_stays(tmp_path, monkeypatch):
+    """Whoever has the lock removes what killed processes left, not what another one is compiling."""
+    space = scalar_space(make_mesh(mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh, 1)
+    source, compile_code, threads = tmp_path / "form.c", compat.compile_code, []
+
+    def other():
+        with compiling():
+            pass
+
+    def slowly(*given):
+        source.touch()
+        threads.append(Thread(target=other))
+        threads[0].start()
+        threads[0].join(0.2)
+        assert source.exists()
+        return compile_code(*given)
+
+    monkeypatch.setattr(compiled, "form_cache", lambda: tmp_path)
+    monkeypatch.setattr(compat, "compile_code", slowly)
+    form(ufl.TestFunction(space) * ufl.dx)
+    threads[0].join()
+    assert not source.exists()
