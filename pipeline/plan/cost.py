@@ -9,6 +9,7 @@ ridge regression about the prior fits stored cases, so that few of them change i
 
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import exp, log
 from statistics import median
 
@@ -221,6 +222,7 @@ def _poisson(case: Case) -> float:
     return 0.3 if case.element == "mixed" else case.poisson
 
 
+@lru_cache
 def _prior(stage: str, kind: str) -> _Numbers:
     if kind.startswith("meridian"):
         return log(_MERIDIAN * {_FOUND: _TRIALS, _STEPS: _ITERATIONS}.get(kind, 1.0)), 0.0, 0.0

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Hashable
 from dataclasses import replace
 from math import isnan
+from operator import is_
 
 from pipeline.plan.key import case_key, normalised, reference_key
 from pipeline.plan.recipe import rungs_for
@@ -90,7 +91,8 @@ def leave_out_stored(plan: Plan, stored: Collection[str], without: Collection[st
 
 def first_attempts(plan: Plan) -> Plan:
     """Return the plan in which every solve with an accuracy has its first mesh, and further ones to try later."""
-    return replace(plan, solves=tuple(map(_first_attempt, plan.solves)))
+    solves = tuple(map(_first_attempt, plan.solves))
+    return plan if all(map(is_, solves, plan.solves)) else replace(plan, solves=solves)
 
 
 def _first_attempt(solve: Solve) -> Solve:

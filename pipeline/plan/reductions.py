@@ -9,7 +9,7 @@ from pipeline.plan.far_fields import far_regions
 from pipeline.plan.interpolation import interpolate_path
 from pipeline.plan.key import case_key, digest
 from pipeline.plan.proportional_depths import ProportionalDepth, depth_key, proportional_to_depth
-from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_steps
+from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import Plan, Struck, reason_of
 from pipeline.shapes.body import Body
@@ -128,7 +128,7 @@ def share_meshes(plan: Plan) -> Plan:
     """
     regions = far_regions([solve.case for solve in plan.solves])
     plan = replace(plan.with_solves([_with_far_region(solve, regions) for solve in plan.solves]), shared=True)
-    return plan.struck_by("sharing", len(plan.solves) - len(mesh_steps(plan.solves)), reason_of(share_meshes))
+    return plan.struck_by("sharing", len(plan.solves) - len(plan.meshes), reason_of(share_meshes))
 
 
 def _with_far_region(solve: Solve, regions: Mapping[Body, FarRegion]) -> Solve:
@@ -211,8 +211,8 @@ def strike_stored(plan: Plan, stored: frozenset[str]) -> Plan:
     """Stored cases are read, not computed again."""
     if plan.study.solve.timing:
         stored &= plan.all_keys - frozenset(plan.keys)
-    kept = tuple(solve for solve in plan.solves if solve.key not in stored)
     found = frozenset(solve.key for solve in plan.solves) & stored
+    kept = tuple(solve for solve in plan.solves if solve.key not in found) if found else plan.solves
     plan = replace(plan, solves=kept, stored=found)
     return plan.struck_by("stored", len(found), reason_of(strike_stored))
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Hashable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import nan
 
 from pipeline.plan.key import mesh_key, operator_key
@@ -129,6 +130,19 @@ class MeshStep:
     def solves(self) -> tuple[Solve, ...]:
         """All solves on this mesh."""
         return tuple(solve for operator in self.operators for solve in operator.solves)
+
+
+class Solves(tuple[Solve, ...]):
+    """The solves of a plan. Plans that share them, because they differ in other things, group them once."""
+
+    @cached_property
+    def steps(self) -> tuple[MeshStep, ...]:
+        """These solves, grouped by mesh and operator."""
+        return mesh_steps(self)
+
+    def __reduce__(self) -> tuple[type["Solves"], tuple[tuple[Solve, ...]]]:
+        """Leave out the groups where a plan is sent to other ranks."""
+        return Solves, (tuple(self),)
 
 
 def mesh_steps(solves: Collection[Solve], *, shared: bool = True) -> tuple[MeshStep, ...]:

@@ -4,13 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from inspect import cleandoc
-from typing import Any
+from typing import Any, cast
 
 from pipeline.plan.cost import CostModel
 from pipeline.plan.equivalent_places import EquivalentPlace
 from pipeline.plan.place_path import PlacePath
 from pipeline.plan.proportional_depths import ProportionalDepth
-from pipeline.plan.steps import MeshStep, Solve, mesh_steps
+from pipeline.plan.steps import MeshStep, Solve, Solves, mesh_steps
 from pipeline.study.case import Case, Scale
 from pipeline.study.sweep import Study
 
@@ -69,6 +69,11 @@ class Plan:
     place_paths: tuple[PlacePath, ...] = ()
     ends: tuple["EndPlans", ...] = ()
 
+    def __post_init__(self) -> None:
+        """Let plans with the same solves share their groups."""
+        if not isinstance(self.solves, Solves):
+            object.__setattr__(self, "solves", Solves(self.solves))
+
     def scale_of(self, case: Case) -> Scale:
         """Return the scale of a case, by which its record is multiplied."""
         depth = self.proportional.get(case.index)
@@ -88,7 +93,8 @@ class Plan:
     @property
     def meshes(self) -> tuple[MeshStep, ...]:
         """The solves grouped by mesh and operator, in the study's order; if not shared, each is a group."""
-        return mesh_steps(self.solves, shared=self.shared)
+        solves = cast("Solves", self.solves)
+        return solves.steps if self.shared else mesh_steps(solves, shared=False)
 
     def with_solves(self, solves: Sequence[Solve]) -> "Plan":
         """Return the plan with each solve replaced by one of ``solves``; keys of cases follow."""
