@@ -1,5 +1,6 @@
 """Finite elements, and the dofs of the spaces of functions of them."""
 
+from functools import cache
 from typing import Any
 
 import basix
@@ -24,6 +25,7 @@ def mixed_element(parts: list[Any]) -> Any:
     return ufl.MixedElement(parts) if hasattr(ufl, "MixedElement") else basix.ufl.mixed_element(parts)
 
 
+@cache
 def reference_element(degree: int) -> Any:
     """Return the element of a scalar Lagrange space on the reference tetrahedron, as dolfinx makes it."""
     return basix.create_element(

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from mpi4py import MPI
-from threadpoolctl import threadpool_limits
 
 from pipeline.plan.plan import Plan
 from pipeline.plan.schedule import schedule
@@ -19,6 +18,7 @@ from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
 from pipeline.run.runner import StepRunner
 from pipeline.run.stop import reason_to_skip, waves
+from pipeline.run.threads import one_thread
 from pipeline.states import SKIPPED
 
 Keep = Callable[[Record], None]
@@ -50,8 +50,7 @@ def execute(
         notes = begun or Begun()
         return StepRunner(plan, group, keep=post, progress=progress, begun=notes, cache=cache, ranks=comm.size)
 
-    # One BLAS thread per rank: idle threads of OpenBLAS spin, and would take the other ranks' cores.
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_thread():
         for wave in waves(plan, plan.solves):
             todo = tuple(solve for solve in wave if not desk.skips(solve))
             prepare(comm, todo)

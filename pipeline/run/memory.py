@@ -14,9 +14,10 @@ from pipeline.stages import stage
 
 _C = ctypes.CDLL(None)
 _kept: list[bool] = []
-# M_MMAP_MAX and M_MMAP_THRESHOLD of glibc, and their values: the number of large arrays, and their least bytes.
-# Small arrays stay with the process, which is faster.
-_MOST_MAPPED, _MAPPED_FROM = -4, -3
+# M_MMAP_MAX, M_MMAP_THRESHOLD and M_TRIM_THRESHOLD of glibc, and their values: the number of large arrays, their least
+# bytes, and the free bytes that stay with the process. gmsh fills an array of 23 MB for each mesh, however small: a
+# tenth of the time of a small case, if the system gives its pages each time.
+_MOST_MAPPED, _MAPPED_FROM, _TRIMMED_FROM = -4, -3, -1
 _MAPPED_ARRAYS, _LARGE = 65_536, 2**25
 # Garbage collections take at most one part in so many of the time, if waiting does no harm.
 _RARELY = 50
@@ -39,11 +40,12 @@ def return_large_arrays() -> None:
     with suppress(AttributeError):  # other C libraries than glibc
         _C.mallopt(_MOST_MAPPED, _MAPPED_ARRAYS)
         _C.mallopt(_MAPPED_FROM, _LARGE)
+        _C.mallopt(_TRIMMED_FROM, _LARGE)
 
 
 @stage("garbage")
 def give_back(comm: MPI.Comm) -> None:
-    """Collect garbage and return its memory to the system, if the C library can; collective.
+    """Collect garbage and return its memory to the system but for some MB, if the C library can; collective.
 
     A collection visits all Python objects, also the records of a long run. On one rank it is therefore rare, and frees
     several small meshes at once. On several ranks it is done each time, so that all free their communicators together.
@@ -53,7 +55,7 @@ def give_back(comm: MPI.Comm) -> None:
         return
     gc.collect()  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
     with suppress(AttributeError):
-        _C.malloc_trim(0)
+        _C.malloc_trim(_LARGE)
     end = time.perf_counter()
     _next[0] = end + _RARELY * (end - start)
 

@@ -153,7 +153,7 @@ def _solved_again(solve: Solve, spaces: Spaces) -> tuple[State | None, str]:
     try:
         with problem_of(spaces, meshed) as problem:
             needed, _ = memory_of(case, problem.dofs)
-            if missing := lacks_memory(FreeMemory(comm), needed, f"degree {degree + 1}"):
+            if missing := lacks_memory(FreeMemory(comm).available(), needed, f"degree {degree + 1}"):
                 return None, missing
             solve_problem(case, problem, estimate=False, meshed=meshed)
             return problem.state(), ""

@@ -11,7 +11,6 @@ from pipeline.plan import estimate
 from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.run.far_field import far_field_of, far_field_seconds
 from pipeline.run.loads import loads_of
-from pipeline.run.memory import FreeMemory
 from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.distance import Distance
@@ -254,19 +253,18 @@ def solve_problem(
     return solution
 
 
-def check_memory(free: FreeMemory, needed: float, what: str) -> None:
-    """Fail the case if it needs more memory (bytes) than there is; collective.
+def check_memory(available: float, needed: float, what: str) -> None:
+    """Fail the case if it needs more memory than what is ``available`` (bytes).
 
     Raises:
-        CaseFailure: on every rank.
+        CaseFailure: if so.
     """
-    if message := lacks_memory(free, needed, what):
+    if message := lacks_memory(available, needed, what):
         raise CaseFailure(f"{message}: use larger elements, or a smaller epsilon")
 
 
-def lacks_memory(free: FreeMemory, needed: float, what: str) -> str:
-    """Return a message if ``needed`` bytes are too much, else ""; the same on every rank; collective."""
-    available = free.available()
+def lacks_memory(available: float, needed: float, what: str) -> str:
+    """Return a message if ``needed`` bytes are too much of those ``available``, else ""."""
     if needed <= MEMORY_SHARE * available:
         return ""
     there = f"{_gigabytes(available)} GB are available, and a case may use {100 * MEMORY_SHARE:.0f} % of them"

@@ -161,7 +161,7 @@ class StepRunner:
             return record if record.is_ok else None
 
         tolerance = self._plan.study.planning.reduced_basis_error
-        if missing := lacks_memory(self._free, memory_of_basis(step.case, problem.dofs), "it"):
+        if missing := lacks_memory(self._free.available(), memory_of_basis(step.case, problem.dofs), "it"):
             found: Failure | None = Failure(missing)
         else:
             found = self._caught(lambda: reduced_records(step.solves, problem, tolerance, compute, self._finish))
@@ -210,10 +210,11 @@ class StepRunner:
             CaseFailure: if there is too little memory for the solve, or for the error bar that an accuracy needs.
         """
         needed, with_bar = memory_of(solve.case, problem.dofs)
-        check_memory(self._free, needed, "solving")
+        available = self._free.available()
+        check_memory(available, needed, "solving")
         if has_bar and solve.goal is not None:
-            check_memory(self._free, with_bar, "the error bar that proves the accuracy")
-        missing = lacks_memory(self._free, with_bar, "the error bar") if has_bar else ""
+            check_memory(available, with_bar, "the error bar that proves the accuracy")
+        missing = lacks_memory(available, with_bar, "the error bar") if has_bar else ""
         has_bar = has_bar and not missing
         solution = solve_problem(solve.case, problem, estimate=has_bar, meshed=solve.meshed_case)
         record = record_of(solve, solution, meshed.times.mesh)
@@ -242,7 +243,7 @@ class StepRunner:
         """Return the distributed mesh of a solve; collective. Timing studies do not use the cache."""
         case = solve.meshed_case
         self._progress.note(f"{MESHING}{solve.label}")
-        check_memory(self._free, estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
+        check_memory(self._free.available(), estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
         return mesh_case(case, solve.mirrors, self._comm, None if case.solve.timing else self._cache)
 
     def _condenses(self, step: OperatorStep, mesh: BodyMesh) -> bool:
@@ -250,7 +251,12 @@ class StepRunner:
         size = estimate.dofs(mesh.cells, step.case.mesh.degree)
         needed = estimate.solving_memory(size, step.case.mesh.degree, direct=True)
         is_small = self._comm.size == 1 and size <= MOST_DOFS
-        return self._plan.condensed and step.is_condensed and is_small and not lacks_memory(self._free, needed, "")
+        return (
+            self._plan.condensed
+            and step.is_condensed
+            and is_small
+            and not lacks_memory(self._free.available(), needed, "")
+        )
 
     def _stamp(self, record: Record, memory: PeakMemory) -> Record:
         date = datetime.now(UTC).isoformat(timespec="seconds")

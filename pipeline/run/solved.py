@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from threadpoolctl import threadpool_limits
 
 from pipeline.arrays import BoolArray
 from pipeline.mesh.distribute import BodyMesh, distribute
@@ -34,6 +33,7 @@ from pipeline.run.problem import (
     solve_problem,
 )
 from pipeline.run.record import Record
+from pipeline.run.threads import one_thread
 from pipeline.solve import SolveError
 from pipeline.solve.cell_values import clear_cells
 from pipeline.solve.compiled import compiling
@@ -99,7 +99,7 @@ def solve_fields(
     """
     return_large_arrays()
     run, solve = solve, replace(solve, axisymmetric=False)
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_thread():
         attempts = Attempts()
         best = latest = _attempt(solve, comm, bar, cache, note)
         while (judged := attempts.judge(solve, latest.record)) is None:
@@ -131,8 +131,9 @@ def _attempt(solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, n
     mesh = distribute(comm, arrays and upright(meshed, arrays))
     with Spaces(mesh) as spaces, problem_of(spaces, meshed) as problem:
         needed, with_bar = memory_of(case, problem.dofs)
-        check_memory(FreeMemory(comm), needed, "solving")
-        room = bar and not lacks_memory(FreeMemory(comm), with_bar, "")
+        available = FreeMemory(comm).available()
+        check_memory(available, needed, "solving")
+        room = bar and not lacks_memory(available, with_bar, "")
         note(f"solving for {problem.dofs} unknowns")
         # Of a history, fields are those of the elastic body.
         still = replace(case, probe=case.probe.model_copy(update={"history": None}), outputs=())
@@ -150,7 +151,7 @@ def _attempt(solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, n
 def modelled_arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -> MeshArrays | None:
     """Return, on rank 0, the mesh of the part of the body that is modelled; of a half ball, where a run makes it."""
     case = solve.meshed_case
-    check_memory(FreeMemory(comm), estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
+    check_memory(FreeMemory(comm).available(), estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
     note("meshing")
     return on_first_rank(comm, lambda: cached_arrays(case, solve.mirrors, cache))
 
