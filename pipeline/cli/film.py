@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, cast
 from pipeline.cli.console import say
 from pipeline.cli.faults import fail, of_file
 from pipeline.cli.words import check_machine, check_output, read_dataset
-from pipeline.shapes.probes._round import RoundIndenter
-from pipeline.shapes.probes.blade import Blade
+from pipeline.shapes.insertion import Needle
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -15,6 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from mpi4py import MPI
 
+    from pipeline.shapes.probes.blade import Blade
     from pipeline.study.case import Case
     from pipeline.study.sweep import Study
     from pipeline.view.fields import Fields
@@ -30,9 +30,9 @@ def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, 
     """
     stages, position = _stages(study, chosen)
     tool = study.tool(chosen)
-    if not isinstance(tool, Blade | RoundIndenter):
+    if tool.CUTS == "crack" and tool.is_flat:
         fail(of_file(study.file, f"there is no film of a {tool.shape} that is inserted", _HOWTO))
-    if isinstance(tool, RoundIndenter) and chosen.body.interfaces:
+    if tool.CUTS == "crack" and chosen.body.interfaces:
         fail(of_file(study.file, "films of needles are those in one material: each layer has its own crack", _HOWTO))
     file = output / f"{study.name}_{position}_path.gif"
     check_output(file)
@@ -45,10 +45,10 @@ def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, 
     from pipeline.view.film import write_film
 
     with abort_on_exception(comm), ended_soon():
-        if isinstance(tool, RoundIndenter):
+        if isinstance(tool, Needle):
             pictures = _of_needle(study, chosen, tool, path, comm)
         else:
-            pictures = _of_blade(tool, study, stages, path, lambda case: solved(case, comm))
+            pictures = _of_blade(cast("Blade", tool), study, stages, path, lambda case: solved(case, comm))
         if comm.rank == 0:
             write_film(path, pictures, file, study.title)
             size = f"{file.stat().st_size / 1e6:.1f} MB"
@@ -56,7 +56,7 @@ def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, 
 
 
 def _of_blade(
-    blade: Blade, study: "Study", stages: "list[Case]", path: "xr.Dataset", solved: "Callable[[Case], Fields | None]"
+    blade: "Blade", study: "Study", stages: "list[Case]", path: "xr.Dataset", solved: "Callable[[Case], Fields | None]"
 ) -> "Pictures":
     """Return the pictures of a blade, on the first rank those of the fields that are ``solved``; collective."""
     from pipeline.view.blade_pictures import BladePictures
@@ -75,7 +75,7 @@ def _of_blade(
     return BladePictures(path, blade, sections)
 
 
-def _of_needle(study: "Study", case: "Case", needle: RoundIndenter, path: "xr.Dataset", comm: "MPI.Comm") -> "Pictures":
+def _of_needle(study: "Study", case: "Case", needle: Needle, path: "xr.Dataset", comm: "MPI.Comm") -> "Pictures":
     """Return the pictures of a needle, solved on the first rank; exit if they cannot be; collective."""
     from pipeline.mesh.generate import MeshError
     from pipeline.run.meshing import on_first_rank

@@ -90,7 +90,6 @@ def view(
     """
     export = export or ("vtu" if vtk else "sofa" if sofa else None)
     from pipeline.shapes.files.labels import is_image
-    from pipeline.shapes.insertion import Needle
 
     if is_image(file):
         if mesh_only or export not in (None, "html"):
@@ -103,7 +102,7 @@ def view(
     (study,) = read_all([file])
     chosen = find_case(study, case or "0")
     is_state = mesh_only or bool(export) or "stage" in case
-    if is_state and study.is_insertion and isinstance(study.tool(chosen), Needle):
+    if is_state and study.is_insertion and study.tool(chosen).CUTS == "crack":
         why = "states of a needle that is inserted are found on the way: only the film of its path is drawn"
         fail(of_file(study.file, why, "docs/howto/needle.md"))
     if study.is_insertion and not is_state:

@@ -9,7 +9,6 @@ import xarray as xr
 from pipeline.experiment.curve import Curve
 from pipeline.identify.parts import CurveFit, Measured, Unknown
 from pipeline.report.identified import engineering
-from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.study.case import Case
 from pipeline.study.check import warn_of_depth
@@ -44,7 +43,7 @@ def _size(probe: Probe) -> float:
     """Return half the width or length (m) of a tool, whatever its depth."""
     if probe.revolved:
         return probe.revolved.limit
-    return (probe.half_length if isinstance(probe, Indenter) else 0.0) or probe.half_width
+    return probe.half_length or probe.half_width
 
 
 def doubts_of_depth(cases: Sequence[Case], found: Sequence[CurveFit]) -> Iterator[str]:

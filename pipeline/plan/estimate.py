@@ -2,7 +2,6 @@
 
 from math import inf, log, pi
 
-from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.scanned import FINE, Scanned
 from pipeline.study.case import Case
 
@@ -51,7 +50,7 @@ def cells(case: Case) -> float:
     total = length * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
     # Below the area where contact may end: ∫ 1 / (rim + growth s)³ ds.
     total += area / (2 * growth * rim**2)
-    if isinstance(probe, Indenter):  # small elements down to the depth of the tool, and beside it
+    if not probe.is_flat:  # small elements down to the depth of the tool, and beside it
         _, depth = probe.depths
         total += area * depth / rim**3 + length * depth / (growth * rim**2)
     total += _of_bend(case) + _of_regions(case)

@@ -13,7 +13,6 @@ from typing import Any
 from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.shapes.body import Layered
 from pipeline.shapes.contact import is_level
-from pipeline.shapes.indenter import Indenter
 from pipeline.study.case import Case
 from pipeline.study.check_mesh import held_gaps
 from pipeline.study.schema import Mesh
@@ -181,7 +180,7 @@ def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
 
 def _ladder(case: Case) -> tuple[Recipe, ...]:
     """Return the recipes for a probe, cheapest first."""
-    if isinstance(case.probe, Indenter):
+    if not case.probe.is_flat:
         return _FOUND_LARGE if case.material.is_large else _FOUND[case.element]
     if not case.has_quarter_points:
         return _DEEP
@@ -196,12 +195,12 @@ def _ladder(case: Case) -> tuple[Recipe, ...]:
 
 def half_width_of(case: Case) -> float:
     """Return the half width (m) of contact, estimated if contact is found."""
-    return case.expected.contact_width if isinstance(case.expected, Indenter) else case.probe.half_width
+    return case.expected.contact_width
 
 
 def edge_width_of(case: Case) -> float:
     """Return the length (m) that elements at the edge of contact resolve, to which ``rim`` of a recipe is relative."""
-    return case.expected.edge_width if isinstance(case.expected, Indenter) else case.probe.half_width
+    return case.expected.edge_width
 
 
 def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
@@ -216,7 +215,7 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
     if case.material.is_large and case.has_quarter_points and not case.probe.is_unilateral:
         shape *= _OF_LARGE * (1 + _BY_DEPTH * case.probe.depth / half_width_of(case))
     locking = 1.0 if case.element == "mixed" else ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
-    if isinstance(case.probe, Indenter) and not case.material.is_large:  # elements in a thin body are small anyway
+    if not (case.probe.is_flat or case.material.is_large):  # elements in a thin body are small anyway
         return [float(recipe.bar * shape * locking) for recipe in ladder]
     is_even = ladder is _EVEN
     thin = min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)

@@ -7,7 +7,6 @@ from math import nan
 
 from pipeline.plan.key import mesh_key, operator_key
 from pipeline.plan.recipe import MARGIN, Rung
-from pipeline.shapes.indenter import Indenter
 from pipeline.study.case import Case
 
 # A first mesh may be coarse for a contact on a bump, which is smaller than on a plane. The ratio of its bar to the
@@ -63,7 +62,7 @@ class Solve:
         meshes, and the first that should reach the goal is chosen.
         """
         more, goal = bar / self.expected, self.goal or 0.0
-        if isinstance(self.case.probe, Indenter):
+        if not self.case.probe.is_flat:
             more = min(more, _WORSE)
         serves = (number for number, rung in enumerate(self.later) if more * rung.bar <= MARGIN * goal)
         number = next(serves, 0)

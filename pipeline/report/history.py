@@ -12,7 +12,6 @@ from pipeline.quantities import LARGEST, attributes
 from pipeline.report.stepped import stepped_values
 from pipeline.report.values import OVER_TIME
 from pipeline.run.record import Record
-from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.states import worst
 from pipeline.study.case import Case
@@ -116,8 +115,7 @@ def convolution_of(case: Case, times: FloatArray, depths: tuple[float, ...]) -> 
 
 def _power(probe: Probe) -> float:
     """Return the power of the depth in F: of a rounded tip, that of a ball; of a long edge, about 1."""
-    is_long = isinstance(probe, Indenter) and probe.half_length > 0
-    return probe.force_exponent or (_OF_EDGE if is_long else _OF_TIP)
+    return probe.force_exponent or (_OF_EDGE if probe.half_length > 0 else _OF_TIP)
 
 
 @lru_cache(_MANY)

@@ -8,7 +8,6 @@ from operator import mul
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.probe import PLANES
-from pipeline.shapes.punch import Punch
 from pipeline.study.case import Case
 
 # Of the axes of a probe, those that say how far it moves, and those that say where it is: the others say what it is.
@@ -62,7 +61,7 @@ class Sinking:
         if why:
             return Sinking(scale, why_not=why)
         probe = case.probe
-        inverse = 1 / probe.circumradius if isinstance(probe, Punch) and probe.is_round else nan
+        inverse = 1 / probe.circumradius if probe.is_flat and probe.is_round else nan
         return Sinking(scale, float(probe.force_exponent or nan), probe.mean_square, inverse, probe.contact)
 
 

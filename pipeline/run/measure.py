@@ -15,7 +15,6 @@ from pipeline.run.record import Record
 from pipeline.shapes.body import Layered
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.frame import Vector
-from pipeline.shapes.indenter import Indenter
 from pipeline.solve.convergence import Convergence
 from pipeline.solve.estimate import is_fine, is_graded
 from pipeline.solve.history import History
@@ -163,7 +162,7 @@ def is_graded_to_contact(case: Case) -> bool:
     """Return whether the mesh of ``case`` is graded to the expected edge of contact."""
     rim = _rim(case)
     # The coarsest recipe equals the limit of `is_graded`: rounding must not exceed it.
-    found = isinstance(case.probe, Indenter)
+    found = not case.probe.is_flat
     rim *= 1 - _ROUNDING if found else 1.0
     if case.probe.is_unilateral:  # small elements surround the axis, so contact must be there
         *beside, _ = first_touch(case.body, case.probe, case.frame)

@@ -154,7 +154,7 @@ def check_first_touch(body: Body, probe: Probe, frame: Frame) -> None:
         PlaceError: if not; the message says where it would touch.
     """
     x, y, _ = first_touch(body, probe, frame)
-    beside, most = hypot(max(0.0, abs(x) - getattr(probe, "half_length", 0.0)), y), _WELL_WITHIN * probe.half_width
+    beside, most = hypot(max(0.0, abs(x) - probe.half_length), y), _WELL_WITHIN * probe.half_width
     if not probe.has_singular_edge and beside > most:
         raise PlaceError(
             f"the {probe.shape} would touch the body first {in_mm(beside)} from its axis, outside the region that is "

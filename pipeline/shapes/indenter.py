@@ -59,6 +59,7 @@ class Indenter(Probe):
     Sizes, symmetry and outline are those of its ``footprint``.
     """
 
+    is_flat: ClassVar[bool] = False
     # Pressure falls to zero at the edge of contact.
     has_singular_edge: ClassVar[bool] = False
 
@@ -139,10 +140,7 @@ class Indenter(Probe):
     outline: ClassVar[Any] = _OfFootprint()
 
     def on_bump(self, curvature: float) -> Self:
-        """Return the tool that expects contact with a surface of this mean ``curvature`` (1/m), positive on a dome.
-
-        Contact with straight edges is expected as on a plane.
-        """
+        """Return the tool that expects contact with a surface of this mean ``curvature`` (1/m)."""
         tool = self.model_copy()
         tool._bump = curvature
         return tool
@@ -186,16 +184,16 @@ class Indenter(Probe):
         """Radius (m) of the smallest circle about the axis that contains the expected contact."""
 
     @property
-    def half_length(self) -> float:
-        """Half the length (m) of contact, equal at all depths; 0 without a straight edge."""
-        return 0.0
-
-    @property
     def edge_band(self) -> tuple[float, float]:
         """The smallest and the largest half width (m) at which contact is expected to end."""
         most = self.footprint.half_width
         least, largest = self.contact_widths
         return min(least, most), min(BAND * largest, most)
+
+    @property
+    def contact_ends(self) -> tuple[Probe, ...]:
+        """The flat tools of these half widths."""
+        return tuple(map(self.touching, self.edge_band))
 
     @property
     def rim_offset(self) -> float:
@@ -216,7 +214,7 @@ class Indenter(Probe):
             )
 
     def warn_of_strains(self, problems: Problems) -> None:
-        """Warn of strains that are large for linear elasticity: of the slope of the tool at the edge of contact."""
+        """Warn of a depth at which the slope of the tool at the edge of contact is steep: strains are of that order."""
         if self.contact_width >= self.footprint.half_width:  # an error of its own
             return
         slope = float(self.section.slope(np.array([self.contact_width]))[0])

@@ -56,7 +56,6 @@ class Inserted(Probe):
         ),
     ] = None
 
-    # How it cuts: a slit that it makes in the body, or a crack ahead of its tip, deep in tissue.
     CUTS: ClassVar[Literal["slit", "crack"]]
 
     @property

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from functools import lru_cache
 from math import hypot, inf
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
@@ -128,6 +128,10 @@ class Probe(Section, ABC):
 
     # Keys to which F is proportional, with known contact, if all change together; the first is the unit of the others.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]]
+    # Whether the tool is a flat face, all of which is its footprint; otherwise contact grows with the depth.
+    is_flat: ClassVar[bool]
+    # How it cuts if it is inserted: a slit that it makes in the body, or a crack ahead of its tip, deep in tissue.
+    CUTS: ClassVar[Literal["slit", "crack"] | None] = None
     # Keys on which its footprint, and so the mesh, does not depend.
     NOT_DRAWN: ClassVar[tuple[str, ...]]
     # Keys for sweeps of a tool on one mesh, which do not belong to the tool itself.
@@ -307,6 +311,43 @@ class Probe(Section, ABC):
         """Length (m) of the expected edge of contact, and its area (m²) if its position is not known exactly."""
 
     @property
+    def contact_width(self) -> float:
+        """Half the expected width (m) of contact: of a flat tool, that of its face."""
+        return self.half_width
+
+    @property
+    def edge_width(self) -> float:
+        """Length (m) that elements at the expected edge of contact resolve: half the width of contact."""
+        return self.contact_width
+
+    @property
+    def expected_radius(self) -> float:
+        """Radius (m) of the smallest circle about the axis that contains the expected contact."""
+        return self.circumradius
+
+    @property
+    def half_length(self) -> float:
+        """Half the length (m) of a straight edge along which contact grows in width alone; 0 without one."""
+        return 0.0
+
+    @property
+    def depths(self) -> tuple[float, float]:
+        """The smallest and the largest depth (m) of the mesh."""
+        return self.depth, self.depth
+
+    @property
+    def contact_ends(self) -> "tuple[Probe, ...]":
+        """The flat tool at whose edge contact ends, or the two between whose edges it is expected to end."""
+        return (self,)
+
+    def on_bump(self, curvature: float) -> Self:
+        """Return the tool that expects contact with a surface of this mean ``curvature`` (1/m), positive on a dome.
+
+        Contact with a flat face, or with straight edges, is expected as on a plane.
+        """
+        return self
+
+    @property
     @abstractmethod
     def rim_offset(self) -> float:
         """Distance (m) of the footprint's edge from the expected edge of contact."""
@@ -337,6 +378,10 @@ class Probe(Section, ABC):
         return ""
 
     # ---- checks ---------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def warn_of_strains(self, problems: Problems) -> None:
+        """Warn of a depth at which strains are large for linear elasticity."""
 
     def check(self, problems: Problems) -> None:
         """Report keys that contradict each other; annotations check each key alone."""

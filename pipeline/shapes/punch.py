@@ -10,7 +10,10 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
+from pipeline.shapes.section import Problems, in_mm
 
+# Linear elasticity, up to this depth in half widths: strain under the probe is of order depth / radius.
+LINEAR = 0.10
 # A line is an axis of the footprint within this tolerance on unit vectors.
 _ALIGNED = 1e-12
 
@@ -18,6 +21,7 @@ _ALIGNED = 1e-12
 class Punch(Probe):
     """A tool with a flat face; contact ends at its edge, unless the tool lifts off."""
 
+    is_flat: ClassVar[bool] = True
     has_singular_edge: ClassVar[bool] = True
     # Zero (m): contact is expected to end at the edge of the face.
     rim_offset: ClassVar[float] = 0.0
@@ -57,6 +61,20 @@ class Punch(Probe):
     def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
         """Return the distance to the edge of the face as text."""
         return self.edge_distance(along, across, height, unit)
+
+    def warn_of_strains(self, problems: Problems) -> None:
+        """Warn of a depth that is not small compared with the face."""
+        if self.half_width <= 0:  # a slit that leaves nothing of a blade says so itself
+            return
+        proportional = "F stays proportional to depth" if self.proportional_to else "strains are assumed small"
+        if self.deepest > LINEAR * self.half_width:
+            problems.warn(
+                "probe.depth",
+                in_mm(self.deepest),
+                f"is {self.deepest / self.half_width:.0%} of the tool's half width {in_mm(self.half_width)}. Above "
+                f"{LINEAR:.0%}, linear elasticity is an extrapolation ({proportional}); at {LINEAR:.0%}, F of a "
+                "neo-Hookean body is about 1 % smaller",
+            )
 
 
 class Straight(Punch):

@@ -9,7 +9,6 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 from pipeline.shapes.body import Body
 from pipeline.shapes.contact import curvature_below, is_level
 from pipeline.shapes.frame import Frame, Vector
-from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.axis import Axis
@@ -100,7 +99,7 @@ class Case:
     def expected(self) -> Probe:
         """The probe; if contact is found, as it is expected to end on a surface that is curved below it."""
         probe = self.probe
-        if not isinstance(probe, Indenter):
+        if probe.is_flat:
             return probe
         bump = curvature_below(self.body, probe, self.frame)
         return probe.on_bump(bump) if bump else probe

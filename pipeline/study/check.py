@@ -10,8 +10,8 @@ from typing import cast
 
 from pipeline.shapes.body import Body
 from pipeline.shapes.from_file import FromFile
-from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
+from pipeline.shapes.punch import LINEAR
 from pipeline.shapes.section import Section, in_mm
 from pipeline.shapes.segmented import Segmented
 from pipeline.shapes.triangles import SurfaceError
@@ -39,8 +39,6 @@ from pipeline.study.schema import Material, Mesh, Planning, Solving
 from pipeline.study.slit import check_slit, check_slit_in
 from pipeline.study.stages import check_history
 
-# Linear elasticity: strain under the probe is of order depth / radius.
-_LINEAR = 0.10
 # No tissue is softer (Pa): brain and fat have some hundred.
 _SOFTEST = 1.0
 # Forces of all cases and times: a dataset then has a few hundred megabytes.
@@ -141,28 +139,14 @@ def _placed(
 
 def warn_of_depth(probe: Probe, problems: Problems) -> None:
     """Warn of depths at which strains at the edge of a tool are large for linear elasticity."""
-    if isinstance(probe, Indenter):
-        probe.warn_of_strains(problems)
-        return
-    if insertion := getattr(probe, "insertion", None):
+    if probe.is_flat and (insertion := getattr(probe, "insertion", None)):
         problems.warn(
             "probe.insertion.to",
             in_mm(insertion.to),
             "assumes small strains: before the puncture, and at the blade's tip, linear elasticity is an extrapolation",
         )
-        return
-    if probe.half_width <= 0:  # a slit that leaves nothing of a blade says so itself
-        return
-    proportional = "F stays proportional to depth" if probe.proportional_to else "strains are assumed small"
-    if probe.deepest > _LINEAR * probe.half_width:
-        problems.warn(
-            "probe.depth",
-            in_mm(probe.deepest),
-            f"is {probe.deepest / probe.half_width:.0%} of the tool's half width {in_mm(probe.half_width)}. Above "
-            f"{_LINEAR:.0%}, linear elasticity is an extrapolation ({proportional}); at {_LINEAR:.0%}, F of a "
-            "neo-Hookean "
-            "body is about 1 % smaller",
-        )
+    else:
+        probe.warn_of_strains(problems)
 
 
 def _tell_notices(body: Body, problems: Problems) -> None:
@@ -202,13 +186,13 @@ def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:
             f"must be below {in_mm(thickness)}, the thickness of the tissue under the tool, along its axis",
         )
         return False
-    if _LINEAR * thickness < probe.deepest <= _LINEAR * probe.half_width:
+    if LINEAR * thickness < probe.deepest <= LINEAR * probe.half_width:
         problems.warn(
             "probe.depth",
             in_mm(probe.deepest),
             f"is {probe.deepest / thickness:.0%} of the thickness of the tissue under the tool, "
             f"{in_mm(thickness)}. Above "
-            f"{_LINEAR:.0%}, linear elasticity is an extrapolation",
+            f"{LINEAR:.0%}, linear elasticity is an extrapolation",
         )
     return True
 

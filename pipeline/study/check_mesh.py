@@ -6,7 +6,6 @@ from math import isfinite, isinf
 from pipeline.shapes.body import Body
 from pipeline.shapes.contact import is_level
 from pipeline.shapes.from_file import FromFile
-from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.section import in_mm
 from pipeline.study.axis import Axis
@@ -76,7 +75,7 @@ def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
     elif (beside := body.support.gap(probe.gap(body, frame))) is not None:
         gaps["body.fixed"] = beside
     if mesh.outside != "free" and isfinite(column := mesh.column(body.reach(frame))):
-        gaps["mesh.epsilon"] = column - (probe.expected_radius if isinstance(probe, Indenter) else probe.circumradius)
+        gaps["mesh.epsilon"] = column - probe.expected_radius
     return {key: gap for key, gap in gaps.items() if gap > 0}
 
 
@@ -84,7 +83,7 @@ def check_column(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> No
     """Report a column that the contact is not inside."""
     frame = probe.frame_on(body)
     column = mesh.column(body.reach(frame))
-    if mesh.outside == "free" and isinstance(probe, Indenter) and column <= (1 + ON_EDGE) * probe.half_length:
+    if mesh.outside == "free" and column <= (1 + ON_EDGE) * probe.half_length:
         problems.error(
             "mesh.epsilon",
             in_mm(mesh.epsilon),
@@ -129,7 +128,7 @@ def check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:
     """Warn of a fine mesh that the contact may leave, and of a rim that does not resolve the probe."""
     if mesh.epsilon < probe.circumradius:
         reach, is_cut = in_mm(probe.circumradius), mesh.outside in ("free", "fixed")
-        if isinstance(probe, Indenter):
+        if not probe.is_flat:
             what = f"is less than {reach}, up to which the {probe.shape} may touch: contact may leave the fine mesh"
             what += ", but not the column" if is_cut else ""
         else:

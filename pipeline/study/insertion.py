@@ -6,8 +6,6 @@ from math import isfinite
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.insertion import Inserted, Insertion
 from pipeline.shapes.probe import STICK, Probe
-from pipeline.shapes.probes._flat_needle import FlatNeedle
-from pipeline.shapes.punch import Punch
 from pipeline.shapes.section import in_mm
 from pipeline.study.problems import Problems
 
@@ -23,8 +21,10 @@ def check_insertion(body: Body, probe: Probe, problems: Problems) -> None:
     if insertion is None:
         if tool.toughness is not None:
             problems.error("probe.toughness", f"{tool.toughness:g} J/m^2", "is for an insertion: add [probe.insertion]")
-        elif isinstance(tool, FlatNeedle) and "crack_shape" in tool.model_fields_set:
-            problems.error("probe.crack_shape", tool.crack_shape, "is for an insertion: add [probe.insertion]")
+        elif "crack_shape" in tool.model_fields_set:
+            problems.error(
+                "probe.crack_shape", getattr(tool, "crack_shape", None), "is for an insertion: add [probe.insertion]"
+            )
         return
     _check_keys(tool, problems)
     if len(problems.errors) == before and isinstance(body, Layered):
@@ -75,7 +75,7 @@ def _check_end(body: Layered, probe: Inserted, insertion: Insertion, problems: P
             f"most {in_mm(max(end - room, 0.0))}",
         )
     if probe.gap(body, probe.frame_on(body)) < room:
-        key, smaller = ("length", "shorter blade") if isinstance(probe, Punch) else ("radius", "thinner needle")
+        key, smaller = ("length", "shorter blade") if probe.CUTS == "slit" else ("radius", "thinner needle")
         problems.error(
             f"probe.{key}",
             in_mm(getattr(probe, key)),

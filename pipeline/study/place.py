@@ -9,7 +9,6 @@ from pipeline.shapes.body import Body
 from pipeline.shapes.contact import check_contact, check_first_touch, edge_gap, is_level, lifted_edge
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
-from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import in_mm
 
@@ -73,7 +72,7 @@ def _check_fit(body: Body, probe: Probe, frame: Frame) -> None:
 
 def _footprint(probe: Probe) -> str:
     """Return the name of the part of the tool that must be on one face."""
-    if isinstance(probe, Indenter):
+    if not probe.is_flat:
         return f"the largest contact area of the {probe.shape}, up to {in_mm(probe.circumradius)} from its axis,"
     if probe.slit and not probe.slit.is_open:
         return "the slit"

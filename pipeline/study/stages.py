@@ -5,7 +5,6 @@ from math import cos, pi, sqrt
 from types import SimpleNamespace
 from typing import Any, cast
 
-from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section, in_mm
 from pipeline.study.axis import Axis
@@ -32,8 +31,6 @@ def shares_of(probe: Probe, *, is_shared: bool) -> tuple[float, ...]:
 
 def _least(probe: Probe) -> float:
     """Return the smallest share of the depth on one mesh."""
-    if not isinstance(probe, Indenter):
-        return _LEAST
     low, high = _LEAST, 0.5
     widest = probe.contact_width
 
@@ -77,8 +74,8 @@ def _at(probe: Probe, share: float, *, is_shared: bool) -> Probe:
     if not (probe.history and probe.is_unilateral):
         return probe
     changes: dict[str, Any] = {"depth": canonical(share * probe.depth)}
-    if is_shared and isinstance(probe, Indenter):
-        least, largest = probe.depth_range or (probe.depth, probe.depth)
+    if is_shared and not probe.is_flat:
+        least, largest = probe.depths
         changes["depth_range"] = (
             min(canonical(shares_of(probe, is_shared=True)[0] * probe.depth), least),
             max(probe.depth, largest),

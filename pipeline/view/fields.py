@@ -8,7 +8,6 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.bodies.cad import FromCad
 from pipeline.shapes.body import Drawn
-from pipeline.shapes.indenter import Indenter
 from pipeline.study.case import Case
 from pipeline.view.lagrange import LagrangeNodes
 
@@ -95,7 +94,7 @@ class Fields:
 
         A tool that is not flat keeps its shape and its depth, so that tissue drawn to scale is what fits it.
         """
-        return 1.0 if isinstance(self.case.probe, Indenter) else self.visible_factor
+        return self.visible_factor if self.case.probe.is_flat else 1.0
 
     @property
     def visible_factor(self) -> float:

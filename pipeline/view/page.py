@@ -10,7 +10,6 @@ import numpy.typing as npt
 from pipeline.files import write_whole
 from pipeline.pages import compressed, hash_of, joined, json_in_page, layout, packed, render_page
 from pipeline.quantities import write
-from pipeline.shapes.indenter import Indenter
 from pipeline.view import palette
 from pipeline.view.fields import Fields
 from pipeline.view.numbers import colours_of, mesh_arrays, shift_unit
@@ -99,6 +98,6 @@ def _told(fields: Fields) -> dict[str, Any]:
         "largest": _MM * float(fields.magnitude.max()) if is_solved else 0,
         "factor": fields.visible_factor if is_solved else 0,
         "start": fields.drawn_factor if is_solved else 0,
-        "keeps_depth": isinstance(fields.case.probe, Indenter),
+        "keeps_depth": not fields.case.probe.is_flat,
         "outline": [(_MM * (line - fields.contact)).round(4).tolist() for line in fields.outline],
     }

@@ -15,7 +15,6 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from pipeline.report.figures.style import DEFAULTS, save
-from pipeline.shapes.indenter import Indenter
 from pipeline.view.drawing import MM, Colouring, Drawing
 from pipeline.view.fields import Fields
 from pipeline.view.numbers import unit_of_length
@@ -115,7 +114,7 @@ def _add_scale(figure: Figure, colouring: Colouring, quantity: str) -> None:
 
 
 def _lines(fields: Fields) -> list[Artist]:
-    edge = "where contact may be" if isinstance(fields.case.probe, Indenter) else "edge of the probe"
+    edge = "edge of the probe" if fields.case.probe.is_flat else "where contact may be"
     lines: list[Artist] = [
         Line2D([], [], color=FOOTPRINT, linewidth=1.6, label=edge),
         Patch(color=TOOL, alpha=0.5, label="probe"),

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.scene.model import PROBE
 from pipeline.shapes.contact import first_touch
-from pipeline.shapes.indenter import Indenter
+from pipeline.shapes.probe import Probe
 from pipeline.view.fields import Fields
 
 # Length of the drawn part, in radii of the footprint.
@@ -31,7 +31,7 @@ def tool_of(fields: Fields) -> Tool:
     """Return the tool of a case: its footprint, extruded, with the footprint's displacement; or its own surface."""
     case = fields.case
     length, outward = _LENGTH * case.probe.circumradius, np.array(case.frame.outward)
-    if isinstance(case.probe, Indenter):
+    if not case.probe.is_flat:
         lines = _lines(case.probe, length)
         # The depth counts from where the tool first touches, which may be beside its axis.
         *_, first = first_touch(case.body, case.probe, case.frame)
@@ -49,7 +49,7 @@ def tool_of(fields: Fields) -> Tool:
     )
 
 
-def _lines(probe: Indenter, length: float) -> FloatArray:
+def _lines(probe: Probe, length: float) -> FloatArray:
     """Return lines (k, n, 3) over its surface, in m and the probe's own coordinates.
 
     Those of a round tool go from its axis to its axis; those of a long one are sections, the first and last points.
@@ -67,7 +67,7 @@ def _lines(probe: Indenter, length: float) -> FloatArray:
     return np.array([ends[0], *sections, ends[1]])
 
 
-def _line(probe: Indenter, start: FloatArray, along: FloatArray, length: float) -> FloatArray:
+def _line(probe: Probe, start: FloatArray, along: FloatArray, length: float) -> FloatArray:
     """Return points (n, 3) from ``start`` on ``along`` the surface; where it ends, or the line, straight up."""
     ray = start + np.linspace(0.0, 1.0, _POINTS)[:, None] * along
     heights = probe.profile(ray)

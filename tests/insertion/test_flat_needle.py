@@ -121,6 +121,7 @@ def test_the_path_ends_where_the_column_ahead_is_near_the_bottom():
     ("keys", "told"),
     [
         ({"edge": "0 mm"}, "an insertion needs a rounded edge, such as 0.1 mm"),
+        ({"edge": "0 mm", "radius": "3.5 mm"}, "use a thinner needle"),
         ({"contact": "bonded", "friction": 0.0}, 'use contact = "unilateral"'),
         ({"insertion": {"to": "6 mm", "withdraw": True}}, "the column within a ring crack stretches again"),
         ({"insertion": {"to": "6 mm", "withdraw": True}, "crack_shape": "least"}, 'crack_shape = "plane"'),

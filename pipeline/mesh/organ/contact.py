@@ -16,7 +16,6 @@ from pipeline.mesh.organ.sheet import FIXED, PROBE, WALL, Sheet, compact, edges_
 from pipeline.mesh.reason import reason
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.shapes.frame import Frame
-from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.rays import facing
 from pipeline.shapes.triangles import half_edges
@@ -67,11 +66,6 @@ def edge_points(probe: Probe, rim: FloatArray) -> FloatArray:
     return probe.to_edge((rim + share * (following - rim)).reshape(-1, 2))
 
 
-def _ends(probe: Probe) -> tuple[Probe, ...]:
-    """Return flat tools at whose edges contact ends: the probe, or those between which the end is expected."""
-    return tuple(map(probe.touching, probe.edge_band)) if isinstance(probe, Indenter) else (probe,)
-
-
 def _resample(outline: FloatArray, count: int) -> FloatArray:
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(outline, axis=0), axis=1))])
     wanted = length[-1] * np.arange(count) / count
@@ -95,7 +89,7 @@ def set_in(
         FoldedError: if facets around it reach over a fold.
     """
     rim = rim_points(probe, sizes)
-    edge = np.vstack([edge_points(tool, rim_points(tool, sizes)) for tool in _ends(probe)])
+    edge = np.vstack([edge_points(tool, rim_points(tool, sizes)) for tool in probe.contact_ends])
     lifted, followed = lift(rim), lift(edge)
     if not (np.isfinite(lifted).all() and np.isfinite(followed).all()):
         raise GeometryError("a part of the footprint's edge has no connected tissue below it")

@@ -11,10 +11,8 @@ from typing import Any, Protocol
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.contact import first_touch, is_flat, is_level
 from pipeline.shapes.from_file import FromFile
-from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.insertion import Inserted
 from pipeline.shapes.probe import STICK, Probe
-from pipeline.shapes.probes._flat_needle import FlatNeedle
 from pipeline.shapes.section import in_mm
 from pipeline.study.loads import Load
 from pipeline.study.schema import Material, Mesh
@@ -78,7 +76,7 @@ def _is_column(scene: Scene) -> bool:
 
 def _touches_beside(scene: Scene) -> bool:
     x, y, _ = first_touch(scene.body, scene.probe, scene.probe.frame_on(scene.body))
-    return isinstance(scene.probe, Indenter) and (x, y) != (0.0, 0.0)
+    return not scene.probe.is_flat and (x, y) != (0.0, 0.0)
 
 
 def _is_level(scene: Scene) -> bool:
@@ -115,7 +113,7 @@ def _is_inserted(scene: Scene, cuts: str | None = None) -> bool:
 
 
 def _may_cut_a_ring(scene: Scene) -> bool:
-    return _is_inserted(scene) and isinstance(scene.probe, FlatNeedle) and scene.probe.crack_shape != "plane"
+    return _is_inserted(scene) and getattr(scene.probe, "crack_shape", "plane") != "plane"
 
 
 def _is_loaded(scene: Scene) -> bool:
@@ -141,11 +139,9 @@ FEATURES: dict[str, Feature] = {
     "fibres": Feature("material.law", lambda s: any(t.has_fibres for t in (s.material, *s.body.regions)), ("body",)),
     "ν < 0.2": Feature("material.poisson", lambda s: s.material.poisson < Material.LEAST_OF_LARGE),
     "ν > 0.49": Feature("material.poisson", lambda s: s.material.poisson > MOST_OF_GREEN),
-    "tool that is not flat": Feature("probe.shape", lambda s: isinstance(s.probe, Indenter)),
+    "tool that is not flat": Feature("probe.shape", lambda s: not s.probe.is_flat),
     "unilateral contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
-    "flat tool that may lift off": Feature(
-        "probe.contact", lambda s: s.probe.is_unilateral and not isinstance(s.probe, Indenter)
-    ),
+    "flat tool that may lift off": Feature("probe.contact", lambda s: s.probe.is_unilateral and s.probe.is_flat),
     "frictionless contact": Feature("probe.contact", lambda s: s.probe.contact == "frictionless"),
     "rounded edge": Feature("probe.edge", _has_edge, write=in_mm),
     "rounded edge of a prescribed footprint": Feature(
