@@ -10,6 +10,7 @@ import gmsh
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.model_arrays import corners_of, points_by_tag
 from pipeline.mesh.regions import PointSizes
 from pipeline.scene.model import Scene
 from pipeline.shapes.bodies.cad import FromCad
@@ -88,18 +89,15 @@ def middle_nodes(position: IntArray, scale: float) -> tuple[IntArray, FloatArray
     ``position`` maps tags of the model, whose unit is ``scale`` metres, to point numbers. A mid node is the point of
     the face, or of the curve between faces, nearest to the middle of the straight edge.
     """
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    at = np.zeros((int(tags.max()) + 1, 3))
-    at[tags] = coordinates.reshape(-1, 3)
+    at = points_by_tag()
     middle: dict[tuple[int, int], FloatArray] = {}
     curves: set[int] = set()
     for dim, face in _boundary():
         curves |= {abs(tag) for _, tag in gmsh.model.getBoundary([(dim, face)], oriented=False)}
         if gmsh.model.getType(dim, face) != _STRAIGHT[dim]:
-            corners = np.concatenate(gmsh.model.mesh.getElements(dim, face)[2]).reshape(-1, 3)
-            _put(middle, dim, face, half_edges(corners), at)
+            _put(middle, dim, face, half_edges(corners_of(dim, [face])), at)
     for curve in sorted(curves):
-        pairs = np.concatenate(gmsh.model.mesh.getElements(1, curve)[2] or [np.empty(0, dtype=int)]).reshape(-1, 2)
+        pairs = corners_of(1, [curve])
         if gmsh.model.getType(1, curve) == _STRAIGHT[1]:
             for edge in np.sort(pairs, axis=1).tolist():
                 middle.pop(tuple(edge), None)

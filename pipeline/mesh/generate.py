@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.follow import middle_nodes, rounded_sizes
+from pipeline.mesh.model_arrays import corners_of, numbered_points, points_by_tag
 from pipeline.mesh.reason import reason
 from pipeline.mesh.regions import LocalSizes, longest_at_rim, region_sizes
 from pipeline.mesh.size import Sizes, set_size_field
@@ -160,21 +161,13 @@ def _folded() -> int:
     curved = [(dim, tag) for dim, tag in gmsh.model.getEntities(2) if gmsh.model.getType(dim, tag) != "Plane"]
     if not curved:
         return 0
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    points = np.zeros((int(tags.max()) + 1, 3))
-    points[np.asarray(tags, dtype=np.int64)] = coordinates.reshape(-1, 3)
-    count = 0
+    points, count = points_by_tag(), 0
     for dim, tag in curved:
-        corners = points[_triangles(tag)]
+        corners = points[corners_of(2, [tag])]
         sides = corners[:, 1:] - corners[:, :1]
         area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum() / 2
         count += bool(area > _OVERLAP * gmsh.model.occ.getMass(dim, tag))
     return count
-
-
-def _triangles(surface: int) -> IntArray:
-    nodes = [part for part in gmsh.model.mesh.getElements(2, surface)[2] if len(part)]
-    return np.concatenate(nodes).astype(np.int64).reshape(-1, 3) if nodes else np.empty((0, 3), dtype=np.int64)
 
 
 def _built(scene: Scene) -> list[int]:
@@ -215,19 +208,16 @@ def model_options() -> None:
 
 def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
     mesh, scale = gmsh.model.mesh, scene.scale
-    tags, coordinates, _ = mesh.getNodes()
-    position = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
-    order = np.argsort(tags)
-    position[tags[order]] = np.arange(len(tags))
-    points = coordinates.reshape(-1, 3)[order] * scale
-    cells = _elements(3, [tag for _, tag in gmsh.model.getEntities(3)], 4, position)
+    points, position = numbered_points()
+    points = points * scale
+    cells = position[corners_of(3, [tag for _, tag in gmsh.model.getEntities(3)])]
     if not len(cells):
         raise MeshError("gmsh made no tetrahedra")
     regions = _regions() if scene.body.regions else None
     facets = {}
     for dim, group in gmsh.model.getPhysicalGroups(2):
         name = gmsh.model.getPhysicalName(dim, group)
-        facets[name] = _elements(2, gmsh.model.getEntitiesForPhysicalGroup(dim, group), 3, position)
+        facets[name] = position[corners_of(2, gmsh.model.getEntitiesForPhysicalGroup(dim, group))]
     assert set(facets) <= {PROBE, FIXED, FREE, CUT, SLIT, *MIRROR.values()}
     rim = [position[mesh.getNodes(1, curve, includeBoundary=True)[0]] for curve in rim_curves]
     # Used points are renumbered without gaps.
@@ -256,14 +246,8 @@ def _regions() -> IntArray:
     """Return the region of each tetrahedron, in the order of the entities."""
     number = region_of_volume()
     tags = [tag for _, tag in gmsh.model.getEntities(3)]
-    counts = [sum(map(len, gmsh.model.mesh.getElements(3, tag)[1])) for tag in tags]
+    counts = [len(corners_of(3, [tag])) for tag in tags]
     return np.repeat(np.array([number[tag] for tag in tags], dtype=np.int64), counts)
-
-
-def _elements(dim: int, entities: list[int], size: int, position: IntArray) -> IntArray:
-    parts = [gmsh.model.mesh.getElements(dim, tag)[2] for tag in entities]
-    nodes = [part[0] for part in parts if len(part)]
-    return position[np.concatenate(nodes)].reshape(-1, size) if nodes else np.empty((0, size), dtype=np.int64)
 
 
 def flat_cells(points: FloatArray, cells: IntArray) -> BoolArray:

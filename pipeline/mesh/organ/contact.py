@@ -12,6 +12,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import GeometryError, MeshError, model_options
+from pipeline.mesh.model_arrays import corners_of, numbered_points
 from pipeline.mesh.organ.sheet import FIXED, PROBE, WALL, Sheet, compact, edges_of
 from pipeline.mesh.reason import reason
 from pipeline.mesh.size import Sizes, set_size_field
@@ -218,12 +219,9 @@ def _mesh_plane(local: FloatArray, loops: list[list[int]], rim: FloatArray, prob
             mesh.generate(2)
         except Exception as error:
             raise MeshError(f"gmsh: {reason(error)}") from error
-        tags, coordinates, _ = mesh.getNodes()
-        position = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
-        order = np.argsort(tags)
-        position[tags[order]] = np.arange(len(tags))
-        points = coordinates.reshape(-1, 3)[order][:, :2] * scale
-        parts = [position[mesh.getElementsByType(2, face)[1]].reshape(-1, 3) for face in (1, 2)]
+        points, position = numbered_points()
+        points = points[:, :2] * scale
+        parts = [position[corners_of(2, [face])] for face in (1, 2)]
 
         def node(point: int) -> int:
             return int(position[mesh.getNodes(0, point)[0][0]])

@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.follow import middle_nodes, points_along, rounded_points
 from pipeline.mesh.generate import GeometryError, MeshArrays, in_model, region_of_volume, with_smaller
+from pipeline.mesh.model_arrays import corners_of, numbered_points
 from pipeline.mesh.organ.field import Field
 from pipeline.mesh.organ.regions import fill_regions
 from pipeline.mesh.regions import LocalSizes
@@ -24,8 +25,6 @@ from pipeline.shapes.contact import lifted_edge
 from pipeline.shapes.files.check import outside_out
 from pipeline.shapes.files.edges import Edges, oriented
 from pipeline.shapes.probe import Probe
-
-_TRIANGLE = 2
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -83,12 +82,9 @@ def mesh_solid(scene: Scene, sizes: Sizes) -> MeshArrays:
 def _faces(scene: Scene, sizes: Sizes, local: tuple[LocalSizes, ...], rim_curves: list[int]) -> ModelFaces:
     """Return the faces of gmsh's current model, after its faces were meshed."""
     model, scale = gmsh.model, scene.scale
-    tags, coordinates, _ = model.mesh.getNodes()
-    order = np.argsort(tags)
-    position = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
-    position[tags[order]] = np.arange(len(tags))
-    all_points = coordinates.reshape(-1, 3)[order] * scale
-    triangles = {tag: position[_triangles(tag)] for _, tag in model.getEntities(2)}
+    all_points, position = numbered_points()
+    all_points = all_points * scale
+    triangles = {tag: position[corners_of(2, [tag])] for _, tag in model.getEntities(2)}
     numbers = region_of_volume()
     beside = {volume: [tag for _, tag in model.getBoundary([(3, volume)], oriented=False)] for volume in numbers}
     sides = {tag: [OUTSIDE, OUTSIDE] for tag in triangles}
@@ -129,11 +125,6 @@ def _field(scene: Scene, sizes: Sizes, local: tuple[LocalSizes, ...], rim_curves
     return SolidField(
         sizes, scene.frame, edge[np.isfinite(edge).all(axis=1)], local, probe=scene.probe, is_lifted=is_lifted
     )
-
-
-def _triangles(face: int) -> IntArray:
-    """Return the node tags (n, 3) of the triangles of a face."""
-    return np.asarray(gmsh.model.mesh.getElementsByType(_TRIANGLE, face)[1], dtype=np.int64).reshape(-1, 3)
 
 
 def _is_behind(points: FloatArray, faces: list[IntArray]) -> list[bool]:

@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import MeshError, model_options
+from pipeline.mesh.model_arrays import corners_of, numbered_points
 from pipeline.mesh.organ.field import Field
 from pipeline.mesh.organ.sheet import TangledError
 from pipeline.mesh.reason import reason
@@ -19,7 +20,7 @@ from pipeline.stages import stage
 # Cells below this quality are optimised. With gmsh's default, 0.3, flat cells may remain that have all four corners in
 # the surface; their curved edges then fold them.
 _OPTIMISED = 0.5
-_TRIANGLE, _TETRAHEDRON = 2, 4
+_TRIANGLE = 2
 MODEL_SIZE = 100.0  # extent of the model, in its unit
 # Relative tolerance on the volume of tetrahedra against that of their surface.
 _SAME = 1e-9
@@ -70,13 +71,10 @@ def _fill(points: FloatArray, shells: list[IntArray], scale: float, field: Field
             model.mesh.generate(3)
         except Exception as error:  # gmsh raises bare Exception
             raise _named(f"gmsh: {reason(error)}", scale) from error
-        found, coordinates, _ = model.mesh.getNodes()
-        corners = model.mesh.getElementsByType(_TETRAHEDRON, volume)[1]
-        if not len(corners):
+        place, position = numbered_points()
+        cells = position[corners_of(3, [volume])]
+        if not len(cells):
             raise MeshError("gmsh made no tetrahedra of the surface")
-        order = np.argsort(found)
-        place = coordinates.reshape(-1, 3)[order]
-        cells = np.searchsorted(found[order], corners).reshape(-1, 4)
     points, cells = _first(points, scaled, place * scale, place, cells)
     corners = points[cells]
     filled = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6
