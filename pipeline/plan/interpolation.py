@@ -8,7 +8,6 @@ from pipeline.plan.place_path import FEWEST, PlacePath
 from pipeline.plan.steps import Solve
 from pipeline.plan.work import Plan, Struck, reason_of
 from pipeline.study.capabilities.obstacles import obstacle
-from pipeline.study.case import Case
 
 
 def interpolate_path(plan: Plan) -> Plan:
@@ -24,7 +23,7 @@ def interpolate_path(plan: Plan) -> Plan:
         ways.setdefault(tuple(i for i, axis in zip(case.index, case.axes, strict=True) if not axis.off), []).append(
             solve
         )
-    reasons = {_obstacle(solve.case) for found in ways.values() for solve in found} - {""}
+    reasons = {obstacle("path", solve.case) for found in ways.values() for solve in found} - {""}
     if reasons:
         reason = f"No interpolation along the path: {sorted(reasons)[0]}; each place is solved."
         return replace(plan, struck=(*plan.struck, Struck("path", 0, reason)))
@@ -40,9 +39,3 @@ def together(paths: Sequence[PlacePath], wanted: Sequence[Solve]) -> list[Solve]
     """Return the solves of all ``paths`` on the meshes of those ``wanted``: other materials share the mesh."""
     meshes = {mesh_key(solve.case) for solve in wanted}
     return [solve for path in paths for solve in path.solves if mesh_key(solve.case) in meshes]
-
-
-def _obstacle(case: Case) -> str:
-    if case.solve.exact and (case.mesh.accuracy is None or "exact" in case.solve.model_fields_set):
-        return "F_exact is computed at each place (exact = false omits it)"
-    return obstacle("path", case)

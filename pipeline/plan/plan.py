@@ -110,7 +110,6 @@ def ask_for_exact(plan: Plan) -> Plan:
     study = plan.study
     if not study.solve.exact or plan.place_paths:
         return plan
-    is_asked = "exact" in study.solve.model_fields_set
     accuracy = min([EXACT, *(solve.goal * _EXACT_SHARE for solve in plan.solves if solve.goal)])
     found: dict[str, Solve] = {}
     unasked: dict[str, Solve] = {}
@@ -130,7 +129,7 @@ def ask_for_exact(plan: Plan) -> Plan:
             keys.append(NO_RECORD)
             without[reason] += bool(reason)
             continue
-        is_wanted = is_asked or study.mesh(index).accuracy is None
+        is_wanted = study.solve.wants_exact(study.mesh(index))
         keys.append(solve.key if is_wanted else NO_RECORD)
         (found if is_wanted else unasked).setdefault(solve.key, solve)
     for reason, count in without.items():

@@ -235,6 +235,10 @@ class Solving(Section):
         Words("Runs of each case of a timing study. The dataset has the median of their times.", "3"),
     ] = 3
 
+    def wants_exact(self, mesh: Mesh) -> bool:
+        """Return whether F_exact is computed beside a ``mesh``; with an accuracy, only if the study says so."""
+        return self.exact and (mesh.accuracy is None or "exact" in self.model_fields_set)
+
 
 class Planning(Section):
     """What the planner may skip: reductions that are not used, and the end of a sweep over ε."""

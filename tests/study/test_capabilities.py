@@ -96,3 +96,11 @@ def test_an_obstacle_is_told_with_its_reason():
     case = study(**HAVING["loads"]).case(())
     assert "three dimensions" in obstacle("meridian", case)
     assert obstacle("F_exact", case) == ""
+
+
+@pytest.mark.parametrize(
+    ("exact", "mesh", "has"), [(None, {}, True), (None, "accuracy", False), (True, "accuracy", True)]
+)
+def test_exact_forces_are_the_default_and_beside_an_accuracy_they_are_asked_for(exact, mesh, has):
+    case = study(**(HAVING[mesh] if mesh else {}), solve={"exact": exact}).case(())
+    assert ("F_exact" in case.features) == has

@@ -120,6 +120,11 @@ def _is_loaded(scene: Scene) -> bool:
     return scene.load.acts or bool(scene.body.pressures)
 
 
+def _wants_exact(scene: Scene) -> bool:
+    solve = getattr(scene, "solve", None)
+    return solve is not None and bool(solve.wants_exact(scene.mesh))
+
+
 def needs_time_steps(scene: Scene) -> bool:
     """Return whether the force over time is no elastic force times a function of time."""
     return scene.probe.history is not None and (scene.material.is_large or len(_relaxations(scene)) > 1)
@@ -195,6 +200,7 @@ FEATURES: dict[str, Feature] = {
     "loads": Feature("load", _is_loaded, ("body",)),
     # Of a case: the sections of a scene have none.
     "outputs": Feature("output", lambda s: bool(getattr(s, "outputs", ()))),
+    "F_exact": Feature("solve.exact", _wants_exact, ("mesh",)),
 }
 
 

@@ -60,6 +60,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "outputs": "outputs of a function need the solution of each depth",
     },
     "path": {
+        "F_exact": "F_exact is computed at each place (exact = false omits it)",
         "history": "a history needs the solution of each place",
         "insertion": "an insertion needs the states of each place",
         "needle that cuts": "an insertion needs the states of each place",
