@@ -101,13 +101,11 @@ benchmark: setup ## make every table of docs/performance.md in results/ (on an i
 	$(PYTHON) -m benchmarks.asked
 	$(PYTHON) -m benchmarks.plain_loop --sample 24
 	$(PYTHON) -m benchmarks.shares
-	$(PYTHON) -m benchmarks.products
 	$(PYTHON) -m benchmarks.solvers
 	$(PYTHON) -m benchmarks.contact
 	$(PYTHON) -m benchmarks.large
 	$(PYTHON) -m benchmarks.organs
 	$(PYTHON) -m benchmarks.paths
-	$(PYTHON) -m benchmarks.scaling
 	$(PYTHON) -m benchmarks.huge
 	$(PYTHON) -m benchmarks.work_precision
 	$(PYTHON) -m benchmarks.many_machines

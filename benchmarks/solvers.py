@@ -160,12 +160,12 @@ def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[A
     return unit, once
 
 
-def _application(matrix: Any, times: int = 9) -> float:
+def _application(matrix: Any) -> float:
     """Return the seconds of one product with ``matrix``."""
     x, y = matrix.createVecs()
     x.set(1.0)
     seconds = []
-    for _ in range(times):
+    for _ in range(9):
         start = time.process_time()
         matrix.mult(x, y)
         seconds.append(time.process_time() - start)

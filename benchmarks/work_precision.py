@@ -202,7 +202,7 @@ def main(output: Path, repeats: int, *, quick: bool = False) -> list[Path]:
         )
     found = dataset(points, repeats)
     path = outputs(output)[0]
-    write_netcdf(found, path, "NETCDF4")
+    write_netcdf(found, path)
     return [path, *draw(found, path.with_suffix(""))]
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,14 +15,8 @@ if TYPE_CHECKING:
 _FILE, _DESCRIPTION = 50_000, 2_000
 
 
-def write_netcdf(
-    dataset: "xr.Dataset",
-    path: Path,
-    kind: Literal["NETCDF4", "NETCDF3_64BIT"],
-    encoding: Mapping[str, Mapping[str, Any]] | None = None,
-    groups: "Mapping[str, xr.Dataset] | None" = None,
-) -> None:
-    """Write ``dataset`` to ``path`` in one piece or not at all; netCDF4 with a Fletcher-32 checksum on arrays.
+def write_netcdf(dataset: "xr.Dataset", path: Path, groups: "Mapping[str, xr.Dataset] | None" = None) -> None:
+    """Write ``dataset`` to ``path`` as netCDF4 in one piece or not at all; arrays have a Fletcher-32 checksum.
 
     ``groups`` are written to groups of those names.
 
@@ -34,17 +28,11 @@ def write_netcdf(
         OSError: if it cannot be written.
     """
     parts = [(None, dataset), *(groups or {}).items()]
-    own = encoding or {}
     with atomic(path) as temporary:
         temporary.write_bytes(bytes(sum(most_bytes(part) for _, part in parts)))
         for group, part in parts:
-            chosen = {
-                str(name): (_guarded(part[name]) if kind == "NETCDF4" else {}) | dict(own.get(str(name), {}))
-                for name in part.variables
-            }
-            part.to_netcdf(
-                temporary, mode="a" if group else "w", format=kind, group=group, engine="netcdf4", encoding=chosen
-            )
+            guarded = {name: _guarded(part[name]) for name in part.variables}
+            part.to_netcdf(temporary, mode="a" if group else "w", group=group, engine="netcdf4", encoding=guarded)
 
 
 def _guarded(array: "xr.DataArray") -> dict[str, Any]:

@@ -17,7 +17,6 @@ MESHES = Path(__file__).resolve().parents[1] / "meshes"
 PLATE, CORNER = (100.0, 70.0, 12.0), 12.0
 RADIUS, LENGTH, BELOW, FOOT = 24.0, 30.0, 4.0, 4.0
 _DATE = re.compile(r"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'")
-_FACE = re.compile(r"ADVANCED_FACE\(''")
 
 
 def draw() -> dict[int, str]:

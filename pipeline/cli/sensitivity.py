@@ -63,7 +63,7 @@ def sensitivity(
     from pipeline.report.figures.sensitivity import draw
     from pipeline.report.sensitivity import answer
 
-    write_netcdf(dataset, files[0], "NETCDF4")
+    write_netcdf(dataset, files[0])
     written = [files[0], *draw(dataset, output / name)]
     seconds = time.perf_counter() - start
     lines = [] if quiet else answer(dataset)

@@ -33,8 +33,8 @@ _ASIDE = 0.2
 
 
 @stage("export mesh")
-def coarse_mesh(case: Case, region: Region, finer: float = 1.0, ranks: Ranks = ALONE) -> BodyMesh:
-    """Return a mesh of the whole body for all places of a region, with elements smaller by a factor ``finer``.
+def coarse_mesh(case: Case, region: Region, ranks: Ranks = ALONE) -> BodyMesh:
+    """Return a mesh of the whole body for all places of a region.
 
     The first of ``ranks`` makes it, and each rank gets all of it.
 
@@ -42,7 +42,7 @@ def coarse_mesh(case: Case, region: Region, finer: float = 1.0, ranks: Ranks = A
         MeshError: if the body cannot be meshed.
     """
     through = _TO_TISSUE if case.body.regions else _THROUGH
-    near, far = region.margin / (_NEAR * finer), region.thickness / (through * finer)
+    near, far = region.margin / _NEAR, region.thickness / through
     near = min(near, far) if case.body.regions else near
     size: dict[str, Any] = {"depth": region.margin, "at": (0.0, 0.0), "axis": None}
     if region.is_round:

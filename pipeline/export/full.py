@@ -87,16 +87,9 @@ class Solver:
         return found
 
     def press_all(
-        self,
-        tool: Tool,
-        at: tuple[float, ...],
-        depths: Sequence[float],
-        poissons: Sequence[float] | None = None,
-        mesh: Mapping[str, Any] | None = None,
+        self, tool: Tool, at: tuple[float, ...], depths: Sequence[float], poissons: Sequence[float] | None = None
     ) -> list[Full]:
-        """Return the forces for all of ``poissons``, and for each at all ``depths`` (m), on one mesh.
-
-        ``mesh`` are the keys of a study's section; without them the mesh is chosen for the accuracy.
+        """Return the forces for all of ``poissons``, and for each at all ``depths`` (m), on a mesh for the accuracy.
 
         Raises:
             RuntimeError: if a solve failed.
@@ -106,10 +99,8 @@ class Solver:
         if poissons is not None:
             own["material"] = {"young": f"{self.young:.12g} Pa", "poisson": list(poissons), **self.law}
         place: dict[str, Any] = {"at": [_mm(x) for x in at], "depth": [_mm(depth) for depth in depths]}
-        if mesh is not None and len(depths) > 1:
-            place["depth_range"] = [_mm(min(depths)), _mm(max(depths))]
-        sizes = mesh or {"accuracy": f"{100 * self.accuracy:.6g} %"}
-        raw = own | {"probe": tool.section | place, "mesh": dict(sizes), "solve": {"exact": False}}
+        mesh = {"accuracy": f"{100 * self.accuracy:.6g} %"}
+        raw = own | {"probe": tool.section | place, "mesh": mesh, "solve": {"exact": False}}
         plan = make_plan(parse(raw, file=self.file))
         records = compute(plan, MPI.COMM_SELF)
         found = [records[key] for key in plan.keys]

@@ -176,4 +176,4 @@ def write(dataset: xr.Dataset, path: Path) -> None:
     Raises:
         OSError: if it cannot be written.
     """
-    write_netcdf(dataset, path, "NETCDF4")
+    write_netcdf(dataset, path)

@@ -212,7 +212,7 @@ def write(dataset: xr.Dataset, path: Path) -> None:
     What cases cost, and how they were obtained, is the group ``run`` of the file; ``status`` is a flag.
     """
     run = [name for name in RUN if name in dataset]
-    write_netcdf(with_flags(dataset.drop_vars(run)), path, "NETCDF4", groups={"run": dataset[run]})
+    write_netcdf(with_flags(dataset.drop_vars(run)), path, groups={"run": dataset[run]})
 
 
 def _along(place: xr.DataArray, own: Collection[str]) -> xr.DataArray:

@@ -7,6 +7,8 @@ from pipeline.shapes.skin import Skin
 from pipeline.shapes.surface import Surface
 from pipeline.shapes.triangles import Triangles, doubled_normals, edge_keys, half_edges
 
+_IN_PLANE = 1e-9  # of the solid's extent
+
 
 class CadFace(Surface):
     """The ``chosen`` facets (m) of a solid: those of all faces with one name.
@@ -54,13 +56,13 @@ def _weights(points: FloatArray, corners: FloatArray) -> FloatArray:
     return np.stack([first, second, 1 - first - second], axis=1)
 
 
-def plane_piece(triangles: Triangles, start: int, same: float = 1e-9) -> IntArray:
+def plane_piece(triangles: Triangles, start: int) -> IntArray:
     """Return the ends (k, 2) of the edges around the plane piece of the surface that contains the facet ``start``."""
     points, facets = triangles.points, triangles.facets
     normals = doubled_normals(points, facets)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     off = np.abs((points[facets] - points[facets[start, 0]]) @ normals[start]).max(axis=1)
-    (flat,) = np.nonzero((off < same * triangles.extent) & (normals @ normals[start] > 0))
+    (flat,) = np.nonzero((off < _IN_PLANE * triangles.extent) & (normals @ normals[start] > 0))
     half = half_edges(facets[flat])
     _, first, count = np.unique(edge_keys(facets[flat], len(points)), return_index=True, return_counts=True)
     ends: IntArray = half[first[count == 1]]

@@ -37,15 +37,15 @@ _FLAT = 1e-9
 _LEAST_BENT = 1e-6
 
 
-def outline_points(probe: Probe, count: int = _ALONG) -> FloatArray:
-    """Return about ``count`` points (n, 2), in m, along a footprint's outline, corners included; not closed."""
+def outline_points(probe: Probe) -> FloatArray:
+    """Return about ``_ALONG`` points (n, 2), in m, along a footprint's outline, corners included; not closed."""
     line = probe.outline()
     lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    if len(line) > count:
+    if len(line) > _ALONG:
         along = np.concatenate([[0.0], np.cumsum(lengths)])
-        at = np.linspace(0.0, along[-1], count + 1)[:-1]
+        at = np.linspace(0.0, along[-1], _ALONG + 1)[:-1]
         return np.column_stack([np.interp(at, along, line[:, axis]) for axis in (0, 1)])
-    pieces = np.maximum(1, np.rint(count * lengths / lengths.sum())).astype(int)
+    pieces = np.maximum(1, np.rint(_ALONG * lengths / lengths.sum())).astype(int)
     number = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     share = number * np.repeat(1 / pieces, pieces)
     return np.asarray(

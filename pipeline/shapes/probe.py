@@ -20,7 +20,6 @@ from pipeline.units import Coordinate, Length
 
 # Candidate planes of symmetry, by the coordinate that is zero on them, and their normals.
 PLANES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
-_ALIGNED = 1e-12
 _MANY = 200_000  # cached pairs of body and probe, enough for a large study
 
 Contact = Literal["bonded", "frictionless", "unilateral"]

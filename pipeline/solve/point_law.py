@@ -103,16 +103,16 @@ class PointLaw:
 
     @cached_property
     def _moduli(self) -> tuple[Any, Kernel]:
-        return self._compiled(0, 0)
+        return self._compiled(0)
 
     @cached_property
     def _coupling(self) -> tuple[Any, Kernel]:
-        return self._compiled(1, 0)
+        return self._compiled(1)
 
-    def _compiled(self, row: int, column: int) -> tuple[Any, Kernel]:
-        test, trial = ufl.TestFunction(self._spaces[row]), ufl.TrialFunction(self._spaces[column])
+    def _compiled(self, row: int) -> tuple[Any, Kernel]:
+        test, trial = ufl.TestFunction(self._spaces[row]), ufl.TrialFunction(self._spaces[0])
         energy = self._energy.derivative(self._fields[row], test, of_shape=row == 0)
-        energy = energy.derivative(self._fields[column], trial, of_shape=column == 0)
+        energy = energy.derivative(self._fields[0], trial, of_shape=True)
         return self._compile(energy.value)
 
     def _compile(self, value: Any) -> tuple[Any, Kernel]:

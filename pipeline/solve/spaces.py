@@ -186,9 +186,9 @@ class ElasticSpace:
         function.interpolate(lambda x: x)
         return np.array(function.x.array[: self.owned])
 
-    def set_displacement(self, values: PETSc.Vec, factor: float = 1.0) -> None:
-        """Set the displacement of the forms to ``factor`` times ``values``; collective."""
-        fill(self.forms.displacement, values, factor)
+    def set_displacement(self, values: PETSc.Vec) -> None:
+        """Set the displacement of the forms; collective."""
+        fill(self.forms.displacement, values)
 
     def _sides_of(self, probe: Int32Array) -> FloatArray | None:
         """Return the side of the slit of each point of the footprint, 1 or -1; None without a slit; collective."""

@@ -28,8 +28,8 @@ _OF_GUESS = 0.3
 MOST, MANY = 300, 800
 
 
-def surrogate(domain: Domain, solve: Solve, tolerance: float | None = None) -> Table:
-    """Return the surrogate of a domain to a relative ``tolerance``: by default one that few solves reach.
+def surrogate(domain: Domain, solve: Solve) -> Table:
+    """Return the surrogate of a domain to a relative error that few solves reach.
 
     On a body so wide that its sides change less than that, the integral equation of layered bodies replaces all but
     three solves. On a less wide one, it is a guess that solves correct.
@@ -37,7 +37,7 @@ def surrogate(domain: Domain, solve: Solve, tolerance: float | None = None) -> T
     Raises:
         SurrogateError: if a case that it needs has no force.
     """
-    tolerance = tolerance or _tolerance(domain)
+    tolerance = _tolerance(domain)
     found = wide_solve(domain, solve) if domain.output == FORCE else None
     if found is None:
         return build(domain, solve, tolerance)

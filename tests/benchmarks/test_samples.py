@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from benchmarks import communication, contact, one_run, organs, products, solvers
+from benchmarks import communication, contact, one_run, organs, solvers
 from benchmarks.processor import by_turns
 from benchmarks.scenes import BOX, DISC, graded, study
 
@@ -18,12 +18,6 @@ def test_a_solver_is_told_in_applications_of_the_operator(element, degree, metho
     assert (row["element"], row["degree"], row["method"]) == (element, degree, method)
     assert (row["iterations"] == 1) == (method == "direct")
     assert row["total"] == row["setup"] + row["solve"] > 0
-
-
-def test_products_of_all_kinds_are_timed():
-    (row,) = products.measure((12.0, 4.0), [2])
-    assert row["dofs"] > row["cells"] > 0
-    assert row["cells_bytes"] < row["matrix_bytes"]
 
 
 def test_found_contact_is_told_in_linear_solves():

@@ -58,7 +58,7 @@ def test_datasets_of_studies_follow_the_conventions(studies, tmp_path):
         write(found, files[-1])
         files.append(tmp_path / f"{study.stem}_run.nc")
         run = found[[name for name in RUN if name in found]].assign_attrs(Conventions="CF-1.8")
-        write_netcdf(run, files[-1], "NETCDF4")
+        write_netcdf(run, files[-1])
     done = check(tmp_path, *files)
     assert done.stdout.count("ERRORS detected: 0") == len(files), done.stdout + done.stderr
     assert len(files) > 10

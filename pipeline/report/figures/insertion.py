@@ -45,7 +45,7 @@ def insertion(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     depth = 1e3 * with_puncture(dataset, "depth")
     force, bar = (1e3 * with_puncture(dataset, name) for name in ("force", "force_error"))
-    _stack(above, dataset, _PARTS, 1e3)
+    _stack(above, dataset, _PARTS)
     above.fill_between(depth, force - bar, force + bar, **_BAND)
     above.plot(depth, force, color=LINE, label="F")
     if back is not None:
@@ -55,7 +55,7 @@ def insertion(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         above.plot(away, pulled, color=COLOURS[4], label="F of the withdrawal")
         above.axhline(0, color=LINE, linewidth=0.6)
     above.set_ylabel("force (mN)")
-    _stack(below, dataset, _ENERGIES, 1e3)
+    _stack(below, dataset, _ENERGIES)
     below.plot(depth, 1e3 * with_puncture(dataset, "work"), color=LINE, linestyle="--", label="work of the tool")
     below.set_ylabel("energy (mJ)")
     below.set_xlabel("depth of the tip (mm)")
@@ -96,9 +96,9 @@ def with_puncture(dataset: xr.Dataset, name: str) -> np.ndarray:
     return np.concatenate([[0.0], np.insert(dataset[name].values.astype(float), np.searchsorted(depths, at), own)])
 
 
-def _stack(ax: Axes, dataset: xr.Dataset, names: Sequence[str], factor: float) -> None:
+def _stack(ax: Axes, dataset: xr.Dataset, names: Sequence[str]) -> None:
     depth, *parts = (with_puncture(dataset, name) for name in ("depth", *names))
-    parts = [factor * part for part in parts]
+    parts = [1e3 * part for part in parts]
     ax.stackplot(1e3 * depth, parts, labels=_LABELS, colors=COLOURS[1:4], alpha=0.5, linewidth=0)
 
 

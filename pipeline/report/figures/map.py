@@ -13,7 +13,7 @@ from pipeline.report.words import choices, heading, scale
 from pipeline.states import FAILURES, LOST, OK, PENDING, SKIPPED
 
 PLACES = ("x", "y")
-_MOST_PANELS = 3
+_MOST_PANELS, _MOST_TICKS = 3, 7
 _COLOURS = "cividis"
 _PANEL = 3.0  # inches: the width of a panel
 
@@ -91,7 +91,7 @@ def draw_excess(ax: Axes, excess: xr.DataArray, bar: xr.DataArray, point: tuple[
     return drawn
 
 
-def _some(values: np.ndarray, most: int = 7) -> np.ndarray:
+def _some(values: np.ndarray) -> np.ndarray:
     """Return the values that are written at an axis, first and last among them."""
-    chosen = np.unique(np.linspace(0, len(values) - 1, min(most, len(values))).round().astype(int))
+    chosen = np.unique(np.linspace(0, len(values) - 1, min(_MOST_TICKS, len(values))).round().astype(int))
     return np.asarray(values[chosen])
