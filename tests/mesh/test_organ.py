@@ -79,6 +79,12 @@ def qualities(mesh):
     return double * 2**0.5 / (np.square(edges).sum(axis=0) / 6) ** 1.5
 
 
+def on_border(mesh):
+    found = np.zeros(len(mesh.points), dtype=bool)
+    found[np.concatenate([facets.ravel() for facets in mesh.facets.values()])] = True
+    return found
+
+
 def test_same_file_same_mesh_in_another_process(file):
     code = (
         "import sys, hashlib; from tests.mesh.test_organ import *; s = scene(sys.argv[1]);"
@@ -240,9 +246,10 @@ def test_a_surface_that_is_not_the_files_is_never_filled(file, monkeypatch):
         mesh_organ(a_scene, SIZES, far)
 
 
-def test_a_thin_brim_is_meshed_whatever_the_elements_of_the_ball_are(tmp_path):
-    """A ball with a brim: elements as large as the ball allows would cross in the brim."""
-    directions, facets = sphere(24)
+@pytest.mark.parametrize("frequency", [20, 24])
+def test_a_thin_brim_is_meshed_whatever_the_elements_of_the_ball_are(tmp_path, frequency):
+    """A ball with a brim: elements as large as the ball allows would cross in the brim, or be flat."""
+    directions, facets = sphere(frequency)
     brim = ((directions / np.array([60e-3, 60e-3, 4e-3])) ** 2).sum(axis=1) ** -0.5
     points = directions * ((35e-3**12 + brim**12) ** (1 / 12))[:, None]
     a_scene = scene(write_stl(tmp_path / "brim.stl", points, facets))
@@ -250,6 +257,8 @@ def test_a_thin_brim_is_meshed_whatever_the_elements_of_the_ball_are(tmp_path):
     mesh = mesh_scanned(a_scene, a_scene.body, sizes)
     assert volume(mesh) == pytest.approx(a_scene.body.volume, rel=0.02)  # by chords
     assert qualities(mesh).min() > 0.05
+    (skin,) = a_scene.body.surfaces()["skin"]
+    assert skin.distance(mesh.points).max(initial=0.0, where=on_border(mesh)) < mesh.deviation + 1e-9
 
 
 @pytest.mark.parametrize("growth", [0.3, 0.6])

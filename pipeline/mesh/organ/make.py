@@ -14,6 +14,7 @@ from pipeline.mesh.organ.contact import Contact, FoldedError, set_in
 from pipeline.mesh.organ.faces import Faces
 from pipeline.mesh.organ.field import Field
 from pipeline.mesh.organ.regions import fill_regions
+from pipeline.mesh.organ.relax import relaxed
 from pipeline.mesh.organ.remesh import remesh
 from pipeline.mesh.organ.sheet import PROBE, Sheet, TangledError, edges_of, group_names
 from pipeline.mesh.organ.untangle import untangled
@@ -108,8 +109,9 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     facets = {name: sheet.facets[sheet.kind == number] for number, name in group_names().items()}
     facets[FREE] = np.vstack([facets[FREE], filled.walls])
     rim = np.unique(sheet.border(PROBE))
+    points = relaxed(filled, sheet, far.faces.skin)
     seconds = perf_counter() - start
-    return MeshArrays(filled.points, filled.cells, facets, rim, seconds, filled.regions, deviation=deviation)
+    return MeshArrays(points, filled.cells, facets, rim, seconds, filled.regions, deviation=deviation)
 
 
 def _check(scene: Scene) -> None:
