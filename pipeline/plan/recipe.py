@@ -105,17 +105,31 @@ _FOUND = {
         Recipe(2, 0.06, 0.14, 3.4e-4),
     ),
 }
-# The same at large displacements, where F is not extrapolated.
+# The same at large displacements, where F is extrapolated for balls on plain bodies only.
 _FOUND_LARGE = (
-    Recipe(2, 0.4, 0.6, 3.3e-2),
-    Recipe(2, 0.3, 0.45, 1.65e-2),
-    Recipe(2, 0.25, 0.35, 9.3e-3),
-    Recipe(2, 0.2, 0.3, 5.1e-3),
-    Recipe(2, 0.15, 0.25, 2.7e-3),
-    Recipe(2, 0.12, 0.2, 1.3e-3),
-    Recipe(2, 0.08, 0.17, 8.4e-4),
-    Recipe(2, 0.06, 0.14, 5.4e-4),
+    Recipe(2, 0.4, 0.6, 3.0e-2),
+    Recipe(2, 0.3, 0.45, 1.2e-2),
+    Recipe(2, 0.25, 0.35, 6.5e-3),
+    Recipe(2, 0.2, 0.3, 4.2e-3),
+    Recipe(2, 0.15, 0.25, 2.8e-3),
+    Recipe(2, 0.12, 0.2, 2.2e-3),
+    Recipe(2, 0.08, 0.17, 1.5e-3),
+    Recipe(2, 0.06, 0.14, 1.1e-3),
 )
+_BALL_LARGE = (
+    Recipe(2, 0.6, 0.8, 1.1e-2),
+    Recipe(2, 0.5, 0.7, 7.5e-3),
+    Recipe(2, 0.4, 0.6, 6.0e-3),
+    Recipe(2, 0.3, 0.45, 4.8e-3),
+    Recipe(2, 0.25, 0.35, 3.8e-3),
+    Recipe(2, 0.2, 0.3, 3.0e-3),
+    Recipe(2, 0.15, 0.25, 2.2e-3),
+    Recipe(2, 0.12, 0.2, 1.7e-3),
+    Recipe(2, 0.08, 0.17, 1.15e-3),
+    Recipe(2, 0.06, 0.14, 8.6e-4),
+)
+# Deeper balls, in units of their radius, need small elements: contact must end within the region that is searched.
+_SHALLOW = 0.8
 # At large displacements, elements of degree 3, and very small ones, fold at the probe's edge.
 _LARGE = (
     *LADDER[:4],
@@ -181,7 +195,10 @@ def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
 def _ladder(case: Case) -> tuple[Recipe, ...]:
     """Return the recipes for a probe, cheapest first."""
     if not case.probe.is_flat:
-        return _FOUND_LARGE if case.material.is_large else _FOUND[case.element]
+        if not case.material.is_large:
+            return _FOUND[case.element]
+        ball = case.probe.hertz_radius if is_ball(case) and case.is_plain and not case.probe.friction else None
+        return _FOUND_LARGE if ball is None or case.probe.depth > _SHALLOW * ball else _BALL_LARGE
     if not case.has_quarter_points:
         return _DEEP
     if case.material.is_large:
@@ -215,7 +232,7 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
     if case.material.is_large and case.has_quarter_points and not case.probe.is_unilateral:
         shape *= _OF_LARGE * (1 + _BY_DEPTH * case.probe.depth / half_width_of(case))
     locking = 1.0 if case.element == "mixed" else ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
-    if not (case.probe.is_flat or case.material.is_large):  # elements in a thin body are small anyway
+    if not case.probe.is_flat:  # elements in a thin body are small anyway
         return [float(recipe.bar * shape * locking) for recipe in ladder]
     is_even = ladder is _EVEN
     thin = min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
@@ -234,6 +251,11 @@ def has_sure_limit(case: Case) -> bool:
     It is for one movement of a disc on a whole plain body. Below blades, one degree more removes less of the error.
     """
     return case.is_plain and case.probe.is_round and case.movements == 1 and not case.is_truncated
+
+
+def is_ball(case: Case) -> bool:
+    """Return whether F has the limit of balls; their histories at large displacements are not extrapolated."""
+    return case.probe.hertz_radius is not None and not (case.material.is_large and case.is_stepped)
 
 
 def _near(case: Case) -> float:

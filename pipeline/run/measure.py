@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.plan.cost import features
-from pipeline.plan.recipe import edge_width_of, half_width_of, has_sure_limit
+from pipeline.plan.recipe import edge_width_of, half_width_of, has_sure_limit, is_ball
 from pipeline.plan.refinement import is_refined
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
@@ -56,7 +56,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
             is_fine=is_plain and has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
             has_others=not is_plain,
             is_large=case.material.is_large,
-            is_ball=case.probe.hertz_radius is not None,
+            is_ball=is_ball(case),
         )
         solution = solution.extrapolated(known)
     # The solution is in the frame where the probe presses along -z; the record is in the body's coordinates.
@@ -168,7 +168,7 @@ def is_graded_to_contact(case: Case) -> bool:
         *beside, _ = first_touch(case.body, case.probe, case.frame)
         if hypot(*beside) > _BESIDE * half_width_of(case):
             return False
-    return is_graded(rim, case.mesh.growth, found=found)
+    return is_graded(rim, case.mesh.growth, found=found, large=case.material.is_large)
 
 
 def _rim(case: Case) -> float:

@@ -14,7 +14,8 @@ class Convergence:
 
     The solve adds the share ``plain`` of edges at the rim without quarter points. ``is_solved`` says
     that decrements at large displacements are not those of a linearisation, and ``is_ended`` that the tool's own edge
-    bounds the contact. ``friction`` is the part of the relative bar that the next degree does not reduce.
+    bounds the contact. ``friction`` is the part of the relative bar that the next degree does not reduce, ``at_edge``
+    the relative bar on the contact's area for the element size alone.
     """
 
     degree: int
@@ -28,3 +29,4 @@ class Convergence:
     is_solved: bool = False
     is_ended: bool = False
     friction: float = 0.0
+    at_edge: float = 0.0

@@ -72,16 +72,20 @@ _FOUND_ENDED, _FOUND_ELSEWHERE = (0.43, 0.4), 1.25
 _FOUND_AGAIN, _FOUND_AT_EDGE = 2.0, 0.1
 # The same at large displacements, for the area's bar, by degree: docs/accuracy.md.
 AT_EDGE_LARGE = {2: 0.15, 3: 0.075}
+# The limit of F there, for balls on plain bodies in degree 2: F_2 - (centre ± spread) (F_2 - F_3). The bar is at least
+# a share of the area's bar, which covers what the contact's edge adds by chance.
+_FOUND_LARGE, _FOUND_LARGE_AT_EDGE, _FOUND_LARGE_DEGREE = (1.08, 0.35), 0.12, 2
 # Limits of a mesh that counts as graded to the edge: rim size relative to the probe's half width, and growth; then
-# those where the width of contact is found.
+# those where the width of contact is found, at small and at large displacements.
 _GRADED, _GRADED_FOUND = (0.4, 0.7), (0.26, 0.41)
+_GRADED_LARGE = (0.61, 0.81)
 # The same for small elements, below those of the coarsest recipe.
 _FINE = (0.31, 0.61)
 
 
-def is_graded(rim: float, growth: float, *, found: bool = False) -> bool:
+def is_graded(rim: float, growth: float, *, found: bool = False, large: bool = False) -> bool:
     """Return whether a mesh is graded to the edge; ``rim`` in units of the half width, of contact if ``found``."""
-    largest, steepest = _GRADED_FOUND if found else _GRADED
+    largest, steepest = (_GRADED_LARGE if large else _GRADED_FOUND) if found else _GRADED
     return rim <= largest and growth <= steepest
 
 
@@ -204,8 +208,11 @@ def extrapolate_found(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the limit of F / d (1, 1) of unilateral contact, and its bar.
 
-    F is lowered by a share of its bar; where one degree more raises it, F and its bar stay.
+    F is lowered by a share of its bar; where one degree more raises it, F and its bar stay. At large displacements the
+    limit is known for balls only.
     """
+    if known.is_large:
+        return _extrapolate_found_large(stiffness, decrements, bars, known)
     which = known.element, known.degree
     centre, spread = _FOUND_BALL[which] if known.is_ball and which in _FOUND_BALL else _FOUND_LIMITS[which]
     if not known.is_graded or known.is_ended:
@@ -214,6 +221,17 @@ def extrapolate_found(
     left = known.friction * np.abs(stiffness)
     own, falls = bars - left, decrements > 0
     return stiffness - np.where(falls, centre, 0.0) * own, np.where(falls, spread, 1.0) * own + left
+
+
+def _extrapolate_found_large(
+    stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, known: Convergence
+) -> tuple[FloatArray, FloatArray]:
+    is_ball = known.is_ball and known.degree == _FOUND_LARGE_DEGREE and not known.has_others and not known.friction
+    if not (is_ball and known.is_graded and decrements[0, 0] > 0):
+        return stiffness, bars
+    (centre, spread), change = _FOUND_LARGE, _FOUND / 2 * decrements  # F_2 - F_3: see `found_again_bar`
+    least = _FOUND_LARGE_AT_EDGE * known.at_edge * np.abs(stiffness)
+    return stiffness - centre * change, np.maximum(spread * change, least)
 
 
 def _theta(degree: int) -> float:

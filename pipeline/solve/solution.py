@@ -173,11 +173,12 @@ class Solution:
 
         ``known`` is what the case says; the solution adds the rest.
         """
-        if self.decrements is None or self.bars is None or (known.is_large and self.contact is not None):
-            return self  # found contact at large displacements has no known limit: F and its bar stay
+        if self.decrements is None or self.bars is None:
+            return self
         known = replace(known, plain=self.plain, is_solved=self.is_solved)
-        if self.contact is not None:
-            known = replace(known, is_ended=self.contact.is_ended, friction=self.contact.friction_bar)
+        if (contact := self.contact) is not None:
+            at_edge = contact.bar - self.bar
+            known = replace(known, is_ended=contact.is_ended, friction=contact.friction_bar, at_edge=at_edge)
             stiffness, bars = extrapolate_found(self.stiffness, self.decrements, self.bars, known)
             return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
         stiffness, bars = extrapolate(self.stiffness, self.decrements, self.bars, known, self.unseen)

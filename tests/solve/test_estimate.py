@@ -9,7 +9,7 @@ from pipeline.run.execute import compute
 from pipeline.run.meshing import mesh_case
 from pipeline.solve.cell_values import plain_share
 from pipeline.solve.convergence import Convergence
-from pipeline.solve.estimate import error_bar, extrapolate, is_graded
+from pipeline.solve.estimate import error_bar, extrapolate, extrapolate_found, found_again_bar, is_graded
 from pipeline.study.read import parse
 from tests.cases import BLADE, solve, study
 from tests.sampling import sampled
@@ -195,6 +195,25 @@ def test_accuracies_of_mixed_elements_hold_in_thin_bodies(case):
     found = force(content, {**given, "accuracy": "10 %"}, solid=True)
     truth = force(content, {"accuracy": "0.1 %"}, solid=False)
     assert abs(found.force / truth.force - 1) <= found.force_error
+
+
+def test_limit_of_a_ball_at_large_displacements():
+    """F is lowered to about that of degree 3; the bar is smaller, with a least value by the contact area."""
+
+    def limit(share, at_edge, **options):
+        decrement, bar = found_again_bar(share, at_edge, 0.15)
+        known = Convergence(degree=2, element="displacement", is_large=True, at_edge=at_edge, **options)
+        values = (np.full((1, 1), value) for value in (1.0, decrement, bar))
+        return [found.item() for found in extrapolate_found(*values, known)], bar
+
+    (force, left), bar = limit(0.02, 0.05, is_ball=True)
+    assert force == pytest.approx(1 - 1.08 * 0.02)
+    assert left == pytest.approx(0.35 * 0.02)
+    assert limit(0.001, 0.05, is_ball=True)[0][1] == pytest.approx(0.12 * 0.05)
+    for options in ({}, {"is_ball": True, "has_others": True}, {"is_ball": True, "is_graded": False}):
+        assert limit(0.02, 0.05, **options)[0] == [1.0, pytest.approx(bar)]
+    (force, left), bar = limit(-0.02, 0.05, is_ball=True)
+    assert (force, left) == (1.0, pytest.approx(bar))
 
 
 def test_what_is_graded():
