@@ -10,12 +10,21 @@ from pathlib import Path
 # `srun --mpi=none` is a run of its own.
 _RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 _LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "MPI_LOCALNRANKS")
+# For one process Open MPI need neither start its daemon nor look for a network: half a second, mostly of waiting.
+_ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_pml": "ob1"}
 _PREFIXES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_")
 
 
 def is_launched() -> bool:
     """Tell whether a launcher has started this process, alone or as one of several ranks."""
     return any(name in os.environ for name in _LAUNCHED)
+
+
+def prepare_mpi() -> None:
+    """Let MPI, which is loaded later, start quickly in a process that no launcher started; what the user set stays."""
+    if not is_launched():
+        for name, value in _ALONE.items():
+            os.environ.setdefault(name, value)
 
 
 def is_first_rank() -> bool:

@@ -43,7 +43,8 @@ def test_study_runs_and_every_rank_has_the_dataset(folder):
     assert data.epsmesh.guide("50%").answer is not None
     assert (folder / "out" / "small.nc").exists()
     assert not (folder / "out" / "cases.sqlite").exists()
-    again = study.run(WORLD, output=folder / "out", store=folder / "kept.sqlite")
+    assert study.run(WORLD, output=folder / "out", store=folder / "kept.sqlite").identical(data)
+    again = study.run(WORLD, output=folder / "again", store=folder / "kept.sqlite")
     assert set(np.unique(again["origin"])) == {f"{origin}, stored" for origin in np.unique(data["origin"])}
     np.testing.assert_array_equal(again["force"], data["force"])
     assert not study.plan(store=folder / "kept.sqlite").solves

@@ -61,10 +61,10 @@ def test_second_run_reads_back(epsmesh, small, whole, tmp_path):
     assert {name.rpartition(", ")[::2] for name in np.unique(one["origin"])} == {("symmetric", "stored")}
 
 
-def test_a_figure_is_drawn_again_if_it_is_not_there_or_shows_something_else(epsmesh, small, whole, tmp_path):
-    """Not if its dataset has the same numbers: one that is replaced is another file."""
+def test_results_are_written_again_if_one_is_not_there_or_shows_something_else(epsmesh, small, whole, tmp_path):
+    """Not if they have the same numbers: one that is replaced is another file."""
     shutil.copytree(whole, tmp_path / "out")
-    files = [tmp_path / "out" / f"small.{suffix}" for suffix in ("png", "svg")]
+    files = [tmp_path / "out" / f"small.{suffix}" for suffix in ("nc", "png", "svg")]
 
     def replaced() -> bool:
         before = [file.stat().st_ino if file.exists() else 0 for file in files]
@@ -73,15 +73,16 @@ def test_a_figure_is_drawn_again_if_it_is_not_there_or_shows_something_else(epsm
         assert len({one == other for one, other in zip(before, after, strict=True)}) == 1
         return before != after
 
+    assert replaced()  # the study was at another place
     assert not replaced()
-    files[1].unlink()
+    files[2].unlink()
     assert replaced()
     assert not replaced()
-    files[0].write_bytes(files[0].read_bytes()[:100])
+    files[1].write_bytes(files[1].read_bytes()[:100])
     assert replaced()
     small.write_text(SMALL.replace('title = "small"', 'title = "another"'))
     assert replaced()
-    assert "another" in files[1].read_text()
+    assert "another" in files[2].read_text()
 
 
 def test_bad_study_ends_with_2_and_writes_nothing(spawn, small, tmp_path):

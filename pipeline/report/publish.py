@@ -7,6 +7,7 @@ from typing import NamedTuple
 from pipeline.files import result_files
 from pipeline.launcher import is_interrupt
 from pipeline.plan.plan import Plan
+from pipeline.report.made import are_made, inputs_of, note_made
 from pipeline.run.record import Record
 
 
@@ -22,7 +23,7 @@ class ResultsError(Exception):
 
 
 class Results(NamedTuple):
-    """Files of results: those ``written``, the dataset first, and figures that had the same numbers before."""
+    """Files of results, the dataset first: those ``written``, or ``unchanged`` since the same inputs gave them."""
 
     written: tuple[Path, ...] = ()
     unchanged: tuple[Path, ...] = ()
@@ -33,32 +34,33 @@ class Results(NamedTuple):
         return (*self.written, *self.unchanged)
 
     def __str__(self) -> str:
-        left = f"; unchanged: {', '.join(map(str, self.unchanged))}" if self.unchanged else ""
-        return f"wrote {', '.join(map(str, self.written))}{left}"
+        what = "wrote" if self.written else "unchanged:"
+        return f"{what} {', '.join(map(str, self.files))}"
 
 
 def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, str], output: Path) -> Results:
     """Write ``<study>.nc`` and its figure into ``output`` and return the files; ``attributes`` tell of the run.
 
-    A figure of the same numbers stays as it is.
+    Files that the same inputs gave stay as they are, with the attributes of the run that wrote them.
 
     Raises:
         ResultsError: whatever keeps them from being made.
     """
-    from pipeline.report.dataset import build, write  # noqa: PLC0415 (xarray is slow to load, and no shard needs it)
-    from pipeline.report.drawn import are_drawn, mark_of  # noqa: PLC0415
-
     what = f"{output}: the results of {plan.study.file} cannot be"
-    path, *figures = result_files(output, plan.study.name)
+    files = result_files(output, plan.study.name)
     try:
+        inputs = inputs_of(plan, records)
+        if are_made(files, inputs):
+            return Results(unchanged=tuple(files))
+        from pipeline.report.dataset import build, write  # noqa: PLC0415 (xarray is slow to load, and no shard needs it)
+
         dataset = build(plan, records, attributes)
-        write(dataset, path)
-        if are_drawn(figures, mark_of(dataset)):
-            return Results((path,), tuple(figures))
+        write(dataset, files[0])
         from pipeline.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)
 
-        draw(dataset, path.with_suffix(""))
-        return Results((path, *figures))
+        draw(dataset, files[0].with_suffix(""))
+        note_made(files, inputs)
+        return Results(tuple(files))
     except (OSError, RuntimeError) as error:  # of a full disk HDF5 tells the latter
         raise ResultsError(f"{what} written: {error}; all forces are on record", is_unwritable=True) from error
     except Exception as error:

@@ -14,6 +14,11 @@ from tests.fuzz.studies import toml
 
 def dataset(failed: int = 0, pending: int = 0, **changes):
     """Return the dataset of a study with forces that follow the curves that real ones have."""
+    return build(*planned(failed, pending, **changes), {"start": "2026-01-01"})
+
+
+def planned(failed: int = 0, pending: int = 0, **changes):
+    """Return the plan of that study and its records, by key."""
     content = raw(**changes)
     plan = make_plan(parse(content, text=toml(content)))
     records = {}
@@ -36,7 +41,7 @@ def dataset(failed: int = 0, pending: int = 0, **changes):
             records[solve.key] = Record(solve.key, "failed", "it went wrong")
     for key in itertools.islice(reversed(plan.keys), pending):
         records.pop(key, None)
-    return build(plan, records, {"start": "2026-01-01"})
+    return plan, records
 
 
 EPSILONS = ["4 mm", "5 mm", "7 mm", "10 mm", "15 mm", "20 mm", "full"]

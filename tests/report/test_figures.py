@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.report.drawn import code_in
 from pipeline.report.figures import KINDS, choose, draw, figure, lacks
 from pipeline.report.figures.curves import positions
 from pipeline.report.figures.facets import arrange, rest
@@ -279,14 +278,3 @@ def test_points_are_written_as_people_write_them():
     assert choice(size, "40 mm 50.5 mm 20 mm").endswith("40 × 50.5 × 20 mm")
     assert points("around 1.5 mm 0 mm -3 mm radius 5 mm") == "around (1.5, 0, −3) mm radius 5 mm"
     assert [points(text) for text in ("disc 3 mm", "10 mm 20 kPa", "coarse")] == ["disc 3 mm", "10 mm 20 kPa", "coarse"]
-
-
-def test_the_code_that_draws_figures_is_part_of_their_mark(tmp_path):
-    module = tmp_path / "figures" / "style.py"
-    module.parent.mkdir()
-    found = []
-    for text in ("WIDTH = 1", "WIDTH = 2"):
-        module.write_text(text)
-        code_in.cache_clear()
-        found.append(code_in(tmp_path))
-    assert found[0] != found[1]

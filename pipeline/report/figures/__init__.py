@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from pipeline.files import FIGURE_FORMATS
 from pipeline.printable import counted
 from pipeline.report.compliance import tool_dimension
-from pipeline.report.drawn import mark_of
 from pipeline.report.figures.compliance import compliance
 from pipeline.report.figures.error import error, error_facets
 from pipeline.report.figures.facets import Facets, is_meshed, rest, swept
@@ -104,11 +103,11 @@ def draw(
     The main figure goes to ``<stem>.png`` and ``.svg``, those of other ``kinds`` to ``<stem>_<kind>.png`` and ``.svg``,
     and, with the ``rest``, what each leaves out to ``<stem>_<kind>_2.png`` and so on.
     """
-    written, mark = [], mark_of(dataset)
+    written = []
     with mpl.rc_context(STYLE):
         for kind, paths in files(dataset, stem, formats, kinds).items():
             drawn = figure(dataset, kind)
-            written += [save(drawn, path, mark) for path in paths]
+            written += [save(drawn, path) for path in paths]
             for number, (words, part) in enumerate(_rest(dataset, kind) if rest else [], start=2):
                 title = " – ".join(filter(None, (str(dataset.attrs.get("title", "")), words)))
                 drawn = figure(part.assign_attrs(title=title), kind)

@@ -25,7 +25,6 @@ _PHONE, _PHONE_PANEL, _PHONE_LINE, _PHONE_LETTERS = 3.4, 2.2, 0.19, 38
 _LETTERS, _LEGEND_LETTERS = 13, 24
 _DECADES = {"x": 1.4, "y": 2.2}  # from here on a logarithmic axis writes powers of ten alone
 _NARROW = 3.0  # below this ratio of its ends, even steps
-_DESCRIBED = (".png", ".svg")  # formats with a description
 # A matplotlibrc, of the user or of the current folder, changes nothing: the same dataset gives the same file.
 DEFAULTS = {name: value for name, value in mpl.rcParamsDefault.items() if name not in STYLE_BLACKLIST}
 STYLE = DEFAULTS | {
@@ -198,14 +197,10 @@ def _written(value: float, _position: int | None = None) -> str:
     return f"{value:,.12g}"
 
 
-def save(figure: Figure, path: Path, mark: str = "") -> Path:
-    """Write ``figure`` to ``path``, in place of an earlier one only once it is whole.
-
-    The ``mark`` of its dataset is the description in the file (:mod:`pipeline.report.drawn`).
-    """
-    metadata: dict[str, str | None] = {"Description": mark} if mark and path.suffix in _DESCRIBED else {}
-    if path.suffix == ".svg":
-        metadata["Date"] = None  # the same dataset gives the same file
+def save(figure: Figure, path: Path) -> Path:
+    """Write ``figure`` to ``path``, in place of an earlier one only once it is whole."""
+    # Without a date the same dataset gives the same file.
+    metadata: dict[str, str | None] = {"Date": None} if path.suffix == ".svg" else {}
     with atomic(path) as temporary:
         figure.savefig(temporary, dpi=200, metadata=metadata)
     return path
