@@ -7,7 +7,7 @@ from functools import lru_cache
 from math import inf
 from typing import Any
 
-from pipeline.plan.refinement import is_refined
+from pipeline.plan.refinement import refinements
 from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.shapes.body import PIECES, Body
 from pipeline.shapes.probe import Probe
@@ -97,10 +97,10 @@ def reference_key(case: Case, accuracy: float) -> str:
 
 
 def mesh_key(case: Case) -> str:
-    """Return the key of a case's mesh: body, footprint, sizes, whether elements are curved, and whether refined."""
+    """Return the key of a case's mesh: body, footprint, sizes, whether elements are curved, and how often refined."""
     sizes = _mesh_text(case.mesh, case.is_full, case.probe.half_width, "")
     footprint = text_of(case.probe, case.probe.not_drawn)
-    refined = ["refined"] if is_refined(case) else []
+    refined = [f"refined {times}"] if (times := refinements(case)) else []
     parts = [_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1), *refined, *_rim_text(case)]
     return digest("\n".join(parts))
 

@@ -1,4 +1,4 @@
-"""Which meshes are refined: gmsh makes one of larger elements, which are then cut into eight each."""
+"""Which meshes are refined, once or twice: gmsh makes one of larger elements, which are then cut into eight each."""
 
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -11,8 +11,8 @@ from pipeline.shapes.probe import Probe
 from pipeline.study.case import Case
 from pipeline.study.schema import Mesh
 
-# Estimated number of tetrahedra of the modelled part from which on meshes are refined.
-LEAST = 40_000
+# Estimated numbers of tetrahedra of the modelled part from which on meshes are refined once, and twice.
+LEAST: tuple[float, float] = (40_000, 200_000)
 # Tetrahedra of a refined mesh, in units of the estimate: .71 to .86 on four scenes.
 _FEWER = 0.8
 _MANY = 200_000  # scenes of a large study
@@ -29,13 +29,18 @@ class _Scene:
 
 
 def is_refined(case: Case) -> bool:
-    """Return whether the mesh of a case is refined.
+    """Return whether the mesh of a case is refined: see :func:`refinements`."""
+    return refinements(case) > 0
+
+
+def refinements(case: Case) -> int:
+    """Return how many times the mesh of a case is refined: 0, 1 or 2.
 
     Points of a refined mesh are placed on surfaces that a formula gives. Bodies from files are therefore not refined,
     nor are curved bodies cut at ε, because two such surfaces meet there, nor slits. Nor are inclusions: some of their
-    elements would fold.
+    elements would fold. Layered bodies are refined once: gmsh's elements would be too large for a layer.
     """
-    return case.mesh.degree > 1 and _is_refined(_Scene(case.body, case.probe, case.mesh, case))
+    return _refinements(_Scene(case.body, case.probe, case.mesh, case)) if case.mesh.degree > 1 else 0
 
 
 def cells(case: Case) -> float:
@@ -44,10 +49,11 @@ def cells(case: Case) -> float:
 
 
 @lru_cache(_MANY)
-def _is_refined(scene: _Scene) -> bool:
+def _refinements(scene: _Scene) -> int:
     body, case = scene.body, scene.case
     if not isinstance(body, Drawn) or body.embedded or scene.probe.slit is not None or scene.probe.crack:
-        return False
-    if estimate.cells(case) * 0.5 ** len(mirror_planes(case)) < LEAST:
-        return False
-    return case.column == inf or not any(surface.is_curved for group in body.surfaces().values() for surface in group)
+        return 0
+    if case.column < inf and any(surface.is_curved for group in body.surfaces().values() for surface in group):
+        return 0
+    count = estimate.cells(case) * 0.5 ** len(mirror_planes(case))
+    return sum(count >= least for least in (LEAST[:1] if body.regions else LEAST))

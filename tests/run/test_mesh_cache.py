@@ -40,12 +40,12 @@ def test_a_mesh_that_cannot_be_refined_is_that_of_gmsh(tmp_path, monkeypatch):
         raise NotRefined("flat")
 
     monkeypatch.setattr(parts, "refined", fails)
-    monkeypatch.setattr(refinement, "LEAST", 0)
-    refinement._is_refined.cache_clear()
+    monkeypatch.setattr(refinement, "LEAST", (0, 0))
+    refinement._refinements.cache_clear()
     cache, wanted = MeshCache(tmp_path), len(unrefined_arrays(CASE, PLANES).cells)
     found = [mesh_case(CASE, PLANES, MPI.COMM_SELF, cache).cells for _ in range(2)]
     found.append(len(cached_arrays(CASE, PLANES, cache).cells))
-    refinement._is_refined.cache_clear()
+    refinement._refinements.cache_clear()
     assert found == 3 * [wanted]
 
 
