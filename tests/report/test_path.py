@@ -41,6 +41,18 @@ def test_a_map_is_the_main_figure_of_a_raster_and_a_curve_that_of_a_line():
     assert "length along the path, mm" in {ax.get_xlabel() for ax in figure(line, "force").axes}
 
 
+def test_labels_of_a_fine_raster_do_not_overlap():
+    fine = {"raster": {"x": {"from": "-15 mm", "to": "15 mm", "steps": 20}, "y": ["-12 mm", "9 mm"]}}
+    drawn = figure(mapped(fine), "map")
+    drawn.draw_without_rendering()
+    for ax in drawn.axes[2:4]:
+        low, high = ax.get_xlim()
+        labels = [label for label in ax.get_xticklabels() if low <= label.get_position()[0] <= high]
+        boxes = [label.get_window_extent() for label in labels]
+        assert len(boxes) >= 3
+        assert all(one.x1 < other.x0 for one, other in itertools.pairwise(boxes))
+
+
 def test_where_contact_is_lost_the_map_says_so_and_keeps_its_colours():
     wide = mapped({"raster": {"x": ["0 mm", "9 mm", "30 mm"], "y": ["0 mm", "19 mm"]}, "off": "lost"})
     (ax, *_) = figure(wide, "map").axes

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import AutoLocator, FixedLocator, Locator
 
 from pipeline.report.figures.facets import arrange
 from pipeline.report.figures.style import CLAIM, FAILED, LINE, finish, look, new_figure
@@ -13,9 +14,11 @@ from pipeline.report.words import choices, heading, scale
 from pipeline.states import FAILURES, LOST, OK, PENDING, SKIPPED
 
 PLACES = ("x", "y")
-_MOST_PANELS, _MOST_TICKS = 3, 7
+_MOST_PANELS = 3
 _COLOURS = "cividis"
 _PANEL = 3.0  # inches: the width of a panel
+# Letters of labels that have room below a panel.
+_LETTERS = 30
 
 
 def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
@@ -60,8 +63,8 @@ def draw_map(ax: Axes, part: xr.Dataset, values: np.ndarray, **look: Any) -> Any
         if rows.size:
             style = {"marker": marker, "color": colour, "linestyle": "none", "fillstyle": "none", "markersize": 4}
             ax.plot(x[columns], y[rows], label=label, **style)
-    ax.set_xticks(_some(x))
-    ax.set_yticks(_some(y))
+    ax.xaxis.set_major_locator(_labels_of(x))
+    ax.yaxis.set_major_locator(_labels_of(y))
     ax.set_aspect("equal")
     return drawn
 
@@ -91,7 +94,7 @@ def draw_excess(ax: Axes, excess: xr.DataArray, bar: xr.DataArray, point: tuple[
     return drawn
 
 
-def _some(values: np.ndarray) -> np.ndarray:
-    """Return the values that are written at an axis, first and last among them."""
-    chosen = np.unique(np.linspace(0, len(values) - 1, min(_MOST_TICKS, len(values))).round().astype(int))
-    return np.asarray(values[chosen])
+def _labels_of(values: np.ndarray) -> Locator:
+    """Return where an axis is labelled: at the values if these have room below a panel, otherwise at round numbers."""
+    letters = len(values) * max(len(f"{value:.4g}") for value in values)
+    return FixedLocator(values) if letters <= _LETTERS else AutoLocator()
