@@ -18,7 +18,7 @@ from pipeline.plan.plan import Plan, leave_out_stored, make_plan
 from pipeline.plan.shard import Shard
 from pipeline.report.publish import Results, ResultsError, publish
 from pipeline.run.begun import ENDING, Begun, fail_begun
-from pipeline.run.completion import complete, places_of
+from pipeline.run.completion import complete
 from pipeline.run.merge import merge
 from pipeline.run.outbox import Outbox
 from pipeline.run.outcome import count_states, failures
@@ -238,17 +238,17 @@ def _compute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
 
 
 def _lacking(plan: Plan, opened: Opened, comm: MPI.Comm) -> Plan | None:
-    """Return the plan of what is needed besides ``plan`` and what is not stored; collective: see ``complete``."""
+    """Return the plan of what is needed besides ``plan`` and what is not stored; collective: see ``complete``.
+
+    Each rank makes it from the same records: a body with search trees cannot be sent.
+    """
 
     def get(keys: Collection[str]) -> dict[str, Record]:
         found = opened.store.get(keys) if opened.store and not opened.is_fresh else {}
-        return {key: record for key, record in found.items() if record.is_ok}
+        return comm.bcast({key: record for key, record in found.items() if record.is_ok})
 
-    further = complete(plan, opened.records, get) if comm.rank == 0 else None
-    if plan.study.is_insertion:
-        return comm.bcast(further)
-    # A body with search trees cannot be sent; each rank has the plan.
-    return places_of(plan, comm.bcast(further.keys if further else ()))
+    known = comm.bcast(opened.records)
+    return complete(plan, opened.records if comm.rank == 0 else known, get)
 
 
 def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None, signals: list[int]) -> None:

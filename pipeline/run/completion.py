@@ -60,12 +60,6 @@ def possible(plan: Plan, records: Mapping[str, Record]) -> Plan | None:
     return _plan_of(plan, {solve.key: solve for solve in solves if solve.key not in planned | records.keys()})
 
 
-def places_of(plan: Plan, keys: Collection[str]) -> Plan | None:
-    """Return the plan of the places with these ``keys`` along the paths of ``plan``; None without keys."""
-    found = {solve.key: solve for one in _with_ends(plan) for path in one.place_paths for solve in path.solves}
-    return _plan_of(plan, {key: found[key] for key in keys})
-
-
 def _with_ends(plan: Plan) -> list[Plan]:
     return [plan, *(one for end in plan.ends for one in (end.low, end.high) if one)]
 

@@ -81,6 +81,15 @@ def test_a_second_run_reads_what_was_solved(ran, epsmesh):
     assert round(1e3 * float(read["puncture_depth"]), 5) == depth
 
 
+def test_two_ranks_solve_the_same_states_of_the_path(ran, spawn, tmp_path):
+    """Those besides its stages, too, which follow from what was solved before."""
+    folder, _ = ran
+    done = spawn("run", folder / "pad.toml", "--output", tmp_path, "-q", ranks=2)
+    assert done.returncode == 0, done.stderr
+    alone, together = (read_file(place / "pad.nc") for place in (folder, tmp_path))
+    np.testing.assert_allclose(together["force"], alone["force"], rtol=1e-6)
+
+
 def test_states_that_were_not_solved_leave_the_case_pending(epsmesh, tmp_path, ran):
     """A killed run has some stages: the next one goes on from them."""
     folder, _ = ran

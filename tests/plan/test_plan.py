@@ -1,7 +1,5 @@
 """The plan: every case gets its record, nothing is solved twice, timing strikes nothing."""
 
-import pickle
-
 import pytest
 
 from pipeline.plan.describe import summary
@@ -45,12 +43,6 @@ def test_stored_cases_are_not_solved():
     again = make_plan(study(**SWEEP), known)
     assert len(again.solves) == 5
     assert again.stored == known
-
-
-def test_a_plan_can_be_sent_to_other_ranks():
-    for sent in (study(), study(mesh={"epsilon": ["8 mm", "full"]}), study(material={"poisson": [0.3, 0.45]})):
-        plan = make_plan(sent)
-        assert pickle.loads(pickle.dumps(plan)).keys == plan.keys
 
 
 def test_timing_strikes_nothing():
