@@ -8,7 +8,7 @@ import re
 import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from math import inf, pi
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -194,24 +194,9 @@ def _refusal(unit: str, why: str) -> PydanticCustomError:
     return PydanticCustomError("quantity", "{allowed}", {"allowed": f"{what}; {why}" if why else what})
 
 
-def _length(text: Any) -> float:
-    return parse_quantity(text, "m")
-
-
-def _pressure(text: Any) -> float:
-    return parse_quantity(text, "Pa")
-
-
-def _density(text: Any) -> float:
-    return parse_quantity(text, "kg/m^3")
-
-
-def _toughness(text: Any) -> float:
-    return parse_quantity(text, "J/m^2")
-
-
-def _acceleration(text: Any) -> float:
-    return parse_quantity(text, "m/s^2")
+def _quantity_in(unit: str) -> BeforeValidator:
+    """Return the validator that reads a quantity in the SI ``unit``."""
+    return BeforeValidator(partial(parse_quantity, unit=unit))
 
 
 def _angle(text: Any) -> float:
@@ -222,29 +207,17 @@ def _angle(text: Any) -> float:
     return angle
 
 
-def _time(text: Any) -> float:
-    return parse_quantity(text, "s")
-
-
-def _frequency(text: Any) -> float:
-    return parse_quantity(text, "Hz")
-
-
-def _share(text: Any) -> float:
-    return parse_quantity(text, "")
-
-
-Coordinate = Annotated[float, BeforeValidator(_length), Field(json_schema_extra={"unit": "m"})]
+Coordinate = Annotated[float, _quantity_in("m"), Field(json_schema_extra={"unit": "m"})]
 Length = Annotated[Coordinate, Field(gt=0)]
 Angle = Annotated[float, BeforeValidator(_angle), Field(json_schema_extra={"unit": "rad"})]
 Rounding = Annotated[Coordinate, Field(ge=0)]
 Travel = Annotated[Coordinate, Field(ge=0)]
-Share = Annotated[float, BeforeValidator(_share), Field(json_schema_extra={"unit": "1"})]
-Stress = Annotated[float, BeforeValidator(_pressure), Field(json_schema_extra={"unit": "Pa"})]
+Share = Annotated[float, _quantity_in(""), Field(json_schema_extra={"unit": "1"})]
+Stress = Annotated[float, _quantity_in("Pa"), Field(json_schema_extra={"unit": "Pa"})]
 Pressure = Annotated[Stress, Field(gt=0)]
-Density = Annotated[float, BeforeValidator(_density), Field(gt=0, json_schema_extra={"unit": "kg/m^3"})]
-Toughness = Annotated[float, BeforeValidator(_toughness), Field(gt=0, json_schema_extra={"unit": "J/m^2"})]
-Acceleration = Annotated[float, BeforeValidator(_acceleration), Field(json_schema_extra={"unit": "m/s^2"})]
-Duration = Annotated[float, BeforeValidator(_time), Field(ge=0, json_schema_extra={"unit": "s"})]
-Time = Annotated[float, BeforeValidator(_time), Field(gt=0, json_schema_extra={"unit": "s"})]
-Frequency = Annotated[float, BeforeValidator(_frequency), Field(gt=0, json_schema_extra={"unit": "Hz"})]
+Density = Annotated[float, _quantity_in("kg/m^3"), Field(gt=0, json_schema_extra={"unit": "kg/m^3"})]
+Toughness = Annotated[float, _quantity_in("J/m^2"), Field(gt=0, json_schema_extra={"unit": "J/m^2"})]
+Acceleration = Annotated[float, _quantity_in("m/s^2"), Field(json_schema_extra={"unit": "m/s^2"})]
+Duration = Annotated[float, _quantity_in("s"), Field(ge=0, json_schema_extra={"unit": "s"})]
+Time = Annotated[float, _quantity_in("s"), Field(gt=0, json_schema_extra={"unit": "s"})]
+Frequency = Annotated[float, _quantity_in("Hz"), Field(gt=0, json_schema_extra={"unit": "Hz"})]

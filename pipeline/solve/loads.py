@@ -21,6 +21,7 @@ from pipeline.scene.model import FREE
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import add_from_ghosts, global_sum, vector
 from pipeline.solve.movement import Loads, SurfaceLoad, Vector
+from pipeline.solve.points.locate import table_of
 
 _CORNERS = np.vstack([np.zeros(3), np.eye(3)])  # of the reference cell
 _FACETS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # corners of its facets, in the order of dolfinx
@@ -78,7 +79,7 @@ def _add_weights(
     degree, geometry = compat.degree(space), _nodes(body)
     order = 1 if geometry.shape[1] == 4 else 2
     points, quadrature = basix.make_quadrature(basix.CellType.tetrahedron, degree + (0 if order == 1 else _CURVED))
-    functions, gradients = _table(degree, points)[0], _table(order, points)[1:]
+    functions, gradients = table_of(degree, points)[0], table_of(order, points)[1:]
     by_region = np.array(weights)
     sums = np.zeros(5)
     for start in range(0, body.owned_cells, _CHUNK):
@@ -113,9 +114,9 @@ def _add_traction(load: SurfaceLoad, body: BodyMesh, space: Any, dofs: Int32Arra
             flat, quadrature = _rule(degree, int(count))
             a, b, c = _CORNERS[_FACETS[side]]
             points = a + flat[:, :1] * (b - a) + flat[:, 1:] * (c - a)
-            values = _table(compat.degree(space), points)[0]
+            values = table_of(compat.degree(space), points)[0]
             order = 1 if geometry.shape[1] == 4 else 2
-            places, gradients = _table(order, points)[0], _table(order, points)[1:]
+            places, gradients = table_of(order, points)[0], table_of(order, points)[1:]
             for part in np.array_split(chosen, -(-len(chosen) * len(points) // 500_000)):
                 x = np.einsum("qk,ckx->cqx", places, geometry[part])
                 jacobian = np.einsum("aqk,ckx->cqxa", gradients, geometry[part])
@@ -167,11 +168,6 @@ def _halvings(load: SurfaceLoad, corners: FloatArray) -> Int32Array:
 def _nodes(body: BodyMesh) -> FloatArray:
     """Return the nodes (m) of each local cell, (cells, 4 or 10, 3)."""
     return np.asarray(body.mesh.geometry.x[compat.geometry_dofs(body.mesh)])
-
-
-def _table(degree: int, points: FloatArray) -> FloatArray:
-    """Return values, and derivatives along the three axes, of the functions of ``degree`` on the reference cell."""
-    return np.asarray(compat.reference_element(degree).tabulate(1, points)[:, :, :, 0])
 
 
 @cache

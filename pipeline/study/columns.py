@@ -7,7 +7,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJson
 from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.section import Section, Words
-from pipeline.units import parse_quantity, unit_factor
+from pipeline.units import unit_factor
 
 
 def refused(allowed: str) -> PydanticCustomError:
@@ -41,10 +41,6 @@ def _unit(kind: str) -> Callable[[str], str]:
     return check
 
 
-def _spring(value: Any) -> float:
-    return parse_quantity(value, "N/m")
-
-
 class Columns(BaseModel):
     """Names or numbers of the columns of a file."""
 
@@ -72,7 +68,7 @@ class Columns(BaseModel):
     ] = None
     spring: Annotated[
         Annotated[float, Field(gt=0, json_schema_extra={"unit": "N/m"})] | None,
-        BeforeValidator(lambda value: None if value is None else _spring(value)),
+        BeforeValidator(lambda value: None if value is None else parse_quantity(value, "N/m")),
         Words("Stiffness of this spring: the force is stiffness times deflection.", '"0.02 N/m"', default="none"),
     ] = None
 

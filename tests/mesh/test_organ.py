@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from basix import CellType, make_quadrature
 
-from benchmarks.folded import folded, study_of
 from pipeline.mesh.curve import EDGES, curve
 from pipeline.mesh.generate import MeshError, flat_cells
 from pipeline.mesh.of_case import mesh_arrays, sizes_of
@@ -29,6 +28,7 @@ from pipeline.shapes.frame import Frame
 from pipeline.shapes.surface import Surface
 from pipeline.study.read import parse
 from tests.cases import raw, study
+from tests.folded import folded, study_of
 from tests.mesh.test_mesh import area, volume
 from tests.organs import AXES, box, ellipsoid, sphere, write_stl
 from tests.sampling import sampled

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.folded import folded, study_of
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.plan import estimate
 from pipeline.plan.cost import CostModel, features
@@ -15,6 +14,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.plan.steps import MeshStep, OperatorStep, mesh_steps
 from pipeline.shapes.files.stl import written
 from tests.cases import BLADE, solve, study
+from tests.folded import folded, study_of
 
 MESHES = {
     "coarse": {"fine": "5 mm", "rim": "1 mm"},

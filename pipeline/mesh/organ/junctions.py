@@ -16,6 +16,7 @@ from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.organ.remesh import remesh
 from pipeline.mesh.organ.sheet import Sheet, compact
 from pipeline.mesh.organ.untangle import crossing_facets
+from pipeline.shapes.files.crossings import cross, dot, less
 
 # An edge is contracted below this length, in units of elements, if its curve moves by at most the second.
 _SHORT, _MOVES = 0.7, 0.15
@@ -159,25 +160,16 @@ class _Curves:
     def _off(self, gone: int, stays: int, other: int) -> float:
         """Return the distance (m) of a point from the edge between its neighbours."""
         a, b = self.points[stays], self.points[other]
-        along, to = _less(b, a), _less(self.points[gone], a)
-        share = min(max(_dot(along, to) / max(_dot(along, along), 1e-300), 0.0), 1.0)
+        along, to = less(b, a), less(self.points[gone], a)
+        share = min(max(dot(along, to) / max(dot(along, along), 1e-300), 0.0), 1.0)
         return dist(to, (share * along[0], share * along[1], share * along[2]))
 
     def _is_good(self, before: list[int], after: list[int]) -> bool:
         old, new = self._normal(before), self._normal(after)
-        doubled = _dot(new, new) ** 0.5
+        doubled = dot(new, new) ** 0.5
         longest = max(self._length(after[k], after[k - 1]) for k in range(3))
-        return doubled > _HEIGHT * longest**2 and _dot(old, new) > _TURN * _dot(old, old) ** 0.5 * doubled
+        return doubled > _HEIGHT * longest**2 and dot(old, new) > _TURN * dot(old, old) ** 0.5 * doubled
 
     def _normal(self, facet: list[int]) -> _Point:
         a, b, c = (self.points[point] for point in facet)
-        (x, y, z), (u, v, w) = _less(b, a), _less(c, a)
-        return y * w - z * v, z * u - x * w, x * v - y * u
-
-
-def _less(a: _Point, b: _Point) -> _Point:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _dot(a: _Point, b: _Point) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+        return cross(less(b, a), less(c, a))

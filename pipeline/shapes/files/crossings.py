@@ -2,11 +2,13 @@
 
 from fractions import Fraction
 from functools import cache
+from typing import TypeVar
 
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 
+Number = TypeVar("Number", float, Fraction)
 _Exact = tuple[Fraction, Fraction, Fraction]
 
 # Most pairs that are tested exactly, 1 ms each: a surface with more has real crossings.
@@ -28,7 +30,7 @@ def crossings(points: FloatArray, facets: IntArray) -> IntArray:
     doubtful = np.array([len({*facets[i]} & {*facets[j]}) < 2 for i, j in pairs], dtype=bool)
     doubtful[doubtful] = ~_surely_cross(points[facets[pairs[doubtful]]])
     again = np.flatnonzero(doubtful)[:_MOST]
-    wrong = [number for number in again if not _cross(*points[facets[pairs[number]]])]
+    wrong = [number for number in again if not _do_cross(*points[facets[pairs[number]]])]
     return np.delete(pairs, wrong, axis=0)
 
 
@@ -70,22 +72,22 @@ def _same_sign(values: FloatArray, least: FloatArray) -> BoolArray:
     return np.asarray((values > least).all(axis=0) | (values < -least).all(axis=0))
 
 
-def _cross(one: FloatArray, other: FloatArray) -> bool:
+def _do_cross(one: FloatArray, other: FloatArray) -> bool:
     """Return, in rational arithmetic, whether two triangles (3, 3) share anything but equal corners."""
     corners, polygon = ([(Fraction(x), Fraction(y), Fraction(z)) for x, y, z in part.tolist()] for part in (one, other))
     shared = {*corners} & {*polygon}
     a, b, c = corners
-    normal = _cross_product(_less(b, a), _less(c, a))
+    normal = cross(less(b, a), less(c, a))
     polygon = _clipped(polygon, normal, a)
-    polygon = _clipped(polygon, _less((Fraction(),) * 3, normal), a)
+    polygon = _clipped(polygon, less((Fraction(),) * 3, normal), a)
     for start, end in ((a, b), (b, c), (c, a)):
-        polygon = _clipped(polygon, _cross_product(normal, _less(end, start)), start)
+        polygon = _clipped(polygon, cross(normal, less(end, start)), start)
     return not {*polygon} <= shared
 
 
 def _clipped(polygon: list[_Exact], inward: _Exact, place: _Exact) -> list[_Exact]:
     """Return the part of a convex ``polygon`` on the ``inward`` side of the plane through ``place``."""
-    heights = [_dot(inward, _less(point, place)) for point in polygon]
+    heights = [dot(inward, less(point, place)) for point in polygon]
     kept = []
     for i, (point, height) in enumerate(zip(polygon, heights, strict=True)):
         before, lower = polygon[i - 1], heights[i - 1]
@@ -98,13 +100,16 @@ def _clipped(polygon: list[_Exact], inward: _Exact, place: _Exact) -> list[_Exac
     return kept
 
 
-def _less(a: _Exact, b: _Exact) -> _Exact:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+def less(a: tuple[Number, Number, Number], b: tuple[Number, Number, Number]) -> tuple[Number, Number, Number]:
+    """Return a - b; numpy would be slower for single vectors, and has no fractions."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-def _dot(a: _Exact, b: _Exact) -> Fraction:
+def dot(a: tuple[Number, Number, Number], b: tuple[Number, Number, Number]) -> Number:
+    """Return a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _cross_product(a: _Exact, b: _Exact) -> _Exact:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+def cross(a: tuple[Number, Number, Number], b: tuple[Number, Number, Number]) -> tuple[Number, Number, Number]:
+    """Return a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

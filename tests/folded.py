@@ -1,30 +1,23 @@
-"""Folded closed surfaces by seed, each meshed and solved at 1 %: ``python -m benchmarks.folded FIRST COUNT``.
+"""Folded closed surfaces by seed, and the study of a tool on each.
 
 A surface is an ellipsoid with narrow sulci along the nodal lines of smooth noise, a level set of a random field by
 marching cubes, or a folded ellipsoid deformed by a random flow, so that folds overhang. All are closed, without
 crossings, with 5,000 to 20,000 facets. A disc of 1.5 mm presses on the highest point.
 """
 
-import sys
-import time
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import igl
 import numpy as np
 
-from benchmarks.tables import markdown
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.crossings import crossings
-from pipeline.shapes.files.stl import written
 from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
 from pipeline.study.sweep import Study
 
 Surface = tuple[FloatArray, IntArray]
-COLUMNS = {"seed": "d", "kind": "", "facets": ",d", "status": "", "cells": ",d", "force": ".6g", "bar": ".2%",
-           "seconds": ".0f", "message": ""}  # fmt: skip
 KINDS = ("sulci", "level", "flow")
 
 
@@ -111,7 +104,7 @@ def folded(seed: int) -> tuple[str, FloatArray, IntArray]:
             return kind, points, facets.astype(np.int64)
 
 
-def study_of(file: Path, points: FloatArray, exact: bool = False) -> Study:
+def study_of(file: Path, points: FloatArray) -> Study:
     """Return the study, at 1 %, of a disc on the highest point of a surface at which it fits."""
     low, high = points[:, 2].min(), points[:, 2].max()
     for top in points[np.argsort(-points[:, 2])]:
@@ -122,35 +115,8 @@ def study_of(file: Path, points: FloatArray, exact: bool = False) -> Study:
                 "material": {"young": "5 kPa", "poisson": 0.45},
                 "probe": {"shape": "disc", "radius": "1.5 mm", "depth": "0.2 mm",
                           "axis": [0, 0, -1], "at": [f"{x:.4f} mm" for x in top]},
-                "mesh": {"accuracy": "1 %"}, "solve": {"exact": exact},
+                "mesh": {"accuracy": "1 %"}, "solve": {"exact": False},
             })  # fmt: skip
         except StudyError:
             continue
     raise ValueError("the disc does not fit anywhere")
-
-
-def main(first: int = 0, count: int = 10) -> int:
-    """Mesh and solve surfaces, print a row for each, and return the number of failures."""
-    from mpi4py import MPI
-
-    from pipeline.plan.plan import make_plan
-    from pipeline.run.execute import compute
-
-    failed = 0
-    with TemporaryDirectory(prefix="folded-") as folder:
-        for seed in range(first, first + count):
-            kind, points, facets = folded(seed)
-            file = Path(folder, f"{seed}.stl")
-            file.write_bytes(written(points, facets))
-            start = time.process_time()
-            row: dict[str, Any] = {"seed": seed, "kind": kind, "facets": len(facets)}
-            (record,) = compute(make_plan(study_of(file, points)), MPI.COMM_SELF).values()
-            failed += record.status != "ok"
-            row |= {"status": record.status, "cells": record.cells, "force": record.force, "bar": record.force_error,
-                    "seconds": time.process_time() - start, "message": record.message}  # fmt: skip
-            print(markdown([row], COLUMNS).splitlines()[-1], flush=True)
-    return failed
-
-
-if __name__ == "__main__":
-    sys.exit(main(*map(int, sys.argv[1:])))
