@@ -7,7 +7,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJson
 from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.section import Section, Words
-from pipeline.units import unit_factor
+from pipeline.units import parse_quantity, unit_factor
 
 
 def refused(allowed: str) -> PydanticCustomError:

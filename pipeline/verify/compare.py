@@ -4,31 +4,46 @@ from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
+from pipeline.run.record import Record
 from pipeline.study.read import parse
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section
 
 # The accuracy of each path. In 2D the error bar is usually far below it.
-_ACCURACY = {"2D": "0.1 %", "3D": "0.3 %"}
+ACCURACY = {"2D": "0.1 %", "3D": "0.3 %"}
 
 
-def solve(comm: MPI.Comm, path: str, scene: Section, mesh: Section | None = None) -> tuple[float, float, str]:
-    """Return force (N), relative error bar and message of a ``scene``, a study's sections without its mesh.
+def record_of(comm: MPI.Comm, study: Section, without: tuple[str, ...] = ()) -> Record:
+    """Return the record of a study of one case, planned ``without`` some reductions; collective."""
+    (record,) = compute(make_plan(parse(study), without=without), comm).values()
+    return record
+
+
+def solved(comm: MPI.Comm, path: str, scene: Section, mesh: Section | None = None) -> Record:
+    """Return the record of a ``scene``, a study's sections without its mesh.
 
     ``path`` is "2D" (on the meridian, if the scene is axisymmetric) or "3D". Without a ``mesh`` an accuracy chooses it.
     Collective.
     """
-    study = parse({**scene, "mesh": mesh or {"accuracy": _ACCURACY[path]}, "solve": {"exact": False}})
-    plan = make_plan(study, without=("axisymmetric",) if path == "3D" else ())
-    (record,) = compute(plan, comm).values()
+    study = {**scene, "mesh": mesh or {"accuracy": ACCURACY[path]}, "solve": {"exact": False}}
+    return record_of(comm, study, ("axisymmetric",) if path == "3D" else ())
+
+
+def solve(comm: MPI.Comm, path: str, scene: Section, mesh: Section | None = None) -> tuple[float, float, str]:
+    """Return force (N), relative error bar and message of a scene, as :func:`solved` does; collective."""
+    record = solved(comm, path, scene, mesh)
     return record.force, record.force_error, record.message
+
+
+def force_row(name: str, path: str, known: tuple[float, str, float], record: Record) -> Row:
+    """Return the row of a force that is ``known``: force (N), source, relative error."""
+    reference, source, bar = known
+    return Row(name, path, reference, source, record.force, record.force_error, bar, record.message)
 
 
 def against(comm: MPI.Comm, name: str, path: str, known: tuple[float, str, float], scene: Section) -> Row:
     """Return the row of a scene with a ``known`` force: force (N), source, relative error; collective."""
-    reference, source, reference_bar = known
-    value, bar, message = solve(comm, path, scene)
-    return Row(name, path, reference, source, value, bar, reference_bar, message)
+    return force_row(name, path, known, solved(comm, path, scene))
 
 
 def against_meridian(comm: MPI.Comm, name: str, scene: Section, round_scene: Section | None = None) -> Row:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from math import radians
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -10,18 +9,14 @@ from mpi4py import MPI
 from pipeline.layered.body import LayeredBody
 from pipeline.layered.compliance import Layer
 from pipeline.layered.contact import Profile
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.shapes.rounded import Rounded
-from pipeline.study.read import parse
 from pipeline.verify import known
-from pipeline.verify.compare import against_meridian, solve
+from pipeline.verify.compare import ACCURACY, against_meridian, force_row, solve, solved
 from pipeline.verify.row import Row
-from pipeline.verify.sections import Section, layers
+from pipeline.verify.sections import Section, cylinder, layers
 
 _YOUNG, _POISSON = 10e3, 0.3
-_ACCURACY = {"2D": "0.1 %", "3D": "0.3 %"}
 # A body so many times as large as the contact radius is a half-space, up to a few 1e-5 of F.
 _FAR = 20_000
 # F at a given depth exceeds Hertz's by this share, on a cylinder with radius and height of 200 contact radii: computed
@@ -77,7 +72,7 @@ def _half_space(comm: MPI.Comm) -> Iterator[Row]:
         ),
     )
     for name, tool, depth, force, section in tools:
-        record = _solved(comm, "2D", _cylinder(_FAR, _FAR), tool, depth)
+        record = _solved(comm, "2D", cylinder(_FAR, _FAR), tool, depth)
         yield _row(f"half-space, {name}, F of depth", "2D", force, known.SNEDDON, record, 1e-4)
         by_radius = _of_contact(section, record.contact_radius)
         yield _row(f"half-space, {name}, F of radius", "2D", by_radius, known.SNEDDON, record, 1e-6)
@@ -88,7 +83,7 @@ def _rounded_punch(comm: MPI.Comm) -> Iterator[Row]:
     for edge, depth in ((0.2, 2e-5), (0.05, 2e-5), (1e-3, 1e-7)):
         force = known.rounded_punch(_YOUNG, _POISSON, 1e-3, edge * 1e-3, depth)
         tool = {"shape": "disc", "radius": "1 mm", "edge": f"{edge} mm"}
-        record = _solved(comm, "2D", _cylinder(_FAR, _FAR), tool, depth)
+        record = _solved(comm, "2D", cylinder(_FAR, _FAR), tool, depth)
         name = f"half-space, disc with a rounded edge of {edge:g} radii"
         yield _row(name, "2D", force, known.CIAVARELLA, record, _PARABOLA)
 
@@ -101,7 +96,7 @@ def _finite(comm: MPI.Comm) -> Iterator[Row]:
     """A body of 200 contact radii, whose force exceeds a half-space's."""
     ball = Rounded(0.0, 1.0)
     depth = 1e-6 / ball.tip
-    record = _solved(comm, "2D", _cylinder(200, 200), {"shape": "sphere", "radius": f"{1e3 * ball.tip} mm"}, depth)
+    record = _solved(comm, "2D", cylinder(200, 200), {"shape": "sphere", "radius": f"{1e3 * ball.tip} mm"}, depth)
     force = (1 + _FINITE) * _of_contact(ball, ball.contact_radius(depth))
     yield _row("body of 200 radii of contact, sphere", "2D", force, "meridian, by hand", record, _FINITE_ERROR)
 
@@ -110,7 +105,7 @@ def _flat(comm: MPI.Comm) -> Iterator[Row]:
     """Contact below a flat disc on a flat top is complete: F is that of the prescribed footprint."""
     tool = {"shape": "disc", "radius": "3 mm"}
     for nu in (0.3, 0.5):
-        for path in _ACCURACY:
+        for path in ACCURACY:
             record = _solved(comm, path, known.CYLINDER_BODY, tool, 1e-5, nu)
             force = known.CYLINDER["frictionless", nu] * _YOUNG * 1e-5 * 1e-3
             name = f"cylinder R = H = 50 mm, a = 3 mm, unilateral, ν = {nu:g}"
@@ -160,7 +155,7 @@ def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
         for thick in _LAYERS[-1:] if quick else _LAYERS:
             touched = LayeredBody((Layer(_YOUNG, nu, thick * 1e-3),)).touch(ball, np.array([1e-3]))
             depth, force = float(touched.depth[0]), float(touched.force[0])
-            body = _cylinder(1 + 20 * max(thick, 0.5), thick)
+            body = cylinder(1 + 20 * max(thick, 0.5), thick)
             record = _solved(comm, "2D", body, {"shape": "sphere", "radius": f"{_BALL} mm"}, depth, nu)
             name = f"layer on a rigid base, sphere, a/h = {1 / thick:.2g}, ν = {nu:g}"
             yield _row(name, "2D", force * _YOUNG / (1 - nu**2), _LAYER_SOURCE, record, 1e-6)
@@ -174,36 +169,19 @@ def _stacks(comm: MPI.Comm, ball: Profile) -> Iterator[Row]:
         body = LayeredBody(tuple(Layer(1e3 * young, nu, 1e-3 * thickness) for thickness, young, nu in stack))
         touched = body.touch(ball, np.array([1e-3]))
         height = sum(thickness for thickness, *_ in stack)
-        scene = _cylinder(1 + 20 * height, height) | {"layer": layers(stack)}
+        scene = cylinder(1 + 20 * height, height) | {"layer": layers(stack)}
         record = _solved(comm, "2D", scene, {"shape": "sphere", "radius": f"{_BALL} mm"}, float(touched.depth[0]))
         name = f"three layers on a rigid base, sphere, the first of {stack[0][1]:g} kPa"
         yield _row(name, "2D", body.top.plane * float(touched.force[0]), known.LAYERED, record, 1e-6)
 
 
 def _row(name: str, path: str, force: float, source: str, record: Record, reference_bar: float) -> Row:
-    return Row(name, path, force, source, record.force, record.force_error, reference_bar, record.message)
+    return force_row(name, path, (force, source, reference_bar), record)
 
 
-def _solved(
-    comm: MPI.Comm, path: str, body: dict[str, Any], tool: dict[str, Any], depth: float, poisson: float = _POISSON
-) -> Record:
+def _solved(comm: MPI.Comm, path: str, body: Section, tool: Section, depth: float, poisson: float = _POISSON) -> Record:
     """Solve a scene to the accuracy of its path."""
-    study = parse(
-        {
-            "body": {"fixed": "bottom"} | body,
-            "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
-            "probe": tool | {"depth": f"{depth!r} m", "contact": "unilateral"},
-            "mesh": {"accuracy": _ACCURACY[path]},
-            "solve": {"exact": False},
-        }
-    )
-    plan = make_plan(study, without=("axisymmetric",) if path == "3D" else ())
-    (record,) = compute(plan, comm).values()
-    return record
-
-
-def _cylinder(radius: float, height: float) -> dict[str, Any]:
-    return {"shape": "cylinder", "radius": f"{radius!r} mm", "height": f"{height!r} mm"}
+    return solved(comm, path, _scene({"fixed": "bottom"} | body, tool | {"depth": f"{depth!r} m"}, poisson))
 
 
 def _thin_layers(comm: MPI.Comm) -> Iterator[Row]:
@@ -211,6 +189,6 @@ def _thin_layers(comm: MPI.Comm) -> Iterator[Row]:
     thick, radius = 1e-3, 10e-3
     for chi, error in _THIN.items():
         depth = (chi * thick) ** 2 / radius
-        record = _solved(comm, "2D", _cylinder(21, 1), {"shape": "sphere", "radius": f"{radius!r} m"}, depth, 0.5)
+        record = _solved(comm, "2D", cylinder(21, 1), {"shape": "sphere", "radius": f"{radius!r} m"}, depth, 0.5)
         name = f"thin layer on a rigid base, sphere, R = 10 h, χ = {chi:g}, ν = 0.5"
         yield _row(name, "2D", known.thin_layer(_YOUNG, radius, depth, thick), known.DIMITRIADIS, record, 1.1 * error)

@@ -4,10 +4,8 @@ from collections.abc import Iterator
 
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.study.read import parse
 from pipeline.verify import known
+from pipeline.verify.compare import force_row, record_of
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section, box, cylinder, disc, mesh, study
 
@@ -45,6 +43,4 @@ def _closed(outside: str, radius: float = 1.0) -> Section:
 
 def _row(comm: MPI.Comm, name: str, truth: tuple[float, str, float], scene: Section) -> Row:
     """Return the row of a scene with a known force: force (N), source, relative error; collective."""
-    reference, source, bar = truth
-    (record,) = compute(make_plan(parse(scene)), comm).values()
-    return Row(name, "3D, closed", reference, source, record.force, record.force_error, bar, record.message)
+    return force_row(name, "3D, closed", truth, record_of(comm, scene))

@@ -6,8 +6,6 @@ from math import asin, pi
 import numpy as np
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
 from pipeline.run.loads import loads_of
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of
@@ -18,6 +16,7 @@ from pipeline.solve.loads import apply_loads
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.read import parse
+from pipeline.verify.compare import record_of
 from pipeline.verify.forces import FAR
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section, box, cylinder, disc, mesh, mm, tissue
@@ -126,18 +125,8 @@ def _beside_a_disc(comm: MPI.Comm) -> Row:
 
 
 def _solve(comm: MPI.Comm, body: Section, nu: float, probe: Section, load: Section) -> Record:
-    study = parse(
-        {
-            "body": body,
-            "material": tissue(nu) | _HEAVY,
-            "probe": probe,
-            "load": load,
-            "mesh": {"accuracy": "1 %"},
-            "solve": {"exact": False},
-        }
-    )
-    (record,) = compute(make_plan(study), comm).values()
-    return record
+    scene = {"body": body, "material": tissue(nu) | _HEAVY, "probe": probe, "load": load}
+    return record_of(comm, scene | {"mesh": {"accuracy": "1 %"}, "solve": {"exact": False}})
 
 
 def _row(name: str, reference: float, source: str, record: Record, reference_bar: float) -> Row:

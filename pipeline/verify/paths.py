@@ -9,6 +9,7 @@ from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.study.read import parse
 from pipeline.verify import known
+from pipeline.verify.compare import force_row
 from pipeline.verify.far_fields import LEFT_OUT, OF_BODY, OFF_MIDDLE
 from pipeline.verify.row import Row
 from pipeline.verify.sections import Section, box, cylinder, disc, mesh, mm, study
@@ -80,5 +81,4 @@ def _records(comm: MPI.Comm, scene: Section) -> list[Record]:
 def _row(name: str, record: Record, truth: tuple[float, str, float]) -> Row:
     """Return the row of a force with a known F / (E d), in mm."""
     stiffness, source, bar = truth
-    reference = stiffness * _YOUNG * _DEPTH * _UNIT
-    return Row(name, "3D", reference, source, record.force, record.force_error, bar, record.message)
+    return force_row(name, "3D", (stiffness * _YOUNG * _DEPTH * _UNIT, source, bar), record)

@@ -9,8 +9,6 @@ from mpi4py import MPI
 
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.of_case import mesh_arrays
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
 from pipeline.run.meshing import on_first_rank
 from pipeline.run.problem import conditions_of
 from pipeline.run.record import Record
@@ -21,9 +19,9 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.read import parse
+from pipeline.verify.compare import record_of
 from pipeline.verify.row import Row
-
-Section = dict[str, Any]
+from pipeline.verify.sections import Section
 
 _QUARTER = ("x", "y")
 _YOUNG = 10e3
@@ -127,7 +125,7 @@ def _pushed_on(comm: MPI.Comm, nu: float) -> Row:
 
 def _blade(comm: MPI.Comm, nu: float, contact: str, incision: float, ahead: float, accuracy: str) -> Record:
     """Return the record of an open slit; ``incision`` and ``ahead`` are in mm."""
-    scene: dict[str, Section] = {
+    scene: Section = {
         "body": {"shape": "box", "size": ["20 mm", "20 mm", "12 mm"], "fixed": "bottom"},
         "material": {"young": "10 kPa", "poisson": nu},
         "probe": {
@@ -143,8 +141,7 @@ def _blade(comm: MPI.Comm, nu: float, contact: str, incision: float, ahead: floa
         "mesh": {"accuracy": accuracy},
         "solve": {"exact": False},
     }
-    (record,) = compute(make_plan(parse(scene)), comm).values()
-    return record
+    return record_of(comm, scene)
 
 
 def _message(records: list[Record]) -> str:
