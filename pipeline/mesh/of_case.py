@@ -16,7 +16,7 @@ from pipeline.mesh.meridian import Meridian
 from pipeline.mesh.parts import Part, refine, reflect_part, split, whole
 from pipeline.mesh.refine import refined
 from pipeline.mesh.reflect import reflect
-from pipeline.mesh.size import Sizes
+from pipeline.mesh.size import EDGES_PER_RADIUS, Sizes
 from pipeline.mesh.slit import open_slit
 from pipeline.mesh.smooth import smoothed
 from pipeline.plan.refinement import is_refined, refinements
@@ -108,7 +108,9 @@ def _scene(case: Case, *, is_coarse: bool) -> tuple[Scene, Sizes]:
     straight, planes, sizes = case.mesh.degree == 1, mirror_planes(case), sizes_of(case)
     if is_coarse:
         times, at_rim = _COARSER ** refinements(case), _AT_RIM ** refinements(case)
-        sizes = replace(sizes, times=times, rim=at_rim * sizes.rim, column=sizes.column / times)
+        # Elements larger than the body is thick would be flat, and so would theirs.
+        column = min(sizes.column, EDGES_PER_RADIUS * case.body.thickness(case.frame))
+        sizes = replace(sizes, times=times, rim=at_rim * sizes.rim, column=column / times)
     segments = sizes.rim_segments(case.expected)
     held, ball = not (case.mesh.keeps_all or case.mesh.outside == "free"), case.is_closed
     folds = not case.has_quarter_points

@@ -12,7 +12,7 @@ from pipeline.mesh.distribute import BodyMesh, distribute, distribute_parts
 from pipeline.mesh.generate import MeshArrays, MeshError
 from pipeline.mesh.of_case import coarse_arrays, refined_arrays, refined_part, unrefined_arrays, upright
 from pipeline.mesh.parts import split
-from pipeline.plan.refinement import is_refined
+from pipeline.plan.refinement import is_refined, refinements
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.run.failure import describe
 from pipeline.run.mesh_cache import MeshCache
@@ -33,7 +33,8 @@ def mesh_case(case: Case, mirrors: tuple[str, ...], comm: MPI.Comm, cache: MeshC
     """
     if is_refined(case):
         with suppress(MeshError):
-            parts = on_first_rank(comm, lambda: split(_cached_coarse(case, cache), comm.size))
+            twice = refinements(case) > 1
+            parts = on_first_rank(comm, lambda: split(_cached_coarse(case, cache), comm.size, is_refined=twice))
             part = refined_part(case, mirrors, comm.scatter(parts or ()), comm)
             return distribute_parts(comm, replace(part, mesh=upright(case, part.mesh)))
     arrays = on_first_rank(comm, lambda: cached_arrays(case, mirrors, cache))

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from pipeline.mesh.generate import MeshArrays
 from pipeline.mesh.of_case import coarse_arrays, mesh_arrays, refined_arrays, unrefined_arrays
+from pipeline.mesh.parts import split
 from pipeline.plan import refinement
 from pipeline.plan.key import mesh_key
 from pipeline.plan.symmetry import mirror_planes
@@ -95,6 +96,22 @@ def _share_of_first(mesh: MeshArrays) -> float:
     corners = mesh.points[mesh.cells[:, :4]]
     volumes = np.linalg.det(corners[:, 1:] - corners[:, :1])
     return float(volumes[mesh.regions == 0].sum() / volumes.sum())
+
+
+def test_ranks_have_parts_of_equal_size_if_cells_of_one_stay_together():
+    with refining(2):
+        mesh = coarse_arrays(case_of({"mesh": {"fine": "3 mm", "rim": "0.5 mm"}, "probe": OFF}))
+    ranks = 2
+    assert len(mesh.cells) >= 400 * ranks
+    parts = split(mesh, ranks, is_refined=True)
+    assert sum(len(part.mesh.cells) for part in parts) == len(mesh.cells)
+    for part, other in zip(parts, reversed(parts), strict=True):
+        assert len(part.mesh.cells) == pytest.approx(len(mesh.cells) / ranks, rel=0.05)
+        # Eight that were cut out of one have its corners, the first points of the first four, and its mid nodes.
+        assert all(len(np.unique(eight)) == 10 for eight in part.mesh.cells[:, :4].reshape(-1, 32))
+        faces = np.count_nonzero(part.beyond >= 0)
+        assert 0 < faces < 8 * len(part.mesh.cells) ** (2 / 3)
+        assert faces == np.count_nonzero(other.beyond >= 0)
 
 
 @pytest.mark.usefixtures("refine_all")
