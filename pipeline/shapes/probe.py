@@ -1,6 +1,6 @@
 """The interface of every probe. Properties whose default could be wrong silently have none."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from functools import lru_cache
 from math import hypot, inf
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -11,10 +11,11 @@ from pydantic_core import PydanticCustomError
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.crack import Crack
-from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.footprint import Footprint
+from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.history import History
 from pipeline.shapes.revolved import Revolved
-from pipeline.shapes.section import Problems, Section, Words
+from pipeline.shapes.section import Problems, Words
 from pipeline.shapes.slit import Slit
 from pipeline.units import Coordinate, Length
 
@@ -48,12 +49,11 @@ _NUMBER_OR_WORD = {"anyOf": [{"type": "number", "minimum": 0, "maximum": MOST_FR
 Friction = Annotated[float, BeforeValidator(_coefficient), WithJsonSchema(_NUMBER_OR_WORD)]
 
 
-class Probe(Section, ABC):
+class Probe(Footprint):
     """A tool: its place, its movement, and its shape.
 
     The footprint is the part of the surface that moves with the tool. With unknown contact area (``is_unilateral``) it
-    is the part that may come into contact. It is given in the probe's own coordinates, along and across: see
-    :class:`Frame`.
+    is the part that may come into contact.
     """
 
     shape: Annotated[str, Words("Shape of the tool.", '"disc"', is_used=True)]
@@ -198,12 +198,7 @@ class Probe(Section, ABC):
         """The length (m) to which F is proportional; 1 if there is none."""
         return float(getattr(self, self.proportional_to[0])) if self.proportional_to else 1.0
 
-    # ---- size -----------------------------------------------------------------------------------------
-
-    @property
-    @abstractmethod
-    def circumradius(self) -> float:
-        """Radius of the smallest circle round the footprint (m)."""
+    # ---- contact --------------------------------------------------------------------------------------
 
     @property
     def pressed(self) -> float:
@@ -214,27 +209,6 @@ class Probe(Section, ABC):
         return self.circumradius
 
     @property
-    @abstractmethod
-    def half_width(self) -> float:
-        """Half of the footprint's smallest extent (m)."""
-
-    @property
-    @abstractmethod
-    def perimeter(self) -> float:
-        """Length of the footprint's edge (m)."""
-
-    @abstractmethod
-    def gap(self, body: Body, frame: Frame) -> float:
-        """Return the distance (m) from the footprint to the edge of its face, negative outside."""
-
-    # ---- symmetry -------------------------------------------------------------------------------------
-
-    @property
-    @abstractmethod
-    def is_round(self) -> bool:
-        """Whether the footprint is axisymmetric about the probe's axis."""
-
-    @property
     def revolved(self) -> Revolved | None:
         """The section of a tool that is round about its axis; None for any other."""
         return None
@@ -243,45 +217,6 @@ class Probe(Section, ABC):
     def hertz_radius(self) -> float | None:
         """Radius (m) of H. Hertz's paraboloid, which it is at small depths; None for any other tool."""
         return None
-
-    @abstractmethod
-    def is_mirrored(self, along: float, across: float) -> bool:
-        """Return whether the footprint has mirror symmetry in the line through its centre normal to (along, across)."""
-
-    # ---- geometry -------------------------------------------------------------------------------------
-
-    @abstractmethod
-    def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
-        """Add the footprint, in its frame, to a CAD ``kernel`` (gmsh's ``occ``); return the tag of the face."""
-
-    @property
-    @abstractmethod
-    def is_curved(self) -> bool:
-        """Whether a part of the footprint's edge is curved, so that elements must be curved, too."""
-
-    @abstractmethod
-    def inscribed(self, edges: int) -> "Probe":
-        """Return a probe of the same shape, enlarged so that its inscribed polygon of ``edges`` has this one's area."""
-
-    @abstractmethod
-    def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Return the distance to the footprint's edge as text, in units of 1/``unit`` m, from own coordinates as text.
-
-        It is exact at the edge, where elements are smallest, and approximate elsewhere.
-        """
-
-    @abstractmethod
-    def to_edge(self, points: FloatArray) -> FloatArray:
-        """Return the nearest points (n, 2) of the footprint's edge to ``points`` (n, 2) near it, in m.
-
-        Without curved edges, return ``points`` unchanged: no element needs to be curved.
-        """
-
-    @abstractmethod
-    def outline(self) -> FloatArray:
-        """Return the edge as a closed polyline (n, 2), in m, counterclockwise: the reference of the other methods."""
-
-    # ---- contact --------------------------------------------------------------------------------------
 
     @abstractmethod
     def profile(self, points: FloatArray) -> FloatArray:
