@@ -28,6 +28,16 @@ SCENE = {
 FIELD = NearTip(strength(YOUNG, POISSON, WIDTH / 2), 700.0)
 
 
+def answered(study, record):
+    """Return the plan of a study, and what ``record`` returns for its solves, and for those that follow from these."""
+    plan = further = make_plan(study)
+    records = {}
+    while further:
+        records |= {solve.key: record(solve) for solve in further.solves}
+        further = lacking(plan, records)
+    return plan, records
+
+
 def stored(depth, ahead, beside=None):
     """Return the energy (J) of the body with a slit, whose front is as far beside the blade if that is not given."""
     beside = ahead if beside is None else beside
@@ -56,9 +66,4 @@ def _record(key, case, bar, deepest):
 
 def solved(study, bar=1e-3, deepest=np.inf):
     """Return the plan of a study of that body, and its records; states below the ``deepest`` front (m) fail."""
-    plan = further = make_plan(study)
-    records = {}
-    while further:
-        records |= {solve.key: _record(solve.key, solve.case, bar, deepest) for solve in further.solves}
-        further = lacking(plan, records)
-    return plan, records
+    return answered(study, lambda solve: _record(solve.key, solve.case, bar, deepest))

@@ -12,6 +12,7 @@ from pipeline.run.record import Record
 from pipeline.states import FAILED, OK, PARTIAL
 from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
+from tests.insertion.scenes import answered
 
 RADIUS, STIFFNESS = 0.5e-3, 2e4  # m, N/m²
 # Depth of a ring crack over that of the punch.
@@ -55,12 +56,7 @@ def record(solve, cuts):
 
 
 def path_of(study, cuts=CUTS):
-    plan = further = make_plan(study)
-    records = {}
-    while further:
-        records |= {solve.key: record(solve, cuts) for solve in further.solves}
-        further = lacking(plan, records)
-    (path,) = paths(plan, records)
+    (path,) = paths(*answered(study, lambda solve: record(solve, cuts)))
     return path
 
 

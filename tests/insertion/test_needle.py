@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from pipeline import workflow
-from pipeline.insertion.paths import lacking, paths, possible
+from pipeline.insertion.paths import paths, possible
 from pipeline.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
@@ -24,6 +24,7 @@ from pipeline.solve.solution import Request
 from pipeline.states import OK, PARTIAL
 from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
+from tests.insertion.scenes import answered
 
 RADIUS, FRICTION, STORED, TORN, SQUEEZE, STIFFNESS = 0.5e-3, 0.25, 6e-3, 3e-3, 30.0, 2e4  # m, 1, N, N, N/m, N/m²
 POWER = SQUEEZE * RADIUS / (STORED + TORN)
@@ -63,14 +64,11 @@ def record(solve):
 
 
 def solved(study, fails=lambda solve: False, reached=nan):
-    plan = further = make_plan(study)
-    records = {}
-    while further:
-        for solve in further.solves:
-            failed = Record(solve.key, "failed", "tissue is turned inside out", depth_reached=reached)
-            records[solve.key] = failed if fails(solve) else record(solve)
-        further = lacking(plan, records)
-    return plan, records
+    def answer(solve):
+        failed = Record(solve.key, "failed", "tissue is turned inside out", depth_reached=reached)
+        return failed if fails(solve) else record(solve)
+
+    return answered(study, answer)
 
 
 def path_of(study, **how):
