@@ -7,6 +7,7 @@ from mpi4py import MPI
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
+from pipeline.shapes.probe import Probe
 from pipeline.study.read import parse
 from pipeline.study.sweep import Study
 from tests.studies import changed
@@ -31,6 +32,11 @@ def raw(**changes: Any) -> dict[str, Any]:
 def study(**changes: Any) -> Study:
     """Return the base study with changes, parsed."""
     return parse(raw(**changes))
+
+
+def probe(**keys: Any) -> Probe:
+    """Return the tool of a study, by its keys."""
+    return study(probe=keys).case(()).probe
 
 
 def solve(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> dict[tuple[int, ...], Record]:

@@ -17,12 +17,12 @@ from petsc4py import PETSc
 
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.of_case import mesh_arrays
-from pipeline.plan.plan import make_plan
 from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.forms import ElasticForms, MixedForms
 from pipeline.solve.physics import MaterialLaw
 from pipeline.study.read import parse
 from pipeline.verify.row import Row
+from pipeline.verify.sections import cylinder, disc, study
 
 _ROUND_OFF = 1e-10
 # Meshes of 2 and 4 cubes a side are coarse for a rate, so it may differ by 15 % from theory.
@@ -57,16 +57,9 @@ def _patch(degree: int, *, mixed: bool) -> float:
 
     The mesh has curved quarter-point elements at the probe's edge.
     """
-    study = parse(
-        {
-            "body": {"shape": "cylinder", "radius": "20 mm", "height": "10 mm"},
-            "material": {"young": "1 kPa", "poisson": 0.4},
-            "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.1 mm"},
-            "mesh": {"epsilon": "full", "fine": "8 mm", "coarse": "8 mm", "rim": "1 mm", "degree": degree},
-        }
-    )
-    (solve,) = [s for s in make_plan(study).solves if not s.is_reference]
-    body = distribute(MPI.COMM_SELF, mesh_arrays(solve.case, ("x", "y")))
+    sizes = {"epsilon": "full", "fine": "8 mm", "coarse": "8 mm", "rim": "1 mm", "degree": degree}
+    case = parse(study(0.4, cylinder(20, 10), disc(3, 0.1), sizes, young=1e3)).case(())
+    body = distribute(MPI.COMM_SELF, mesh_arrays(case, ("x", "y")))
     space = vector_space(body.mesh, degree)
     forms = ElasticForms(space)
     forms.set_law(MaterialLaw.of(1.0, 1.0))

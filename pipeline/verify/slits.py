@@ -21,7 +21,7 @@ from pipeline.solve.spaces import Spaces
 from pipeline.study.read import parse
 from pipeline.verify.compare import record_of
 from pipeline.verify.row import Row
-from pipeline.verify.sections import Section
+from pipeline.verify.sections import Section, blade, box, mm, study
 
 _QUARTER = ("x", "y")
 _YOUNG = 10e3
@@ -125,23 +125,8 @@ def _pushed_on(comm: MPI.Comm, nu: float) -> Row:
 
 def _blade(comm: MPI.Comm, nu: float, contact: str, incision: float, ahead: float, accuracy: str) -> Record:
     """Return the record of an open slit; ``incision`` and ``ahead`` are in mm."""
-    scene: Section = {
-        "body": {"shape": "box", "size": ["20 mm", "20 mm", "12 mm"], "fixed": "bottom"},
-        "material": {"young": "10 kPa", "poisson": nu},
-        "probe": {
-            "shape": "blade",
-            "length": "6 mm",
-            "width": "1 mm",
-            "depth": "0.1 mm",
-            "ends": "open",
-            "incision": f"{incision} mm",
-            "ahead": f"{ahead} mm",
-            "contact": contact,
-        },
-        "mesh": {"accuracy": accuracy},
-        "solve": {"exact": False},
-    }
-    return record_of(comm, scene)
+    probe = blade(6, 1, depth="0.1 mm", ends="open", incision=mm(incision), ahead=mm(ahead), contact=contact)
+    return record_of(comm, study(nu, box(20, 20, 12), probe, {"accuracy": accuracy}))
 
 
 def _message(records: list[Record]) -> str:

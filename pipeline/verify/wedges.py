@@ -18,6 +18,7 @@ from pipeline.study.case import Case
 from pipeline.study.read import parse
 from pipeline.verify.layer_wedge import layer_wedge
 from pipeline.verify.row import Row
+from pipeline.verify.sections import box, mesh, mm, study
 
 _YOUNG, _ANGLE = 10e3, 80.0
 # Half the width of contact and the strip's length along the wedge (m); distance of the strip's sides from the contact,
@@ -52,31 +53,10 @@ def strip(comm: MPI.Comm, thick: float, poisson: float) -> tuple[float, float, f
 def _case(thick: float, depth: float, poisson: float) -> Case:
     """Return a case whose wedge is as long as its body, which study files do not allow."""
     width = 2e3 * _HALF * (2 + _BESIDE * thick)
-    case = parse(
-        {
-            "body": {
-                "shape": "box",
-                "size": [f"{1e3 * _LENGTH} mm", f"{width} mm", f"{1e3 * thick * _HALF!r} mm"],
-                "fixed": "bottom",
-            },
-            "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
-            "probe": {
-                "shape": "wedge",
-                "angle": f"{_ANGLE} deg",
-                "length": f"{800 * _LENGTH} mm",
-                "depth": f"{depth!r} m",
-                "contact": "unilateral",
-            },
-            "mesh": {
-                "epsilon": "full",
-                "fine": f"{500 * thick * _HALF!r} mm",
-                "coarse": "20 mm",
-                "rim": "0.1 mm",
-                "growth": 0.3,
-                "degree": 2,
-            },
-        }
-    ).case(())
+    wedge = {"shape": "wedge", "angle": f"{_ANGLE} deg", "length": mm(800 * _LENGTH), "contact": "unilateral"}
+    sizes = mesh(rim=0.1, growth=0.3, fine=500 * thick * _HALF, coarse=20)
+    body = box(1e3 * _LENGTH, width, 1e3 * thick * _HALF)
+    case = parse(study(poisson, body, wedge | {"depth": f"{depth!r} m"}, sizes, young=_YOUNG)).case(())
     return replace(case, probe=case.probe.model_copy(update={"length": _LENGTH}))
 
 

@@ -8,9 +8,8 @@ from pipeline.identify.tools import tip_of_probe
 from pipeline.layered.body import LayeredBody
 from pipeline.layered.compliance import Solid
 from pipeline.shapes.rounded import Rounded
-from pipeline.study.read import parse
 from pipeline.surrogate.wide import profile_of
-from tests.cases import raw
+from tests.cases import probe
 
 NOTHING = {
     "hidden_layer_ratio": 1.0,
@@ -19,11 +18,6 @@ NOTHING = {
     "hidden_strain": 0.0,
 }
 DEEPEST = 5e-4
-
-
-def probe(**keys):
-    """Return a probe of a study."""
-    return next(parse(raw() | {"probe": keys}).cases()).probe
 
 
 BALL = probe(shape="sphere", radius="8 mm", depth="0.5 mm")

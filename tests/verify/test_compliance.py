@@ -8,17 +8,11 @@ import pytest
 from pipeline.layered.body import LayeredBody
 from pipeline.layered.compliance import Layer
 from pipeline.layered.contact import Profile
-from pipeline.study.read import parse
 from pipeline.verify import known
-from tests.cases import raw
+from tests.cases import probe
 
 YOUNG, NU = 10e3, 0.3
 PLANE = YOUNG / (1 - NU**2)
-
-
-def probe(**keys):
-    """Return a probe of a study."""
-    return next(parse(raw() | {"probe": keys}).cases()).probe
 
 
 def added(force, half_space, depth, exponent):
