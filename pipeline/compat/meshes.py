@@ -114,9 +114,10 @@ def partition(cells: np.ndarray, parts: int) -> np.ndarray:
 def geometry_dofs(mesh: Any) -> np.ndarray:
     """Return the geometry nodes of each local cell (owned and ghosts), shape (cells, nodes per cell)."""
     dofmap = mesh.geometry.dofmap if hasattr(mesh.geometry, "dofmap") else mesh.geometry.dofmaps[0]
-    array = dofmap.array if hasattr(dofmap, "array") else np.asarray(dofmap)
-    topology = mesh.topology.index_map(mesh.topology.dim)
-    return array.reshape(topology.size_local + topology.num_ghosts, -1)
+    if not hasattr(dofmap, "array"):
+        return np.asarray(dofmap)
+    # A rank may have no cells: their number does not tell that of their nodes.
+    return np.asarray(dofmap.array).reshape(-1, mesh.geometry.cmap.create_dof_layout().num_dofs)
 
 
 def original_cells(mesh: Any) -> np.ndarray:

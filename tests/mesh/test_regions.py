@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.mesh.distribute import distribute
+from pipeline.mesh.generate import MeshArrays
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.mesh.reflect import reflect
 from pipeline.plan.symmetry import mirror_planes
@@ -160,3 +161,15 @@ def test_local_cells_know_their_region():
     assert body.regions is not None
     assert len(body.regions) == len(middles)
     assert np.array_equal(body.regions[sure], expected[sure])
+
+
+@pytest.mark.mpi
+def test_a_rank_may_have_no_cells():
+    """One cell on all ranks together: it, its region and its faces are there once."""
+    points, cell, rim = np.vstack([np.zeros(3), np.eye(3)]), np.arange(4), np.arange(3)
+    faces = {"free": np.array([np.delete(cell, corner) for corner in cell])}
+    one = MeshArrays(points, cell[None], faces, rim, 0.0, regions=np.array([7]))
+    body = distribute(MPI.COMM_WORLD, one if MPI.COMM_WORLD.rank == 0 else None)
+    mine = [int((body.regions == 7).sum()), len(body.facets["free"]), compat.geometry_dofs(body.mesh).size]
+    assert compat.geometry_dofs(body.mesh).shape[1] == 4
+    assert MPI.COMM_WORLD.allreduce(np.array(mine)).tolist() == [1, 4, 4]
