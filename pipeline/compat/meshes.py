@@ -83,6 +83,8 @@ def create_mesh(
     domain = ufl.Mesh(_coordinate_element("tetrahedron" if dim == 3 else "triangle", order, dim))
     names = inspect.signature(dolfinx.mesh.create_mesh).parameters
     more: dict[str, Any] = {"domain" if "domain" in names else "e": domain}
+    if comm.size == 1:  # dolfinx would ask SCOTCH, whose threads take 3 ms to start and end
+        beyond = np.empty((len(cells), 0), dtype=np.int32)
     if beyond is not None:
         destinations = _destinations(comm.rank, beyond)
         more["partitioner"] = lambda *_: destinations
