@@ -105,6 +105,13 @@ _FOUND = {
         Recipe(2, 0.06, 0.14, 3.4e-4),
     ),
 }
+# Larger elements for balls whose limit of F is sure on them: has_sure_contact.
+_BALL = (
+    Recipe(2, 0.4, 0.6, 1.05e-2),
+    Recipe(2, 0.35, 0.5, 7.5e-3),
+    Recipe(2, 0.3, 0.42, 4.5e-3),
+    *_FOUND["displacement"],
+)
 # The same at large displacements, where F is extrapolated for balls on plain bodies only.
 _FOUND_LARGE = (
     Recipe(2, 0.4, 0.6, 3.0e-2),
@@ -167,6 +174,8 @@ _SLIDE = 0.8
 # A mesh is chosen if its expected error bar is below MARGIN times the accuracy. If its error bar exceeds the accuracy,
 # the next one's expected bar is smaller by _STEP at least; rungs in between only serve as first meshes.
 MARGIN, _STEP = 0.9, 1.4
+# Thickness of a thin body, in half widths of contact: its pressure follows the tool's shape, and is smoother.
+_SQUEEZED = 1.5
 # Number of elements between the probe's edge and a fixed face.
 _ACROSS_GAP = 3
 # Number of elements through the thickness near the probe.
@@ -196,7 +205,7 @@ def _ladder(case: Case) -> tuple[Recipe, ...]:
     """Return the recipes for a probe, cheapest first."""
     if not case.probe.is_flat:
         if not case.material.is_large:
-            return _FOUND[case.element]
+            return _BALL if has_sure_contact(case) else _FOUND[case.element]
         ball = case.probe.hertz_radius if is_ball(case) and case.is_plain and not case.probe.friction else None
         return _FOUND_LARGE if ball is None or case.probe.depth > _SHALLOW * ball else _BALL_LARGE
     if not case.has_quarter_points:
@@ -256,6 +265,20 @@ def has_sure_limit(case: Case) -> bool:
 def is_ball(case: Case) -> bool:
     """Return whether F has the limit of balls; their histories at large displacements are not extrapolated."""
     return case.probe.hertz_radius is not None and not (case.material.is_large and case.is_stepped)
+
+
+def has_sure_contact(case: Case) -> bool:
+    """Return whether the limit of F in unilateral contact is known well on large elements, too.
+
+    It is for a frictionless ball on a plain body that is not thin, with displacement elements at small displacements.
+    """
+    is_simple = case.element == "displacement" and not case.is_stepped and not case.is_truncated
+    return is_ball(case) and case.probe.is_unilateral and is_simple and case.is_plain and not is_thin(case)
+
+
+def is_thin(case: Case) -> bool:
+    """Return whether the body is so thin for the contact that the limit of F is less sure than on a deep one."""
+    return case.body.thickness(case.frame) < _SQUEEZED * half_width_of(case)
 
 
 def _near(case: Case) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.plan.cost import features
-from pipeline.plan.recipe import edge_width_of, half_width_of, has_sure_limit, is_ball
+from pipeline.plan.recipe import edge_width_of, half_width_of, has_sure_contact, has_sure_limit, is_ball, is_thin
 from pipeline.plan.refinement import is_refined
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
@@ -159,7 +159,7 @@ def _known_of(case: Case, force: Vector) -> Vector:
 
 
 def is_graded_to_contact(case: Case) -> bool:
-    """Return whether the mesh of ``case`` is graded to the expected edge of contact."""
+    """Return whether the mesh of ``case`` is graded to the expected edge of contact, and that is enough."""
     rim = _rim(case)
     # The coarsest recipe equals the limit of `is_graded`: rounding must not exceed it.
     found = not case.probe.is_flat
@@ -168,7 +168,10 @@ def is_graded_to_contact(case: Case) -> bool:
         *beside, _ = first_touch(case.body, case.probe, case.frame)
         if hypot(*beside) > _BESIDE * half_width_of(case):
             return False
-    return is_graded(rim, case.mesh.growth, found=found, large=case.material.is_large)
+        if is_ball(case) and not case.material.is_large and is_thin(case):
+            return False
+    sure = has_sure_contact(case) and case.mesh.degree == 2
+    return is_graded(rim, case.mesh.growth, found=found, large=case.material.is_large, sure=sure)
 
 
 def _rim(case: Case) -> float:

@@ -79,13 +79,19 @@ _FOUND_LARGE, _FOUND_LARGE_AT_EDGE, _FOUND_LARGE_DEGREE = (1.08, 0.35), 0.12, 2
 # those where the width of contact is found, at small and at large displacements.
 _GRADED, _GRADED_FOUND = (0.4, 0.7), (0.26, 0.41)
 _GRADED_LARGE = (0.61, 0.81)
+# The same for balls with displacement elements of degree 2, whose limit is known on larger elements, too.
+_GRADED_BALL = (0.41, 0.61)
 # The same for small elements, below those of the coarsest recipe.
 _FINE = (0.31, 0.61)
 
 
-def is_graded(rim: float, growth: float, *, found: bool = False, large: bool = False) -> bool:
-    """Return whether a mesh is graded to the edge; ``rim`` in units of the half width, of contact if ``found``."""
-    largest, steepest = (_GRADED_LARGE if large else _GRADED_FOUND) if found else _GRADED
+def is_graded(rim: float, growth: float, *, found: bool = False, large: bool = False, sure: bool = False) -> bool:
+    """Return whether a mesh is graded to the edge; ``rim`` in units of the half width, of contact if ``found``.
+
+    ``large`` is for found contact at large displacements, ``sure`` where its limit is known on large elements, too.
+    """
+    of_found = _GRADED_LARGE if large else _GRADED_BALL if sure else _GRADED_FOUND
+    largest, steepest = of_found if found else _GRADED
     return rim <= largest and growth <= steepest
 
 

@@ -201,10 +201,13 @@ def test_round_bodies_are_meshed_more_finely_before_elements_of_degree_3_are_tak
 # Balls, a cone and a rounded disc on cylinders, for which earlier limits of F were outside their bars, above all with
 # degree 3: tool, radius and height of the body (mm), ν, rim (in contact widths), growth, degree.
 SPHERE = {"shape": "sphere", "radius": "8.245 mm", "depth": "0.121286 mm"}
+SHALLOW = {"shape": "sphere", "radius": "22.469 mm", "depth": "0.0445058 mm"}
 CONE = {"shape": "cone", "angle": "77.6 deg", "radius": "3 mm", "depth": "0.345362 mm"}
 FOUND = [
     (SPHERE, 7.865, 0.56, 0.3, 0.3, 0.5, 3),
+    (SHALLOW, 12.379, 0.524, 0.3, 0.25, 0.35, 2),
     (SPHERE, 20, 20, 0.3, 0.25, 0.35, 2),
+    (SPHERE, 20, 20, 0.3, 0.4, 0.6, 2),
     (SPHERE, 20, 20, 0.49, 0.2, 0.3, 2),
     (CONE, 16.046, 5.915, 0.2, 0.2, 0.4, 3),
     (CONE, 16.046, 5.915, 0.2, 0.2, 0.3, 2),
