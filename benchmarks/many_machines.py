@@ -14,6 +14,7 @@ the processor time of the single process over that of all jobs.
 import os
 import random
 import shlex
+import signal
 import subprocess
 import sys
 import time
@@ -34,6 +35,8 @@ from tests.cluster.slurm import HERE, JOBS, ROOT, Cluster, started
 from tests.compare import all_done, assert_same_bits
 
 CASES, MACHINES, ON_A_MESH = 10_000, 20, 20
+# Quadratic elements: the cases of a job then take minutes, as those of a study that is dealt to many machines do.
+DEGREE = 2
 # Ways to kill a job, and the name of each in the output.
 PROGRAM, STEP, SCRIPT = "program", "step", "script"
 WAYS = (PROGRAM, STEP, SCRIPT)
@@ -42,7 +45,7 @@ _FIRST, _LAST, _DRAIN = 0.05, 0.75, 0.5
 # Seconds between two looks at the register, and between two lines of output.
 _LOOK, _TELL = 0.2, 20.0
 # Seconds after which the campaign is given up.
-_PATIENCE = 3600.0
+_PATIENCE = 1200.0
 # The command of a job: it notes the processor time of the program, also of one that was killed.
 COMMAND = """#!/bin/bash
 {python} -m pipeline "$@"
@@ -115,6 +118,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if os.geteuid() != 0:
         print("many_machines needs root, which starts Slurm: left out")
         return 0
+    # Who ends this program ends its Slurm, too.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     with TemporaryDirectory() as name:
         if subprocess.run([HERE / "start-slurm.sh", name], check=False).returncode:
             print("many_machines: no Slurm can be installed or started here: left out")
@@ -124,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         folder = Path(name)
         os.environ |= MPI_ENVIRONMENT | {"XDG_STATE_HOME": str(folder / "state"), "PYTHONPATH": str(ROOT)}
         study = folder / "many.toml"
-        study.write_text(to_toml(many_small(asked.cases, ON_A_MESH), study.name))
+        study.write_text(to_toml(many_small(asked.cases, ON_A_MESH, DEGREE), study.name))
         # Compiled forms are made once a machine.
         _run("run", _first(folder), "--output", folder / "first", "--meshes", folder / "first", "-q")
         print(f"one process, {asked.cases} cases", flush=True)
@@ -214,7 +219,7 @@ def _verdict(folder: Path) -> str:
 def _first(folder: Path) -> Path:
     """Return a study of few cases, whose run compiles the forms."""
     path = folder / "first.toml"
-    path.write_text(to_toml(many_small(ON_A_MESH, ON_A_MESH), path.name))
+    path.write_text(to_toml(many_small(ON_A_MESH, ON_A_MESH, DEGREE), path.name))
     return path
 
 

@@ -106,18 +106,27 @@ class CostModel:
         title = step.solves[0].label
         if len(step.solves) > 1:
             title += f" and {len(step.solves) - 1} more"
+        seconds = self.step_seconds(step)
         if step.axisymmetric:
-            seconds = sum(self.seconds("solve", *features(solve)) for solve in step.solves)
             return StepEstimate("meridian", len(step.solves), len(step.solves), 1e3, seconds, _MERIDIAN_BYTES, title)
-        kind, cells, _ = features(step.solves[0])
-        seconds = self.seconds("mesh", kind, cells, 0.0)
-        for solve in step.solves:
-            kind, poisson = kind_of(solve), _poisson(solve.case)
-            proof = 1.0 if solve.goal is None else _PROOF
-            seconds += proof * sum(self.seconds(stage, kind, cells, poisson) for stage in ("solve", "bar"))
-            seconds += self._further(solve)
+        _, cells, _ = features(step.solves[0])
         memory = max(map(_memory, {_size(solve): solve for solve in step.solves}.values()))
         return StepEstimate("mesh", len(step.solves), len(step.operators), cells, seconds, memory, title)
+
+    def step_seconds(self, step: MeshStep) -> float:
+        """Return the estimated seconds of a mesh step on one rank."""
+        if step.axisymmetric:
+            return sum(self.seconds("solve", *features(solve)) for solve in step.solves)
+        kind, cells, _ = features(step.solves[0])
+        seconds = self.seconds("mesh", kind, cells, 0.0)
+        alike: dict[tuple[str, float, bool], float] = {}
+        for solve in step.solves:
+            kind, poisson, is_proven = kind_of(solve), _poisson(solve.case), solve.goal is not None
+            if (known := alike.get((kind, poisson, is_proven))) is None:
+                both = sum(self.seconds(stage, kind, cells, poisson) for stage in ("solve", "bar"))
+                known = alike[kind, poisson, is_proven] = (_PROOF if is_proven else 1.0) * both
+            seconds += known + self._further(solve)
+        return seconds
 
     def _further(self, solve: Solve) -> float:
         """Return the expected seconds of further meshes, in case the first one's error bar exceeds the accuracy."""

@@ -119,7 +119,7 @@ def _cost(step: MeshStep) -> int:
 
     The estimate does not use stored times, and is rounded to three digits, because later ones may differ by machine.
     """
-    return max(1, round(1000 * float(f"{CostModel().step(step).seconds:.3g}")))
+    return max(1, round(1000 * float(f"{CostModel().step_seconds(step):.3g}")))
 
 
 class _Groups:
