@@ -1,4 +1,4 @@
-"""Start-up of the commands that need no solver: processor seconds, and number of modules loaded.
+"""Start-up of the commands that need no solver: processor seconds, elapsed seconds, and number of modules loaded.
 
 Two are of stored results and of many cases: a run whose records are all stored, and the plan of 100,000 cases.
 
@@ -15,6 +15,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 from benchmarks.processor import ROOT, processor_seconds
@@ -28,7 +29,7 @@ COMMANDS = {
     "status": ["status", "studies/quick.toml"],
     "plan of a case": ["plan", "studies/quick.toml", "0"],
     "plan of 100,000": ["plan", "studies/many.toml", "--quiet"],
-    "run, stored": ["run", "studies/quick.toml", "--output", "../stored"],
+    "run, stored": ["run", "studies/quick.toml", "--output", "../{tree}"],
 }
 _MANY = """
 [body]
@@ -58,18 +59,23 @@ def main() -> None:
     asked = parser.parse_args()
     trees = [ROOT, *(other.resolve() for other in asked.others)]
     seconds: dict[tuple[Path, str], list[float]] = {(tree, name): [] for tree in trees for name in COMMANDS}
+    elapsed: dict[tuple[Path, str], list[float]] = {(tree, name): [] for tree in trees for name in COMMANDS}
     modules: dict[tuple[Path, str], int] = {}
     with tempfile.TemporaryDirectory() as folder:
         for turn in range(asked.repeats + 1):
-            for name, arguments in COMMANDS.items():
-                for tree in trees:
+            for name, words in COMMANDS.items():
+                for number, tree in enumerate(trees):
+                    # Each checkout has results of its own: those of another program would be written again.
+                    arguments = [word.format(tree=number) for word in words]
                     place = Path(folder) / "place"
                     shutil.copytree(trees[-1] / "studies", place / "studies", ignore=shutil.ignore_patterns("results"))
                     (place / "studies" / "many.toml").write_text(_MANY, encoding="utf-8")
                     if not turn and arguments[0] == "run":
                         _run(tree, ["-m", "pipeline", *arguments], place)  # what it stores is there from then on
                     if turn:
+                        start = time.monotonic()
                         seconds[tree, name].append(_seconds(tree, arguments, place))
+                        elapsed[tree, name].append(time.monotonic() - start)
                     else:  # this run also writes the bytecode
                         modules[tree, name] = _modules(tree, arguments, place)
                     shutil.rmtree(place)
@@ -78,6 +84,7 @@ def main() -> None:
             name: {
                 "least": min(seconds[tree, name]),
                 "median": statistics.median(seconds[tree, name]),
+                "elapsed": min(elapsed[tree, name]),
                 "modules": modules[tree, name],
             }
             for name in COMMANDS
@@ -86,7 +93,8 @@ def main() -> None:
     }
     for name in COMMANDS:
         row = (found[str(tree)][name] for tree in trees)
-        print(f"{name:18}", *(f"{one['least']:.3f} {one['median']:.3f} s {one['modules']:4} modules" for one in row))
+        told = "{least:.3f} {median:.3f} s of processor time, {elapsed:.3f} s, {modules:4} modules"
+        print(f"{name:18}", *(told.format(**one) for one in row))
     write("start_up", asked.output, found)
 
 

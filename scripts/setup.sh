@@ -9,7 +9,7 @@ cd "$(dirname "$0")/.."
 packages=(
     python3-dolfinx python3-gmsh python3-mpi4py python3-petsc4py python3-numpy python3-scipy
     python3-xarray python3-netcdf4 python3-matplotlib python3-venv python3-dev
-    libopenblas0-pthread openmpi-bin gcc g++ make git ca-certificates libudunits2-0
+    libopenblas0-pthread openmpi-bin gcc g++ make git ca-certificates
 )
 python=/usr/bin/python3
 venv=.venv
@@ -22,6 +22,7 @@ elif [[ ${EXTRAS:-} == view ]] || compgen -G "$venv/lib/python*/site-packages/py
     extras=dev,docs,images,repair,fmi,view
     packages+=(libegl1)
 fi
+[[ $extras == images,repair ]] || packages+=(libudunits2-0) # of cfchecker, in tests
 stamp=$venv/.epsmesh-setup
 mmg=mmgpy==0.17.1
 
