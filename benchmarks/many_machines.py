@@ -36,8 +36,8 @@ from tests.cluster.slurm import HERE, JOBS, ROOT, Cluster, started
 from tests.compare import all_done, assert_same_bits
 
 CASES, MACHINES, ON_A_MESH = 10_000, 20, 20
-# Quadratic elements: the cases of a job then take minutes, as those of a study that is dealt to many machines do.
-DEGREE = 2
+# 2,400 quadratic elements: a job computes several times as long as it takes to start, and all of them ten minutes.
+MESH = {"degree": 2, "fine": "3 mm", "coarse": "3 mm"}
 # Ways to kill a job, and the name of each in the output.
 PROGRAM, STEP, SCRIPT = "program", "step", "script"
 WAYS = (PROGRAM, STEP, SCRIPT)
@@ -182,8 +182,9 @@ def _scenes(cases: int) -> dict[str, Any]:
     A restarted job would have other initial guesses than one that was not killed: forces would agree to 1e-11, but not
     in every bit.
     """
-    scenes = many_small(cases, ON_A_MESH, DEGREE)
-    return scenes | {"plan": {"without": [*scenes["plan"]["without"], "reuse"]}}
+    scenes = many_small(cases, ON_A_MESH)
+    without = [*scenes["plan"]["without"], "reuse"]
+    return scenes | {"mesh": scenes["mesh"] | MESH, "plan": {"without": without}}
 
 
 def _campaign(campaign: Campaign, study: Path, jobs: int) -> str:

@@ -19,12 +19,12 @@ def graded(fine: str, coarse: str, rim: str, growth: float, **others: Any) -> di
     return {"epsilon": "full", "fine": fine, "coarse": coarse, "rim": rim, "growth": growth} | others
 
 
-def many_small(cases: int, on_a_mesh: int = 10, degree: int = 1) -> dict[str, Any]:
+def many_small(cases: int, on_a_mesh: int = 10) -> dict[str, Any]:
     """Return a study of small scenes: ``on_a_mesh`` cases share a mesh, and none can reuse another's solution."""
     meshes = max(cases // on_a_mesh, 1)
     body = BOX | {"size": ["30 mm", "30 mm", "15 mm"]}
     probe = DISC | {"radius": [f"{2 + i / meshes:.6f} mm" for i in range(meshes)], "depth": "0.1 mm"}
-    mesh = graded("6 mm", "6 mm", "1 mm", 0.9, degree=degree, model="3d")
+    mesh = graded("6 mm", "6 mm", "1 mm", 0.9, degree=1, model="3d")
     ratios = [0.4 * number / on_a_mesh for number in range(on_a_mesh)]
     return study(body, ratios, probe, mesh) | {"plan": {"without": ["reduced"]}}
 
