@@ -29,7 +29,7 @@ from pipeline.solve.newton import HyperelasticBody, LargeError, Preconditioner
 from pipeline.solve.physics import MaterialLaw
 
 # Residual of the solution in one degree more, relative to the forces at prescribed dofs.
-_AGAIN = 1e-6
+_AGAIN = 1e-3
 
 
 class FinerResiduals:

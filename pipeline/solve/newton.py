@@ -31,9 +31,9 @@ from pipeline.stages import stage
 # Tolerance on the residual, relative to the forces at prescribed dofs, and most Newton iterations.
 LEFT, _MOST = 1e-9, 25
 # The same for load steps before the last: the work of F has fewer digits.
-ON_THE_WAY = 1e-6
+ON_THE_WAY = 1e-4
 # Tolerances of linear solves: the first one and the least, and the share of the gain that is needed to the end.
-_ROUGH, _FINE, _SPARE = 1e-2, 1e-4, 0.1
+_ROUGH, _FINE, _SPARE = 1e-1, 1e-4, 0.1
 # Most halvings of a step that turns tissue inside out.
 _HALVINGS = 12
 # Sufficient decrease: least gain of energy, as a share of that predicted by the slope.

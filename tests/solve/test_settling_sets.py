@@ -103,3 +103,22 @@ def test_sets_settle_where_they_would_repeat_for_ever():
     assert np.flatnonzero(found.active).tolist() == [3]
     assert -found.forces[:, 1] == pytest.approx(np.maximum(-gap, 0.0))
     assert heights - springs.state == pytest.approx(np.maximum(gap, 0.0))
+
+
+def test_a_rough_solution_is_close_and_takes_at_least_one_step():
+    """It may end before its set settles, but not at an initial guess."""
+    generator, rough = np.random.default_rng(5), []
+    followers = np.zeros(COUNT, dtype=bool)
+    for _ in range(100):
+        mixed = generator.normal(size=(COUNT, 3 * COUNT))
+        stiffness, loads = mixed @ mixed.T / COUNT, generator.normal(size=COUNT) + 1.0
+        tool, all_nodes = ceiling(0.1 * generator.random(COUNT), followers), np.ones(COUNT, dtype=bool)
+        if not (np.linalg.solve(stiffness, loads) > 0.1).any():
+            continue  # no contact
+        exact, near = (solve_contact(Springs(stiffness, loads), tool, all_nodes, limit=limit) for limit in (0.0, 0.05))
+        size = np.linalg.norm(exact.forces)
+        assert np.linalg.norm(near.forces - exact.forces) <= 0.1 * size
+        rough.append((exact.iterations, near.iterations))
+    exact_steps, rough_steps = np.array(rough).T
+    assert (rough_steps >= 1).all()
+    assert rough_steps.sum() < exact_steps.sum()

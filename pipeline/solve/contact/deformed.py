@@ -135,8 +135,9 @@ def solve_contact(
     """Find equilibrium and contact from the tissue's state and an initial ``active`` set (n); collective.
 
     Without ``friction_step`` there is no friction. Without patience, the loop ends where smaller load steps need fewer
-    iterations. A residual and gaps below ``limit`` are enough, in units of the forces and the depth. The tool must
-    touch a node, unless the ``scale`` (N) of the contact forces is known, to which the residual is then compared.
+    iterations. A residual and gaps below ``limit`` are enough, in units of the forces and the depth; nodes that pull or
+    penetrate less may then still change the set. The tool must touch a node, unless the ``scale`` (N) of the contact
+    forces is known, to which the residual is then compared.
 
     Raises:
         LargeError: if the loop does not converge.
@@ -183,18 +184,20 @@ class _Loop:
         normal = _within_planes(self._place.normal, tissue.fixed)
         self._there = Placed(positions, normal)
         following = _next_set(tool, before, self._reactions, self._place.gap)
-        self._pressed = np.where(before, np.einsum("ni,ni->n", forces, normal), 0.0)
         self._active = active = _with_care(tool, before, following, self._repeats)
+        is_same, is_rough = np.array_equal(active, before), self._limit > 0
+        # A rough solution has the next set: forces of nodes that leave it are residuals.
+        pressing = before & active if is_rough else before
+        self._pressed = np.where(pressing, np.einsum("ni,ni->n", forces, normal), 0.0)
         exerted = self._exerted(iteration, forces, before)
-        is_same = np.array_equal(active, before)
         if is_same and self._scale is None and not active.any():
             raise LargeError("the probe does not touch a single node: use smaller elements below it")
         residual = Residual(tissue.unbalanced(), float(np.linalg.norm(forces - exerted)))
         enough = max(self._limit, _ROUNDING) if residual.size > self._before / 2 else self._limit
         self._before = residual.size
         # An initial guess may be an equilibrium whose tool pulls: no reaction was predicted yet.
-        pulls = iteration == 0 and _pulls(tool, active, self._pressed)
-        if is_same and not pulls and self._is_converged(residual, enough):
+        pulls = iteration == 0 and (is_rough or _pulls(tool, active, self._pressed))
+        if (is_same or is_rough) and not pulls and self._is_converged(residual, enough):
             return self._solution(iteration, forces)
         self._check_patience(iteration)
         if not is_same:

@@ -42,7 +42,7 @@ from pipeline.stages import stage
 # Relative change of the displacement for the check of the work.
 _SMALL = 1e-4
 # Residual and gaps of one degree more, for the error bar.
-_FOUND_AGAIN = 1e-5
+_FOUND_AGAIN = 1e-3
 
 
 class LargeContact:
