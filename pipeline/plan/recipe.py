@@ -137,6 +137,8 @@ _BALL_LARGE = (
 )
 # Deeper balls, in units of their radius, need small elements: contact must end within the region that is searched.
 _SHALLOW = 0.8
+# Nearer to a held side, in units of the radius, F has errors that the next degree does not remove.
+_FROM_HELD = 2.0
 # At large displacements, elements of degree 3, and very small ones, fold at the probe's edge.
 _LARGE = (
     *LADDER[:4],
@@ -263,8 +265,11 @@ def has_sure_limit(case: Case) -> bool:
 
 
 def is_ball(case: Case) -> bool:
-    """Return whether F has the limit of balls; their histories at large displacements are not extrapolated."""
-    return case.probe.hertz_radius is not None and not (case.material.is_large and case.is_stepped)
+    """Return whether F has the limit of balls; at large displacements not in histories, nor close to a held side."""
+    if (radius := case.probe.hertz_radius) is None or not case.material.is_large:
+        return radius is not None
+    gaps = held_gaps(case.body, case.probe, case.mesh).values()
+    return not case.is_stepped and all(gap >= _FROM_HELD * radius for gap in gaps)
 
 
 def has_sure_contact(case: Case) -> bool:
