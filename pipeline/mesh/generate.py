@@ -161,13 +161,19 @@ def _folded() -> int:
     curved = [(dim, tag) for dim, tag in gmsh.model.getEntities(2) if gmsh.model.getType(dim, tag) != "Plane"]
     if not curved:
         return 0
-    points, count = points_by_tag(), 0
-    for dim, tag in curved:
+    points = points_by_tag()
+    areas, true = np.empty(len(curved)), np.empty(len(curved))
+    for number, (dim, tag) in enumerate(curved):
         corners = points[corners_of(2, [tag])]
         sides = corners[:, 1:] - corners[:, :1]
-        area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum() / 2
-        count += bool(area > _OVERLAP * gmsh.model.occ.getMass(dim, tag))
-    return count
+        areas[number] = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum() / 2
+        true[number] = gmsh.model.occ.getMass(dim, tag)
+    folded = areas > _OVERLAP * true
+    # The area of a part of an ellipsoid may err by a quarter in the geometry kernel; that of all parts does not.
+    spline = np.array([gmsh.model.getType(dim, tag) == "BSpline surface" for dim, tag in curved])
+    if areas[spline].sum() <= true[spline].sum():
+        folded &= ~spline
+    return int(folded.sum())
 
 
 def _built(scene: Scene) -> list[int]:

@@ -125,6 +125,22 @@ def test_a_thin_cylinder_with_large_elements_at_its_side_is_whole(rim, growth):
     assert volume(mesh) == pytest.approx(pi * 4.609e-3**2 * 1.175e-3 / 2, rel=0.02)
 
 
+def test_a_part_of_an_ellipsoid_whose_area_the_geometry_kernel_does_not_know_is_not_folded():
+    """For the held part of this scene it says three quarters of the area."""
+    tumour = {"name": "tumour", "at": ["7 mm", "-4 mm", "10 mm"], "radius": "5 mm", "young": "80 kPa", "poisson": 0.4}
+    body = {
+        "shape": "ellipsoid",
+        "axes": ["40 mm", "30 mm", "20 mm"],
+        "fixed": {"below": "-5 mm"},
+        "inclusion": [tumour],
+    }
+    probe = {"radius": "2 mm", "depth": "0.2 mm", "contact": "frictionless", "at": ["0 mm", "-15 mm"]}
+    sizes = {"epsilon": "8 mm", "fine": "2 mm", "coarse": "9 mm", "rim": "0.25 mm", "outside": "coarse"}
+    mesh = mesh_arrays(study(body=body, probe=probe, mesh=sizes).case(()), ())
+    assert volume(mesh) == pytest.approx(4 / 3 * pi * 24e-6, rel=0.02)
+    assert area(mesh, "fixed") == pytest.approx(4450e-6, rel=0.01)
+
+
 def test_curved_rim_and_sides_are_round():
     mesh = scene(column=10e-3)
     curved = curve(generate(mesh, SIZES), mesh)
