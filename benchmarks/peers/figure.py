@@ -21,24 +21,35 @@ _LOOKS = {
     "scikit-fem": ("#c98a00", "-", "s"),
     "CalculiX": ("#7b4fa3", "-", "^"),
 }
+# Panels in a row, at most.
+_COLUMNS = 4
 
 
 def draw(runs: Sequence[Run], path: Path) -> Path:
     """Draw the runs on one thread: all as marks, the best of each program connected."""
     names = list(dict.fromkeys(run.scene for run in runs))
     with mpl.rc_context(STYLE):
-        width = 2.6 * len(names) + 0.9 + 1.2 * (len(names) == 1)
-        figure = Figure(figsize=(width, 3.4))
+        columns = min(len(names), _COLUMNS)
+        rows = -(-len(names) // columns)
+        height = 2.9 * rows + 0.4
+        figure = Figure(figsize=(2.6 * columns + 2.1 * (columns == 1), height), layout="constrained")
+        figure.get_layout_engine().set(rect=(0, 0.4 / height, 1, 1 - 0.4 / height))
         FigureCanvasAgg(figure)
-        panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
-        for axes, name in zip(panels, names, strict=True):
+        panels = figure.subplots(rows, columns, sharey=True, squeeze=False)
+        for axes in panels.flat[len(names) :]:
+            axes.remove()
+        for axes, name in zip(panels.flat, names, strict=False):
             _panel(axes, [run for run in runs if run.scene == name and run.threads == 1])
             axes.set_title(f"{TASKS[name].title}, ν = {TASKS[name].poisson:g}", fontsize=8)
             axes.set_xlabel("time from geometry to F (s)")
-        panels[0].set_ylabel("|true error of F| (%)")
-        known = {label: h for axes in panels for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+        for axes in panels[:, 0]:
+            axes.set_ylabel("|true error of F| (%)")
+        known = {
+            label: h
+            for axes in panels.flat[: len(names)]
+            for h, label in zip(*axes.get_legend_handles_labels(), strict=True)
+        }
         figure.legend(known.values(), known.keys(), loc="lower center", ncol=len(known))
-        figure.subplots_adjust(left=0.85 / width, right=1 - 0.15 / width, top=0.9, bottom=0.26, wspace=0.08)
         return save(figure, path)
 
 
