@@ -208,12 +208,13 @@ def test_elastic_contact_over_time_is_that_of_the_depths_on_the_way():
     table = {"table": [["0 s", "0 mm"], ["4 s", "0.4 mm"], ["6 s", "0.4 mm"]], "steps": 60}
     plan = make_plan(study(**scene, probe=sphere | {"depth": None, "history": table}))
     data = build(plan, compute(plan, MPI.COMM_SELF))
+    scene["mesh"] |= {"accuracy": "0.3 %"}
     static = make_plan(study(**scene, probe=sphere | {"depth": ["0.02 mm", "0.1 mm", "0.3 mm"]}))
     known = build(static, compute(static, MPI.COMM_SELF))
     at = data.sel(time=[0.2, 1.0, 3.0], method="nearest")
     assert data["status"] == "ok"
     assert (abs(at["force"].values - known["force"].values) <= at["force_error"].values).all()
-    assert at["force"].values == pytest.approx(known["force"].values, rel=3e-3)
+    assert at["force"].values == pytest.approx(known["force"].values, rel=8e-3)
     assert at["contact_radius"].values == pytest.approx(known["contact_radius"].values, rel=0.03)
     for name in ("force", "contact_area", "contact_radius"):
         assert float(data[name].sel(time=slice(4, 6)).std()) == pytest.approx(0, abs=1e-12)

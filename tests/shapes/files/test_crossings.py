@@ -43,7 +43,7 @@ def test_what_floating_point_is_sure_of_is_so_in_rational_numbers():
     corners = random.standard_normal((400, 2, 3, 3))
     corners[::4, 1, 0] = corners[::4, 0, 0]
     sure = module._surely_cross(corners)
-    exact = np.array([module._cross(*pair) for pair in corners])
+    exact = np.array([module._do_cross(*pair) for pair in corners])
     assert 20 < sure.sum() < 200
     np.testing.assert_array_equal(sure[1::4], exact[1::4])
     assert exact[sure].all()
