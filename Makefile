@@ -92,7 +92,7 @@ slurm-test: setup ## install and start a Slurm of two virtual nodes here, and ru
 verify: setup ## compare forces with closed forms and published tables
 	$(EPSMESH) verify
 
-benchmark: setup ## make every table of docs/performance.md in results/ (on an idle machine, half an hour)
+benchmark: setup ## make every table of docs/performance.md in results/ (on an idle machine, one to two hours)
 	@scripts/peers.sh
 	$(PYTHON) -m benchmarks.start_up
 	$(PYTHON) -m benchmarks.ranks
