@@ -7,7 +7,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from benchmarks.peers.results import TARGETS, Run
 from benchmarks.peers.tasks import TASKS
@@ -64,7 +64,8 @@ def _panel(axes: Axes, runs: Sequence[Run]) -> None:
             axes.plot(*_points([mine[i] for i in best]), line, color=colour, marker=marker, label=label)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    # A LogLocator would label every minor tick of less than a decade.
+    axes.xaxis.set_major_locator(FixedLocator([digit * 10.0**power for power in range(-3, 4) for digit in (1, 2, 5)]))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())

@@ -31,9 +31,9 @@ _SHARE = 0.5
 # The face: points along each direction, and the number of polynomials fitted to them (facets are smoothed).
 _POINTS, _TERMS = 25, 9
 # On facets, second derivatives of that fit are noise near its ends. Curvature therefore comes from paraboloids, fitted
-# within _WINDOW radii of the study's disc; its error is the largest difference to the windows _OTHERS. Heights for them
-# are _APART radii apart.
-_WINDOW, _OTHERS, _APART = 1.0, (0.7, 1.4), 0.25
+# within _WINDOW radii of the study's disc; its error is the largest difference to the windows _OTHERS. The smallest is
+# that of a ball's or cone's contact, which follows single facets. Heights are _APART radii apart.
+_WINDOW, _OTHERS, _APART = 1.0, (0.35, 0.5, 1.4), 0.125
 # Tolerances of a query: distance from the face, in units of that fit's error or of the room; angle to the normal.
 _OFF, _LEAST_OFF, _ALIGNED = 1.5, 1e-3, 0.1
 

@@ -10,25 +10,14 @@ from dataclasses import dataclass
 from math import hypot, pi, sqrt
 from typing import Any
 
+from pipeline.plan import ladders
+from pipeline.plan.ladders import Recipe
 from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.shapes.body import Layered
 from pipeline.shapes.contact import is_level
 from pipeline.study.case import Case
 from pipeline.study.check_mesh import held_gaps
 from pipeline.study.schema import Mesh
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """Mesh settings: ``rim`` in units of :func:`edge_width_of`, and ``bar``, the expected relative error bar.
-
-    ``bar`` is for a disc on a deep body at ν = 0.3; see :func:`_expected` for others.
-    """
-
-    degree: int
-    rim: float
-    growth: float
-    bar: float
 
 
 @dataclass(frozen=True)
@@ -39,123 +28,10 @@ class Rung:
     bar: float
 
 
-LADDER = (
-    Recipe(2, 0.4, 0.7, 4.6e-3),
-    Recipe(2, 0.3, 0.6, 3.2e-3),
-    Recipe(2, 0.2, 0.5, 2.0e-3),
-    Recipe(2, 0.15, 0.45, 1.4e-3),
-    Recipe(3, 0.3, 0.6, 9.0e-4),
-    Recipe(3, 0.2, 0.5, 5.3e-4),
-    Recipe(3, 0.15, 0.45, 3.5e-4),
-    Recipe(3, 0.1, 0.4, 2.0e-4),
-    Recipe(3, 0.05, 0.35, 1.0e-4),
-    Recipe(3, 0.025, 0.3, 5.0e-5),
-)
-# If the probe's edge dominates the error, error bars are predictable: rungs are closer. None has degree 3 and a larger
-# rim: few quadratic arcs approximate a circle poorly, and the force is too low (docs/accuracy.md).
-_EVEN = (
-    Recipe(2, 0.4, 0.7, 7.0e-3),
-    Recipe(2, 0.3, 0.6, 4.1e-3),
-    Recipe(2, 0.25, 0.55, 3.1e-3),
-    Recipe(2, 0.2, 0.5, 2.3e-3),
-    Recipe(3, 0.3, 0.6, 1.8e-3),
-    Recipe(3, 0.25, 0.55, 1.25e-3),
-    Recipe(3, 0.2, 0.5, 8.0e-4),
-    Recipe(3, 0.15, 0.45, 7.0e-4),
-    Recipe(3, 0.125, 0.425, 5.2e-4),
-    Recipe(3, 0.1, 0.4, 3.8e-4),
-    Recipe(3, 0.07, 0.37, 2.7e-4),
-    Recipe(3, 0.05, 0.35, 1.9e-4),
-    Recipe(3, 0.025, 0.3, 1.0e-4),
-)
-# On a curved surface, smaller elements of degree 2 have a smaller error bar than the first rung of degree 3, in the
-# same time (docs/decisions.md).
-_ROUND = (
-    *LADDER[:4],
-    Recipe(2, 0.15, 0.35, 1.15e-3),
-    Recipe(2, 0.1, 0.3, 9.0e-4),
-    Recipe(2, 0.07, 0.25, 6.0e-4),
-    *LADDER[5:],
-)
-# Unilateral contact uses degree 2.
-_FLAT = (*LADDER[:4], Recipe(2, 0.1, 0.4, 9.0e-4), Recipe(2, 0.05, 0.35, 4.5e-4), Recipe(2, 0.025, 0.3, 2.3e-4))
-# For tools whose contact width is found, the pressure below them needs small elements as much as the edge of contact.
-# Mixed elements gain less from small ones. Limits of F are sure from the first rung on: pipeline/solve/estimate.py.
-_FOUND = {
-    "displacement": (
-        Recipe(2, 0.25, 0.35, 2.7e-3),
-        Recipe(2, 0.22, 0.32, 2.0e-3),
-        Recipe(2, 0.2, 0.3, 1.6e-3),
-        Recipe(2, 0.17, 0.27, 1.1e-3),
-        Recipe(2, 0.15, 0.25, 7.2e-4),
-        Recipe(2, 0.135, 0.225, 5.2e-4),
-        Recipe(2, 0.12, 0.2, 3.7e-4),
-        Recipe(2, 0.1, 0.185, 2.3e-4),
-        Recipe(2, 0.08, 0.17, 1.4e-4),
-        Recipe(2, 0.06, 0.14, 9.0e-5),
-    ),
-    "mixed": (
-        Recipe(2, 0.25, 0.35, 3.9e-3),
-        Recipe(2, 0.22, 0.32, 3.0e-3),
-        Recipe(2, 0.2, 0.3, 2.45e-3),
-        Recipe(2, 0.17, 0.27, 1.8e-3),
-        Recipe(2, 0.15, 0.25, 1.35e-3),
-        Recipe(2, 0.12, 0.2, 8.5e-4),
-        Recipe(2, 0.08, 0.17, 5.0e-4),
-        Recipe(2, 0.06, 0.14, 3.4e-4),
-    ),
-}
-# Larger elements for balls whose limit of F is sure on them: has_sure_contact.
-_BALL = (
-    Recipe(2, 0.4, 0.6, 1.05e-2),
-    Recipe(2, 0.35, 0.5, 7.5e-3),
-    Recipe(2, 0.3, 0.42, 4.5e-3),
-    *_FOUND["displacement"],
-)
-# The same at large displacements, where F is extrapolated for balls on plain bodies only.
-_FOUND_LARGE = (
-    Recipe(2, 0.4, 0.6, 3.0e-2),
-    Recipe(2, 0.3, 0.45, 1.2e-2),
-    Recipe(2, 0.25, 0.35, 6.5e-3),
-    Recipe(2, 0.2, 0.3, 4.2e-3),
-    Recipe(2, 0.15, 0.25, 2.8e-3),
-    Recipe(2, 0.12, 0.2, 2.2e-3),
-    Recipe(2, 0.08, 0.17, 1.5e-3),
-    Recipe(2, 0.06, 0.14, 1.1e-3),
-)
-_BALL_LARGE = (
-    Recipe(2, 0.6, 0.8, 1.1e-2),
-    Recipe(2, 0.5, 0.7, 7.5e-3),
-    Recipe(2, 0.4, 0.6, 6.0e-3),
-    Recipe(2, 0.3, 0.45, 4.8e-3),
-    Recipe(2, 0.25, 0.35, 3.8e-3),
-    Recipe(2, 0.2, 0.3, 3.0e-3),
-    Recipe(2, 0.15, 0.25, 2.2e-3),
-    Recipe(2, 0.12, 0.2, 1.7e-3),
-    Recipe(2, 0.08, 0.17, 1.15e-3),
-    Recipe(2, 0.06, 0.14, 8.6e-4),
-)
 # Deeper balls, in units of their radius, need small elements: contact must end within the region that is searched.
 _SHALLOW = 0.8
 # Nearer to a held side, in units of the radius, F has errors that the next degree does not remove.
 _FROM_HELD = 2.0
-# At large displacements, elements of degree 3, and very small ones, fold at the probe's edge.
-_LARGE = (
-    *LADDER[:4],
-    Recipe(2, 0.15, 0.45, 1.5e-3),
-    Recipe(2, 0.1, 0.4, 1.0e-3),
-    Recipe(2, 0.07, 0.35, 6.5e-4),
-    Recipe(2, 0.05, 0.3, 4.4e-4),
-)
-# Deep probes at large displacements: no quarter points, and rims that do not fold. Bars hardly depend on the depth.
-_DEEP = (
-    Recipe(2, 0.4, 0.7, 9.5e-3),
-    Recipe(2, 0.3, 0.6, 7.5e-3),
-    Recipe(2, 0.2, 0.5, 5.5e-3),
-    Recipe(2, 0.15, 0.45, 4.3e-3),
-    Recipe(2, 0.1, 0.4, 3.1e-3),
-    Recipe(2, 0.07, 0.35, 2.4e-3),
-)
 # Error bars at large displacements, in units of those of linear elasticity: at small depths, and their growth with the
 # depth in units of the half width.
 _OF_LARGE, _BY_DEPTH = 1.8, 6.0
@@ -207,18 +83,18 @@ def _ladder(case: Case) -> tuple[Recipe, ...]:
     """Return the recipes for a probe, cheapest first."""
     if not case.probe.is_flat:
         if not case.material.is_large:
-            return _BALL if has_sure_contact(case) else _FOUND[case.element]
+            return ladders.BALL if has_sure_contact(case) else ladders.FOUND[case.element]
         ball = case.probe.hertz_radius if is_ball(case) and case.is_plain and not case.probe.friction else None
-        return _FOUND_LARGE if ball is None or case.probe.depth > _SHALLOW * ball else _BALL_LARGE
+        return ladders.FOUND_LARGE if ball is None or case.probe.depth > _SHALLOW * ball else ladders.BALL_LARGE
     if not case.has_quarter_points:
-        return _DEEP
+        return ladders.DEEP
     if case.material.is_large:
-        return _LARGE
+        return ladders.LARGE
     if case.probe.is_unilateral:
-        return _FLAT
+        return ladders.FLAT
     if case.is_plain:
-        return _EVEN
-    return LADDER if is_level(case.body, case.frame) else _ROUND
+        return ladders.EVEN
+    return ladders.LADDER if is_level(case.body, case.frame) else ladders.ROUND
 
 
 def half_width_of(case: Case) -> float:
@@ -245,7 +121,7 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
     locking = 1.0 if case.element == "mixed" else ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
     if not case.probe.is_flat:  # elements in a thin body are small anyway
         return [float(recipe.bar * shape * locking) for recipe in ladder]
-    is_even = ladder is _EVEN
+    is_even = ladder is ladders.EVEN
     thin = min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
     shape *= locking * (1 + (_THICKNESS_EVEN if is_even else _THICKNESS) * thin)
     of_degree = _MIXED_LARGE if case.material.is_large else _MIXED

@@ -9,7 +9,7 @@ from pipeline.plan.plan import Plan
 from pipeline.plan.work import EndPlans
 from pipeline.quantities import attributes
 from pipeline.report.words import percent
-from pipeline.shapes.segmented import Segmented
+from pipeline.shapes.segmented import Segmented, is_uncertain
 
 NAME = "force_uncertainty"
 IMAGE = "force_image_uncertainty"
@@ -36,7 +36,7 @@ def force_image_uncertainty(plan: Plan, force: xr.DataArray, force_of: ForceOf) 
     for end in (end for end in plan.ends if end.of_image):
         found = [abs(_like(force_of(one), force).transpose(*force.dims) - force).values for one in _there(end)]
         squares += np.fmax.reduce([np.full(force.shape, np.nan), *found]) ** 2
-    bodies = [body for body in plan.study.sections["body"] if isinstance(body, Segmented) and body.boundary_range]
+    bodies = [body for body in plan.study.sections["body"] if is_uncertain(body)]
     comment = "; ".join(dict.fromkeys(map(_range, bodies)))
     return force.copy(data=np.sqrt(squares)).assign_attrs(attributes(IMAGE) | {"comment": comment}).rename(IMAGE)
 

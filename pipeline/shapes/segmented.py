@@ -2,13 +2,13 @@
 
 import re
 from abc import abstractmethod
-from typing import Annotated, Self
+from typing import Annotated, Self, TypeGuard
 
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.from_file import FromFile
-from pipeline.shapes.section import Words
+from pipeline.shapes.section import Section, Words
 from pipeline.units import Coordinate, canonical, parse_quantity
 
 _VOXELS = re.compile(r"^\s*(\d+(?:\.\d+)?)\s*voxels?\s*$")
@@ -80,3 +80,8 @@ class Segmented(FromFile):
         made = self.model_copy(update={"offset": shift, "boundary_uncertainty": None, "region": region} | more)
         made._loaded = made.read(made.file, dict(made))
         return made
+
+
+def is_uncertain(body: Section) -> TypeGuard[Segmented]:
+    """Return whether a body is segmented, and its boundary has a half range."""
+    return isinstance(body, Segmented) and body.boundary_range > 0

@@ -13,7 +13,7 @@ from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.punch import LINEAR
 from pipeline.shapes.section import Section, in_mm
-from pipeline.shapes.segmented import Segmented
+from pipeline.shapes.segmented import is_uncertain
 from pipeline.shapes.triangles import SurfaceError
 from pipeline.study.axis import Axis
 from pipeline.study.capabilities.refusals import check_features
@@ -157,7 +157,7 @@ def _tell_notices(body: Body, problems: Problems) -> None:
 
 def _check_boundary(body: Body, problems: Problems) -> None:
     """Check that the surface can be shifted to the ends of its boundary's range."""
-    if isinstance(body, Segmented) and body.boundary_range:
+    if is_uncertain(body):
         try:
             for sign in (-1, 1):
                 body.varied(offset=sign * body.boundary_range)

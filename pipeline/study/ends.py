@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from pipeline.shapes.segmented import Segmented
+from pipeline.shapes.segmented import Segmented, is_uncertain
 from pipeline.shapes.triangles import SurfaceError
 from pipeline.study.identified import NOTHING
 from pipeline.study.problems import StudyError
@@ -41,7 +41,7 @@ def ends_of(study: Study) -> tuple[Ends, ...]:
 
 def ends_of_image(study: Study) -> tuple[Ends, ...]:
     """Return the ends of the boundary's position and of the smoothing; none without ``boundary_uncertainty``."""
-    bodies = [body for body in study.sections["body"] if isinstance(body, Segmented) and body.boundary_range]
+    bodies = [body for body in study.sections["body"] if is_uncertain(body)]
     if not bodies:
         return ()
     inward, outward = (_with_bodies(study, partial(_moved_boundary, sign=sign)) for sign in (-1, 1))
@@ -64,10 +64,7 @@ def _smoothed(body: Segmented, end: int) -> Segmented:
 def _with_bodies(study: Study, change: Callable[[Segmented], Segmented]) -> Study | None:
     """Return the study with other segmented bodies, without F_exact and bars; None if one cannot be made."""
     try:
-        bodies = tuple(
-            change(body) if isinstance(body, Segmented) and body.boundary_range else body
-            for body in study.sections["body"]
-        )
+        bodies = tuple(change(body) if is_uncertain(body) else body for body in study.sections["body"])
     except SurfaceError:
         return None
     solve = study.solve.model_copy(update={"exact": False, "timing": False})
