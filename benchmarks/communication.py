@@ -135,7 +135,7 @@ def table(runs: list[dict[str, Any]]) -> str:
             "reductions": run["most"]["reductions"],
             "s of assembly": run["most"]["assembly"],
             "s of iterations": run["most"]["iterating"],
-            "load balance of the solve": alone["solve"] / run["most"]["solve"],
+            "speed-up of the solve": alone["solve"] / run["most"]["solve"],
             "of its error bar": alone[_BAR] / run["most"][_BAR],
         }
         for run in runs

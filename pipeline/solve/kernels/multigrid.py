@@ -27,9 +27,9 @@ from pipeline.stages import stage
 _STEPS, _LEFT, _RAISED, _LANCZOS = 2, 0.1, 1.15, 5
 # Where the material jumps, the largest eigenvector is in the stiffest region, where random vectors have little of it.
 _LANCZOS_JUMPS = 12
-# From this many unknowns on, twice the steps: the more elements, the less a random vector has of the worst few. At ten
-# million the estimate was 22 % too low with 5 steps, 9 % with 10, which saved a third of the iterations of mixed
-# elements, a ninth of those of others.
+# From this many unknowns on, twice the steps of bodies of one material: the more elements, the less a random vector has
+# of the worst few. At ten million the estimate was 22 % too low with 5 steps, 9 % with 10, which saved a third of the
+# iterations of mixed elements, a ninth of those of others.
 _MANY, _LANCZOS_MANY = 500_000, 10
 # An eigenvalue above 1.1 times the estimate makes the cycle indefinite. A few slender elements may have one, with an
 # eigenvector that random vectors hardly contain; this many steps find it.
