@@ -17,7 +17,7 @@ from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, leave_out_stored, make_plan
 from pipeline.plan.shard import Shard
 from pipeline.report.publish import Results, ResultsError, publish
-from pipeline.run.begun import ENDING, Begun, fail_begun
+from pipeline.run.begun import ENDING, Begun, fail_begun, store_done
 from pipeline.run.completion import complete
 from pipeline.run.merge import merge
 from pipeline.run.outbox import Outbox
@@ -100,6 +100,7 @@ def prepare(
         try:
             opened.store = Store(store_path)
             merged = merge(beside, opened.store) if beside and not (shard or fresh) else ()
+            store_done(opened.store)
             cost = opened.store.cost_model()
             if not fresh:
                 wanted = own - {*declared.keys} if study.solve.timing else own
@@ -233,6 +234,8 @@ def _compute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
         with _interruptible() as signals:
             _execute(plan, opened, comm, progress, signals)
     except KeyboardInterrupt:
+        if opened.store:  # what other ranks have finished
+            opened.records |= {key: one for key, one in store_done(opened.store).items() if key in plan.all_keys}
         return True
     return False
 
@@ -271,17 +274,19 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
         if signals:
             raise KeyboardInterrupt
 
-    with progress or nullcontext(), registered or nullcontext(), outbox or nullcontext(), opened.begun as begun:
-        execute(
-            plan,
-            comm,
-            keep,
-            registered or Progress(),
-            known=opened.records,
-            cache=cache,
-            begun=begun,
-            last=opened.again,
-        )
+    with progress or nullcontext(), registered or nullcontext(), opened.begun as begun:
+        with outbox or nullcontext():
+            execute(
+                plan,
+                comm,
+                keep,
+                registered or Progress(),
+                known=opened.records,
+                cache=cache,
+                begun=begun,
+                last=opened.again,
+            )
+        comm.barrier()  # each rank keeps its own files until all records are in the store
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """Records on their way to the store: those of one mesh are written in one transaction.
 
-A synchronised write takes up to tens of milliseconds on a network file system, as long as a small case. Also, after a
-run was killed, the next one repeats quick steps as a whole, from the same initial guesses, to the same bits.
+A synchronised write takes up to tens of milliseconds on a network file system, as long as a small case. Meanwhile the
+records are in files of the processes that made them (``pipeline.run.begun``), so that a killed process loses none.
 """
 
 import time
@@ -12,7 +12,7 @@ from pipeline.plan.plan import Plan
 from pipeline.run.record import Record
 from pipeline.run.store import Store
 
-# Longest time (s) that a record waits for others: so much work is lost if the process is killed.
+# Longest time (s) that a record waits for others, unless a case takes longer: so much is lost if the machine stops.
 _LONGEST = 2.0
 
 
@@ -54,5 +54,5 @@ class Outbox:
 
     def _flush(self) -> None:
         if self._waiting:
-            records, self._waiting = self._waiting, []
-            self._store.put_all(records)
+            self._store.put_all(self._waiting)
+            self._waiting = []  # not before: a signal may raise an exception at any line

@@ -5,7 +5,6 @@ lock on the file shows whether the run is alive. For runs elsewhere, Slurm knows
 If the folder cannot be written, runs are not registered.
 """
 
-import fcntl
 import json
 import os
 import socket
@@ -20,6 +19,7 @@ from types import TracebackType
 from pydantic import TypeAdapter
 
 from pipeline.files import state_folder
+from pipeline.locks import hold, is_held
 from pipeline.plan.plan import Plan
 from pipeline.plan.shard import shard_of
 from pipeline.run.progress import MESHING, Progress
@@ -114,8 +114,7 @@ class Registered(Progress):
                 _remove(path)
         path = folder / f"{name}-{os.urandom(4).hex()}.json"
         self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
-        with suppress(OSError):  # a file system without locks
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        hold(self._file)
 
     def _update_if_due(self) -> None:
         if time.monotonic() - self._last > _PACE:
@@ -155,7 +154,8 @@ def runs() -> list[Run]:
     folder, found = state_folder() / "runs", []
     for path in sorted(folder.iterdir()) if folder.is_dir() else []:
         with suppress(OSError, ValueError):
-            found.append((_read(path), _is_locked(path)))
+            run = _read(path)
+            found.append((run, is_held(path, run.machine, run.pid)))
     known = _running_jobs() if any(_is_elsewhere(run) and run.job_id for run, _ in found) else None
     told = [_judged(run, is_locked, known) for run, is_locked in found if Path(run.store).exists()]
     return sorted(
@@ -196,16 +196,13 @@ def _read(path: Path) -> Run:
     return TypeAdapter(Run).validate_json(path.read_bytes())
 
 
-def _is_locked(path: Path) -> bool:
-    with path.open("rb") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError:
-            return True
-    return False
-
-
 def _remove(path: Path) -> None:
+    """Remove the file of a run that is over."""
     with suppress(OSError):
-        if not _is_locked(path):
+        try:
+            run = _read(path)
+            is_over = run.state != RUNNING or not is_held(path, run.machine, run.pid)
+        except ValueError:
+            is_over = True
+        if is_over:
             path.unlink()

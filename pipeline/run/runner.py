@@ -288,6 +288,7 @@ class StepRunner:
         if judged is not None:
             self._records[judged.key] = judged
             if self._comm.rank == 0:
+                self._begun.done(judged)
                 self._keep(judged)
 
     def _caught(self, compute: Callable[[], T]) -> T | Failure:

@@ -1,9 +1,11 @@
 """A process that is ended from outside, or from below Python, costs the case that it was at, and no other."""
 
+import errno
 import json
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -11,7 +13,8 @@ from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
 from pipeline.report.read import read_file
-from pipeline.run.begun import Begun, Ended, fail_begun
+from pipeline.run.begun import Begun, Ended, fail_begun, store_done
+from pipeline.run.outbox import Outbox
 from pipeline.run.reading import open_to_read
 from pipeline.run.record import Record
 from pipeline.run.store import Store
@@ -33,6 +36,15 @@ StepRunner._solve = fatal
 from pipeline.__main__ import main
 main()
 """
+# Ends the process once another has finished all other cases.
+WAIT = """
+        import time
+        from pathlib import Path
+        for _ in range(1200):
+            if sum(path.read_bytes().count(b"key") for path in Path(sys.argv[4]).glob(".*-done-*")) == 2:
+                break
+            time.sleep(0.05)
+        os.abort()"""
 BEGIN = """
 import os, signal, sys
 from pathlib import Path
@@ -42,6 +54,20 @@ begun = Begun(Path(sys.argv[1]))
 begun.name(["c"])
 begun.name(["a", "b"])
 os.kill(os.getpid(), signal.{asked})
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+FINISH = """
+import os, signal, sys
+from pathlib import Path
+from pipeline.run.begun import Begun
+from pipeline.run.record import Record
+begun = Begun(Path(sys.argv[1]))
+begun.name("ab")
+begun.done(Record("a", "ok", force=1.0))
+begun.done(Record("b", "ok", force=2.0))
+begun.name("c")
+os.write(begun._open("done"), b'\\n{"key": "c", "sta')
 os.kill(os.getpid(), signal.SIGKILL)
 """
 
@@ -82,6 +108,47 @@ def test_a_case_of_a_process_that_was_killed_is_tried_again_once_but_forces_on_r
     assert (list(ended.failed), ended.again) == (["b"], set())
     assert "the process was killed while it computed this case" in ended.failed["b"].message
     assert [path.name for path in store.path.parent.iterdir()] == ["cases.sqlite"]
+
+
+def without_locks(*_: object) -> None:
+    raise OSError(errno.ENOLCK, "No locks available")
+
+
+@pytest.mark.parametrize("has_locks", [True, False])
+def test_records_of_a_killed_process_are_stored_but_for_a_torn_one_and_blame_no_case(
+    store: Store, monkeypatch, has_locks: bool
+):
+    run(FINISH, store.path)
+    if not has_locks:
+        monkeypatch.setattr("fcntl.flock", without_locks)
+    assert store.get("abc") == {}
+    assert {*store_done(store)} == {"a", "b"}
+    assert {key: record.force for key, record in store.get("abc").items()} == {"a": 1.0, "b": 2.0}
+    assert fail_begun(store, {"a", "b"}) == NONE
+    assert fail_begun(store, {"c"}).again == {"c"}
+    assert [path.name for path in store.path.parent.iterdir()] == ["cases.sqlite"]
+    with Begun(store.path) as begun:
+        begun.name(["d"])
+        begun.done(Record("e", "ok", force=3.0))
+        assert {*store_done(store)} == {"e"}
+        assert fail_begun(store, {"d"}) == NONE
+        assert len(list(store.path.parent.iterdir())) == 3
+    assert [path.name for path in store.path.parent.iterdir()] == ["cases.sqlite"]
+
+
+def test_a_signal_while_records_are_written_loses_none(store: Store, monkeypatch):
+    plan, write = Mock(meshes=[Mock(solves=[Mock(key=key) for key in "abc"])]), Record.to_json
+
+    def interrupted(record: Record) -> str:
+        monkeypatch.setattr(Record, "to_json", write)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), Outbox(store, plan) as outbox:
+        for key in "abc":
+            if key == "c":
+                monkeypatch.setattr(Record, "to_json", interrupted)
+            outbox.put(Record(key, "ok", force=1.0))
+    assert {*store.get("abc")} == {*"abc"}
 
 
 def test_a_process_that_was_asked_to_end_blames_no_case(store: Store):
@@ -129,12 +196,16 @@ def test_a_damaged_file_blames_no_case(store: Store):
 
 
 def test_a_case_that_ends_its_process_twice_fails_in_the_next_run_alone(epsmesh, tmp_path: Path):
-    """The second run does it last. The fourth run tries it again."""
+    """The second run does it last. The fourth run tries it again. What another rank has finished is kept."""
     file = tmp_path / "small.toml"
     file.write_text(small_text(mesh={"epsilon": ["4 mm", "6 mm", "full"], "degree": 1}, solve={"exact": False}))
     words = ("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes")
-    killed = run(COMMAND.format(ends="os.abort()"), *words, ranks=2)
+    killed = run(COMMAND.format(ends=WAIT), *words, ranks=2)
     assert killed.returncode not in (0, 1, 2)
+    stored = Store(tmp_path / "cases.sqlite")
+    store_done(stored)
+    assert [record.status for record in stored.records()] == ["ok", "ok"]
+    stored.close()
     killed = run(COMMAND.format(ends="os.abort()"), *words)
     assert killed.returncode not in (0, 1, 2)
     assert "the case that it was at is tried again, after the others" in killed.stderr

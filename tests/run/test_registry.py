@@ -1,11 +1,13 @@
 """The register of the user's runs: which are alive, which were killed, and which cannot be known from here."""
 
+import errno
 import json
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -41,7 +43,10 @@ def store(tmp_path: Path, monkeypatch) -> Path:
     return path
 
 
-def test_a_run_is_alive_until_it_is_killed_and_the_next_one_takes_its_place(store: Path):
+@pytest.mark.parametrize("has_locks", [True, False])
+def test_a_run_is_alive_until_it_is_killed_and_the_next_one_takes_its_place(store: Path, monkeypatch, has_locks: bool):
+    if not has_locks:
+        monkeypatch.setattr("fcntl.flock", Mock(side_effect=OSError(errno.ENOLCK, "No locks available")))
     environment = ENVIRONMENT | {"PYTHONPATH": str(ROOT), "XDG_STATE_HOME": str(state_folder().parent)}
     with subprocess.Popen(
         [sys.executable, "-c", BEGIN, str(store)], env=environment, cwd=ROOT, stdout=subprocess.PIPE, text=True
