@@ -59,6 +59,8 @@ def read_curves(pattern: str, reading: Reading, folder: Path = Path()) -> tuple[
             found.append(read_curve(path, reading))
         except ExperimentError as error:
             found.append(error)
+        except Exception as error:  # an odd file does not end a folder
+            found.append(ExperimentError(str(path), f"cannot be read: {type(error).__name__}: {error}"))
     return some(found, pattern)
 
 

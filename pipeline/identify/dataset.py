@@ -113,10 +113,14 @@ def joined(found: Sequence[xr.Dataset | ExperimentError], files: Sequence[str]) 
     """
     good = [one for one in found if isinstance(one, xr.Dataset)]
     longest = {dim: max(one.sizes.get(dim, 0) for one in good) for dim in ("sample", "point", "window")}
-    rows = [_row(one, good[0]) for one in found]
-    padded = [
+    rows = [
         one.pad({dim: (0, length - one.sizes[dim]) for dim, length in longest.items() if dim in one.dims})
-        for one in rows
+        for one in (_row(one, good[0]) for one in found)
+    ]
+    # Some files have what others lack, such as E over windows where the law does not fit.
+    every = {str(name): variable for one in rows for name, variable in one.data_vars.items()}
+    padded = [
+        one.assign({name: xr.full_like(every[name], np.nan) for name in every.keys() - one.keys()}) for one in rows
     ]
     whole = xr.concat(padded, "file", data_vars="all", coords="minimal", compat="override", combine_attrs="drop")
     for name, variable in whole.variables.items():

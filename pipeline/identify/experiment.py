@@ -10,15 +10,17 @@ import numpy as np
 
 from pipeline.experiment.curve import Curve
 from pipeline.experiment.reading import ExperimentError
-from pipeline.identify.forward import OwnForce, SceneForce, forward_of
+from pipeline.identify.forward import OwnForce, SceneForce, forward_of, unknown_domain
 from pipeline.identify.may_hide import hidden_parts
 from pipeline.identify.parts import Estimate, Hidden, Measured, Unknown
 from pipeline.identify.tools import tip_of_probe
+from pipeline.report.identified import engineering
 from pipeline.shapes.probe import Probe
 from pipeline.study.case import Case
 from pipeline.study.curves import curves_of, sound
 from pipeline.study.measurement import Measurement
 from pipeline.study.own_lengths import own_length
+from pipeline.study.problems import StudyError
 from pipeline.study.read import scene_of
 from pipeline.study.schema import Material
 from pipeline.study.sweep import Study
@@ -28,6 +30,8 @@ from pipeline.surrogate.ranges import Range
 # The force is computed this much deeper than from a twentieth of the largest force on: a ball has that at an eighth of
 # its depth, a cone at a fifth, and the contact point is not known beforehand.
 _SMALL, _DEEPER = 0.05, 1.4
+# Curves this many times as deep as most are another test, or have another unit.
+_ODD = 2.0
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,61 @@ def _specimen(study: Study, found: Sequence[Curve | ExperimentError]) -> Specime
     return Specimen(name, tuple(replace(curve, name=one.name) for curve, one in rows))
 
 
+def without_too_deep(
+    study: Study, unknowns: Sequence[Unknown], found: Sequence[Specimen], times: float
+) -> tuple[Specimen, ...]:
+    """Return the specimens, with an error in place of the curves of those that are too deep for their scene.
+
+    Forces are needed down to ``times`` a depth that curves usually do not go beyond.
+
+    Raises:
+        StudyError: if a scene cannot be run at any depth.
+    """
+    made = list(found)
+    for number, measurement in enumerate(study.measurements):
+        scene = scene_of(study, measurement)
+        sought = of_scene(unknowns, own_names(measurement, unknowns))
+        depths = {n: deepest_of([one.curves[number]], times) for n, one in enumerate(made) if one.curves}
+        refused: dict[float, str] = {}
+        for depth in sorted(set(depths.values()), reverse=True):
+            if not (why := _refusal(scene, sought, depth)):
+                break
+            refused[depth] = why
+        for n in (n for n, depth in depths.items() if depth in refused):
+            made[n] = _too_deep(made[n], number, refused[depths[n]])
+    return tuple(made)
+
+
+def without_odd(found: Sequence[Specimen], why: str) -> tuple[Specimen, ...]:
+    """Return the specimens, with an error in place of the curves of those that are far deeper than most."""
+    made = list(found)
+    for number in range(max(len(one.curves) for one in found)):
+        depths = {n: depth_of(one.curves[number]) for n, one in enumerate(made) if one.curves}
+        most = _ODD * float(np.median(list(depths.values())))
+        for n in (n for n, depth in depths.items() if depth > most):
+            made[n] = _too_deep(made[n], number, why)
+    return tuple(made)
+
+
+def _too_deep(specimen: Specimen, number: int, why: str) -> Specimen:
+    """Return a specimen whose curve of that number is too deep for its scene."""
+    curve = specimen.curves[number]
+    told = f"the curve is about {engineering(depth_of(curve), 'm')} deep, for which there is no force: {why}. "
+    told += "Is a unit or a size wrong? Else give a `window` that ends earlier"
+    return Specimen(specimen.name, (), ExperimentError(curve.name, told))
+
+
+def _refusal(scene: Study, sought: Sequence[Unknown], deepest: float) -> str:
+    """Return why forces of a scene cannot be computed down to a depth (m); "" if they can."""
+    try:
+        unknown_domain(scene, sought, deepest)
+    except StudyError as error:
+        if any(problem.key != "probe.depth" for problem in error.problems):
+            raise
+        return error.problems[0].allowed
+    return ""
+
+
 def cases_of(study: Study) -> tuple[Case, ...]:
     """Return the first case of the scene of each measurement; its depth is none of a curve.
 
@@ -159,7 +218,8 @@ def depth_of(curve: Curve) -> float:
     top = int(np.argmax(curve.depth))
     pressed = np.flatnonzero(force[: top + 1] > _SMALL * force.max())
     start = curve.depth[pressed[0]] if pressed.size else curve.depth[0]
-    return float(min(curve.depth[top] - start, np.ptp(curve.depth)))
+    whole = float(np.ptp(curve.depth))
+    return max(min(float(curve.depth[top] - start), whole), whole / len(curve.depth))
 
 
 def _poisson(study: Study, unknowns: Sequence[Unknown]) -> float:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-import numpy as np
 import xarray as xr
 
 from pipeline.experiment.reading import ExperimentError
@@ -14,7 +13,7 @@ from pipeline.identify.advice import advice
 from pipeline.identify.dataset import dataset_of, described
 from pipeline.identify.doubts import doubts_of_depth, doubts_of_force, doubts_of_moduli, doubts_of_scale
 from pipeline.identify.estimate import identify
-from pipeline.identify.experiment import Near, Scenes, Specimen
+from pipeline.identify.experiment import Near, Scenes, Specimen, without_odd
 from pipeline.identify.hertz import hertz_young
 from pipeline.identify.kept import Kept
 from pipeline.identify.parts import Estimate, TooDeepError
@@ -22,6 +21,7 @@ from pipeline.identify.unknowns import unknowns
 from pipeline.run.provenance import provenance
 from pipeline.study.problems import StudyError
 from pipeline.study.sweep import Study
+from pipeline.surrogate.cases import SurrogateError
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -33,6 +33,8 @@ Found: TypeAlias = xr.Dataset | ExperimentError
 SILENCE = 10.0
 # Depths that forces are computed for, in turn, as multiples of what is enough if there is air before the contact.
 _DEEPER = (1.0, 1.6, 2.5, 4.5)
+# And what is hardly enough, for tools that go no deeper, such as a ball to its equator.
+LEAST = 0.83
 # Most fits of a specimen, of which each has forces that are corrected about the one before; so many specimens at once.
 _MOST_FITS, _AT_ONCE = 3, 16
 _REMEDY = "record air before the contact, or give a `window` that ends earlier"
@@ -40,14 +42,14 @@ _REMEDY = "record air before the contact, or give a `window` that ends earlier"
 
 @dataclass(frozen=True)
 class Work:
-    """Specimens of a study to fit, with the forces down to multiples of the usual depth that ``scenes`` returns.
+    """Specimens of a study to fit; ``scenes`` returns the forces for some, down to a multiple of their usual depth.
 
     Of one specimen alone, it is said which test to make next.
     """
 
     study: Study
     specimens: tuple[Specimen, ...]
-    scenes: Callable[[float], Scenes]
+    scenes: Callable[[tuple[Specimen, ...], float], Scenes]
 
     def done(self, comm: "MPI.Comm", kept: Kept, say: Callable[[str], None]) -> list[Found]:
         """Return what is found of each specimen, on every rank; collective.
@@ -73,17 +75,22 @@ class Work:
 
     def _fitted(self, mine: Mapping[int, Specimen], comm: "MPI.Comm") -> Iterator[tuple[int, Found]]:
         """Yield what is found of specimens of this rank by number, in any order; all ranks go through it."""
-        left = dict.fromkeys(mine, "")
+        left, some = dict.fromkeys(mine, ""), self.specimens
         for times in _DEEPER:
             if not comm.allreduce(len(left)):
                 return
             try:
-                scenes = self.scenes(times)
-            except StudyError as error:  # such as a ball deeper than its radius
+                some, scenes = self._scenes(some) if times == _DEEPER[0] else (some, self.scenes(some, times))
+            except (StudyError, SurrogateError) as problem:  # such as a ball deeper than its radius
                 if times == _DEEPER[0]:
                     raise
-                left = {number: f"{why}, and cannot be: {error.problems[0]}" for number, why in left.items()}
+                why_not = problem.problems[0].allowed if isinstance(problem, StudyError) else str(problem)
+                left = {number: f"{why}, and cannot be: {why_not}" for number, why in left.items()}
                 break
+            for number, error in [(n, some[n].error) for n in left]:
+                if error:
+                    del left[number]
+                    yield number, error
             waiting = tuple(left)
             while comm.allreduce(len(waiting)):
                 batch, waiting = waiting[:_AT_ONCE], waiting[_AT_ONCE:]
@@ -96,6 +103,18 @@ class Work:
         for number, why in left.items():
             yield number, ExperimentError(mine[number].name, f"{why}: {_REMEDY}")
 
+    def _scenes(self, some: tuple[Specimen, ...]) -> tuple[tuple[Specimen, ...], Scenes]:
+        """Return forces that are deep enough for most fits, and the specimens without those that are far deeper."""
+        try:
+            return some, self.scenes(some, _DEEPER[0])
+        except StudyError:
+            return some, self.scenes(some, LEAST)
+        except SurrogateError as error:
+            fewer = without_odd(some, str(error))
+            if all(one is before for one, before in zip(fewer, some, strict=True)):
+                raise
+            return self._scenes(fewer)
+
     def _repeated(self, some: Mapping[int, Specimen], scenes: Scenes, comm: "MPI.Comm") -> Iterator[tuple[int, Found]]:
         """Yield what is found of specimens by number: fits, repeated with forces that are corrected about them.
 
@@ -103,15 +122,31 @@ class Work:
         """
         about: dict[int, Near] = {number: ((),) * len(scenes.forwards) for number in some}
         for repeated in range(_MOST_FITS):
-            fits = {number: _fit(some[number], scenes.near(own), self.study) for number, own in about.items()}
-            wanted = {n: scenes.ranges(fit) for n, fit in fits.items() if isinstance(fit, Estimate)}
-            wanted = {n: own for n, own in wanted.items() if own != about[n] and repeated < _MOST_FITS - 1}
+            wanted: dict[int, Near] = {}
+            for number, near in about.items():
+                outcome = self._tried(some[number], scenes.near(near), None if repeated == _MOST_FITS - 1 else near)
+                if isinstance(outcome, tuple):
+                    wanted[number] = outcome
+                else:
+                    yield number, outcome
             for own in dict.fromkeys(own for part in comm.allgather(list(wanted.values())) for own in part):
                 scenes.near(own)
-            for number in (n for n in fits if n not in wanted):
-                fit, near = fits[number], scenes.near(about[number])
-                yield number, self._told(some[number], near, fit) if isinstance(fit, Estimate) else fit
             about = wanted
+
+    def _tried(self, specimen: Specimen, scenes: Scenes, near: Near | None) -> Found | Near:
+        """Return what curves of a specimen say, or why they cannot be fitted.
+
+        Where forces that were corrected over ``near`` are not exact enough for it, return the ranges to correct over.
+        Whatever goes wrong with one specimen is told of it, and does not end the others.
+        """
+        try:
+            fit = identify(scenes.measured(specimen), unknowns(self.study))
+            ranges = scenes.ranges(fit)
+            return self._told(specimen, scenes, fit) if near in (None, ranges) else ranges
+        except ExperimentError as error:
+            return error
+        except Exception as error:
+            return ExperimentError(specimen.name, f"cannot be fitted: {type(error).__name__}: {error}")
 
     def _told(self, specimen: Specimen, scenes: Scenes, found: Estimate) -> xr.Dataset:
         """Return the dataset of a fit, with all that is said of it."""
@@ -124,16 +159,6 @@ class Work:
         if len(measured) == 1 and (young := hertz_young(scenes.cases[0], measured[0], found)) is not None:
             dataset = dataset.assign(hertz_young=described("hertz_young", young))
         return dataset.assign_attrs({"told": "\n".join(told)} if told else {})
-
-
-def _fit(specimen: Specimen, scenes: Scenes, study: Study) -> Estimate | ExperimentError:
-    """Return what the curves of a specimen say."""
-    try:
-        return identify(scenes.measured(specimen), unknowns(study))
-    except ExperimentError as error:
-        return error
-    except np.linalg.LinAlgError as error:
-        return ExperimentError(specimen.name, f"cannot be fitted: {error}")
 
 
 def _attributes(study: Study) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 
 import xarray as xr
@@ -10,10 +9,10 @@ import xarray as xr
 from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.dataset import joined
 from pipeline.identify.doubts import doubts_of_scale
-from pipeline.identify.experiment import cases_of, scenes_of, specimens
+from pipeline.identify.experiment import Scenes, Specimen, cases_of, scenes_of, specimens, without_too_deep
 from pipeline.identify.forward import stored_in
 from pipeline.identify.kept import Kept
-from pipeline.identify.many import SILENCE, Work
+from pipeline.identify.many import LEAST, SILENCE, Work
 from pipeline.identify.unknowns import unknowns
 from pipeline.printable import counted
 from pipeline.report.identified import once
@@ -39,8 +38,12 @@ def identification(study: Study, output: Path, store: Path, say: Callable[[str],
     read += [(one.name, line) for one in found if one.curves for line in doubts_of_scale(cases, one.curves)]
     for line in once(read, len(found)):
         say(line)
-    solve = telling(stored_in(store, comm), say)
-    scenes = cache(lambda times: scenes_of(study, unknowns(study), found, solve, times))
+    solve, sought = telling(stored_in(store, comm), say), unknowns(study)
+    found = without_too_deep(study, sought, found, LEAST)
+
+    def scenes(some: tuple[Specimen, ...], times: float) -> Scenes:
+        return scenes_of(study, sought, some, solve, times)
+
     outcomes = Work(study, found, scenes).done(comm, Kept(output, study), say)
     if all(isinstance(one, ExperimentError) for one in outcomes):
         raise outcomes[0]

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 import pipeline
+from pipeline.identify.estimate import identify
 from pipeline.layered.body import RIGID, LayeredBody
 from pipeline.layered.compliance import Layer
 from pipeline.study.problems import StudyError
@@ -102,30 +103,45 @@ def test_many_files_are_a_dimension_and_each_is_kept(folder, epsmesh, found, mon
     xr.testing.assert_equal(xr.load_dataset(folder / "results" / "three.nc"), dataset)
 
 
-def test_a_bad_file_is_a_row_and_what_is_told_of_files_is_told_once(folder, epsmesh, found):
-    many = folder / "many"
+def test_a_bad_file_is_a_row_and_what_is_told_of_files_is_told_once(folder, epsmesh, found, monkeypatch):
+    many, head = folder / "many", "depth (mm),force (mN)"
     many.mkdir()
     for number in (8, 9, 10):
-        head, *rows = (folder / "curves" / f"gel_{number}.csv").read_text().splitlines()
+        _, *rows = (folder / "curves" / f"gel_{number}.csv").read_text().splitlines()
         (many / f"gel_{number}.csv").write_text("\n".join([head, *rows[90 if number == 9 else 0 :]]))
-    (many / "gel_11.csv").write_text("depth (mm),force (mN)\n" + "1,2\n" * 3)
+    (many / "gel_11.csv").write_text(head + "\n" + "1,2\n" * 3)
+    way = np.linspace(-0.5, 1, 150)
+    other = 5e3 * np.maximum(0.2 * way, 0) ** 3 + np.random.default_rng(1).normal(0, 0.05, len(way))
+    for number, unit in ((1, 0.2), (12, 20.0), (13, 0.2)):  # of another law, far too deep, and one that is odd
+        rows = [f"{unit * z:.6f},{f:.5f}" for z, f in zip(way, other, strict=True)]
+        (many / f"gel_{number}.csv").write_text("\n".join([head, *rows[: 140 if number == 13 else 150]]))
+
+    def fitted(measured, unknowns):
+        if len(measured[0].curve.depth) == 140:
+            raise AssertionError("no such noise")
+        return identify(measured, unknowns)
+
+    monkeypatch.setattr("pipeline.identify.many.identify", fitted)
     (folder / "many.toml").write_text(STUDY.format(file="many/*.csv", may_hide="[]"))
     result = epsmesh("identify", folder / "many.toml", "--output", folder / "results")
-    assert result.exit_code == 1
-    assert result.stdout.rstrip().endswith("many.toml: 1 of 4 files failed")
-    assert "1 file failed: " in result.stdout and "gel_11.csv: the file has 3 rows" in result.stdout
+    assert result.exit_code == 1, result.output
+    assert result.stdout.rstrip().endswith("many.toml: 3 of 7 files failed")
+    assert "gel_11.csv: the file has 3 rows" in result.stdout
     assert result.stderr.count("force is column `force (mN)`") == 1
     assert "gel_9: punch: little or no air" in result.stderr
-    dataset = xr.load_dataset(folder / "results" / "many.nc")
-    assert list(dataset["status"].values) == ["ok", "ok", "ok", "failed"]
-    assert "3 rows" in str(dataset["message"].values[3])
-    assert dataset["estimate"].sel(unknown="young").values[:3] == pytest.approx([20e3, 25e3, 30e3], rel=0.03)
-    assert np.isnan(dataset["estimate"].values[3]).all()
+    dataset = xr.load_dataset(folder / "results" / "many.nc").set_index(file="file")
+    assert list(dataset["file"].values) == [f"gel_{number}" for number in (1, 8, 9, 10, 11, 12, 13)]
+    assert list(dataset["status"].values) == ["ok"] * 4 + ["failed"] * 3
+    for number, why in ((11, "3 rows"), (12, " mm deep"), (13, "AssertionError: no such noise")):
+        row = dataset.sel(file=f"gel_{number}")
+        assert why in str(row["message"].values) and np.isnan(row["estimate"]).all()
+    assert "does not fit" in str(dataset["verdict"].values[0])
+    assert dataset["estimate"].sel(unknown="young").values[1:4] == pytest.approx([20e3, 25e3, 30e3], rel=0.03)
     page = epsmesh("report", folder / "results" / "many.nc")
     assert page.exit_code == 0, page.output
     assert "3 rows" in (folder / "results" / "many.html").read_text()
     data = json.loads(epsmesh("identify", folder / "many.toml", "--output", folder / "results", "--json").stdout)
-    assert data["status"] == 1 and list(data["studies"][0]["failed"]) == ["gel_11"]
+    assert data["status"] == 1 and list(data["studies"][0]["failed"]) == ["gel_11", "gel_12", "gel_13"]
 
 
 def test_ranks_share_the_files_and_find_the_same(folder, spawn, found):

@@ -50,7 +50,7 @@ def made(tmp_path_factory):
     ]
     specimens = tuple(Specimen(curve.name, (curve,)) for curve in curves)
     kept = Kept(tmp_path_factory.mktemp("kept"), study)
-    found = Work(study, specimens, lambda _: scenes).done(MPI.COMM_SELF, kept, print)
+    found = Work(study, specimens, lambda *_: scenes).done(MPI.COMM_SELF, kept, print)
     return force, found, asked[:before], asked[before:]
 
 
