@@ -1,6 +1,7 @@
 """Files of testing machines become the curves that were measured, whatever their layout."""
 
 import os
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -277,18 +278,25 @@ def test_exports_of_testing_machines(tmp_path, machine):
     assert is_the_approach(read(path))
 
 
-@pytest.mark.parametrize("form", ["{:02.0f}:{:02.0f}:{:06.3f}", "2025-10-30 {:02.0f}:{:02.0f}:{:06.3f}"])
-def test_clock_times_over_midnight(tmp_path, form):
+@pytest.mark.parametrize(
+    ("form", "begin", "longer"),
+    [
+        ("%H:%M:%S.%f", "2025-10-30 23:59:50", 1),
+        ("%Y-%m-%d %H:%M:%S.%f", "2025-10-30 23:59:50", 1),
+        ("%Y-%m-%dT%H:%M:%S.%f", "2025-10-31 10:00:00", 9000),  # over two nights
+        ("%d.%m.%Y %H:%M:%S,%f", "2025-02-28 23:00:00", 4500),  # 25 hours
+        ("%m/%d/%Y %H:%M:%S.%f", "2025-10-11 20:00:00", 4500),
+        ("%d/%m/%Y %H:%M:%S.%f", "2025-10-11 20:00:00", 4500),
+    ],
+)
+def test_clock_times_over_midnight(tmp_path, form, begin, longer):
     def clock(lines):
         rows = [line.split(",") for line in lines[1:]]
-        times = [(23 * 3600 + 59 * 60 + 50 + float(row[0])) % 86400 for row in rows]
-        texts = [form.format(t // 3600, t % 3600 // 60, t % 60) for t in times]
-        return [
-            lines[0].replace("time (s)", "Time"),
-            *(",".join([t, *row[1:]]) for t, row in zip(texts, rows, strict=True)),
-        ]
+        times = [datetime.fromisoformat(begin) + timedelta(seconds=longer * float(row[0])) for row in rows]
+        head = lines[0].replace("time (s)", "Time").replace(",", ";")
+        return [head, *(";".join([t.strftime(form), *row[1:]]) for t, row in zip(times, rows, strict=True))]
 
     curve = read(write(tmp_path / "a.csv", IN_MM, change=clock))
     assert curve.time is not None
-    np.testing.assert_allclose(curve.time, TIME, atol=2e-3)
+    np.testing.assert_allclose(curve.time, longer * TIME, atol=2e-3 * longer)
     np.testing.assert_allclose(curve.force, FORCE, atol=1e-7)
