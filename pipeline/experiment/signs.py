@@ -1,28 +1,34 @@
 """Signs of depth and force: deeper and pressed are positive."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.experiment.columns import Recorded
 from pipeline.experiment.reading import Reading
+from pipeline.experiment.segments import turning_points
 
 # Shares of the depth at both ends of a curve that are compared, and by how much the contact's end must vary more, or
 # have the larger force: an offset of the force makes the latter less sure.
 _END, _CLEAR, _CLEAR_SIZE = 0.25, 2.0, 10.0
 _STEP, _FEWEST, _BETWEEN = 0.02, 4, (0.1, 0.9)
+# Strokes turn by this share of the depth's range, and go over it but for this share at each end; places on them.
+_TURN, _SHORT, _PLACES = 0.1, 0.1, 80
 
 
 def signs_of(found: Recorded, reading: Reading) -> tuple[int, int]:
     """Return the signs of depth and force with which both are positive where the tool presses.
 
     Force varies where there is contact, and not in air: this end of the depths is the deep one, and the force there
-    is pressure. Where both ends vary alike, it is the one with the larger force; where these are alike, too, the tool
-    is taken to advance from the first row on.
+    is pressure. A curve that begins and ends at the same depth is deep where it turns. Where neither is clear, the end
+    with the larger force is the deep one; where these are alike, too, the tool is taken to advance from the first row
+    on.
     """
     depth = reading.depth_sign or _deep_end(found.depth, found.force) or _by_time(found.depth, found.force)
-    return depth, reading.force_sign or _force_sign(found.depth * depth, found.force)
+    way, force = _mean_stroke(found.depth * depth, found.force)
+    return depth, reading.force_sign or _force_sign(way, force)
 
 
 def signed(found: Recorded, reading: Reading) -> Recorded:
@@ -43,14 +49,51 @@ def signed(found: Recorded, reading: Reading) -> Recorded:
 
 
 def _deep_end(depth: FloatArray, force: FloatArray) -> int:
-    """Return 1 if the force varies, or is large, at the largest depths, -1 at the smallest; 0 if that is not clear."""
+    """Return 1 if contact is at the largest depths, -1 if at the smallest; 0 if that is not clear."""
     rows = _moving(depth)
     depth, force = depth[rows], force[rows]
-    for measure, clear in ((_spread, _CLEAR), (_size, _CLEAR_SIZE)):
-        low, high = (measure(depth, force, end) for end in (-1, 1))
-        if max(low, high) > clear * min(low, high):
-            return 1 if high > low else -1
-    return 0
+    way, mean = _mean_stroke(depth, force)
+    varies = _clear_end(*(_spread(way, mean, end) for end in (-1, 1)), _CLEAR_SIZE)
+    if end := varies or _turned_to(depth):
+        return end
+    measures = ((_spread, _CLEAR), (_size, _CLEAR_SIZE))
+    ends = (_clear_end(*(measure(way, mean, end) for end in (-1, 1)), clear) for measure, clear in measures)
+    return next(filter(None, ends), 0)
+
+
+def _clear_end(low: float, high: float, clear: float) -> int:
+    """Return which of two ends has the larger value, -1 or 1; 0 if it is not so many times as large."""
+    return 0 if max(low, high) <= clear * min(low, high) else 1 if high > low else -1
+
+
+def _turned_to(depth: FloatArray) -> int:
+    """Return the end, -1 or 1, at which a curve turns that begins and ends at the other one; 0 if it does not."""
+    low, range_ = float(depth.min()), float(np.ptp(depth))
+    ends = (depth[[0, -1]] - low) / range_
+    return 1 if (ends < _SHORT).all() else -1 if (ends > 1 - _SHORT).all() else 0
+
+
+def _mean_stroke(depth: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return depths, and the mean of the forces of strokes to both directions: a drift cancels but for a constant.
+
+    A curve of one stroke is as it was. Strokes that do not go over the whole depth are left out.
+    """
+    turns = [row for row in turning_points(depth, _TURN * float(np.ptp(depth))) if 0 < row < len(depth) - 1]
+    strokes = [slice(a, b + 1) for a, b in pairwise([0, *turns, len(depth) - 1])]
+    whole = [rows for rows in strokes if np.ptp(depth[rows]) >= (1 - 2 * _SHORT) * np.ptp(depth)]
+    if len(strokes) == 1 or not whole:
+        return depth, force
+    low, high = (side(end(depth[rows]) for rows in whole) for side, end in ((max, np.min), (min, np.max)))
+    way = np.linspace(low, high, _PLACES)
+    means = []
+    for sign in (-1, 1):
+        along = [rows for rows in whole if sign * (depth[rows][-1] - depth[rows][0]) > 0]
+        orders = [np.argsort(depth[rows], kind="stable") for rows in along]
+        each = [
+            np.interp(way, depth[rows][order], force[rows][order]) for rows, order in zip(along, orders, strict=True)
+        ]
+        means += [np.mean(each, axis=0)] if each else []
+    return way, np.asarray(np.mean(means, axis=0))
 
 
 def _moving(depth: FloatArray) -> list[int]:

@@ -62,3 +62,19 @@ def test_signs_and_segments(seed):
     assert abs(cycle.retract - cycle.hold - one.hold) <= max(tolerance, 0.1 * one.hold)
     (without_time,) = cycles_of(curve.depth, None)
     assert abs(without_time.hold - one.ramp) <= tolerance
+
+
+@pytest.mark.parametrize("drift", [-2.0, -0.5, 0.5, 2.0])
+@pytest.mark.parametrize("air", [0.0, 0.5])
+@pytest.mark.parametrize("signs", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
+def test_a_baseline_that_drifts_between_strokes_does_not_turn_signs(signs, air, drift):
+    """The baseline drifts by up to twice the largest force; the way back may be faster, and the load may relax."""
+    up = np.linspace(0, 1, 300)
+    for back, hold in ((300, 0), (100, 0), (300, 300)):
+        depth = np.concatenate([up, np.ones(hold), np.linspace(1, 0.02, back)])
+        force = np.maximum(depth - air, 0) ** 1.5 / (1 - air) ** 1.5
+        force += drift * np.linspace(0, 1, len(depth)) + 0.01 * np.random.default_rng(back).normal(size=len(depth))
+        time, lines, names = np.arange(len(depth)) * 1.0, np.arange(len(depth)), {"depth": "z", "force": "F"}
+        curve = Recorded("a.csv", signs[0] * depth, signs[1] * force, time, lines, names)
+        assert signs_of(curve, Reading()) == signs
+        assert not any("is it" in told for told in signed(curve, Reading(depth_sign=signs[0])).told)
