@@ -13,6 +13,7 @@ from pipeline.quantities import quantity_of
 from pipeline.report.words import percent
 from pipeline.states import FAILED
 from pipeline.study.identified import FITS, is_of_test
+from pipeline.study.text import toml_of
 
 # What a body may hide, in words.
 _HIDDEN = {"layer": "a layer", "base": "a stiff base", "strain": "stiffening with strain"}
@@ -226,7 +227,9 @@ def material(dataset: xr.Dataset) -> str:
         lines.setdefault(heading, []).append(f"{key} = {text}  # {comment}")
     if terms:
         own = ", ".join(f"{{ {', '.join(terms[key])} }}" for key in sorted(terms))
-        lines["[material]"].append(f"relaxation = [{own}]")
+        has_material = "material" in toml_of(str(dataset.attrs.get("study", "")), "")
+        heading = "[material]" if has_material or lines["[material]"] else "# in the table of each layer:"
+        lines.setdefault(heading, []).append(f"relaxation = [{own}]")
     return "\n".join("\n".join((heading, *rows)) for heading, rows in lines.items() if rows)
 
 

@@ -96,12 +96,26 @@ class Body(Section, ABC):
         """Whether its layers fill it, so that `[material]` applies nowhere."""
         return False
 
-    def with_law_of(self, material: Tissue) -> Self:
-        """Return the body; its regions that have no law of their own have that of ``material``."""
+    def main(self, material: Tissue) -> Tissue:
+        """Return ``material``, or where layers fill the body, and it applies nowhere, the first layer."""
+        return self.regions[0] if self.is_filled else material
+
+    def completed(self, piece: Region, material: Tissue) -> Region:
+        """Return a region with what it lacks of ``material``; of another region, it has nothing."""
+        is_hollow = isinstance(piece, Embedded) and piece.is_hollow
+        return piece if self.is_filled and not is_hollow else piece.completed(material)
+
+    def completed_by(self, material: Tissue) -> Self:
+        """Return the body; what its regions lack of law, relaxation and density, they have from ``material``.
+
+        Where layers fill the body, there is no such material: each region has its own or none.
+        """
         if not self.pieces:
             return self
         return self.model_copy(
-            update={key: tuple(piece.completed(material) for piece in found) for key, found in self.pieces.items()}
+            update={
+                key: tuple(self.completed(piece, material) for piece in found) for key, found in self.pieces.items()
+            }
         )
 
     @property

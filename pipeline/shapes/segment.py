@@ -110,7 +110,7 @@ class Segment(Embedded):
         return self.hollow
 
     def completed(self, material: Tissue) -> "Segment":
-        """Return the region with the law of ``material`` if it has none; with all of the material if it is hollow."""
+        """Return the region with what it lacks of ``material``; with all of it if it is hollow."""
         if self.hollow:
             return self.model_copy(update={key: getattr(material, key) for key in Tissue.model_fields if key != "name"})
         return super().completed(material)

@@ -142,7 +142,11 @@ class Tissue(Section):
 
     law: Annotated[
         Literal[tuple(LAWS)] | None,  # type: ignore[valid-type]
-        Words("Law of the region.", '"neo-hookean"', default="the material's, with its parameters"),
+        Words(
+            "Law of the region.",
+            '"neo-hookean"',
+            default="the material's, with its parameters; linear where layers fill the body",
+        ),
     ] = None
     c2: Annotated[
         float | None,
@@ -179,7 +183,11 @@ class Tissue(Section):
     density: Annotated[
         Density | None,
         Field(json_schema_extra={"unit": "kg/m^3"}),
-        Words("Density. Gravity needs it.", '"1060 kg/m^3"', default="none; of regions, the material's"),
+        Words(
+            "Density. Gravity needs it.",
+            '"1060 kg/m^3"',
+            default="none; of regions, the material's, none where layers fill the body",
+        ),
     ] = None
 
     relaxation: Annotated[
@@ -189,7 +197,7 @@ class Tissue(Section):
             "Relaxation over time, as a Prony series: `young` is then the instantaneous modulus, and Poisson's ratio "
             "is constant. It needs [probe.history]. Regions that relax differently are computed in time steps.",
             '[{share = 0.4, time = "2 s"}, {share = 0.2, time = "30 s"}]',
-            default="none: elastic; of regions, the material's",
+            default="none: elastic; of regions, the material's, none where layers fill the body",
         ),
     ] = ()
 
@@ -238,10 +246,15 @@ class Tissue(Section):
         return "fibres" in self.given and not (self.fibres and self.fibres.is_isotropic)
 
     def completed(self: _Tissue, material: "Tissue") -> _Tissue:
-        """Return this tissue with the law of ``material``, and its parameters, if it has none of its own."""
-        if self.law is not None or not material.is_large:
-            return self
-        return self.model_copy(update={"law": material.law, **material.given})
+        """Return this tissue; the law with its parameters, relaxation and density that it lacks are ``material``'s."""
+        own: dict[str, Any] = {}
+        if self.law is None and material.is_large:
+            own = {"law": material.law, **material.given}
+        if "relaxation" not in self.model_fields_set and material.relaxation:
+            own["relaxation"] = material.relaxation
+        if self.density is None and material.density is not None:
+            own["density"] = material.density
+        return self.model_copy(update=own) if own else self
 
     @property
     def lame(self) -> tuple[float, float]:

@@ -137,7 +137,7 @@ class Case:
     def tissues(self) -> tuple[Tissue, ...]:
         """What the regions of the body are made of, in the order of their numbers in meshes.
 
-        Where layers fill the body, no cell has number 0.
+        Where layers fill the body, no cell has number 0; it is then as the first layer.
         """
         return self.material, *self.body.regions
 
@@ -150,8 +150,8 @@ class Case:
     @property
     @of_scene
     def relaxations(self) -> tuple[Terms, ...]:
-        """Terms of the relaxation of the regions of the body; where a region has none, the material's."""
-        return tuple(tissue.prony or self.material.prony for tissue in self.tissues)
+        """Terms of the relaxation of the regions of the body, in the order of their numbers."""
+        return tuple(tissue.prony for tissue in self.tissues)
 
     @property
     @of_scene
@@ -163,7 +163,7 @@ class Case:
     @of_scene
     def densities(self) -> tuple[float | None, ...]:
         """Densities (kg/m³) of the regions of the body, in the order of their numbers; None where there is none."""
-        return tuple(tissue.density if tissue.density is not None else self.material.density for tissue in self.tissues)
+        return tuple(tissue.density for tissue in self.tissues)
 
     @property
     @of_scene

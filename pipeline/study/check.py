@@ -60,7 +60,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     problems.each(check_sizes, mesh=meshes)
     check_chosen(meshes, problems)
     problems.each(check_epsilon, mesh=meshes, probe=probes)
-    problems.each(check_linear, material=materials, mesh=meshes)
+    problems.each(check_linear, body=bodies, material=materials, mesh=meshes)
     problems.each(check_support, body=bodies, mesh=meshes)
     way = next((axis for axis in axes if axis.off), None)
     placed = _placed(bodies, probes, way, problems)

@@ -6,6 +6,7 @@ from typing import Any
 
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import is_direction
+from pipeline.shapes.regions import Region
 from pipeline.shapes.section import words_of
 from pipeline.shapes.tissue import LAWS, MOST_TERMS, Term, Tissue
 from pipeline.study.problems import Problems
@@ -33,11 +34,19 @@ def _regions(body: Body) -> Iterator[tuple[str, Tissue]]:
 def _check_tissues(body: Body, material: Material, problems: Problems) -> None:
     """Check each region; all must be for large displacements, or none."""
     tissues = dict(tissues_of(body, material))
-    first = next(iter(tissues.values()))
+    main = body.main(material)
+    model = next((tissue for tissue in tissues.values() if tissue.is_large), main) if body.is_filled else main
     for key, tissue in tissues.items():
         _check_tissue(key, tissue, problems)
-        complete = tissue.completed(first)
-        if complete.is_large != first.is_large:
+        complete = body.completed(tissue, main) if isinstance(tissue, Region) else tissue
+        if complete.law is None and model.is_large:
+            problems.error(
+                f"{key}.law",
+                None,
+                "is required: another tissue of the body has a law of large displacements, and where layers fill the "
+                f"body, each has its own. For the same law, write {_law_in_words(model)}",
+            )
+        elif complete.is_large != model.is_large:
             problems.error(
                 f"{key}.law",
                 tissue.law or "linear",
@@ -48,6 +57,11 @@ def _check_tissues(body: Body, material: Material, problems: Problems) -> None:
             problems.error(
                 f"{key}.poisson", tissue.poisson, f"must be at least {least} with a law of large displacements"
             )
+
+
+def _law_in_words(tissue: Tissue) -> str:
+    keys = LAWS[str(tissue.law)]
+    return f'law = "{tissue.law}"' + (f" and its own {' and '.join(keys)}" if keys else "")
 
 
 def _check_tissue(key: str, tissue: Tissue, problems: Problems) -> None:

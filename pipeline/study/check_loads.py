@@ -14,6 +14,7 @@ from pipeline.shapes.support import Faces, NamedFace
 from pipeline.study.axis import Axis
 from pipeline.study.loads import FREE, Cap, Load, Traction
 from pipeline.study.problems import Problems, nearest
+from pipeline.study.regions import tissues_of
 from pipeline.study.schema import Material
 
 # Largest distance of a centre from the surface, in units of the cap's radius.
@@ -61,9 +62,9 @@ def _check_densities(body: Body, material: Material, problems: Problems) -> None
     if not body.is_filled and material.density is None:
         problems.error("material.density", None, 'is required for gravity: density = "1060 kg/m^3"')
     if body.is_filled:
-        for number, region in enumerate(body.regions, start=1):
-            if region.density is None and material.density is None:
-                problems.error(f"body: {region.name}", None, f"region {number} needs a density for gravity")
+        for key, tissue in tissues_of(body, material):
+            if tissue.density is None:
+                problems.error(f"{key}.density", None, 'is required for gravity: density = "1060 kg/m^3"')
 
 
 def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -> bool:

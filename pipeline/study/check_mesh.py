@@ -36,13 +36,13 @@ def check_sizes(mesh: Mesh, problems: Problems) -> None:
         )
 
 
-def check_linear(material: Material, mesh: Mesh, problems: Problems) -> None:
+def check_linear(body: Body, material: Material, mesh: Mesh, problems: Problems) -> None:
     """Report a linear body beyond ε of a body that is linear anyway."""
-    if mesh.outside == "linear" and not material.is_large:
+    if mesh.outside == "linear" and not body.main(material).is_large:
         problems.error(
             "mesh.outside",
             mesh.outside,
-            f'is linear elasticity beyond epsilon, but law = "{material.law}" is linear everywhere: use outside = '
+            'is linear elasticity beyond epsilon, but law = "linear" is linear everywhere: use outside = '
             '"coarse", or a law of large displacements',
         )
 
@@ -152,7 +152,7 @@ def check_locking(body: Body, material: Material, mesh: Mesh, problems: Problems
     """Check elements against Poisson's ratios of all the materials of a body."""
     tissues = dict(tissues_of(body, material))
     poissons = {f"{key}.poisson": tissue.poisson for key, tissue in tissues.items()}
-    is_large = next(iter(tissues.values())).is_large
+    is_large = body.main(material).is_large
     if mesh.element_for(max(poissons.values()), is_large=is_large) == "mixed":
         if max(poissons.values()) <= _LEAST_MIXED:
             problems.error(

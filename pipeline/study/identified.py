@@ -123,11 +123,13 @@ def _filled(raw: dict[str, Any], material: dict[str, Any], found: Identified, pr
         if own[key] != found.known[key]:
             allowed = f"must be {json.dumps(found.known[key])}, with which {found.file} was found, or left out"
             problems.error(f"material.{key}", own[key], allowed)
-    filled = raw | {"material": found.known | own | new}
-    if not filled["material"]:  # layers have all that was found
-        del filled["material"]
+    tissue, of_pieces = found.known | own | new, {}
+    if tissue.keys() <= {"relaxation"}:  # layers fill the body: they have all that was found, and relax alike
+        tissue, of_pieces = {}, tissue
+    filled = {key: value for key, value in raw.items() if key != "material"} | ({"material": tissue} if tissue else {})
     if body := raw.get("body"):
-        filled["body"] = [_body(b, found.values) for b in body] if isinstance(body, list) else _body(body, found.values)
+        bodies = [_body(one, found.values, of_pieces) for one in (body if isinstance(body, list) else [body])]
+        filled["body"] = bodies if isinstance(body, list) else bodies[0]
     return filled
 
 
@@ -145,15 +147,18 @@ def _material(values: Mapping[str, float]) -> dict[str, Any]:
     return found | ({"relaxation": [terms[number] for number in sorted(terms)]} if terms else {})
 
 
-def _body(body: Any, values: Mapping[str, float]) -> Any:
-    """Return a body whose layers and inclusions have the values found under their names, where they have none."""
+def _body(body: Any, values: Mapping[str, float], all_have: Mapping[str, Any]) -> Any:
+    """Return a body whose layers and inclusions have the values found under their names, and what ``all_have``.
+
+    What they say themselves stays.
+    """
     if not isinstance(body, dict):
         return body
     filled = dict(body)
     for kind in ("layer", "inclusion", "region"):
         pieces = body.get(kind)
         if isinstance(pieces, list):
-            filled[kind] = [_piece(piece, values) if isinstance(piece, dict) else piece for piece in pieces]
+            filled[kind] = [all_have | _piece(piece, values) if isinstance(piece, dict) else piece for piece in pieces]
     return filled
 
 

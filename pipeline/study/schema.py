@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, BeforeValidator, Field
 from pydantic_core import PydanticCustomError
 
+from pipeline.shapes.body import Body
 from pipeline.shapes.history import History
 from pipeline.shapes.insertion import Insertion
 from pipeline.shapes.regions import Inclusion, Layer
@@ -57,6 +58,11 @@ class Material(Tissue):
     # Least Poisson's ratio at large displacements: below, F depends on the elements at the probe's edge
     # (docs/accuracy.md).
     LEAST_OF_LARGE: ClassVar[float] = 0.2
+
+
+def main_material(body: Body, material: Material) -> Material:
+    """Return the material of a body's region 0: where layers fill the body, and there is none, the first layer's."""
+    return material_of(body.regions[0]) if body.is_filled else material
 
 
 def material_of(tissue: Tissue) -> Material:

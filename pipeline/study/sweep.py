@@ -21,7 +21,7 @@ from pipeline.study.loads import Load
 from pipeline.study.measurement import Measurement
 from pipeline.study.output import Output
 from pipeline.study.problems import Problem
-from pipeline.study.schema import Drawing, Material, Mesh, Planning, Solving, material_of
+from pipeline.study.schema import Drawing, Material, Mesh, Planning, Solving, main_material
 from pipeline.study.sensitivity import Spread
 
 Value = TypeVar("Value")
@@ -215,8 +215,8 @@ def _nothing(_index: tuple[int, ...]) -> Hashable:
 def _in_use(body: Body, material: Material, load: Load) -> tuple[Body, Material, Load]:
     """Return the parts of a case that depend on each other.
 
-    A body that layers fill has the first one's material, not the section's. Regions without a law have that of the
-    material. Pressures in hollow regions are tractions of the load.
+    What regions lack, they have from the material. A body that layers fill has none: its first layer then takes the
+    place of region 0, which has no cell. Pressures in hollow regions are tractions of the load.
     """
-    material = material_of(body.regions[0]) if body.is_filled else material
-    return body.with_law_of(material), material, load.with_pressures(body.pressures)
+    material = main_material(body, material)
+    return body.completed_by(material), material, load.with_pressures(body.pressures)

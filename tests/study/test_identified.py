@@ -5,6 +5,7 @@ import pytest
 
 from pipeline.identify.dataset import joined, write
 from pipeline.plan.plan import make_plan
+from pipeline.report.identified import material
 from pipeline.report.uncertainty import tissue
 from pipeline.study.identified import NOTHING
 from pipeline.study.problems import StudyError
@@ -129,3 +130,17 @@ def test_relaxation_is_read_into_its_terms(tmp_path):
     history = {"ramp": "1 s", "hold": "10 s"}
     (term,) = next(using(tmp_path, probe={"history": history}).cases()).material.relaxation
     assert (term.share, term.time) == (0.4, 2.0)
+
+
+def test_layers_that_fill_the_body_have_the_relaxation_that_was_found(tmp_path):
+    """There is no [material] that could have it: each layer has it in the study, and in what is told to paste."""
+    names = ("skin_young", "relaxation_share_1", "relaxation_time_1")
+    write_one(tmp_path, names=names, study="[body]\n")
+    layer = [{"name": "skin", "poisson": 0.3, "thickness": "1 mm"}, {"name": "fat", "young": "5 kPa", "poisson": 0.3}]
+    history = {"ramp": "1 s", "hold": "10 s"}
+    (case,) = using(tmp_path, body={"layer": layer}, probe={"history": history}).cases()
+    assert case.relaxations[1:] == (((0.4, 2.0),),) * 2
+    assert not case.is_stepped
+    pasted = material(identification(names=names, study="[body]\n"))
+    assert "# in the table of each layer:\nrelaxation = [{" in pasted
+    assert "[material]" not in pasted

@@ -126,7 +126,7 @@ def test_tables_of_materials_have_laws_of_their_own():
 
 
 def test_a_region_without_a_law_has_that_of_the_material():
-    """With its parameters; a layer that says the same has the same key. Layers that fill the body follow the first."""
+    """With its parameters; a layer that says the same has the same key."""
     inherits = study(body={"layer": [SKIN]}, material=YEOH).case(())
     given = study(body={"layer": [SKIN | YEOH | {"c3": 0.0}]}, material=YEOH).case(())
     assert inherits.tissues[1].further == {"c2": 0.4, "c3": 0.0}
@@ -134,11 +134,74 @@ def test_a_region_without_a_law_has_that_of_the_material():
     other = study(body={"layer": [SKIN | YEOH | {"c2": 0.5}]}, material=YEOH).case(())
     assert case_key(inherits) != case_key(other)
     assert mesh_key(inherits) == mesh_key(other)
-    content = raw(body={"layer": [SKIN | YEOH, {"name": "fat", "young": "5 kPa", "poisson": 0.3}]})
+
+
+HISTORY = {"ramp": "1 s", "hold": "10 s"}
+RELAXING = {"relaxation": [{"share": 0.8, "time": "1 s"}]}
+FAT = {"name": "fat", "young": "5 kPa", "poisson": 0.4}
+
+
+def filled(*layers, **changes):
+    """Return the content of a study whose layers fill the body."""
+    changes["body"] = {"layer": list(layers), **changes.get("body", {})}
+    content = raw(**changes)
     del content["material"]
-    filled = parse(content).case(())
-    assert [tissue.law for tissue in filled.tissues] == ["yeoh"] * 3
-    assert filled.formulation == "yeoh"
+    return content
+
+
+def _given(case):
+    """Return what tissue below the skin, and what the others are made of, by their names."""
+    lowest = {} if case.body.is_filled else {"fat": case.material}
+    tissues = lowest | {region.name: region for region in case.body.regions}
+    return {name: (t.law or "linear", t.further, t.prony, t.density) for name, t in sorted(tissues.items())}
+
+
+@pytest.mark.parametrize("skin", [RELAXING, {"density": "900 kg/m^3"}, YEOH], ids=["relaxation", "density", "law"])
+@pytest.mark.parametrize("order", ["skin on fat", "fat on skin"])
+def test_layers_that_fill_the_body_are_those_above_a_material(skin, order):
+    """No layer or inclusion has what the first layer or another one says of itself."""
+    of_fat = {"law": "neo-hookean"} if "law" in skin else {}
+    upper, lower = SKIN | skin, FAT | of_fat
+    if order == "fat on skin":
+        upper, lower = FAT | of_fat | {"thickness": "2 mm"}, SKIN | skin
+        del lower["thickness"]
+    probe = {"history": HISTORY} if "relaxation" in skin else {}
+    ball = BALL | of_fat
+    alone = parse(filled(upper, lower, body={"inclusion": [ball]}, probe=probe)).case(())
+    found = _given(alone)
+    assert found["tumour"] == found["fat"] != found["skin"]
+    if order == "skin on fat":
+        material = {key: value for key, value in lower.items() if key != "name"}
+        below = study(body={"layer": [upper], "inclusion": [ball]}, material=material, probe=probe).case(())
+        assert _given(below) == found
+        assert (alone.formulation, alone.is_stepped) == (below.formulation, below.is_stepped)
+
+
+def test_a_layer_of_a_body_that_layers_fill_is_asked_for_its_law_and_density():
+    """Whichever layer it is; a body's law is its own in a sweep of bodies."""
+    for layers in ([SKIN | YEOH, FAT], [FAT | {"thickness": "2 mm"}, SKIN | YEOH | {"thickness": "18 mm"}]):
+        with pytest.raises(StudyError, match=r'layer\[\d\]\.law: is required.* write law = "yeoh" and its own c2'):
+            parse(filled(*layers))
+    with pytest.raises(StudyError, match=r"inclusion\[1\]\.law: is required"):
+        parse(filled(SKIN | YEOH, FAT | YEOH, body={"inclusion": [BALL]}))
+    gravity = {"load": {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}}
+    with pytest.raises(StudyError, match=r"body\.layer\[2\]\.density: is required"):
+        parse(filled(SKIN | {"density": "900 kg/m^3"}, FAT, **gravity))
+    content = filled(SKIN, FAT)
+    own = {**content["body"], "layer": [SKIN | YEOH, FAT | YEOH]}
+    content["body"] = [{"name": "linear", **content["body"]}, {"name": "large", **own}]
+    content["probe"] |= {"shape": "blade", "length": "4 mm", "width": "0.5 mm", "slice": "1 mm"}
+    del content["probe"]["radius"]
+    with pytest.raises(StudyError, match=r"probe\.slice.*must be 0 mm with a law of large displacements"):
+        parse(content)
+
+
+def test_an_elastic_layer_in_relaxing_tissue():
+    """An empty list is a relaxation of its own."""
+    layers = [SKIN, SKIN | {"name": "fat", "relaxation": []}]
+    case = study(body={"layer": layers}, material=RELAXING, probe={"history": HISTORY}).case(())
+    assert case.relaxations == (((0.8, 1.0),), ((0.8, 1.0),), ())
+    assert case.is_stepped
 
 
 def test_terms_are_swept():

@@ -26,7 +26,7 @@ MISTAKES = {
     "gravity without density": ({"load": {"gravity": DOWN}}, ["material.density", "1060 kg/m^3"]),
     "layer without density": (
         {"load": {"gravity": DOWN}, "body": {"layer": [SKIN, SKIN | {"name": "fat", "thickness": "18 mm"}]}},
-        ["body: skin", "needs a density"],
+        ["body.layer[1].density", "is required for gravity"],
     ),
     "bare number": ({"load": {"gravity": ["0", "0", "-9.81 m/s^2"]}}, ["load.gravity", "an acceleration"]),
     "wrong unit": ({"material": HEAVY | {"density": "1060 g"}}, ["material.density", "a density"]),

@@ -97,10 +97,13 @@ def _has_edge(scene: Scene) -> bool:
 
 
 def _relaxations(scene: Scene) -> set[Terms]:
-    """Return the different relaxations of a body's regions; of one without its own, the material's."""
-    regions = scene.body.regions
-    main = regions[0].prony if scene.body.is_filled else scene.material.prony
-    return {main, *(region.prony or main for region in regions)}
+    """Return the different relaxations of a body's regions."""
+    body, main = scene.body, scene.body.main(scene.material)
+    return {main.prony, *(body.completed(region, main).prony for region in body.regions)}
+
+
+def _is_large(scene: Scene) -> bool:
+    return scene.body.main(scene.material).is_large
 
 
 def _coefficient(friction: float) -> float | str:
@@ -127,7 +130,7 @@ def _wants_exact(scene: Scene) -> bool:
 
 def needs_time_steps(scene: Scene) -> bool:
     """Return whether the force over time is no elastic force times a function of time."""
-    return scene.probe.history is not None and (scene.material.is_large or len(_relaxations(scene)) > 1)
+    return scene.probe.history is not None and (_is_large(scene) or len(_relaxations(scene)) > 1)
 
 
 FEATURES: dict[str, Feature] = {
@@ -135,14 +138,19 @@ FEATURES: dict[str, Feature] = {
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
     "region": Feature("body.region", lambda s: "region" in s.body.pieces),
     "curved body": Feature("body.shape", lambda s: not isinstance(s.body, Layered)),
-    "large displacements": Feature("material.law", lambda s: s.material.is_large),
+    "large displacements": Feature("material.law", _is_large, ("body",)),
     "relaxation": Feature("material.relaxation", lambda s: any(_relaxations(s)), ("body",)),
     "static relaxing tissue": Feature(
         "probe.history", lambda s: any(_relaxations(s)) and s.probe.history is None, ("body", "material")
     ),
     "time steps": Feature("probe.history", needs_time_steps, ("body", "material")),
     "fibres": Feature("material.law", lambda s: any(t.has_fibres for t in (s.material, *s.body.regions)), ("body",)),
-    "ν < 0.2": Feature("material.poisson", lambda s: s.material.poisson < Material.LEAST_OF_LARGE),
+    # Of regions, those of layers that fill the body included, the study's check of laws reports it.
+    "ν < 0.2": Feature(
+        "material.poisson",
+        lambda s: not s.body.is_filled and s.material.poisson < Material.LEAST_OF_LARGE,
+        ("body",),
+    ),
     "ν > 0.49": Feature("material.poisson", lambda s: s.material.poisson > MOST_OF_GREEN),
     "tool that is not flat": Feature("probe.shape", lambda s: not s.probe.is_flat),
     "unilateral contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
@@ -154,12 +162,12 @@ FEATURES: dict[str, Feature] = {
     ),
     "friction": Feature("probe.friction", lambda s: s.probe.friction > 0, write=_coefficient),
     "inclined touch of a linear law": Feature(
-        "probe.axis", lambda s: _touches_beside(s) and not s.material.is_large, ("body", "material"), list
+        "probe.axis", lambda s: _touches_beside(s) and not _is_large(s), ("body", "material"), list
     ),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
     "bent surface of a linear law": Feature(
         "load",
-        lambda s: _is_loaded(s) and s.probe.is_unilateral and not s.material.is_large,
+        lambda s: _is_loaded(s) and s.probe.is_unilateral and not _is_large(s),
         ("body", "probe", "material"),
     ),
     "bent surface": Feature("load", lambda s: _is_loaded(s) and s.probe.is_unilateral, ("body", "probe")),
@@ -172,7 +180,7 @@ FEATURES: dict[str, Feature] = {
     "inserted needle": Feature("probe.insertion", lambda s: _is_inserted(s, "crack")),
     "ring crack": Feature("probe.crack_shape", _may_cut_a_ring),
     "needle that cuts": Feature("probe.toughness", lambda s: s.probe.crack is not None),
-    "linear law": Feature("material.law", lambda s: not s.material.is_large),
+    "linear law": Feature("material.law", lambda s: not _is_large(s), ("body",)),
     "model in three dimensions": Feature("mesh.model", lambda s: s.mesh.model == "3d"),
     "no round scene": Feature("probe.at", lambda s: s.body.half_plane() is None or any(s.probe.at), PLACE, list),
     "six motions": Feature("probe.motion", lambda s: s.probe.motion == "all"),
