@@ -56,9 +56,7 @@ def distribute(comm: MPI.Comm, arrays: MeshArrays | None) -> BodyMesh:
         cells, points, known = np.empty((0, 0), np.int64), np.empty((0, 3)), None
     width, surface, count, deviation = comm.bcast(known)
     mesh = compat.create_mesh(comm, cells.reshape(-1, width), points, order=1 if width == 4 else 2)
-    # Each rank receives one byte per cell of the whole mesh: less than the coordinates.
-    small = None if arrays is None or arrays.regions is None else arrays.regions.astype(np.uint8)
-    regions = comm.bcast(small)
+    regions = comm.bcast(None if arrays is None else _narrow(arrays.regions))
     return BodyMesh(mesh, _find_facets(mesh, surface), count, _of_cells(mesh, regions), deviation)
 
 
@@ -69,10 +67,15 @@ def distribute_parts(comm: MPI.Comm, part: Part) -> BodyMesh:
     arrays, numbers = part.mesh, part.numbers
     mesh = compat.create_mesh(comm, numbers[arrays.cells], arrays.points[own], order=2, beyond=part.beyond)
     surface = {name: numbers[triangles] for name, triangles in arrays.facets.items()}
-    small = None if arrays.regions is None else arrays.regions.astype(np.uint8)
+    small = _narrow(arrays.regions)
     regions = None if small is None else np.concatenate(comm.allgather(small))
     count = comm.allreduce(len(arrays.cells))
     return BodyMesh(mesh, _find_facets(mesh, surface), count, _of_cells(mesh, regions), arrays.deviation)
+
+
+def _narrow(regions: IntArray | None) -> IntArray | None:
+    """Return region numbers in the fewest bytes: each rank receives those of the whole mesh."""
+    return None if regions is None else regions.astype(np.min_scalar_type(int(regions.max(initial=0))))
 
 
 def _of_cells(mesh: Any, regions: IntArray | None) -> Int32Array | None:

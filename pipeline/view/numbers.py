@@ -52,7 +52,7 @@ def mesh_arrays(fields: Fields) -> dict[str, npt.NDArray[Any]]:
         "points": (_MM * (fields.points[used] - fields.contact)).T.astype("<f4"),
         "cells": np.vstack([np.diff(corners[:, 0], prepend=0), np.diff(corners, axis=1).T]).astype("<i4"),
         **_faces(corners, {name: number[triangles] for name, triangles in fields.facets.items()}),
-        "regions": regions[order].astype("u1"),
+        "regions": regions[order].astype("u1" if regions.max(initial=0) < 256 else "i4"),
         "sizes": _steps(sizes, float(sizes.min()))[order],
         "tool_points": (_MM * (tool.points - fields.contact)).astype("<f4"),
         "tool_moved": (_MM * tool.moved).astype("<f4"),

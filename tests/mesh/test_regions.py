@@ -164,12 +164,13 @@ def test_local_cells_know_their_region():
 
 
 @pytest.mark.mpi
-def test_a_rank_may_have_no_cells():
-    """One cell on all ranks together: it, its region and its faces are there once."""
+@pytest.mark.parametrize("number", [7, 300, 70_000])
+def test_a_rank_may_have_no_cells(number):
+    """One cell on all ranks together: it, its region, whatever its number, and its faces are there once."""
     points, cell, rim = np.vstack([np.zeros(3), np.eye(3)]), np.arange(4), np.arange(3)
     faces = {"free": np.array([np.delete(cell, corner) for corner in cell])}
-    one = MeshArrays(points, cell[None], faces, rim, 0.0, regions=np.array([7]))
+    one = MeshArrays(points, cell[None], faces, rim, 0.0, regions=np.array([number]))
     body = distribute(MPI.COMM_WORLD, one if MPI.COMM_WORLD.rank == 0 else None)
-    mine = [int((body.regions == 7).sum()), len(body.facets["free"]), compat.geometry_dofs(body.mesh).size]
+    mine = [int((body.regions == number).sum()), len(body.facets["free"]), compat.geometry_dofs(body.mesh).size]
     assert compat.geometry_dofs(body.mesh).shape[1] == 4
     assert MPI.COMM_WORLD.allreduce(np.array(mine)).tolist() == [1, 4, 4]

@@ -147,7 +147,7 @@ def painted(
     if not segments:
         raise SurfaceError("contains no segments: it is empty")
     sizes = {label: sum(int((array == own).sum()) for _, array, own in pieces) for label, pieces in segments.items()}
-    values = np.zeros(shape, np.uint16)
+    values = np.zeros(shape, np.min_scalar_type(max(255, *segments)))
     taken: Counter[tuple[int, int]] = Counter()
     for label in sorted(segments, key=lambda one: -sizes[one]):
         for index, array, own in segments[label]:
