@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.files.loaded import SOLIDS, UNITS, LengthUnit, Loaded, Repair
+from pipeline.shapes.files.loaded import SOLIDS, UNITS, Label, LengthUnit, Loaded, Repair
 from pipeline.shapes.regions import Embedded
 from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.shell import Shell
@@ -56,11 +56,11 @@ class Segment(Embedded):
         ),
     ] = None
     label: Annotated[
-        Annotated[int, Field(gt=0)] | Annotated[str, Field(min_length=1)] | None,
+        Label | None,
         Field(exclude=True),
         Words(
-            "Label of the region in the image of the body, by value or by name. The body is the union of its own label "
-            "and those of its regions.",
+            "Label of the region in the image of the body, by value or by name; a list is one region of several "
+            "labels. The body is the union of its own label and those of its regions.",
             "2",
             default="none: a file is given",
         ),

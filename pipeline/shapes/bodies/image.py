@@ -10,7 +10,7 @@ from pydantic import Field
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.complex import Complex
-from pipeline.shapes.files.loaded import UNITS, LengthUnit, Loaded
+from pipeline.shapes.files.loaded import UNITS, Label, LengthUnit, Loaded
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
 from pipeline.shapes.segmented import Segmented
@@ -29,9 +29,13 @@ class FromImage(Segmented, Scanned):
 
     shape: Literal["image"]
     label: Annotated[
-        Annotated[int, Field(gt=0)] | Annotated[str, Field(min_length=1)],
+        Label,
         Field(exclude=True),
-        Words("Label of the body: the value of its voxels, or its name, as the image or `names` has it.", '"liver"'),
+        Words(
+            "Label of the body: the value of its voxels, or its name, as the image or `names` has it. A list is one "
+            "body of several labels.",
+            '"liver"',
+        ),
     ]
     names: Annotated[
         str,
@@ -74,9 +78,9 @@ class FromImage(Segmented, Scanned):
         from pipeline.shapes.files.label_map import NoVoxelError  # noqa: PLC0415
 
         def surface(
-            label: int | str,
+            label: Label,
             smooth: float | None,
-            inner: tuple[tuple[int | str, float | None], ...] = (),
+            inner: tuple[tuple[Label, float | None], ...] = (),
             offset: float = 0.0,
         ) -> Loaded:
             unit = UNITS[given["unit"]] if given["unit"] else None

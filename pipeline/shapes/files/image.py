@@ -5,9 +5,10 @@ from pathlib import Path
 
 from pipeline.class_maps import CLASS_MAPS
 from pipeline.shapes.files.checked import kept_image
+from pipeline.shapes.files.label_map import united
 from pipeline.shapes.files.label_surface import surface_of
 from pipeline.shapes.files.labels import LARGEST_IMAGE, files_of, read_labels
-from pipeline.shapes.files.loaded import Loaded
+from pipeline.shapes.files.loaded import Label, Loaded
 from pipeline.shapes.files.partition import do_meet, partition_of
 from pipeline.shapes.files.read import state_of
 from pipeline.shapes.triangles import SurfaceError
@@ -18,14 +19,14 @@ _METHOD = 5
 
 def read_image(
     path: Path,
-    label: int | str,
+    label: Label,
     unit: float | None = None,
     smooth: float | None = None,
     names: str = "",
-    inner: tuple[tuple[int | str, float | None], ...] = (),
+    inner: tuple[tuple[Label, float | None], ...] = (),
     offset: float = 0.0,
 ) -> Loaded:
-    """Return the surface of the voxels with a ``label``, a number or a name, and notices of what was changed.
+    """Return the surface of the voxels with a ``label``, a number, a name or several, and notices of what was changed.
 
     Voxels with one of the ``inner`` labels, those of regions of a body, belong to it, too; each has a filter of its own
     (m). If regions meet each other or the body's surface, the result also has the surfaces between all labels, in this
@@ -65,7 +66,7 @@ def _load(
     path: Path,
     files: tuple[Path, ...],
     states: tuple[tuple[int, int], ...],
-    labels: tuple[tuple[int | str, float | None], ...],
+    labels: tuple[tuple[Label, float | None], ...],
     unit: float | None,
     names: str,
     offset: float,
@@ -76,10 +77,11 @@ def _load(
         raise SurfaceError(f"has {largest / 1e9:.2g} GB, more than {LARGEST_IMAGE / 1e9:g}: crop or resample it")
 
     def make() -> Loaded:
-        found, (own, *inner) = read_labels(path, unit, names), (label for label, _ in labels)
+        found, (own, *inner) = united(read_labels(path, unit, names), [label for label, _ in labels])
+        lengths = [length for _, length in labels]
         if inner and do_meet(found, (own, *inner)):
-            return partition_of(found, labels, offset)
-        return surface_of(found, own, labels[0][1], tuple(inner), offset)
+            return partition_of(found, list(zip((own, *inner), lengths, strict=True)), offset)
+        return surface_of(found, own, lengths[0], tuple(inner), offset)
 
     given = f" {offset!r}" if offset else ""
     given = f"{_METHOD} {path.suffix.lower()} {labels!r} {unit!r} {names if names in CLASS_MAPS else ''}{given}"

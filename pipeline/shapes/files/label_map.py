@@ -1,14 +1,16 @@
 """A label map: an integer for each voxel, the positions of the voxels, and the names of the labels."""
 
+import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.shapes.files.loaded import Label
 from pipeline.shapes.triangles import SurfaceError
 
 UNITS = {"m": 1.0, "meter": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "micron": 1e-6}
@@ -107,7 +109,7 @@ def _listed(values: Sequence[Any]) -> str:
 class NoVoxelError(SurfaceError):
     """No voxel has a ``label``."""
 
-    def __init__(self, label: int | str, what: str):
+    def __init__(self, label: Label, what: str):
         super().__init__(what)
         self.label = label
 
@@ -118,7 +120,10 @@ def of_label(found: LabelMap, label: int | str) -> Any:
     Raises:
         SurfaceError: if there are none, or no such name; the message names the labels that exist.
     """
-    number = found.number(label)
+    return _check_voxels(found, found.number(label), label)
+
+
+def _check_voxels(found: LabelMap, number: int, label: Label) -> Any:
     mask = found.values == number
     if not mask.any():
         labels = [found.written(one) for one in found.labels]
@@ -128,6 +133,40 @@ def of_label(found: LabelMap, label: int | str) -> Any:
             + (f"labels are {_listed(labels)}" if labels else "all are 0: it is empty"),
         )
     return mask
+
+
+def united(found: LabelMap, labels: Sequence[Label]) -> tuple[LabelMap, list[int]]:
+    """Return the map in which each of ``labels``, numbers, names or several of them, is one number; and these numbers.
+
+    Raises:
+        SurfaceError: if a label has no voxels, or is meant twice.
+    """
+    taken: dict[int, Label] = {}
+    numbers = []
+    for label in labels:
+        own = [found.number(one) for one in (label if isinstance(label, tuple) else (label,))]
+        if not own:
+            raise SurfaceError("label = [] is no label: give at least one")
+        for number in own:
+            if number in taken:
+                both = " and ".join(f"label = {_in_study(one)}" for one in (taken[number], label))
+                raise SurfaceError(
+                    f"{both} are the same label, {found.written(number)}: the body and its regions have labels of "
+                    "their own"
+                )
+            taken[number] = label
+            _check_voxels(found, number, label)
+        numbers.append(own)
+    if all(len(own) == 1 for own in numbers):
+        return found, [own for (own,) in numbers]
+    values = found.values.copy()
+    for first, *others in numbers:
+        values[np.isin(found.values, others)] = first
+    return replace(found, values=values), [own[0] for own in numbers]
+
+
+def _in_study(label: Label) -> str:
+    return json.dumps(label, ensure_ascii=False)
 
 
 # Voxels of a segment: where they are in the map, an array there, and its value for them.

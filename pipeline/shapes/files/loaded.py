@@ -27,6 +27,11 @@ Repair = Annotated[
 ]
 
 
+_OneLabel = Annotated[int, Field(gt=0)] | Annotated[str, Field(min_length=1)]
+# A label of an image, by number or name, or several as one.
+Label = _OneLabel | tuple[_OneLabel, ...]
+
+
 @dataclass(frozen=True)
 class Loaded:
     """A surface, and notices about changes that the author of the study should know.

@@ -191,3 +191,23 @@ def test_what_is_no_label_map_is_refused(scan: Path, tmp_path: Path):
         read_image(tmp_path / "nowhere.nrrd", 2)
     with pytest.raises(SurfaceError, match="voxel size is unknown"):
         read_image(tmp_path / "nowhere.nrrd", 2, unit=1e-3)
+
+
+def test_several_labels_are_one_body_and_no_label_is_meant_twice(tmp_path: Path):
+    affine = _affine(2.0)
+    whole = _ellipsoid(affine, (51, 51, 51))
+    parts = whole.copy()
+    parts[25:][parts[25:] == 2] = 9
+    parts[20:30, 24:28, 22:28][parts[20:30, 24:28, 22:28] > 0] = 4
+    one, path = (_nifti(tmp_path / f"{n}.nii", values, affine) for n, values in enumerate((whole, parts)))
+    names = tmp_path / "names.txt"
+    names.write_text("2 liver 1 1 1 255\n4 tumour 1 1 1 255\n9 lobe 1 1 1 255\n")
+    united = read_image(path, (2, "lobe", 4), names=str(names)).triangles
+    np.testing.assert_array_equal(united.points, read_image(one, 2).triangles.points)
+    inner = read_image(path, ("liver", 9), names=str(names), inner=((4, None),)).triangles
+    np.testing.assert_array_equal(inner.points, united.points)
+    for label, region in [("liver", 2), (2, "Liver"), (("tumour", 2), 4), ((2, 2), 4)]:
+        with pytest.raises(SurfaceError, match=r"label = .* and label = .* are the same label"):
+            read_image(path, label, names=str(names), inner=((region, None),))
+    with pytest.raises(SurfaceError, match="no voxel has label 5; labels are 2"):
+        read_image(path, (2, 5), names=str(names))
