@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from epsmesh_realtime.file import VERSION, ModelError, pack
-from epsmesh_realtime.library import TOUCH_SIZE, library, size_of
+from epsmesh_realtime.library import QUERY_SIZE, TOUCH_SIZE, library, size_of
 from epsmesh_realtime.touch import Touch, Touches
 
 Array = NDArray[np.float64]
@@ -116,7 +116,14 @@ class Evaluator:
         return touch_of(found)
 
     def touch_each(self, queries: NDArray[Any]) -> Touches:
-        """Return the answers of packed queries, each by itself."""
+        """Return the answers of packed queries (:func:`epsmesh_realtime.query.packed_each`), each by itself.
+
+        Raises:
+            TypeError: if they are something else.
+        """
+        if queries.dtype.itemsize != QUERY_SIZE:
+            raise TypeError(f"a packed query has {QUERY_SIZE} bytes, and these have {queries.dtype.itemsize}")
+        queries = np.ascontiguousarray(queries)
         found = np.zeros(len(queries), [("status", np.int32), ("pad", np.int32), ("numbers", np.float64, 6)])
         self._c.epsmesh_touch_each(self._model, len(queries), queries.ctypes.data, found.ctypes.data)
         numbers = found["numbers"]
@@ -130,7 +137,7 @@ class Evaluator:
 
     def foot(self, tip: Sequence[float]) -> tuple[str, Array, float]:
         """Return "ok" or why a ``tip`` (m) has no place of the face, the place (3,), and the tip's depth (m)."""
-        given, at, depth = np.asarray(tip, dtype=float), np.full(3, nan), ctypes.c_double(nan)
+        given, at, depth = np.ascontiguousarray(tip, dtype=float), np.full(3, nan), ctypes.c_double(nan)
         if given.shape != (3,):
             return "input", at, nan
         status = self._c.epsmesh_foot(self._model, given.ctypes.data, at.ctypes.data, ctypes.byref(depth))

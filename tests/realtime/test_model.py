@@ -13,6 +13,7 @@ import pipeline
 from epsmesh_realtime import Model, ModelError
 from epsmesh_realtime.file import pack, unpack
 from epsmesh_realtime.model import about, model_of
+from epsmesh_realtime.query import Query, packed_each
 from pipeline.verify import known
 from tests.realtime.synthetic import of_place, random_model, write_random, write_surface
 
@@ -316,6 +317,16 @@ def test_many_queries_in_one_call_are_those_of_many_calls(name, sizes):
         np.testing.assert_array_equal(touches.force[number], touch.force)
         for field in ("force_error", "stiffness", "contact_radius"):
             np.testing.assert_array_equal(getattr(touches, field)[number], getattr(touch, field))
+
+
+def test_packed_queries_may_have_gaps_and_are_nothing_else():
+    query = Query("disc", radius=2e-3, at=AT, depth=np.linspace(1e-5, 1e-4, 6))
+    evaluator, packed = random_model().evaluator, packed_each(query, 1e3, 0.4)
+    whole, part = evaluator.touch_each(packed), evaluator.touch_each(packed[::2])
+    np.testing.assert_array_equal(part.force, whole.force[::2])
+    assert np.isfinite(part.force).all()
+    with pytest.raises(TypeError, match="a packed query has 136 bytes"):
+        evaluator.touch_each(np.zeros(6))
 
 
 def test_queries_whose_shapes_do_not_go_together_are_refused():

@@ -6,6 +6,7 @@ import sys
 from threading import Thread
 
 import cffi
+import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
@@ -14,6 +15,7 @@ from pipeline import compat
 from pipeline.solve import compiled
 from pipeline.solve.compiled import compiling, form, form_cache, scalar_space, vector_space
 from pipeline.solve.kernels.assembly import cell_kernel
+from pipeline.solve.kernels.native import call
 from tests.solve.test_mixed import make_mesh
 
 _EVERY_MODULE = """
@@ -135,3 +137,17 @@ def test_the_source_of_a_form_being_compiled_stays(tmp_path, monkeypatch):
     form(ufl.TestFunction(space) * ufl.dx)
     threads[0].join()
     assert not source.exists()
+
+
+def test_arrays_of_another_type_are_refused_at_the_boundary_to_c():
+    """Every parameter of every function has a type of numpy; a slice with gaps is refused, too."""
+    numbers = np.arange(4.0)
+    assert call("largest", 4, numbers) == 3.0
+    with pytest.raises(TypeError, match="largest in C takes an array of float64, not an array of float32"):
+        call("largest", 4, numbers.astype(np.float32))
+    with pytest.raises(TypeError, match="largest in C takes a number, not an array of float64"):
+        call("largest", numbers, numbers)
+    with pytest.raises(TypeError, match="subtract in C takes an array of float32, not an array of >f4"):
+        call("subtract", 4, numbers.astype(">f4"), numbers.astype(np.float32))
+    with pytest.raises(ValueError, match="contiguous"):
+        call("largest", 2, numbers[::2])

@@ -23,17 +23,32 @@ Single = npt.NDArray[np.float32]
 
 _FLAGS = ("-O3", "-march=native", "-fvisibility=hidden")
 _FOLDER = Path(__file__).parent
+# Types of numpy by those of C.
+_TYPES = {"double": "float64", "float": "float32", "int": "int32", "uint8_t": "uint8", "uint64_t": "uint64"}
 _PRECISIONS = {np.dtype(name): name for name in ("float32", "float64")}
 
 
 def call(name: str, *arguments: Any) -> Any:
-    """Call a C function; arrays are passed without copies, and must be contiguous and of the declared type."""
+    """Call a C function; arrays are passed without copies.
+
+    Raises:
+        TypeError: if an array is not of the declared type.
+        ValueError: if it is not contiguous.
+    """
     function, of_array, arrays = _function(name)
     passed = [
-        of_array(kind, value) if kind is not None and isinstance(value, np.ndarray) else value
+        _passed(name, of_array, kind, value) if isinstance(value, np.ndarray) else value
         for kind, value in zip(arrays, arguments, strict=True)
     ]
     return function(*passed)
+
+
+def _passed(name: str, of_array: Any, kind: tuple[Any, np.dtype] | None, values: np.ndarray) -> Any:
+    """Return an array as C takes it: from its bytes alone, cffi would take those of any type."""
+    if kind is None or values.dtype != kind[1]:
+        expected = "a number" if kind is None else f"an array of {kind[1]}"
+        raise TypeError(f"{name} in C takes {expected}, not an array of {values.dtype}")
+    return of_array(kind[0], values)
 
 
 def precision(values: np.ndarray) -> str:
@@ -43,11 +58,14 @@ def precision(values: np.ndarray) -> str:
 
 @cache
 def _function(name: str) -> tuple[Any, Any, tuple[Any, ...]]:
-    """Return a C function, the conversion of arrays, and the array type of each parameter, None for numbers."""
+    """Return a C function, the conversion of arrays, and the array types of each parameter, None for numbers."""
     module = library()
     function, ffi = getattr(module.lib, name), module.ffi
     kinds = ffi.typeof(function).args
-    arrays = tuple(ffi.typeof(f"{kind.item.cname}[]") if kind.kind == "pointer" else None for kind in kinds)
+    arrays = tuple(
+        (ffi.typeof(f"{kind.item.cname}[]"), np.dtype(_TYPES[kind.item.cname])) if kind.kind == "pointer" else None
+        for kind in kinds
+    )
     return function, ffi.from_buffer, arrays
 
 
@@ -60,7 +78,8 @@ def address(name: str) -> int:
 def point_at(name: str, values: np.ndarray) -> None:
     """Point a C pointer of the library at ``values``, which the caller must keep alive."""
     module = library()
-    setattr(module.lib, name, module.ffi.from_buffer("double[]", values))
+    double = module.ffi.typeof("double[]"), np.dtype(float)
+    setattr(module.lib, name, _passed(name, module.ffi.from_buffer, double, values))
 
 
 @cache
