@@ -156,6 +156,7 @@ def case_memory(case: Case, share: float = 1.0) -> float:
 
     ``share`` is the modelled part of the body.
     """
-    count, degree, direct = share * cells(case), case.mesh.degree, case.solve.method == "direct"
+    count, degree = share * cells(case), case.mesh.degree
+    direct = case.solve.method == "direct" or case.is_factorised
     solving = solving_memory(dofs(count, degree), degree, case.formulation, direct=direct)
     return max(_BASE + _BYTES_PER_CELL * count, solving)

@@ -68,7 +68,7 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:
     """Return the estimated bytes of a solve of ``case`` with ``dofs`` unknowns, and of its error bar."""
     degree, direct = case.mesh.degree, is_direct(case.solve.method, dofs, DIRECT_LIMIT[case.mesh.degree])
-    direct = direct or case.probe.friction > 0
+    direct = direct or case.is_factorised
     return (
         estimate.solving_memory(dofs, degree, case.formulation, direct=direct),
         estimate.error_bar_memory(dofs, degree, case.formulation),

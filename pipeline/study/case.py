@@ -292,6 +292,11 @@ class Case:
         return self.material.is_large or self.probe.friction > 0
 
     @property
+    def is_factorised(self) -> bool:
+        """Whether it is solved by a factorisation, whatever its size: friction on a linear body."""
+        return self.probe.friction > 0 and not self.material.is_large
+
+    @property
     def whole(self) -> str:
         """Its name in the dataset: that of all of its stages."""
         return _named({axis.name: self.words[axis.name] for axis in self.axes if not axis.is_stage})

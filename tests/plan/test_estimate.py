@@ -12,6 +12,7 @@ from pipeline.plan.cost import CostModel, features
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import make_plan
 from pipeline.plan.steps import MeshStep, OperatorStep, mesh_steps
+from pipeline.run.problem import memory_of
 from pipeline.shapes.files.stl import written
 from tests.cases import BLADE, solve, study
 from tests.folded import folded, study_of
@@ -113,3 +114,16 @@ def test_a_folded_surface_takes_longer_to_mesh(tmp_path):
     plain = CostModel().seconds("mesh", kind.replace("folded", "curved"), cells, poisson)
     assert kind.endswith("folded") and 0.5 < cells / 4_505 < 2.0
     assert CostModel().seconds("mesh", kind, cells, poisson) > 5 * plain
+
+
+def test_friction_asks_for_a_factorisation_on_a_linear_body_alone():
+    """The plan and the run agree on it."""
+
+    def needed(law, friction):
+        probe = {"shape": "sphere", "radius": "5 mm", "contact": "unilateral", "friction": friction}
+        case = study(probe=probe, material={"law": law}, mesh={"fine": "0.5 mm", "rim": "0.5 mm"}).case(())
+        return memory_of(case, 1_000_000)[0], estimate.case_memory(case, 30.0)
+
+    assert needed("neo-hookean", 0.3) == needed("neo-hookean", 0.0)
+    for linear, without in zip(needed("linear", 0.3), needed("linear", 0.0), strict=True):
+        assert linear > 3 * without
