@@ -123,7 +123,8 @@ def _filled(raw: dict[str, Any], material: dict[str, Any], found: Identified, pr
         if own[key] != found.known[key]:
             allowed = f"must be {json.dumps(found.known[key])}, with which {found.file} was found, or left out"
             problems.error(f"material.{key}", own[key], allowed)
-    tissue, of_pieces = found.known | own | new, {}
+    tissue: dict[str, Any] = found.known | own | new
+    of_pieces: dict[str, Any] = {}
     if tissue.keys() <= {"relaxation"}:  # layers fill the body: they have all that was found, and relax alike
         tissue, of_pieces = {}, tissue
     filled = {key: value for key, value in raw.items() if key != "material"} | ({"material": tissue} if tissue else {})
@@ -158,7 +159,9 @@ def _body(body: Any, values: Mapping[str, float], all_have: Mapping[str, Any]) -
     for kind in ("layer", "inclusion", "region"):
         pieces = body.get(kind)
         if isinstance(pieces, list):
-            filled[kind] = [all_have | _piece(piece, values) if isinstance(piece, dict) else piece for piece in pieces]
+            filled[kind] = [
+                dict(all_have) | _piece(piece, values) if isinstance(piece, dict) else piece for piece in pieces
+            ]
     return filled
 
 

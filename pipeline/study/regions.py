@@ -14,6 +14,7 @@ from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.closed import Closed
 from pipeline.shapes.complex import OUTSIDE
 from pipeline.shapes.facetted import Facetted
+from pipeline.shapes.files.loaded import Label
 from pipeline.shapes.regions import Embedded, Inclusion
 from pipeline.shapes.section import Section, in_mm
 from pipeline.shapes.segment import Segment
@@ -98,7 +99,7 @@ def _check_pieces(body: Body, problems: Problems) -> None:
 def _check_segments(body: Body, problems: Problems) -> None:
     """Check that each region has a file with its unit, or a label of its own of the body's image."""
     label = getattr(body, "label", None)  # of an image
-    taken: dict[int | str, str] = {} if label is None else {label: "the body"}
+    taken: dict[Label, str] = {} if label is None else {label: "the body"}
     for number, piece in enumerate(body.region, start=1):
         key = f"body.region[{number}]"
         _check_hollow(piece, key, problems)

@@ -120,7 +120,7 @@ def test_friction_asks_for_a_factorisation_on_a_linear_body_alone():
     """The plan and the run agree on it."""
 
     def needed(law, friction):
-        probe = {"shape": "sphere", "radius": "5 mm", "contact": "unilateral", "friction": friction}
+        probe = {"shape": "sphere", "radius": "5 mm", "depth": "1 mm", "contact": "unilateral", "friction": friction}
         case = study(probe=probe, material={"law": law}, mesh={"fine": "0.5 mm", "rim": "0.5 mm"}).case(())
         return memory_of(case, 1_000_000)[0], estimate.case_memory(case, 30.0)
 
