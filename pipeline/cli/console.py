@@ -60,7 +60,9 @@ def say(data: Any, *lines: str) -> None:
 
 
 def plain(value: Any, key: str = "") -> Any:
-    """Return ``value``, found under ``key``, as JSON types."""
+    """Return ``value``, found under ``key``, as JSON types: numbers of numpy, too."""
+    if hasattr(value, "dtype") and not value.ndim:
+        value = value.item()
     if isinstance(value, dict):
         return {name: plain(item, name) for name, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,7 +1,9 @@
 """Verification itself: the quick rows are right, and a wrong number is called out."""
 
+import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 from typer.testing import CliRunner
@@ -50,12 +52,14 @@ def test_closed_forms_meet_in_their_limits():
 
 
 def test_command_fails_if_a_row_is_out(monkeypatch):
-    right = Row("scene", "3D", 1.0, "source", 1.001, 0.01)
+    right = Row("scene", "3D", 1.0, "source", np.float64(1.001), 0.01)
     for table, status in (([right], 0), ([right, replace(right, value=1.1)], 1)):
         monkeypatch.setattr(verify, "rows", lambda *_, table=table, **__: iter(table))
         result = CliRunner().invoke(cli.app, ["verify"])
         assert result.exit_code == status
         assert ("1 out" in result.output) == bool(status)
+        told = json.loads(CliRunner().invoke(cli.app, ["verify", "--json"]).stdout)
+        assert [row["right"] for row in told] == [True, False][: len(table)]
 
 
 def test_layers_on_half_spaces_meet_their_limits():
