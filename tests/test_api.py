@@ -1,5 +1,6 @@
 """The program from Python: the same as the command line, serial and on ranks, with exceptions for what is wrong."""
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -71,6 +72,24 @@ def test_failed_cases_are_counted_in_a_warning(folder):
         data = study.run(WORLD, output=folder)
     assert (data["status"].sel(rim=1e-12) == "failed").all()
     assert (data["status"].sel(rim=0.5e-3) == "ok").all()
+
+
+def test_an_interrupted_run_leaves_what_is_finished(tmp_path, monkeypatch):
+    """The signal comes while the second solve is at work."""
+    (tmp_path / "small.toml").write_text(TEXT.replace('"4 mm"', '"4 mm", "5 mm"'))
+    study, calls = pipeline.read(tmp_path / "small.toml"), iter(range(9))
+
+    def machine_load():
+        if next(calls) == 1:
+            signal.raise_signal(signal.SIGINT)
+        return 1.0
+
+    monkeypatch.setattr("pipeline.run.runner.machine_load", machine_load)
+    with pytest.raises(KeyboardInterrupt):
+        study.run(MPI.COMM_SELF, output=tmp_path)
+    left = pipeline.open(tmp_path / "small.toml", tmp_path)["status"]
+    assert 0 < int((left == "ok").sum()) < left.size
+    assert (study.run(MPI.COMM_SELF, output=tmp_path)["status"] == "ok").all()
 
 
 def test_plan_says_what_a_run_would_do(tmp_path):

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from pipeline.mesh.of_case import mesh_arrays
+from pipeline.plan.describe import summary
 from pipeline.plan.key import case_key, mesh_key
+from pipeline.plan.plan import make_plan
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.shell import Shell
 from pipeline.shapes.triangles import Triangles
@@ -97,11 +99,15 @@ def test_a_region_has_its_cells_and_its_volume(folder, which):
         "file": body(folder, vessel, inclusion=[INCLUSION]),
         "label": body(folder, OF_LABEL, vessel, file="coarse.nii.gz"),
     }[which]
-    case = study(body=held, probe=PROBE, mesh=MESH).case(())
+    asked = study(body=held, probe=PROBE, mesh=MESH)
+    case = asked.case(())
+    extent, told = summary(make_plan(asked))["notes"]
+    assert extent.startswith("Body: x from ")
     mesh = mesh_arrays(case, ())
     found = volumes(mesh)
     for number, piece in enumerate(case.body.embedded, start=1):
         assert found[number] == pytest.approx(1e9 * piece.surface.volume, rel=0.01)
+        assert f"{piece.name} {1e6 * piece.surface.volume:.3g} cm³" in told
         middle = mesh.points[mesh.cells[:, :4]].mean(axis=1)
         distance = piece.surface.distance(middle)
         clear = np.abs(distance) > 0.3e-3

@@ -269,6 +269,7 @@ def test_timed_cases_are_medians_of_repeats_each_made_afresh(monkeypatch, tmp_pa
     (record,) = found
     assert record.time_mesh == pytest.approx(3e6, rel=1e-4)
     assert record.time_error > 1e8
+    assert record.load >= 0 < record.time_spread
     assert 0 < record.force_error < 0.5
     assert next(told, None) is None
     assert not list(tmp_path.iterdir())

@@ -83,6 +83,7 @@ def test_contact_radius_grows_smoothly_with_depth():
     radii = np.array([record.contact_radius for record in found])
     ratio = radii / np.sqrt(10e-3 * depths)
     assert np.abs(ratio - 1).max() < 0.03
+    assert np.abs(ratio[radii > 4 * 0.3e-3] - 1).max() < 0.01  # four elements
     assert (np.diff(radii) > 0).all()
     assert np.abs(np.diff(ratio)).max() < 0.025
     bars = np.array([record.contact_area_error for record in found])

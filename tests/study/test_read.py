@@ -205,7 +205,10 @@ MISTAKES = {
         {"body": ELLIPSOID, "probe": {"at": ["32 mm", "0 mm"], "axis": [0, 0, -1], "radius": "9 mm"}},
         ["probe.at", "misses the body"],
     ),
-    "footprint round an ellipsoid": ({"body": ELLIPSOID, "probe": {"radius": "29 mm"}}, ["probe.at", "turns by"]),
+    "footprint round an ellipsoid": (
+        {"body": ELLIPSOID, "probe": {"radius": "29 mm"}},
+        ["probe.at", "turns by", "at most 45°"],
+    ),
     "no room beside the probe": (
         {"body": {"shape": "cylinder", "radius": "3.5 mm", "height": "9 mm", "fixed": "sides"}},
         ["body.fixed", "leaves 0.5 mm", "`rim` below 0.5 mm"],

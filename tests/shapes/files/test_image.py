@@ -12,7 +12,7 @@ import pytest
 from pipeline.arrays import FloatArray
 from pipeline.shapes.files.crossings import crossings
 from pipeline.shapes.files.image import read_image
-from pipeline.shapes.files.label_surface import default_smooth
+from pipeline.shapes.files.label_surface import default_smooth, filtered
 from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals
 
 AXES = np.array([40.0, 30.0, 20.0])  # mm
@@ -72,6 +72,15 @@ def test_without_the_filter_the_steps_between_voxels_stay(scan: Path):
 
     assert normals_off(read_image(scan, 2).triangles) < 4
     assert normals_off(read_image(scan, 2, smooth=0.0).triangles) > 15
+
+
+@pytest.mark.parametrize(("thickness", "least", "most"), [(12, 2, 2), (8, 0.75, 1.9), (2, 0.75, 0.9), (1, 0.5, 0.75)])
+def test_the_filter_is_narrowed_for_a_label_that_is_thin_everywhere(thickness: int, least: float, most: float):
+    """Sheets of some voxels, and a filter of two."""
+    mask, asked = np.zeros((40, 41, 41), bool), np.full(3, 2.0)
+    mask[10 : 10 + thickness] = True
+    assert least <= filtered(mask, asked, may_narrow=True)[1][0] <= most
+    assert filtered(mask, asked, may_narrow=False)[1][0] == 2
 
 
 def test_thick_slices_are_smoothed_over_their_distance(tmp_path: Path):
