@@ -79,11 +79,12 @@ def _of_needle(study: "Study", case: "Case", needle: Needle, path: "xr.Dataset",
     """Return the pictures of a needle, solved on the first rank; exit if they cannot be; collective."""
     from pipeline.mesh.generate import MeshError
     from pipeline.run.meshing import on_first_rank
+    from pipeline.run.problem import CaseFailure
     from pipeline.view.needle_pictures import NeedlePictures
 
     try:
         found = on_first_rank(comm, lambda: NeedlePictures.of(case, needle, path))
-    except MeshError as wrong:
+    except (CaseFailure, MeshError) as wrong:
         fail(of_file(study.file, f"the film: {wrong}", _HOWTO))
     return cast("Pictures", found)
 

@@ -2,7 +2,16 @@
 
 import gmsh
 
+_OF_MEMORY = "bad_alloc"
+
 
 def reason(error: Exception) -> str:
-    """Return gmsh's message of an ``error``, which is empty if memory has run out."""
-    return str(error) or gmsh.logger.getLastError() or "gives no reason: memory may have run out"
+    """Return gmsh's message of an ``error``.
+
+    Raises:
+        MemoryError: if memory has run out, which no other mesh helps; gmsh then gives that reason or none.
+    """
+    told = str(error) or gmsh.logger.getLastError()
+    if isinstance(error, MemoryError) or not told or _OF_MEMORY in told:
+        raise MemoryError(f"gmsh: {told or 'gives no reason: memory may have run out'}") from error
+    return told

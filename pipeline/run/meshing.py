@@ -16,6 +16,7 @@ from pipeline.plan.refinement import is_refined, refinements
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.run.failure import describe
 from pipeline.run.mesh_cache import MeshCache
+from pipeline.run.problem import CaseFailure
 from pipeline.stages import Times, recharge, stage
 from pipeline.study.case import Case
 
@@ -28,8 +29,11 @@ def mesh_case(case: Case, mirrors: tuple[str, ...], comm: MPI.Comm, cache: MeshC
 
     The mesh is turned so that the probe presses along -z.
 
+    A mesh that cannot be refined is made as a whole.
+
     Raises:
         MeshError: on every rank.
+        CaseFailure: on every rank, if it failed for another reason, as for want of memory.
     """
     if is_refined(case):
         with suppress(MeshError):
@@ -37,7 +41,7 @@ def mesh_case(case: Case, mirrors: tuple[str, ...], comm: MPI.Comm, cache: MeshC
             parts = on_first_rank(comm, lambda: split(_cached_coarse(case, cache), comm.size, is_refined=twice))
             part = refined_part(case, mirrors, comm.scatter(parts or ()), comm)
             return distribute_parts(comm, replace(part, mesh=upright(case, part.mesh)))
-    arrays = on_first_rank(comm, lambda: cached_arrays(case, mirrors, cache))
+    arrays = on_first_rank(comm, lambda: _cached_unrefined(case, mirrors, cache))
     return distribute(comm, arrays and upright(case, arrays))
 
 
@@ -78,16 +82,23 @@ def _cached(
 
 
 def on_first_rank(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
-    """Return the result of ``compute`` on rank 0, None elsewhere; a failure is raised on every rank."""
-    result, message = None, None
+    """Return the result of ``compute`` on rank 0, None elsewhere; collective.
+
+    Raises:
+        MeshError: on every rank, if rank 0 raised it.
+        CaseFailure: on every rank, if it raised another exception.
+    """
+    result: T | None = None
+    message: str | None = None
+    kind: type[Exception] = MeshError
     if comm.rank == 0:
         try:
             result = compute()
         except Exception as error:
             if is_interrupt(error):
                 raise
-            message = describe(error)
-    message = comm.bcast(message)
+            message, kind = describe(error), MeshError if isinstance(error, MeshError) else CaseFailure
+    message, kind = comm.bcast((message, kind))
     if message is not None:
-        raise MeshError(message)
+        raise kind(message)
     return result

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.mesh.generate import MeshArrays
+from pipeline.mesh.generate import MeshArrays, MeshError
 from pipeline.mesh.of_case import coarse_arrays, mesh_arrays, refined_arrays, unrefined_arrays
 from pipeline.mesh.parts import split
 from pipeline.plan import refinement
 from pipeline.plan.key import mesh_key
 from pipeline.plan.symmetry import mirror_planes
+from pipeline.run.meshing import mesh_case
+from pipeline.run.problem import CaseFailure
 from pipeline.study.case import Case
 from tests.cases import BLADE, solve, study
 from tests.mesh.test_mesh import area
@@ -164,3 +166,40 @@ def test_the_mesh_does_not_depend_on_the_number_of_ranks(name, times):
     together = WORLD.bcast(together)
     assert together.force == pytest.approx(alone.force, rel=1e-9)
     assert (together.cells, together.dofs) == (alone.cells, alone.dofs)
+
+
+@pytest.mark.parametrize(
+    ("error", "tried"),
+    [(MeshError("folded"), ["coarse", "whole"]), (MemoryError("40 GiB"), ["coarse"])],
+)
+def test_a_coarse_mesh_that_failed_is_not_made_again_and_one_that_lacked_memory_fails(monkeypatch, error, tried):
+    made: list[str] = []
+
+    def coarse(_):
+        made.append("coarse")
+        raise error
+
+    def entire(*_):
+        made.append("whole")
+        raise MeshError("gmsh")
+
+    monkeypatch.setattr("pipeline.run.meshing.coarse_arrays", coarse)
+    monkeypatch.setattr("pipeline.run.meshing.unrefined_arrays", entire)
+    with refining(1), pytest.raises(CaseFailure if tried == ["coarse"] else MeshError, match=r"40 GiB|gmsh"):
+        mesh_case(study(mesh={"fine": "3 mm"}).case(()), (), MPI.COMM_SELF)
+    assert made == tried
+
+
+@pytest.mark.parametrize("told", ["", "std::bad_alloc"])
+def test_gmsh_without_memory_is_not_tried_with_smaller_elements(monkeypatch, told):
+    calls = []
+
+    def exhausted(dim):
+        calls.append(dim)
+        raise Exception(told)
+
+    monkeypatch.setattr("gmsh.model.mesh.generate", exhausted)
+    monkeypatch.setattr("gmsh.logger.getLastError", lambda: "")
+    with pytest.raises(MemoryError, match="gmsh"):
+        unrefined_arrays(study().case(()), ())
+    assert len(calls) == 1
