@@ -102,6 +102,7 @@ class RunnableStudy:
 
         Raises:
             StoreError: on every rank, if the store cannot be used.
+            ResultsError: on every rank, if the dataset cannot be written, or would replace an identification's.
             KeyboardInterrupt: if the run was interrupted; what was finished is on record.
         """
         from pipeline import workflow  # noqa: PLC0415 (MPI starts as it is imported)
@@ -155,10 +156,11 @@ class RunnableStudy:
         if case.lost_contact:
             raise ValueError(f"{case}: {case.lost_contact}")
         comm = workflow.world() if comm is None else comm
-        cache = MeshCache(Path(meshes)) if meshes else None
+        cache, agreed = MeshCache(Path(meshes)) if meshes else None, (CaseFailure, MeshError, SolveError)
         try:
-            solved = solve_fields(solve_alone(self.declared, case), comm, cache=cache)
-        except (CaseFailure, MeshError, SolveError) as failure:
+            with workflow.abort_on_exception(comm, *agreed):
+                solved = solve_fields(solve_alone(self.declared, case), comm, cache=cache)
+        except agreed as failure:
             raise RuntimeError(f"{case}: {failure}") from failure
         if solved.record.status in FAILURES:
             warnings.warn(f"{case}: {solved.record.message}", RuntimeWarning, stacklevel=2)
@@ -172,6 +174,7 @@ class RunnableStudy:
 
         Raises:
             ValueError: if the study has no measurements.
+            FileExistsError: if the dataset of a run would be replaced.
             ExperimentError: if a file is no force curve.
             StudyError: if the scene of a measurement cannot be run.
             SurrogateError: if a case that the forces need has none.
@@ -179,10 +182,12 @@ class RunnableStudy:
         from pipeline.identify.dataset import write  # noqa: PLC0415 (MPI starts as it is imported)
         from pipeline.identify.run import identification  # noqa: PLC0415
         from pipeline.report.figures.identification import draw  # noqa: PLC0415
+        from pipeline.report.read import check_kind  # noqa: PLC0415
 
         if not self.declared.measurements:
             raise ValueError(f"{self.declared.file}: has no [[measurement]]")
         path = Path(output) / f"{self.name}.nc"
+        check_kind(path, identified=True)
         dataset = identification(self.declared, Path(output), Path(store or Path(output) / STORE_NAME), lambda _: None)
         if is_first_rank():
             write(dataset, path)

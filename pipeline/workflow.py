@@ -202,14 +202,15 @@ def end_ranks(comm: MPI.Comm, status: int) -> None:
 
 
 @contextmanager
-def abort_on_exception(comm: MPI.Comm) -> Iterator[None]:
-    """End all ranks when one of them meets an error that nobody handles: the others would wait for ever."""
+def abort_on_exception(comm: MPI.Comm, *agreed: type[Exception]) -> Iterator[None]:
+    """End all ranks when one of them meets an error that nobody handles: the others would wait for ever.
+
+    Exceptions that are ``agreed`` are those that every rank raises.
+    """
     try:
         yield
-    except (CompilerError, ResultsError):  # on every rank
-        raise
-    except Exception:
-        if comm.size == 1:
+    except Exception as error:
+        if comm.size == 1 or isinstance(error, (CompilerError, ResultsError, *agreed)):
             raise
         traceback.print_exc()
         comm.Abort(1)

@@ -53,3 +53,12 @@ def spawn(*arguments: object, ranks: int = 1) -> subprocess.CompletedProcess[str
         command(*arguments, ranks=ranks),
         capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=300, cwd=ROOT,
     )  # fmt: skip
+
+
+def run_script(script: str, *arguments: object, ranks: int = 1) -> subprocess.CompletedProcess[str]:
+    """Run a script of Python in a process of its own, to its end, with the command line ``arguments``."""
+    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    return subprocess.run(
+        [*launcher, sys.executable, "-c", script, *map(str, arguments)], cwd=ROOT, text=True, capture_output=True,
+        env=ENVIRONMENT | {"PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL, check=False, timeout=300,
+    )  # fmt: skip

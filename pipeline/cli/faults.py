@@ -110,13 +110,18 @@ def refusing(
 
 @contextmanager
 def refusing_cases(study: "Study", store: Path, howto: str | None = None) -> Iterator[None]:
-    """Exit, on all ranks, if the cases that a command needs cannot be run, have no force, or the ``store`` is bad."""
+    """Exit, on all ranks, if the cases that a command needs cannot be run, have no force, or the ``store`` is bad.
+
+    If one rank alone meets another error, all end.
+    """
     from pipeline.run.store import StoreError
     from pipeline.study.problems import StudyError
     from pipeline.surrogate.cases import SurrogateError
+    from pipeline.workflow import abort_on_exception, world
 
     try:
-        yield
+        with abort_on_exception(world(), StoreError, StudyError, SurrogateError, typer.Exit):
+            yield
     except StudyError as wrong:
         fail(*of_study(wrong), on_all_ranks=True)
     except StoreError as wrong:

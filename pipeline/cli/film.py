@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+import typer
+
 from pipeline.cli.console import say
 from pipeline.cli.faults import fail, of_file
 from pipeline.cli.words import check_machine, check_output, read_dataset
@@ -44,7 +46,7 @@ def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, 
     load_solvers()
     from pipeline.view.film import write_film
 
-    with abort_on_exception(comm), ended_soon():
+    with abort_on_exception(comm, typer.Exit), ended_soon():
         if isinstance(tool, Needle):
             pictures = _of_needle(study, chosen, tool, path, comm)
         else:

@@ -17,6 +17,7 @@ from pipeline.cli.words import (
     Output,
     Quiet,
     StoreFile,
+    check_kind,
     check_machine,
     check_output,
     check_store,
@@ -80,6 +81,8 @@ def identify(
     if without:
         fail(*without)
     check_output(path, *(file for study in studies for file in result_files(output, study.name)))
+    for study in studies:
+        check_kind(output / f"{study.name}.nc", identified=True)
     check_machine()
     found = []
     for study in studies:

@@ -131,7 +131,7 @@ def _scene_of(path: Path, dataset: "xr.Dataset", text: str) -> str:
     from pipeline.cli.view import fields_of
     from pipeline.report.table import DatasetError, study_of
     from pipeline.view.page import render
-    from pipeline.workflow import world
+    from pipeline.workflow import abort_on_exception, world
 
     study = study_of(dataset)
     if study is None:
@@ -143,7 +143,8 @@ def _scene_of(path: Path, dataset: "xr.Dataset", text: str) -> str:
             fail(of_file(path, f"--scene {_ANSWER} needs an answer: {wrong}; name a case by its number"))
     else:
         chosen = find_case(study, text, "--scene")
-    fields = fields_of(study, chosen, world(), mesh_only=True, export=None, meshes=DEFAULT_MESHES)
+    with abort_on_exception(world(), typer.Exit):
+        fields = fields_of(study, chosen, world(), mesh_only=True, export=None, meshes=DEFAULT_MESHES)
     assert fields is not None  # one process
     return render(fields, study.title)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from pipeline.cli.console import error, print_json, warning
-from pipeline.cli.faults import DONE, INTERRUPTED, SOME_FAILED, Fault, fail, of_file, of_results
+from pipeline.cli.faults import DONE, INTERRUPTED, SOME_FAILED, Fault, fail, of_results
 from pipeline.cli.words import (
     DEFAULT_MESHES,
     DEFAULT_OUTPUT,
@@ -25,6 +25,7 @@ from pipeline.cli.words import (
     Verbose,
     Without,
     axes_of,
+    check_kind,
     check_machine,
     check_names,
     check_output,
@@ -146,24 +147,8 @@ def run(
 def _check_measured(studies: "list[Study]", output: Path) -> None:
     """Say that measurements are left out; exit if results would replace an identification's."""
     for study in (study for study in studies if study.measurements):
-        file = output / f"{study.name}.nc"
-        if file.exists() and _is_identification(file):
-            what = f"is what `epsmesh identify {quote(study.file)}` found: give another --output for its cases"
-            fail(of_file(file, what))
+        check_kind(output / f"{study.name}.nc", identified=False)
         warning(f"{study.file}: its measurements are for `epsmesh identify`: only its cases are run")
-
-
-def _is_identification(file: Path) -> bool:
-    """Tell the dataset of an identification from others, and from what is none."""
-    import xarray as xr
-
-    from pipeline.report.identified import is_identification
-
-    try:
-        with xr.open_dataset(file) as dataset:
-            return is_identification(dataset)
-    except (OSError, ValueError, RuntimeError):  # damaged: a run replaces it
-        return False
 
 
 def _progress(first: "Plan", plan: "Plan", *, is_told: bool, verbose: bool) -> "Terminal":

@@ -26,7 +26,7 @@ def verify(
     Example: epsmesh verify
     """
     from pipeline.verify import rows
-    from pipeline.workflow import ended_soon, load_solvers, world
+    from pipeline.workflow import abort_on_exception, ended_soon, load_solvers, world
 
     comm = world()
     speaks, lists = comm.rank == 0, comm.rank == 0 and not as_json
@@ -34,7 +34,7 @@ def verify(
     if lists:
         print(_ROW.format("", "scene", "path", "reference", "value", "error", "bar", "source"))
     table = []
-    with ended_soon():
+    with abort_on_exception(comm), ended_soon():
         for row in rows(comm, quick=quick):
             table.append(row)
             if lists:

@@ -127,7 +127,7 @@ def view(
     comm = world()
     export = "html" if missing else export
     load_solvers()
-    with abort_on_exception(comm), ended_soon():
+    with abort_on_exception(comm, typer.Exit), ended_soon():
         fields = fields_of(study, chosen, comm, mesh_only, export, meshes)
         if fields is not None:
             _write(study, fields, stem, export, missing)

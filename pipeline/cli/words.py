@@ -151,6 +151,16 @@ def check_output(*files: Path, folder: Path | None = None) -> None:
         fail(Fault(why, file=str(folder)))
 
 
+def check_kind(file: Path, *, identified: bool) -> None:
+    """Exit, before any computation, if an identification (``identified``) would replace a run's dataset, or it that."""
+    if not file.exists():
+        return
+    from pipeline.report.read import check_kind as check
+
+    with refusing(FileExistsError, file=file):
+        check(file, identified=identified)
+
+
 def check_machine() -> None:
     """Exit, before any computation, if a folder that the compiler or MPI needs cannot be written."""
     if found := faults_of_machine():

@@ -16,8 +16,10 @@ from pipeline.identify.many import LEAST, SILENCE, Work
 from pipeline.identify.unknowns import unknowns
 from pipeline.printable import counted
 from pipeline.report.identified import once
+from pipeline.run.store import StoreError
+from pipeline.study.problems import StudyError
 from pipeline.study.sweep import Study
-from pipeline.surrogate.cases import Solve
+from pipeline.surrogate.cases import Solve, SurrogateError
 
 
 def identification(study: Study, output: Path, store: Path, say: Callable[[str], None]) -> xr.Dataset:
@@ -33,21 +35,23 @@ def identification(study: Study, output: Path, store: Path, say: Callable[[str],
     """
     from pipeline import workflow  # noqa: PLC0415 (MPI starts as it is imported)
 
-    comm, found, cases = workflow.world(), specimens(study), cases_of(study)
-    read = [(one.name, f"{curve.name}: {line}") for one in found for curve in one.curves for line in curve.told]
-    read += [(one.name, line) for one in found if one.curves for line in doubts_of_scale(cases, one.curves)]
-    for line in once(read, len(found)):
-        say(line)
-    solve, sought = telling(stored_in(store, comm), say), unknowns(study)
-    found = without_too_deep(study, sought, found, LEAST)
+    comm = workflow.world()
+    with workflow.abort_on_exception(comm, ExperimentError, StoreError, StudyError, SurrogateError):
+        found, cases = specimens(study), cases_of(study)
+        read = [(one.name, f"{curve.name}: {line}") for one in found for curve in one.curves for line in curve.told]
+        read += [(one.name, line) for one in found if one.curves for line in doubts_of_scale(cases, one.curves)]
+        for line in once(read, len(found)):
+            say(line)
+        solve, sought = telling(stored_in(store, comm), say), unknowns(study)
+        found = without_too_deep(study, sought, found, LEAST)
 
-    def scenes(some: tuple[Specimen, ...], times: float) -> Scenes:
-        return scenes_of(study, sought, some, solve, times)
+        def scenes(some: tuple[Specimen, ...], times: float) -> Scenes:
+            return scenes_of(study, sought, some, solve, times)
 
-    outcomes = Work(study, found, scenes).done(comm, Kept(output, study), say)
-    if all(isinstance(one, ExperimentError) for one in outcomes):
-        raise outcomes[0]
-    return joined(outcomes, [one.name for one in found]) if len(found) > 1 else outcomes[0]
+        outcomes = Work(study, found, scenes).done(comm, Kept(output, study), say)
+        if all(isinstance(one, ExperimentError) for one in outcomes):
+            raise outcomes[0]
+        return joined(outcomes, [one.name for one in found]) if len(found) > 1 else outcomes[0]
 
 
 def telling(solve: Solve, say: Callable[[str], None]) -> Solve:

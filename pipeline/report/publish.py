@@ -53,7 +53,9 @@ def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, 
         if are_made(files, inputs):
             return Results(unchanged=tuple(files))
         from pipeline.report.dataset import build, write  # noqa: PLC0415 (xarray is slow to load, and no shard needs it)
+        from pipeline.report.read import check_kind  # noqa: PLC0415
 
+        check_kind(files[0], identified=False)
         dataset = build(plan, records, attributes)
         write(dataset, files[0])
         from pipeline.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)

@@ -58,6 +58,24 @@ def dataset_path(file: str | Path, output: str | Path = "results") -> Path:
     return path
 
 
+def check_kind(path: Path, *, identified: bool) -> None:
+    """Check that a dataset may be written to ``path``: in place of none, of a damaged one, or of one of its own kind.
+
+    Raises:
+        FileExistsError: if an identification (``identified``) would replace a study's dataset, or the reverse.
+    """
+    if not path.is_file():
+        return
+    try:
+        with xr.open_dataset(path) as dataset:
+            known = is_identification(dataset)
+    except (OSError, ValueError, RuntimeError):  # damaged
+        return
+    if known != identified:
+        what = "identification of curves" if known else "dataset of a study's cases"
+        raise FileExistsError(f"{path}: is the {what}, and is not replaced by the other: give another output folder")
+
+
 def read(file: str | Path, output: str | Path = "results", warn: Callable[[str], None] = warnings.warn) -> xr.Dataset:
     """Return the dataset meant by ``file``, in memory: a later run may write it anew.
 

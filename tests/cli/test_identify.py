@@ -13,6 +13,7 @@ from pipeline.layered.body import RIGID, LayeredBody
 from pipeline.layered.compliance import Layer
 from pipeline.study.problems import StudyError
 from scripts.make_curves import TRUTH, Machine, disc, main, pressed, write
+from tests.commands import run_script
 
 YOUNG = 20e3
 STUDY = """title = "Punch"
@@ -200,7 +201,42 @@ def test_the_cases_of_the_study_do_not_replace_what_was_found(folder, epsmesh, f
     (folder / "whole" / "punch.toml").write_text(text)
     result = epsmesh("run", folder / "whole" / "punch.toml", "--output", folder / "results")
     assert result.exit_code == 2
-    assert "is what `epsmesh identify" in result.stderr
+    assert "is the identification of curves, and is not replaced" in result.stderr
+
+
+def test_what_was_found_does_not_replace_the_dataset_of_a_run_nor_the_reverse(folder, epsmesh, small, tmp_path):
+    ran = tmp_path / "ran"
+    assert epsmesh("run", small, "--output", ran).exit_code == 0
+    (ran / "small.nc").rename(ran / "punch.nc")
+    before = (ran / "punch.nc").read_bytes()
+    result = epsmesh("identify", folder / "punch.toml", "--output", ran)
+    assert (result.exit_code, "is the dataset of a study's cases" in result.stderr) == (2, True)
+    with pytest.raises(FileExistsError, match="give another output folder"):
+        pipeline.read(folder / "punch.toml").identify(output=ran)
+    assert (ran / "punch.nc").read_bytes() == before
+    (ran / "small.nc").write_bytes((folder / "results" / "punch.nc").read_bytes())
+    result = epsmesh("run", small, "--output", ran)
+    assert (result.exit_code, "is the identification of curves" in result.stderr) == (2, True)
+
+
+# A rank that fails alone, where the others wait for it.
+FAILS = """
+from mpi4py import MPI
+from pipeline.identify.kept import Kept
+def read(self, specimen):
+    if MPI.COMM_WORLD.rank:
+        raise ValueError("of one rank")
+Kept.read = read
+from pipeline.__main__ import main
+main()
+"""
+
+
+def test_a_rank_that_fails_alone_ends_all(folder):
+    words = ["identify", folder / "three.toml", "--output", folder / "alone", "--quiet"]
+    done = run_script(FAILS, *words, ranks=2)
+    assert done.returncode not in (0, 2, 130)
+    assert "ValueError: of one rank" in done.stderr
 
 
 def test_python_gets_the_dataset(folder, found):

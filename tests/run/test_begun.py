@@ -2,8 +2,6 @@
 
 import errno
 import json
-import subprocess
-import sys
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -20,7 +18,7 @@ from pipeline.run.record import Record
 from pipeline.run.store import Store
 from pipeline.workflow import prepare
 from tests.cases import study
-from tests.commands import ENVIRONMENT, ROOT
+from tests.commands import run_script as run
 from tests.studies import small_text
 
 # The command, with a solve in it that ends the process, and one that only it is told of.
@@ -70,14 +68,6 @@ begun.name("c")
 os.write(begun._open("done"), b'\\n{"key": "c", "sta')
 os.kill(os.getpid(), signal.SIGKILL)
 """
-
-
-def run(script: str, *arguments: object, ranks: int = 1) -> "subprocess.CompletedProcess[str]":
-    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
-    return subprocess.run(
-        [*launcher, sys.executable, "-c", script, *map(str, arguments)], cwd=ROOT, text=True, capture_output=True,
-        env=ENVIRONMENT | {"PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL, check=False, timeout=300,
-    )  # fmt: skip
 
 
 @pytest.fixture
