@@ -20,6 +20,10 @@ from pipeline.units import Travel
 _FEW = 32  # cached surfaces of regions
 # Range of the smoothing length, in its units.
 _NARROWEST, _WIDEST = 2 / 3, 4 / 3
+_UNKNOWN_FRAME = (
+    "its file names no frame: taken as that of the image, x to the right, y to the front, z to the head. Of a file in "
+    "LPS, x and y are to be negated"
+)
 
 
 class FromImage(Segmented, Scanned):
@@ -75,7 +79,7 @@ class FromImage(Segmented, Scanned):
     def read(cls, file: str, given: Mapping[str, Any]) -> Loaded:
         """Return the surface of the label, together with the labels of its regions."""
         from pipeline.shapes.files.image import read_image  # noqa: PLC0415 (only when a file is read)
-        from pipeline.shapes.files.label_map import NoVoxelError  # noqa: PLC0415
+        from pipeline.shapes.files.label_map import LabelError  # noqa: PLC0415
 
         def surface(
             label: Label,
@@ -90,7 +94,7 @@ class FromImage(Segmented, Scanned):
         smooth = {n: given["smooth"] if piece.smooth is None else piece.smooth for n, piece in labelled.items()}
         try:
             whole = surface(given["label"], given["smooth"], tuple(smooth.items()), given["offset"])
-        except NoVoxelError as error:
+        except LabelError as error:
             if piece := labelled.get(error.label):
                 raise SurfaceError(f"{piece.name}, label {error.label}: {error}") from error
             raise
@@ -103,6 +107,14 @@ class FromImage(Segmented, Scanned):
             except SurfaceError as error:
                 raise SurfaceError(f"{piece.name}, label {label}: {error}") from error
         return whole
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Notices about what was read, and about surfaces whose frame is not known to be that of the image."""
+        from pipeline.shapes.files.read import space_of  # noqa: PLC0415
+
+        unknown = [piece.name for piece in self.region if piece.file and not space_of(Path(piece.file))]
+        return *super().notices, *(f"{name}: {_UNKNOWN_FRAME}" for name in unknown)
 
     @property
     def _spacing(self) -> FloatArray:

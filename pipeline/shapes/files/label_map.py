@@ -106,8 +106,8 @@ def _listed(values: Sequence[Any]) -> str:
     return ", ".join(map(str, values[:_SHOWN])) + (f", … ({len(values)} in all)" if len(values) > _SHOWN else "")
 
 
-class NoVoxelError(SurfaceError):
-    """No voxel has a ``label``."""
+class LabelError(SurfaceError):
+    """A ``label`` has no voxel, or is meant twice."""
 
     def __init__(self, label: Label, what: str):
         super().__init__(what)
@@ -127,7 +127,7 @@ def _check_voxels(found: LabelMap, number: int, label: Label) -> Any:
     mask = found.values == number
     if not mask.any():
         labels = [found.written(one) for one in found.labels]
-        raise NoVoxelError(
+        raise LabelError(
             label,
             f"no voxel has label {found.written(number)}; "
             + (f"labels are {_listed(labels)}" if labels else "all are 0: it is empty"),
@@ -150,9 +150,10 @@ def united(found: LabelMap, labels: Sequence[Label]) -> tuple[LabelMap, list[int
         for number in own:
             if number in taken:
                 both = " and ".join(f"label = {_in_study(one)}" for one in (taken[number], label))
-                raise SurfaceError(
+                raise LabelError(
+                    label,
                     f"{both} are the same label, {found.written(number)}: the body and its regions have labels of "
-                    "their own"
+                    "their own",
                 )
             taken[number] = label
             _check_voxels(found, number, label)
@@ -239,15 +240,17 @@ def whole(values: Any) -> Any:
     """Return labels after checking that they are integers, none of them negative."""
     if values.dtype.kind in "ub" or (values.dtype.kind == "i" and values.min() >= 0):
         return values
-    if values.dtype.kind == "i":
+    if values.dtype.kind == "f" and np.isnan(values).any():  # of what is outside of the field of view
+        values = np.where(np.isnan(values), 0, values)
+    if values.dtype.kind == "i" or (values.dtype.kind == "f" and (values.min() < 0 or np.isinf(values).any())):
         raise SurfaceError(
-            f"contains values from {values.min()} to {values.max()}: it is an image, such as a CT; export its "
+            f"contains values from {values.min():g} to {values.max():g}: it is an image, such as a CT; export its "
             "segmentation as a label map"
         )
     if values.dtype.kind != "f":
         raise SurfaceError("contains colours, not labels: export the segmentation as a label map")
     if not (values == np.floor(values)).all():
-        low, high = np.nanmin(values), np.nanmax(values)
+        low, high = values.min(), values.max()
         raise SurfaceError(
             f"contains values between {low:g} and {high:g} that are not integers: it is an image, or a probability; "
             "export the segmentation as a label map"

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pipeline.arrays import FloatArray
 from pipeline.class_maps import CLASS_MAPS
 from pipeline.shapes.files.dicom_labels import read_dicom, series_files
 from pipeline.shapes.files.label_map import LARGEST_IMAGE, UNITS, LabelMap, check_shape, of_label, unit_of, whole
@@ -19,6 +21,8 @@ __all__ = ["ENDINGS", "LARGEST_IMAGE", "LabelMap", "files_of", "is_image", "of_l
 _NIFTI, _NRRD, _DICOM = (".nii", ".nii.gz"), (".nrrd", ".nhdr"), (".dcm",)
 ENDINGS = (*_NIFTI, *_NRRD, *_DICOM)
 _SINGULAR = 1e-9
+# Positions of corners that are the same, in units of a voxel.
+_SAME_PLACE = 0.1
 
 
 def is_image(path: Path) -> bool:
@@ -58,7 +62,7 @@ def read_labels(path: Path, unit: float | None, names: str = "") -> LabelMap:
         raise SurfaceError(
             f"cannot be read as {kind} ({text}): it is truncated or of another kind; export it again"
         ) from error
-    if abs(np.linalg.det(found.affine[:, :3] / found.spacing.max())) < _SINGULAR or not np.isfinite(found.affine).all():
+    if not _has_volume(found.affine):
         raise SurfaceError("its header gives voxels without volume: export it again with spacing and directions")
     return replace(found, names=read_names(names)) if names else found
 
@@ -77,11 +81,44 @@ def _nifti(path: Path, unit: float | None) -> LabelMap:
     check_shape(image.shape, image.header.get_data_dtype().itemsize)
     named = image.header.get_xyzt_units()[0]
     size = unit_of(named if named in UNITS else None, unit)
-    notices = []
-    if not int(image.header["sform_code"]) and not int(image.header["qform_code"]):
-        notices.append(
-            "its header does not give a position: the frame is that of its voxels, with their centre as origin"
-        )
-    affine = np.asarray(image.affine, dtype=np.float64)[:3] * size
+    position, notices = _position(image)
+    affine = position[:3] * size
     names = names_of_extensions(extension.get_content() for extension in image.header.extensions)
-    return LabelMap(whole(np.asanyarray(image.dataobj).reshape(image.shape[:3])), affine, tuple(notices), names)
+    return LabelMap(whole(np.asanyarray(image.dataobj).reshape(image.shape[:3])), affine, notices, names)
+
+
+def _position(image: Any) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the affine (4, 4) from voxels to positions, in the header's unit, and notices.
+
+    The sform comes before the qform, unless its voxels have no volume.
+    """
+    affine: FloatArray = np.asarray(image.affine, dtype=np.float64)
+    if not hasattr(image, "get_qform"):  # of a format with one affine
+        return affine, ()
+    forms = [image.get_sform(coded=True), image.get_qform(coded=True)]
+    if not any(code for _, code in forms):
+        return affine, (
+            "its header does not give a position: the frame is that of its voxels, with their centre as origin",
+        )
+    (sform, is_sform), (qform, is_qform) = forms
+    if not (is_sform and is_qform):
+        return affine, ()
+    if not _has_volume(sform):
+        return np.asarray(qform, dtype=np.float64), ("its sform gives voxels without volume: its qform is used",)
+    corners = np.array(list(product(*((0, size - 1) for size in image.shape[:3]))), dtype=np.float64)
+    apart = np.linalg.norm(corners @ (sform - qform)[:3, :3].T + (sform - qform)[:3, 3], axis=1).max()
+    voxel = np.linalg.norm(sform[:3, :3], axis=0).min()
+    if not apart > _SAME_PLACE * voxel:
+        return affine, ()
+    unit = image.header.get_xyzt_units()[0]
+    return affine, (
+        f"its sform and its qform differ by up to {apart:.3g} {unit if unit in UNITS else 'units'}: its sform is used",
+    )
+
+
+def _has_volume(affine: FloatArray) -> bool:
+    """Return whether an affine gives voxels of a volume."""
+    sides = np.linalg.norm(affine[:3, :3], axis=0)
+    if not np.isfinite(affine).all() or sides.max() == 0:
+        return False
+    return bool(abs(np.linalg.det(affine[:3, :3] / sides.max())) > _SINGULAR)

@@ -1,5 +1,6 @@
 """Reader of surface files: a closed surface in metres, or an error that names the defect."""
 
+import re
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -14,6 +15,8 @@ from pipeline.shapes.files.whole import made_whole
 from pipeline.shapes.triangles import SurfaceError
 
 _PARSERS: dict[str, Callable[[bytes], Raw]] = {".stl": stl.parse, ".ply": ply.parse, ".obj": obj.parse}
+# The frame of a patient in a header or a comment, and the first bytes in which it is looked for.
+_SPACE, _HEAD, _HEADER_OF_STL = re.compile(rb"SPACE\s*=\s*(LPS|RAS)\b", re.IGNORECASE), 20_000, 80
 # Size of 2,000,000 facets in an STL file as text.
 LARGEST_FILE = 600_000_000  # bytes
 
@@ -64,12 +67,40 @@ def _load(
     except OSError as error:
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
     ending = path.suffix.lower()
-    given = f"{ending} {unit!r} {repair} {smooth!r}"
+    given = f"{ending} {unit!r} {repair} {smooth!r}" + (" from LPS" if _space(data, ending) == "LPS" else "")
     whole = kept_whole(data, given, lambda: Loaded(*made_whole(_parsed(data, ending), unit, repair, smooth)))
     return Loaded(shifted(whole.triangles, offset), whole.notices) if offset else whole
 
 
+def space_of(path: Path) -> str:
+    """Return the frame of a patient that the header of a surface file names, "LPS" or "RAS"; "" if it names none."""
+    with path.open("rb") as file:
+        return _space(file.read(_HEAD), path.suffix.lower())
+
+
+def _space(data: bytes, ending: str) -> str:
+    """Return the frame that 3D Slicer, among others, writes into the header or into comments: SPACE=LPS."""
+    head = data[:_HEAD]
+    if ending == ".stl":
+        head = head.partition(b"\n")[0] if head.lstrip()[:5].lower() == b"solid" else head[:_HEADER_OF_STL]
+    elif ending == ".ply":
+        head = head.partition(b"end_header")[0]
+    else:
+        head = b"\n".join(line for line in head.splitlines() if line.lstrip().startswith(b"#"))
+    found = _SPACE.search(head)
+    return found[1].decode().upper() if found else ""
+
+
 def _parsed(data: bytes, ending: str) -> Raw:
+    """Parse the content by the file's ending, and return it in the frame of images, x to the right, y to the front."""
+    raw = _by_ending(data, ending)
+    if _space(data, ending) != "LPS":
+        return raw
+    told = "its header says SPACE=LPS: x and y are negated, into the frame of images (RAS: right, front, head)"
+    return Raw(raw.points * (-1.0, -1.0, 1.0), raw.facets, (*raw.notices, told))
+
+
+def _by_ending(data: bytes, ending: str) -> Raw:
     """Parse the content by the file's ending; if that fails, report the format that it looks like."""
     try:
         return _PARSERS[ending](data)

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.files.loaded import Loaded
-from pipeline.shapes.files.read import read_surface
+from pipeline.shapes.files.read import read_surface, space_of
 from tests.shapes.files.solids import Surface, ball, obj, ply, stl, stl_text
 
 BALL = ball()
@@ -172,3 +172,26 @@ def test_a_ring_is_one_piece_of_tissue(tmp_path: Path):
     facets = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     loaded = _load(tmp_path, "ring.stl", stl((points.reshape(-1, 3), facets)))
     assert loaded.triangles.volume == pytest.approx(2 * np.pi**2 * 30 * 64e-9, rel=0.03)
+
+
+@pytest.mark.parametrize("space", ["LPS", "RAS", ""])
+@pytest.mark.parametrize("name", ["a.stl", "text.stl", "a.ply", "a.obj"])
+def test_a_surface_in_lps_is_converted_to_the_frame_of_images(name: str, space: str, tmp_path: Path):
+    """3D Slicer writes the frame into the header of an STL file, and into comments of others."""
+    shift = np.array([40.0, 20.0, 10.0])
+    moved = BALL[0] + shift, BALL[1]
+    note = f"3D Slicer output. SPACE={space}".encode() if space else b"ball"
+    data = {
+        "a.stl": lambda: note.ljust(80, b"\0") + stl(moved)[80:],
+        "text.stl": lambda: b"solid " + note + b"\n" + stl_text(moved).partition(b"\n")[2],
+        "a.ply": lambda: ply(moved).replace(b"\nelement", b"\ncomment " + note + b"\nelement", 1),
+        "a.obj": lambda: b"# " + note + b"\n" + obj(moved),
+    }[name]()
+    (tmp_path / name).write_bytes(data)
+    found = read_surface(tmp_path / name, 1e-3)
+    middle = np.mean(found.triangles.bounds, axis=0)
+    expected = np.mean([BALL[0].min(axis=0), BALL[0].max(axis=0)], axis=0) + shift
+    np.testing.assert_allclose(middle, 1e-3 * expected * ((-1, -1, 1) if space == "LPS" else 1), atol=1e-6)
+    assert found.triangles.volume == pytest.approx(VOLUME, rel=1e-5)
+    assert any("SPACE=LPS" in notice for notice in found.notices) == (space == "LPS")
+    assert space_of(tmp_path / name) == space

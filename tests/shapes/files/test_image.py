@@ -220,3 +220,31 @@ def test_several_labels_are_one_body_and_no_label_is_meant_twice(tmp_path: Path)
             read_image(path, label, names=str(names), inner=((region, None),))
     with pytest.raises(SurfaceError, match="no voxel has label 5; labels are 2"):
         read_image(path, (2, 5), names=str(names))
+
+
+def test_a_sform_without_volume_gives_way_to_the_qform_and_two_that_differ_are_told(scan: Path, tmp_path: Path):
+    image: Any = nibabel.load(scan)
+    image.set_qform(image.affine, 1)
+    image.set_sform(np.diag([0, 0, 0, 1.0]), 1)
+    nibabel.save(image, tmp_path / "zero.nii")
+    zero, right = read_image(tmp_path / "zero.nii", 2), read_image(scan, 2)
+    np.testing.assert_allclose(zero.triangles.points, right.triangles.points, atol=1e-9)
+    assert any("its qform is used" in notice for notice in zero.notices)
+    image.set_sform(_affine(2.0, (-36, -70, 8)), 1)
+    nibabel.save(image, tmp_path / "two.nii")
+    two = read_image(tmp_path / "two.nii", 2)
+    np.testing.assert_allclose(two.triangles.points, right.triangles.points + np.array([4e-3, 0, 3e-3]), atol=1e-9)
+    assert any("its sform and its qform differ by up to 5 mm: its sform is used" in notice for notice in two.notices)
+    assert not any("qform" in notice for notice in right.notices)
+
+
+def test_background_that_is_not_a_number_is_background(scan: Path, tmp_path: Path):
+    affine = _affine(2.0)
+    values = _ellipsoid(affine, (51, 51, 51)).astype(np.float32)
+    values[values == 0] = np.nan
+    found = read_image(_nifti(tmp_path / "nan.nii", values, affine), 2)
+    np.testing.assert_array_equal(found.triangles.points, read_image(scan, 2).triangles.points)
+    for wrong in (-1.0, np.inf):
+        values[0, 0, 0] = wrong
+        with pytest.raises(SurfaceError, match="contains values from"):
+            read_image(_nifti(tmp_path / f"{wrong}.nii", values, affine), 2)
