@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[1]
 TABLE = ROOT / "docs" / "promises.toml"
 PAGES = ("README.md", "CONTRIBUTING.md", "docs/*.md", "docs/howto/*.md")
 # "each", "any", "no" and "only" are left out: most of their sentences describe a rule, few of them guarantee one.
-WORDS = ("always", "never", "every", "everywhere", "all", "whole", "at most", "within")
+WORDS = ("always", "never", "every", "everywhere", "all", "whole", "at most", "within", "nothing")
 # Answers other than tests, for what promises nothing. "measured by" names the file that prints or makes its figures.
 REASONS = ("definition", "heading", "instruction", "advice", "scope", "literature", "measured once", "measured by ")
 UNANSWERED = "?"
@@ -33,9 +33,9 @@ _PROMISE = re.compile(rf"\b({'|'.join(WORDS)})\b", re.IGNORECASE)
 # Of a sentence; initials of names have a point, too.
 _END = re.compile(r"(?<!\b[A-Z]\.)(?<=[.!?])\s+(?=[^a-z0-9.])|(?<=[.!?]\))\s+")
 _HEAD = """\
-# Sentences with "always", "never", "every", "all", "whole", "at most" or "within": the tests that hold each, or why it
-# needs none: "definition", "heading", "instruction", "advice", "scope" (what is not computed), "literature", "measured
-# once", or "measured by" a file. `python docs/promises.py` checks this table, `python docs/promises.py --update` writes
+# Sentences with "always", "never", "every", "all", "whole", "at most", "within" or "nothing": the tests that hold each,
+# or why it needs none: "definition", "heading", "instruction", "advice", "scope" (what is not computed), "literature",
+# "measured once", or "measured by" a file. `python docs/promises.py` checks this table, `python docs/promises.py --update` writes
 # it anew: answer the rows that it marks with "?".
 """
 
