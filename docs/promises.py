@@ -35,8 +35,8 @@ _END = re.compile(r"(?<!\b[A-Z]\.)(?<=[.!?])\s+(?=[^a-z0-9.])|(?<=[.!?]\))\s+")
 _HEAD = """\
 # Sentences with "always", "never", "every", "all", "whole", "at most", "within" or "nothing": the tests that hold each,
 # or why it needs none: "definition", "heading", "instruction", "advice", "scope" (what is not computed), "literature",
-# "measured once", or "measured by" a file. `python docs/promises.py` checks this table, `python docs/promises.py --update` writes
-# it anew: answer the rows that it marks with "?".
+# "measured once", or "measured by" a file. `python docs/promises.py` checks this table, `python docs/promises.py
+# --update` writes it anew: answer the rows that it marks with "?".
 """
 
 
