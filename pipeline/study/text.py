@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from pipeline.shapes.files.foreign import why_no_study
 from pipeline.study.problems import Problem, Problems, StudyError
 
 # A hundred times the longest study with a path of its own points: what is larger is another kind of file.
@@ -18,6 +19,7 @@ _LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+
 # Integers of TOML, and of what is made of them.
 LARGEST = 2**63
 # Control characters and what turns the direction of writing: on a terminal they make a line say something else.
+_NO_STUDY = "is no study: a study file is TOML, and ends in .toml"
 _CONTROLS = ("Cc", "Cs", "Zl", "Zp")
 _TURNS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 
@@ -33,13 +35,22 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
             data = file.read(_MOST_BYTES + 1)
     except (OSError, ValueError) as error:  # a name with a NUL is a ValueError
         raise _refused(str(path), "file", getattr(error, "strerror", None) or str(error)) from None
+    if why := why_no_study(path):
+        raise _refused(str(path), "file", why)
     _check_size(len(data), str(path))
     try:
         text = data.decode("utf-8-sig")  # some editors begin a file with the mark of its encoding
     except UnicodeDecodeError as error:
+        if path.suffix != ".toml":
+            raise _refused(str(path), "file", _NO_STUDY) from None
         raise _refused(str(path), "file", f"is not UTF-8 text: {error}") from None
     text = text.replace("\r\n", "\n").replace("\r", "\n")
-    return text, toml_of(text, str(path))
+    try:
+        return text, toml_of(text, str(path))
+    except StudyError:
+        if path.suffix in (".toml", ""):
+            raise
+        raise _refused(str(path), "file", _NO_STUDY) from None
 
 
 def toml_of(text: str, file: str) -> dict[str, Any]:

@@ -209,3 +209,20 @@ def test_fits_a_phone_and_the_dark(browser, page, width, tmp_path):
     box = browser.ask("document.getElementById('panel').getBoundingClientRect().toJSON()")
     assert box["left"] >= 0 and box["right"] <= width
     assert browser.messages == []
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("scan.mha", "is a MetaImage, which is not read: save it as .nrrd"),
+        ("organ.vtp", "save its surface as .stl or .ply"),
+        ("organ.stl", 'has shape = "surface" and file = "organ.stl"'),
+        ("organ.step", 'has shape = "cad" and file = "organ.step"'),
+        ("curve.lvm", "a study file is TOML, and ends in .toml"),
+    ],
+)
+def test_a_file_of_another_kind_is_told_what_to_do_with_it(tmp_path, name, told):
+    (tmp_path / name).write_bytes(b"solid \xff\xfe\0 = [")
+    done = epsmesh("view", tmp_path / name)
+    assert (done.exit_code, told in done.output) == (2, True), done.output
+    assert "TOML syntax" not in done.output and "UTF-8" not in done.output

@@ -230,7 +230,9 @@ def unit_of(named: str | None, given: float | None) -> float:
         SurfaceError: if there is none, or both differ.
     """
     if named is None and given is None:
-        raise SurfaceError('its header names no unit of length: add one to the study, such as unit = "mm"')
+        raise SurfaceError(
+            'its header names no unit of length: give one, such as unit = "mm" in the study or `--unit mm`'
+        )
     if named is not None and given is not None and not np.isclose(UNITS[named], given):
         raise SurfaceError(f"its header says {named}, and the study another unit: leave out `unit`")
     return UNITS[named] if named is not None else float(given or 0.0)

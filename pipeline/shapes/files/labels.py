@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.class_maps import CLASS_MAPS
 from pipeline.shapes.files.dicom_labels import read_dicom, series_files
+from pipeline.shapes.files.foreign import why_not_read
 from pipeline.shapes.files.label_map import LARGEST_IMAGE, UNITS, LabelMap, check_shape, of_label, unit_of, whole
 from pipeline.shapes.files.label_names import names_of_extensions, read_names
 from pipeline.shapes.files.nrrd_labels import data_file, read_nrrd
@@ -18,7 +19,8 @@ from pipeline.shapes.triangles import SurfaceError
 
 __all__ = ["ENDINGS", "LARGEST_IMAGE", "LabelMap", "files_of", "is_image", "of_label", "read_labels"]
 
-_NIFTI, _NRRD, _DICOM = (".nii", ".nii.gz"), (".nrrd", ".nhdr"), (".dcm",)
+_NIFTI = (".nii", ".nii.gz", ".mgz", ".mgh", ".hdr", ".img")  # and what nibabel reads beside it
+_NRRD, _DICOM = (".nrrd", ".nhdr"), (".dcm",)
 ENDINGS = (*_NIFTI, *_NRRD, *_DICOM)
 _SINGULAR = 1e-9
 # Positions of corners that are the same, in units of a voxel.
@@ -36,10 +38,17 @@ def files_of(path: Path, names: str = "") -> tuple[Path, ...]:
     Raises:
         SurfaceError: if it is a folder that is not of a DICOM series.
     """
-    data = data_file(path) if path.name.lower().endswith(_NRRD) else None
+    data = data_file(path) if path.name.lower().endswith(_NRRD) else _other_half(path)
     own = series_files(path) if path.is_dir() else (path,)
     others = [] if not names or names in CLASS_MAPS else [Path(names)]
     return (*own, *([] if data is None else [data]), *others)
+
+
+def _other_half(path: Path) -> Path | None:
+    """Return the data of a header .hdr, or the header of data .img; None of any other file."""
+    other = {".hdr": ".img", ".img": ".hdr"}.get(path.suffix)
+    found = path.with_suffix(other) if other else path
+    return found if other and found.exists() else None
 
 
 def read_labels(path: Path, unit: float | None, names: str = "") -> LabelMap:
@@ -51,7 +60,8 @@ def read_labels(path: Path, unit: float | None, names: str = "") -> LabelMap:
         SurfaceError: if it is no label map, or does not give the size of its voxels.
     """
     if not is_image(path):
-        raise SurfaceError(f"its name ends in `{path.suffix}`; allowed label maps are {', '.join(ENDINGS)}")
+        why = why_not_read(path) or f"its name ends in `{path.suffix}`"
+        raise SurfaceError(f"{why}; allowed label maps are {', '.join(ENDINGS)}")
     kind, read = _reader(path)
     try:
         found = read(path, unit)
@@ -79,11 +89,18 @@ def _nifti(path: Path, unit: float | None) -> LabelMap:
 
     image: Any = nibabel.load(path)
     check_shape(image.shape, image.header.get_data_dtype().itemsize)
-    named = image.header.get_xyzt_units()[0]
+    if isinstance(image, nibabel.AnalyzeImage) and not isinstance(image, nibabel.Nifti1Pair):
+        raise SurfaceError(
+            "its header is that of Analyze 7.5, which does not say which side is left: save it as .nii.gz, and check "
+            "the side"
+        )
+    is_mgh = isinstance(image, nibabel.MGHImage)  # of FreeSurfer: in mm, with one affine
+    named = "mm" if is_mgh else image.header.get_xyzt_units()[0]
     size = unit_of(named if named in UNITS else None, unit)
     position, notices = _position(image)
     affine = position[:3] * size
-    names = names_of_extensions(extension.get_content() for extension in image.header.extensions)
+    extensions = getattr(image.header, "extensions", ())
+    names = names_of_extensions(extension.get_content() for extension in extensions)
     return LabelMap(whole(np.asanyarray(image.dataobj).reshape(image.shape[:3])), affine, notices, names)
 
 
@@ -93,7 +110,7 @@ def _position(image: Any) -> tuple[FloatArray, tuple[str, ...]]:
     The sform comes before the qform, unless its voxels have no volume.
     """
     affine: FloatArray = np.asarray(image.affine, dtype=np.float64)
-    if not hasattr(image, "get_qform"):  # of a format with one affine
+    if not hasattr(image, "get_qform"):  # of FreeSurfer
         return affine, ()
     forms = [image.get_sform(coded=True), image.get_qform(coded=True)]
     if not any(code for _, code in forms):

@@ -8,6 +8,7 @@ from stat import S_ISREG
 
 from pipeline.shapes.files import obj, ply, stl
 from pipeline.shapes.files.checked import kept_whole
+from pipeline.shapes.files.foreign import why_not_read
 from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.files.raw import Raw
 from pipeline.shapes.files.shifted import shifted
@@ -55,7 +56,8 @@ def _load(
     path: Path, _changed: int, size: int, unit: float, repair: bool, smooth: float | None, offset: float
 ) -> Loaded:
     if path.suffix.lower() not in _PARSERS:
-        raise SurfaceError(f"its name ends in `{path.suffix}`; allowed are {', '.join(_PARSERS)}")
+        why = why_not_read(path) or f"its name ends in `{path.suffix}`"
+        raise SurfaceError(f"{why}; allowed are {', '.join(_PARSERS)}")
     if size == 0:
         raise SurfaceError("is empty: copy or export it again")
     if size > LARGEST_FILE:

@@ -161,7 +161,7 @@ def corpus() -> list[Broken]:
         Broken("really-ply.stl", ply(good), ("content is that of `.ply`", "rename")),
         Broken("really-stl.obj", whole, ("content is that of `.stl`", "rename")),
         Broken("really-stl.ply", text, ("content is that of `.stl`", "rename")),
-        Broken("organ.vtk", b"# vtk DataFile", ("`.vtk`", ".stl, .ply, .obj")),
+        Broken("organ.vtk", b"# vtk DataFile", ("is a file of VTK, which is not read", ".stl, .ply, .obj")),
         Broken(
             "cloud.ply", _changed(ply(good, "ascii"), b"element face", b"element edge"), ("no surface", "vertex, edge")
         ),

@@ -248,3 +248,18 @@ def test_background_that_is_not_a_number_is_background(scan: Path, tmp_path: Pat
         values[0, 0, 0] = wrong
         with pytest.raises(SurfaceError, match="contains values from"):
             read_image(_nifti(tmp_path / f"{wrong}.nii", values, affine), 2)
+
+
+def test_other_formats_of_nibabel_are_at_the_same_place_and_analyze_is_refused(scan: Path, tmp_path: Path):
+    image: Any = nibabel.load(scan)
+    values, affine = np.asarray(image.dataobj), image.affine
+    pair = nibabel.Nifti1Pair(values, affine)
+    pair.header.set_xyzt_units("mm")
+    nibabel.save(nibabel.MGHImage(values, affine), tmp_path / "scan.mgz")
+    nibabel.save(pair, tmp_path / "pair.img")
+    nibabel.save(nibabel.AnalyzeImage(values, np.diag([-2.0, 2, 2, 1])), tmp_path / "old.img")
+    expected = read_image(scan, 2).triangles.points
+    for name in ("scan.mgz", "pair.img", "pair.hdr"):
+        np.testing.assert_allclose(read_image(tmp_path / name, 2).triangles.points, expected, atol=1e-9)
+    with pytest.raises(SurfaceError, match=r"Analyze 7.5.* which side is left: save it as \.nii\.gz"):
+        read_image(tmp_path / "old.hdr", 2)
