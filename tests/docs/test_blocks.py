@@ -109,7 +109,7 @@ def test_pieces_of_studies_are_valid(block, begun):
     One with body, tissue, tool and mesh is a study by itself.
     """
     pieces = tomllib.loads(block.text)
-    is_study = _PARTS <= pieces.keys() and "shape" in pieces["probe"]
+    is_study = pieces.keys() >= _PARTS and "shape" in pieces["probe"]
     study = {} if is_study else tomllib.loads(begun)
     for name, piece in pieces.items():
         whole = not isinstance(piece, dict) or "shape" in piece
