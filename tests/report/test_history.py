@@ -72,6 +72,13 @@ def test_several_speeds_and_relaxations_cost_one_solve():
     assert len(make_plan(study(probe=[base | table for table in tables])).solves) == 1
 
 
+def test_all_numbers_of_a_history_but_a_table_are_swept():
+    sine = {"amplitude": ["0.01 mm", "0.02 mm"], "frequency": ["1 Hz", "2 Hz", "3 Hz"], "periods": [2, 3]}
+    history = {"ramp": ["1 s", "2 s"], "hold": ["1 s", "2 s", "3 s"], "steps": [5, 10], "sine": sine}
+    swept = study(material=RELAXING, probe={"history": history}).shape
+    assert swept == (2, 3, 2, 2, 3, 2)
+
+
 def test_a_table_may_pull():
     table = [["0 s", "0 mm"], ["1 s", "0.2 mm"], ["2 s", "-0.1 mm"]]
     data = dataset(material=RELAXING, probe={"depth": None, "history": {"table": table}})
