@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
 _HOWTO = "docs/howto/identify.md"
 _OF_CURVES = "docs/howto/curves.md"
-# Files of curves, which are described; studies are read.
-_CURVES = (".csv", ".tsv", ".txt", ".tab", ".dat", ".asc")
+# Endings of files that are no curves: studies by name or path, and datasets.
+_NO_CURVES = ("", ".toml", ".nc")
 
 
 def identify(
@@ -56,7 +56,7 @@ def identify(
     over the ranges of the unknowns are cases in the store, computed once. An interrupted run goes on where it was. Of
     many files, those that are no curve have the status "failed", and the exit status is 1; ranks of mpirun share them.
 
-    Of a curve without a study (CSV, TXT), it prints what is in the file, and a [[measurement]] to paste into a study.
+    Of a curve without a study (CSV, TXT, LVM), it prints what is in the file, and a [[measurement]] to paste into one.
 
     With --design it reads no curves. It ranks further tests, such as a second radius, from the study's declared values.
 
@@ -66,7 +66,7 @@ def identify(
 
     Example: epsmesh identify studies/curves/ball.csv
     """
-    if curves := [file for file in files if file.suffix.lower() in _CURVES]:
+    if curves := [file for file in files if _is_curve(file)]:
         _describe(curves, [file for file in files if file not in curves])
         return
     studies = read_all(files, have_cases=False)
@@ -95,6 +95,11 @@ def identify(
     if is_json_wanted() and is_first_rank():
         print_json({"status": ended, "studies": found})
     raise typer.Exit(ended)
+
+
+def _is_curve(file: Path) -> bool:
+    """Tell the file of a curve, which is described, from a study."""
+    return file.suffix.lower() not in _NO_CURVES and (file.is_file() or file.suffix.lower() in (".csv", ".txt"))
 
 
 def _describe(curves: list[Path], others: list[Path]) -> None:

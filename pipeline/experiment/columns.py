@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.experiment.header import factor_of, header_of, is_unit_of, without_mark
+from pipeline.experiment.header import MASSES, factor_of, header_of, is_unit_of, without_mark
 from pipeline.experiment.reading import UNITS, ExperimentError, Reading
 from pipeline.experiment.table import Table
 from pipeline.experiment.words import is_called
@@ -75,7 +75,7 @@ def recorded(table: Table, reading: Reading) -> Recorded:
     elif (time := _time(table, set(chosen.values()), reading, told)) is not None:
         chosen["time"] = time
     _check_distinct(table, chosen)
-    values = {kind: _in_si(table, number, kind, reading) for kind, number in chosen.items()}
+    values = {kind: _in_si(table, number, kind, reading, told) for kind, number in chosen.items()}
     names = {kind: table.headers[number].text or f"{number + 1}" for kind, number in chosen.items()}
     way = values["piezo" if has_spring else "depth"]
     force = values["deflection"] * (reading.spring or 1.0) if has_spring else values["force"]
@@ -101,6 +101,11 @@ def _listed(table: Table) -> str:
     return ", ".join(f"`{_title(table, number)}`" for number in range(len(table.headers)))
 
 
+def _unused(table: Table) -> str:
+    """Return why the headers of a file are not used; "" if they are."""
+    return f"; {table.unused}" if table.unused else ""
+
+
 def _named(table: Table, kind: str, reading: Reading) -> int:
     """Return the number of the column that the study names, by header or number."""
     wanted = reading.columns[kind]
@@ -115,7 +120,9 @@ def _named(table: Table, kind: str, reading: Reading) -> int:
         own = _plain(header_of(wanted).name)
         found = [number for number, header in enumerate(table.headers) if header.name and _plain(header.name) == own]
     if not found:
-        raise ExperimentError(table.file, f'has no column "{wanted}" for {kind}: it has {_listed(table)}')
+        raise ExperimentError(
+            table.file, f'has no column "{wanted}" for {kind}: it has {_listed(table)}{_unused(table)}'
+        )
     if len(found) > 1 and not _are_equal(table, found):
         numbers = ", ".join(str(number + 1) for number in found)
         raise ExperimentError(table.file, f'has several columns "{wanted}": give {kind} by number, one of {numbers}')
@@ -147,6 +154,7 @@ def _found(table: Table, kind: str, reading: Reading, told: list[str]) -> int:
     without = [n for n, unit in enumerate(units) if not unit and _has_values(table, n)]
     if kind == "depth":
         of_kind = [n for n in of_kind if not is_called(table.headers[n].name, "deflection")]
+    of_kind = [n for n in of_kind if units[n] not in MASSES or is_called(table.headers[n].name, kind)]
     called = [n for n in (*of_kind, *without) if is_called(table.headers[n].name, kind)]
     candidates = called or of_kind
     if len(candidates) > 1 and _are_equal(table, candidates, but_for_a_constant=kind == "force"):
@@ -160,7 +168,7 @@ def _found(table: Table, kind: str, reading: Reading, told: list[str]) -> int:
     raise ExperimentError(
         table.file,
         f"{kind} {why} among {_listed(table)}: name it by header or number in columns of {_SECTION}, and its unit in "
-        f"units if the header has none{_if_bent(table)}{_why_not(table, kind, units)}",
+        f"units if the header has none{_if_bent(table)}{_why_not(table, kind, units)}{_unused(table)}",
     )
 
 
@@ -213,7 +221,7 @@ def _unit(table: Table, number: int, reading: Reading, kind: str) -> str:
     return header or in_name or reading.units.get(kind, "")
 
 
-def _in_si(table: Table, number: int, kind: str, reading: Reading) -> FloatArray:
+def _in_si(table: Table, number: int, kind: str, reading: Reading, told: list[str]) -> FloatArray:
     """Return a column in SI units."""
     title, si = _title(table, number), UNITS[kind]
     if number in table.strange:
@@ -242,6 +250,8 @@ def _in_si(table: Table, number: int, kind: str, reading: Reading) -> FloatArray
     named = header_of(wanted).unit if isinstance(wanted, str) else ""
     if named and is_unit_of(named, si) and not np.isclose(factor_of(named, si), factor, rtol=1e-9):
         raise ExperimentError(table.file, f'has the unit {unit}, but columns.{kind} is "{wanted}"', column=title)
+    if unit in MASSES:
+        told.append(f"{kind} is the weight of a mass: 1 {unit} is {factor:.6g} N")
     return table.values[:, number] * factor
 
 

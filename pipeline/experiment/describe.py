@@ -13,7 +13,7 @@ from pipeline.experiment.segments import cycles_of
 from pipeline.experiment.signs import signed, signs_of
 from pipeline.experiment.table import Table, table_of
 from pipeline.experiment.text import read_lines
-from pipeline.experiment.words import is_called
+from pipeline.experiment.words import is_called, is_other
 
 _SEPARATORS = {" ": "spaces", "\t": "tabs", ",": "commas", ";": "semicolons", "|": "bars"}
 # Units that people read, from the largest on: the first of which there is one at least.
@@ -107,21 +107,37 @@ def _to_choose(table: Table, name: str) -> list[str]:
     """Return the table of a study in which columns are to be chosen: the likely ones are written."""
     if spring := _of_spring(table):
         return [*_heading(name), f"columns = {{{', '.join(spring)}}} # check"]
-    columns, units = [], []
+    chosen: dict[str, int] = {}
     for kind in ("depth", "force", "time"):
-        likely = [n for n, header in enumerate(table.headers) if is_called(header.name, kind)]
-        number = likely[0] if likely else ("time", "depth", "force").index(kind)
-        if number >= len(table.headers) or (kind == "time" and not likely):
-            continue
-        columns.append(f"{kind} = {_of_column(table, number)}")
-        if not table.headers[number].unit:
-            units.append(f'{kind} = "{ {"m": "mm", "N": "N", "s": "s"}[UNITS[kind]] }"')
+        if (number := _likely(table, kind, set(chosen.values()))) is not None:
+            chosen[kind] = number
+    columns = [f"{kind} = {_of_column(table, number)}" for kind, number in chosen.items()]
+    lacking = [f"{kind} = …" for kind in ("depth", "force") if kind not in chosen]
+    units = [
+        f'{kind} = "{ {"m": "mm", "N": "N", "s": "s"}[UNITS[kind]] }"'
+        for kind, number in chosen.items()
+        if not table.headers[number].unit
+    ]
+    hint = f"; no column has the name and unit of {' and '.join(one.split()[0] for one in lacking)}" if lacking else ""
     return [
         *_heading(name),
-        f"columns = {{{', '.join(columns)}}} # check: header or number of each column",
+        *([f"columns = {{{', '.join(columns)}}} # check: header or number of each column{hint}"] if columns else []),
+        *([f"# columns = {{{', '.join(lacking)}}}{hint}"] if not columns else []),
         *([f"units = {{{', '.join(units)}}} # check"] if units else []),
         *_to_add(table),
     ]
+
+
+def _likely(table: Table, kind: str, taken: set[int]) -> int | None:
+    """Return the column that is likely a depth, force or time: by name, unit or place; None if none can be."""
+    free = [n for n in range(len(table.headers)) if n not in taken and not np.isnan(table.values[:, n]).all()]
+    free = [n for n in free if n not in table.strange]
+    of_kind = [n for n in free if is_unit_of(table.headers[n].unit, UNITS[kind])]
+    without = [n for n in free if not table.headers[n].unit and not is_other(table.headers[n].name)]
+    called = [n for n in (*of_kind, *without) if is_called(table.headers[n].name, kind)]
+    place = ("time", "depth", "force").index(kind)
+    unnamed = [n for n in without if n == place and not table.headers[n].text and kind != "time"]
+    return next(iter((*called, *of_kind, *unnamed)), None)
 
 
 def _of_spring(table: Table) -> list[str]:

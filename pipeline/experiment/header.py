@@ -16,12 +16,33 @@ _SPELLINGS = {
     **dict.fromkeys(("micron", "microns", "micrometer", "micrometers"), "µm"),
     **dict.fromkeys(("millimeter", "millimeters", "millimetres"), "mm"),
     **dict.fromkeys(("newton", "newtons"), "N"),
+    **dict.fromkeys(("in.", "inch", "inches", "zoll"), "in"),
+    **dict.fromkeys(("lb", "lbs", "pound", "pounds"), "lbf"),
+    **dict.fromkeys(("gram", "grams", "gramm", "gr", "g"), "gf"),
+    **dict.fromkeys(("kg", "kp"), "kgf"),
+    **dict.fromkeys(("ounce", "ounces", "oz"), "ozf"),
+    **dict.fromkeys(("dyne", "dynes"), "dyn"),
+    **dict.fromkeys(("foot", "feet"), "ft"),
+    **dict.fromkeys(("angstrom", "angstroms", "å"), "Å"),
 }
+# Units of curves alone, with their SI unit and what they are worth in it; scales show forces as masses.
+_WORTH = {
+    "gf": ("N", 9.80665e-3), "kgf": ("N", 9.80665), "lbf": ("N", 4.4482216152605), "ozf": ("N", 0.27801385095378),
+    "dyn": ("N", 1e-5), "mgf": ("N", 9.80665e-6), "mg": ("N", 9.80665e-6), "in": ("m", 0.0254), "ft": ("m", 0.3048),
+    "mil": ("m", 2.54e-5), "thou": ("m", 2.54e-5), "Å": ("m", 1e-10),
+}  # fmt: skip
+# Prefixes in full: "microN", "millinewtons", "micro-meter". All in capitals, MICRON is a length.
+_LONG = re.compile(
+    r"(?P<prefix>[Nn]ano|[Mm]icro|[Mm]illi|[Cc]enti|[Kk]ilo)[ -]?(?P<unit>N|m|s|(?i:newtons?|met(?:er|re)s?|seconds?))"
+)
+_PREFIXES = {"nano": "n", "micro": "µ", "milli": "m", "centi": "c", "kilo": "k"}
+# Units of masses: they are forces in columns that are called so.
+MASSES = frozenset({"g", "kg", "mg", "lb", "lbs", "oz"})
 _MARK = re.compile(r"\s*(#|%|//|!)+\s*")
 # Units of other quantities: a column that has one is neither depth, force nor time.
 _OTHERS = frozenset({
     "-", "%", "1", "V", "mV", "µV", "A", "mA", "Pa", "kPa", "MPa", "GPa", "psi", "°C", "K", "Hz", "deg", "rad",
-    "g", "kg", "gf", "kgf", "lbf", "lb", "in", "inch", "ft", "counts", "a.u.", "mm/s", "mm/min", "N/mm",
+    "counts", "a.u.", "mm/s", "mm/min", "N/mm",
     "mm/mm", "J",
 })  # fmt: skip
 
@@ -54,7 +75,12 @@ def factor_of(text: str, kind: str) -> float:
     Raises:
         ValueError: if ``text`` is no unit of that kind, with those that are.
     """
-    return unit_factor(_SPELLINGS.get(text.casefold(), text), kind)
+    plain = text.strip()
+    if long := _LONG.fullmatch(plain):
+        plain = _PREFIXES[long["prefix"].lower()] + {"n": "N"}.get(long["unit"][0].lower(), long["unit"][0].lower())
+    plain = _SPELLINGS.get(plain.casefold(), plain)
+    own, factor = _WORTH.get(plain, ("", 0.0))
+    return factor if own == kind else unit_factor(plain, kind)
 
 
 def is_comment(line: str) -> bool:

@@ -13,7 +13,7 @@ from pandas.api.types import is_bool_dtype, is_numeric_dtype
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.experiment.clock import is_clock, seconds
 from pipeline.experiment.header import Header, is_comment
-from pipeline.experiment.headings import headers_of
+from pipeline.experiment.headings import has_headers, headers_of
 from pipeline.experiment.layout import MISSING, Layout, find_layout
 from pipeline.experiment.reading import ExperimentError
 from pipeline.units import unit_factor
@@ -39,7 +39,7 @@ class Table:
     """Values (rows × columns; NaN where missing) and the numbers of their lines, from 1.
 
     ``strange`` has, by column, the first line and text of a value that is no number. ``told`` says what was found.
-    ``spring`` is the spring constant in the lines above.
+    ``spring`` is the spring constant in the lines above. ``unused`` says why headers there are those of no columns.
     """
 
     file: str
@@ -50,6 +50,7 @@ class Table:
     told: tuple[str, ...] = ()
     layout: Layout = field(default_factory=lambda: Layout(",", ".", 0))
     spring: str = ""
+    unused: str = ""
 
 
 def table_of(lines: Sequence[str], file: str) -> Table:
@@ -65,8 +66,7 @@ def table_of(lines: Sequence[str], file: str) -> Table:
     if begin is None:
         raise ExperimentError(file, "has no row of numbers")
     kept, odd = _rows(lines, begin, layout)
-    headers = headers_of(lines[:begin], layout)
-    _check_decimals(headers, lines[:begin], layout, file, begin)
+    _check_decimals(lines[:begin], layout, file, begin)
     wrong = [number for number in odd if not is_comment(lines[number])]
     if len(wrong) > max(1, _MOST_ODD * len(kept)):
         width = len(layout.fields(lines[wrong[0]]))
@@ -76,8 +76,11 @@ def table_of(lines: Sequence[str], file: str) -> Table:
         told.append(f"the header has a spring constant of {spring}: {_OF_SPRING}")
     numbers = np.array(kept) + 1
     values, strange, clocks = _values([lines[n] for n in kept], layout, numbers)
+    headers, of_headers = headers_of(lines[:begin], layout, values)
+    told += [of_headers] if of_headers else []
     headers = tuple(replace(one, unit="s") if n in clocks else one for n, one in enumerate(headers))
-    return Table(file, headers, values, numbers, strange, tuple(told), layout, spring)
+    unused = "" if any(header.text for header in headers) else of_headers
+    return Table(file, headers, values, numbers, strange, tuple(told), layout, spring, unused)
 
 
 def spring_of(before: Sequence[str]) -> str:
@@ -179,9 +182,9 @@ def _values(
     return found, strange, clocks
 
 
-def _check_decimals(headers: tuple[Header, ...], before: Sequence[str], layout: Layout, file: str, begin: int) -> None:
+def _check_decimals(before: Sequence[str], layout: Layout, file: str, begin: int) -> None:
     """Report numbers with decimal commas between which there are commas, too."""
-    if layout.separator != "," or any(header.text for header in headers):
+    if layout.separator != "," or has_headers(before, layout):
         return
     for line in before:
         fields = layout.fields(line)

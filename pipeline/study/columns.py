@@ -6,8 +6,9 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
+from pipeline.experiment.header import factor_of
 from pipeline.shapes.section import Section, Words
-from pipeline.units import parse_quantity, unit_factor
+from pipeline.units import parse_quantity
 
 
 def refused(allowed: str) -> PydanticCustomError:
@@ -35,7 +36,7 @@ def _unit(kind: str) -> Callable[[str], str]:
     """Return the check of a unit of the same kind as the SI unit ``kind``."""
 
     def check(text: str) -> str:
-        unit_factor(text, kind)
+        factor_of(text, kind)
         return text
 
     return check

@@ -278,6 +278,10 @@ def test_a_curve_without_a_study_is_described(folder, epsmesh):
     (folder / "letter.txt").write_text("Dear all,\n")
     result = epsmesh("identify", folder / "letter.txt")
     assert (result.exit_code, "no table of numbers" in result.stderr) == (2, True)
+    for name, why in (("a.xlsx", "spreadsheet"), ("a.ibw", "Igor"), ("a.jpk-force", "JPK"), ("a.other", "is binary")):
+        (folder / name).write_bytes(b"\x01\x00\x02\xff" * 9)
+        result = epsmesh("identify", folder / name)
+        assert (result.exit_code, why in result.stderr) == (2, True), result.stderr
 
 
 def test_a_wrong_unit_is_told_by_depth_and_modulus(folder, epsmesh, found):

@@ -54,6 +54,21 @@ def test_a_choice_is_left_to_the_user(tmp_path):
     assert block(said)["measurement"][0]["columns"] == {"depth": 2, "force": 3}
 
 
+@pytest.mark.parametrize(
+    ("columns", "chosen", "lacking"),
+    [
+        ({"Time[ms]": TIME, "Stress (kPa)": FORCE, "Extension (mm)": DEPTH}, {"depth", "time"}, "force"),
+        ({"Force time (ms)": TIME, "Depth stress (kPa)": FORCE}, {"time"}, "depth and force"),
+        ({"strain (%)": DEPTH, "stress (kPa)": FORCE}, set(), "depth and force"),
+    ],
+)
+def test_a_column_of_another_unit_is_not_proposed(tmp_path, columns, chosen, lacking):
+    said = describe(write(tmp_path / "a.csv", columns))
+    found = block(said)["measurement"][0].get("columns", {})
+    assert set(found) == chosen and not any("tress" in header for header in found.values())
+    assert f"no column has the name and unit of {lacking}" in said
+
+
 def test_what_is_no_table_is_refused(tmp_path):
     (tmp_path / "a.csv").write_text("Dear all,\nno curves today.\n")
     with pytest.raises(ExperimentError):

@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.experiment.read import files_of, read_curve, read_curves
 from pipeline.experiment.reading import ExperimentError, Reading, Window
+from pipeline.study.columns import ColumnUnits
 from tests.experiment.curves import AIR, DEEP, RAMP, approach, cycle, write
 
 TIME, DEPTH, FORCE = approach()
@@ -66,6 +67,40 @@ def test_headers_with_units(tmp_path, names):
     curve = read(write(tmp_path / "a.csv", dict(zip(names, IN_MM.values(), strict=True))))
     assert is_the_approach(curve)
     assert any(f"depth is column `{names[1]}`" in told for told in curve.told)
+
+
+UNITS = [
+    ("in", 25.4e-3, "gf", 9.80665e-3),
+    ("inch", 25.4e-3, "lbf", 4.4482216152605),
+    ("micron", 1e-6, "microN", 1e-6),
+    ("millimeters", 1e-3, "g", 9.80665e-3),
+    ("mil", 25.4e-6, "kgf", 9.80665),
+]
+
+
+@pytest.mark.parametrize(("length", "metres", "unit", "newtons"), UNITS)
+def test_units_of_machines_and_scales(tmp_path, length, metres, unit, newtons):
+    columns = {"time (s)": TIME, f"Extension ({length})": DEPTH / metres, f"Load ({unit})": FORCE / newtons}
+    assert is_the_approach(read(write(tmp_path / "a.csv", columns)))
+    plain = dict(zip("tzF", columns.values(), strict=True))
+    names = {"time": "t", "depth": "z", "force": "F"}
+    units = ColumnUnits.model_validate({"time": "s", "depth": length, "force": unit}).model_dump(exclude_none=True)
+    curve = read(write(tmp_path / "b.csv", plain), columns=names, units=units)
+    assert is_the_approach(curve)
+    assert any("1 g is 0.00980665 N" in told for told in curve.told) == (unit == "g")
+
+
+def test_headers_of_rows_with_a_name_or_a_number(tmp_path):
+    """As R writes tables: the names of rows have no header."""
+    for name in ("{}", "row{}"):
+        rows = lambda lines: [lines[0], *(f"{name.format(n)},{row}" for n, row in enumerate(lines[1:], 1))]  # noqa: B023, E731
+        curve = read(write(tmp_path / "a.csv", IN_MM, change=rows))
+        assert is_the_approach(curve)
+        assert any("the first column has the names of rows" in told for told in curve.told)
+
+
+def test_headers_that_end_with_a_separator(tmp_path):
+    assert is_the_approach(read(write(tmp_path / "a.csv", IN_MM, change=lambda x: [f"{x[0]},", *x[1:]])))
 
 
 def test_units_in_a_row_of_their_own(tmp_path):
@@ -268,6 +303,34 @@ MACHINES = {
     ),
     "tabs at the ends, and seconds": ("Test: x\nElapsed Time \tDisp\tLoad\t\nSec\tmm\tmN\t\n", {"separator": "\t"}),
 }  # fmt: skip
+
+
+LABVIEW = """LabVIEW Measurement\t
+Writer_Version\t2
+Separator\tTab
+Decimal_Separator\t.
+X_Columns\tOne
+Date\t2025/10/30
+Time\t12:21:07.250
+***End_of_Header***\t
+\t
+Channels\t2\t\t
+Samples\t200\t200\t
+Y_Unit_Label\tMillimeters\tmN\t
+X_Dimension\tTime\tTime\t
+X0\t0.0E+0\t0.0E+0\t
+Delta_X\t0.1\t0.1\t
+***End_of_Header***\t\t\t
+X_Value\tDisplacement\tForce\tComment
+"""
+
+
+@pytest.mark.parametrize("ending", ["", "\t"])
+def test_files_of_labview(tmp_path, ending):
+    change = lambda lines: [f"{row}{ending}" for row in lines[1:]]  # noqa: E731
+    curve = read(write(tmp_path / "a.lvm", IN_MM, separator="\t", before=LABVIEW, change=change))
+    assert is_the_approach(curve)
+    assert any("time is column `X_Value (s)`" in told for told in curve.told)
 
 
 @pytest.mark.parametrize("machine", MACHINES)

@@ -144,8 +144,17 @@ ERRORS = {
         ["`F`", "goes to and fro", "swapped"],
     ),
     "a last row of zero": (GOOD, {"change": cell(200, 2, "0")}, {}, ["line 201", "`force (mN)`", "it is the last"]),
-    "grams for a force": (
-        {"z (mm)": 1e3 * DEPTH, "load (g)": 1e2 * FORCE}, {}, {}, ["force is not found", "unit g, no unit of a force"],
+    "volts for a load": (
+        {"z (mm)": 1e3 * DEPTH, "load (V)": 1e2 * FORCE}, {}, {}, ["force is not found", "unit V, no unit of a force"],
+    ),
+    "grams of another column": ({"z (mm)": 1e3 * DEPTH, "acc (g)": 1e2 * FORCE}, {}, {}, ["force is not found"]),
+    "one header more than columns": (
+        GOOD, {"change": lambda lines: [f"{lines[0]},x", *lines[1:]]}, {},
+        ["depth is not found", "3 columns have 4 headers", "by number"],
+    ),
+    "one header fewer than columns": (
+        GOOD, {"change": lambda lines: [lines[0].partition(",")[2], *lines[1:]]}, {"columns": {"depth": "depth"}},
+        ["no column", "3 columns have 2 headers", "by number"],
     ),
     "a comma for thousands": (
         {"way (µm)": 1e6 * DEPTH, "load (mN)": 1e3 * FORCE}, {"separator": ";", "change":

@@ -37,7 +37,7 @@ MISTAKES = {
         [{"columns": {"piezo": 1, "deflection": 2, "spring": "1 N/m", "depth": 3}}], {}, ["columns", "depth and force"],
     ),
     "unit of another kind": ([{"units": {"depth": "N"}}], {}, ["measurement[1].units.depth", "no unit of a length"]),
-    "unit unknown": ([{"units": {"force": "lbf"}}], {}, ["measurement[1].units.force", "unknown unit `lbf`", "mN"]),
+    "unit unknown": ([{"units": {"force": "sn"}}], {}, ["measurement[1].units.force", "unknown unit `sn`", "mN"]),
     "segment": ([{"segment": "loading"}], {}, ["measurement[1].segment", "'approach'", "'hold'"]),
     "cycle": ([{"cycle": 0}], {}, ["measurement[1].cycle = 0", "at least 1"]),
     "window of two kinds": ([{"window": ["0 mm", "1 s"]}], {}, ["measurement[1].window", "range of depth or time"]),
