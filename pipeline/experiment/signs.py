@@ -53,12 +53,13 @@ def _deep_end(depth: FloatArray, force: FloatArray) -> int:
     rows = _moving(depth)
     depth, force = depth[rows], force[rows]
     way, mean = _mean_stroke(depth, force)
-    varies = _clear_end(*(_spread(way, mean, end) for end in (-1, 1)), _CLEAR_SIZE)
-    if end := varies or _turned_to(depth):
-        return end
-    measures = ((_spread, _CLEAR), (_size, _CLEAR_SIZE))
-    ends = (_clear_end(*(measure(way, mean, end) for end in (-1, 1)), clear) for measure, clear in measures)
-    return next(filter(None, ends), 0)
+    spreads, sizes = ((measure(way, mean, -1), measure(way, mean, 1)) for measure in (_spread, _size))
+    return (
+        _clear_end(*spreads, _CLEAR_SIZE)
+        or _turned_to(depth)
+        or _clear_end(*spreads, _CLEAR)
+        or _clear_end(*sizes, _CLEAR_SIZE)
+    )
 
 
 def _clear_end(low: float, high: float, clear: float) -> int:
