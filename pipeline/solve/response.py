@@ -37,7 +37,8 @@ class Contact:
     """Unilateral contact: its area (m²), with a relative 95 % bar if requested.
 
     ``slip_area`` (m²) is the part of it that slides along the tool, ``friction_force`` (N) the sum of the sizes of the
-    tangential forces, and ``torque`` (N m) that of the tissue on the tool about its advance: NaN without friction.
+    tangential forces, and ``torque`` (N m) that of the tissue on the tool about its advance: NaN without friction. Each
+    has a 95 % bar in its own unit, NaN if unknown.
     ``friction_bar`` is the relative bar on what friction adds to the force. ``sag`` (m) is the displacement of the
     first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere the
     tool's own edge bounds the contact, where the pressure is singular.
@@ -48,6 +49,9 @@ class Contact:
     slip_area: float = nan
     friction_force: float = nan
     torque: float = nan
+    slip_area_bar: float = nan
+    friction_force_bar: float = nan
+    torque_bar: float = nan
     friction_bar: float = 0.0
     sag: float = nan
     load_energy: float = nan
@@ -63,11 +67,11 @@ class Contact:
 
         The ``sizes`` (n) of the tangential forces at nodes (N), with the sign of the normal reaction, and the
         ``torque`` (N m) are those of the part that planes of symmetry, normal to the axes ``mirrored``, bound. A mirror
-        image has the opposite torque.
+        image has the opposite torque: the whole has exactly none. No other bar is known.
         """
         total = 2.0 ** len(mirrored) * float(sizes.sum())
-        whole_torque = 0.0 if mirrored else torque
-        return replace(self, slip_area=share * self.area, friction_force=total, torque=whole_torque)
+        found = replace(self, slip_area=share * self.area, friction_force=total, torque=torque)
+        return replace(found, torque=0.0, torque_bar=0.0) if mirrored else found
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,13 @@ from math import log, pi, sqrt
 import numpy as np
 import pytest
 
+from pipeline.solve import SolveError
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.plane.column import Column
+from pipeline.solve.plane.cut import Cut
 from pipeline.solve.plane.hole import MESHES, open_hole
+from pipeline.solve.plane.needle import NeedleSolver
 from pipeline.solve.plane.ring import Ring, ring_cuts
 from pipeline.verify import known
 
@@ -101,3 +105,21 @@ def test_stiffening_and_toughness_make_the_crack_need_more():
         3.0, 0.5, "ogden", share1=1.0, alpha1=9.0, share2=0.0, alpha2=1.0, share3=0.0, alpha3=1.0
     )
     assert ring(stiff).cut().energy > ring(INCOMPRESSIBLE).cut().energy
+
+
+def test_a_crack_as_wide_as_the_punch_is_no_ring_crack():
+    """Of tissue that stiffens steeply, e falls until no hole is opened: at this end of its range it has no minimum."""
+    with pytest.raises(SolveError, match="as wide as the punch"):
+        ring_cuts(MaterialLaw.of_moduli(2.6, 0.3, "veronda-westmann", alpha=10.0), 2.0)
+
+
+def test_each_result_of_a_needle_has_a_bar_of_its_own_that_is_never_nought():
+    fine = Cut(energy=8.0, stored=5.0, pressure=3.0, touched=4.0, balance=1e-8, steps=9)
+
+    def solved(coarse):
+        return NeedleSolver(1.0, 1.0, lambda *_: (coarse, fine)).solve(COMPRESSIBLE, Movement.along((0.0, 0.0, -1.0)))
+
+    same, other = solved(fine), solved(fine._replace(touched=4.4))
+    assert 1e-8 < same.bar == other.bar < 1e-6
+    assert other.contact.bar == pytest.approx(0.1, rel=1e-3)
+    assert other.contact.slip_area_bar == pytest.approx(4.0 * other.contact.bar)

@@ -35,9 +35,9 @@ _WORST_ERROR = 1e-3
 class Answer:
     """Result of one mesh at a depth: F/d from the energy and from the reaction, in units of μ a, and the solution.
 
-    ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²), friction the part of it
-    that slides and the sum of tangential forces over d, in units of μ a. The strain energy, in units of μ a times m²,
-    is half of F d if it is not given.
+    ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²) with a relative bar,
+    friction the part of it that slides and the sum of tangential forces over d, in units of μ a, with bars in the same
+    units. The strain energy, in units of μ a times m², is half of F d if it is not given.
     """
 
     stiffness: float
@@ -50,16 +50,27 @@ class Answer:
     cells: int
     iterations: int
     area: float = nan
+    area_error: float = nan
     slip_area: float = nan
+    slip_area_error: float = nan
     friction: float = nan
+    friction_error: float = nan
     energy: float | None = None
 
     def contact(self, scale: float) -> Contact:
         """Return the contact, with the tangential forces times ``scale``; by symmetry they have no torque."""
-        found = Contact(self.area, self.error)
+        found = Contact(self.area, self.area_error)
         if isnan(self.slip_area):
             return found
-        return replace(found, slip_area=self.slip_area, friction_force=scale * self.friction, torque=0.0)
+        return replace(
+            found,
+            slip_area=self.slip_area,
+            slip_area_bar=self.slip_area_error,
+            friction_force=scale * self.friction,
+            friction_force_bar=scale * self.friction_error,
+            torque=0.0,
+            torque_bar=0.0,
+        )
 
 
 class MeridianSolver(Problem):

@@ -5,6 +5,7 @@ ahead of its tip, which its shaft wedges open: e = s + 2b Γ, the least over the
 (O. A. Shergold and N. A. Fleck, Proc. R. Soc. Lond. A 460, 3037, 2004). That of a flat punch is in :mod:`.ring`.
 """
 
+from collections.abc import Sequence
 from math import nan
 
 from pipeline.solve import SolveError
@@ -14,6 +15,9 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.plane.crack import LEVELS, open_crack
 from pipeline.solve.plane.cut import Cut, Cuts
 from pipeline.solve.plane.opening import Opening
+
+# Two meshes may have the same results by chance: round-off errs by less than this many times the balance.
+_ROUND_OFF = 3.0
 
 
 class NeedleSolver(MeridianSolver):
@@ -29,30 +33,42 @@ class NeedleSolver(MeridianSolver):
         self._radius, self._toughness, self._cuts = radius, toughness, cuts
 
     def _answer(self, law: MaterialLaw, depth: float) -> Answer:
-        """Return the answer on the finer mesh; its error bar is the largest difference to the coarser one.
+        """Return the answer on the finer mesh; its error bars are differences to the coarser one, and round-off.
+
+        That of the force is the largest of all energies and of the pressure.
 
         Raises:
             SolveError: if the crack cannot be opened so far, or forces are not balanced.
         """
         coarse, fine = self._cuts(law, self._toughness / (law.lame_mu[0] * self._radius))
         check_balance(max(coarse.balance, fine.balance))
+        round_off = _ROUND_OFF * fine.balance
+        error, touched = max(_apart(coarse[:3], fine[:3])) + round_off, fine.touched * self._radius * depth
+        of_touched = _apart(coarse[3:4], fine[3:4])[0] + round_off
         # Per length, forces are in units of μ R, energies of μ R².
         share = depth / self._radius
         return Answer(
             stiffness=fine.energy / share,
             on_probe=-fine.energy / share,
             balance=fine.balance,
-            error=max(abs(a / b - 1) for a, b in zip(coarse[:3], fine[:3], strict=True)),
+            error=error,
             unit=self._radius,
             max_strain=nan,
             dofs=0,
             cells=0,
             iterations=fine.steps,
-            area=fine.touched * self._radius * depth,
-            slip_area=fine.touched * self._radius * depth,
+            area=touched,
+            area_error=of_touched,
+            slip_area=touched,
+            slip_area_error=of_touched * touched,
             friction=fine.pressure,
+            friction_error=error * fine.pressure,
             energy=fine.stored * self._radius * depth,
         )
+
+
+def _apart(coarse: Sequence[float], fine: Sequence[float]) -> list[float]:
+    return [abs(a / b - 1) for a, b in zip(coarse, fine, strict=True)]
 
 
 def plane_cuts(law: MaterialLaw, toughness: float) -> tuple[Cut, Cut]:

@@ -12,8 +12,9 @@ and the least over b and λ is the force without friction. The least over λ is 
 e = −πb² ∂ψ/∂λ. Incompressible tissue has λ = (b/R)².
 """
 
-from math import exp, isfinite, log, pi, sqrt
+from math import exp, isfinite, pi, sqrt
 
+import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from pipeline.solve import SolveError
@@ -67,9 +68,19 @@ class Ring:
         return self.least(float(before)) < self.least(float(last))
 
     def solved(self) -> float:
-        """Return the growth at which it is least."""
-        ends = log(_LEAST), log(float(self._hole.ratios[-1]))
-        return exp(minimize_scalar(lambda at: self.least(exp(at)), bounds=ends, method="bounded").x)
+        """Return the growth at which it is least.
+
+        Raises:
+            SolveError: if that is none: the crack is then as wide as the punch.
+        """
+        growths = np.array([_LEAST, *self._hole.ratios])
+        energies = [self.least(growth) for growth in growths]
+        at = int(np.nanargmin(energies))
+        low, high = np.log(growths[[max(at - 1, 0), min(at + 1, len(growths) - 1)]])
+        found = minimize_scalar(lambda at: self.least(exp(at)), bounds=(low, high), method="bounded")
+        if not found.fun < energies[0]:
+            raise SolveError("it is as wide as the punch, since wider holes take more: the shaft opens none")
+        return exp(found.x)
 
     def cut(self) -> Cut:
         """Return the cut at which it is least."""
@@ -87,14 +98,17 @@ def ring_cuts(law: MaterialLaw, toughness: float) -> tuple[Cut, Cut]:
     Raises:
         SolveError: if the hole cannot be opened so far.
     """
-    column = Column(law)
+    column, name = Column(law), f"the ring crack of a punch, with Γ/(μ R) = {toughness:.3g}"
 
     def on(mesh: HoleMesh) -> Cut:
         try:
             hole = open_hole(law, mesh, lambda hole: Ring(column, hole, toughness).rises)
         except SolveError as error:
-            raise SolveError(f"the ring crack of a punch, with Γ/(μ R) = {toughness:.3g}: {error}") from error
-        return Ring(column, hole, toughness).cut()
+            raise SolveError(f"{name}: {error}") from error
+        try:
+            return Ring(column, hole, toughness).cut()
+        except SolveError as error:
+            raise SolveError(f'{name}: {error}; use crack_shape = "plane", or a law that stiffens less') from error
 
     coarse, fine = map(on, MESHES)
     return coarse, fine
