@@ -52,13 +52,14 @@ def _has_slit(case: Case) -> bool:
 _COSTS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total", "time_spread")
 _COUNTS = ("dofs", "cells", "iterations")
 _OF_LOADS = ("load_force", "load_force_error", "load_energy", "sag", "load_force_vector")
+_OF_FRICTION = tuple(f"{name}{bar}" for name in ("slip_area", "friction_force", "torque") for bar in ("", "_error"))
 _PARTS = (
     _Part(("force", "force_error", "energy", "balance", *_COSTS, "machine_load", "memory")),
     _Part(
         ("contact_area", "contact_area_error", "contact_radius", "contact_radius_error"),
         of=lambda case: case.probe.is_unilateral,
     ),
-    _Part(("slip_area", "friction_force", "torque"), of=lambda case: case.probe.friction > 0),
+    _Part(_OF_FRICTION, of=lambda case: case.probe.friction > 0),
     _Part(("depth_reached", "force_reached"), of=lambda case: case.has_load_steps or case.is_stepped),
     _Part(("surface_deviation",), of=lambda case: isinstance(case.body, Scanned)),
     _Part((*LARGEST, *_COUNTS)),

@@ -34,7 +34,11 @@ BARS = (
     "load_force_error",
     "contact_area_error",
     "contact_radius_error",
+    "slip_area_error",
+    "friction_force_error",
+    "torque_error",
 )
+_OF_FRICTION = ("slip_area", "friction_force", "torque")
 TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
 
 
@@ -117,10 +121,10 @@ def _of_contact(contact: Contact | None) -> dict[str, Any]:
     """Return the fields of a record for found contact, none for a prescribed footprint."""
     if contact is None:
         return {}
-    bars = {"contact_area_error": contact.bar, "contact_radius_error": contact.bar / 2}
-    names = ("slip_area", "friction_force", "torque")
-    areas = {"contact_area": contact.area} | {name: getattr(contact, name) for name in names}
-    return {**areas, "contact_radius": contact.radius, **bars}
+    found = {name: getattr(contact, name) for name in _OF_FRICTION}
+    found |= {f"{name}_error": getattr(contact, f"{name}_bar") for name in _OF_FRICTION}
+    found |= {"contact_area": contact.area, "contact_area_error": contact.bar}
+    return found | {"contact_radius": contact.radius, "contact_radius_error": contact.bar / 2}
 
 
 def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:

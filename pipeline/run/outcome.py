@@ -39,8 +39,11 @@ def without_contact(case: Case) -> Record | None:
         contact_area_error=0.0,
         contact_radius_error=0.0,
         slip_area=0.0,
+        slip_area_error=0.0,
         friction_force=0.0,
+        friction_force_error=0.0,
         torque=0.0,
+        torque_error=0.0,
     )
 
 

@@ -27,7 +27,9 @@ _POWERS = {
     "energy": 2,
     "energy_release": 2,
     "friction_force": 1,
+    "friction_force_error": 1,
     "torque": 1,
+    "torque_error": 1,
 }
 
 # What the course of a case has by time, each with the power of the depth that it is proportional to: time (s), force
@@ -50,7 +52,8 @@ class Record:
     - ``stiffness``: of all six rigid motions, with the error bars ``stiffness_error``; empty without `motion = "all"`.
     - ``contact_area`` (m²), ``contact_radius`` (m): of unilateral contact, with relative error bars;
       ``slip_area`` (m²): the part that slides, of contact with friction. ``friction_force`` (N): the sum of the
-      sizes of its tangential forces; ``torque`` (N m): that of the tissue on the probe about its advance.
+      sizes of its tangential forces; ``torque`` (N m): that of the tissue on the probe about its advance. Their error
+      bars are in the same units, NaN if unknown.
     - ``largest``: the largest values of cells away from the probe's edge, by their names in the dataset.
     - ``energy_release`` (J/m²): the mean along a slit's front, with its relative 95 % error bar.
     - ``load_force`` (N), with the error bar ``load_force_error`` (N), and ``load_force_vector`` (N): what loads add to
@@ -87,8 +90,11 @@ class Record:
     contact_area_error: float = nan
     contact_radius_error: float = nan
     slip_area: float = nan
+    slip_area_error: float = nan
     friction_force: float = nan
+    friction_force_error: float = nan
     torque: float = nan
+    torque_error: float = nan
     load_force: float = nan
     load_force_error: float = nan
     load_force_vector: tuple[float, float, float] = (nan, nan, nan)

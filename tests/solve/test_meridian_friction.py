@@ -53,7 +53,10 @@ def test_little_friction_is_none_and_much_sticks(of):
     assert np.isnan(none.contact.slip_area)
     assert np.isnan(none.contact.friction_force)
     assert 0 < some.contact.friction_force < 0.2 * some.reaction[2]
-    assert some.contact.torque == 0
+    assert some.contact.torque == some.contact.torque_bar == 0
+    assert 0 < some.contact.slip_area_bar < 0.5 * some.contact.area
+    assert some.bar < some.contact.friction_force_bar / some.contact.friction_force < 0.5
+    assert sticks.contact.slip_area_bar == 0 < much.contact.slip_area_bar
 
 
 @pytest.mark.parametrize(

@@ -129,3 +129,11 @@ def test_a_study_tells_the_depth_that_a_path_reached():
     assert 4e-3 < found.depth_reached < 12e-3
     assert found.force_reached > 0
     assert "unstable" in found.message
+
+
+@pytest.mark.parametrize(("tool", "depth"), [(BALL, 0.1), (CONE, 0.1)])
+def test_the_area_has_a_bar_of_its_own(tool, depth):
+    """F is stationary with respect to the area, which errs by more than F."""
+    found, fine = (pressed(tool, depth, 0.3, accuracy=accuracy).contact for accuracy in (5e-3, 1e-9))
+    assert abs(found.area / fine.area - 1) < found.bar + fine.bar
+    assert 5 * fine.bar < 4 * found.bar < 0.2

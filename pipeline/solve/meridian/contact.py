@@ -31,6 +31,8 @@ from pipeline.stages import stage
 
 # Tolerance on the depth of a trial radius (F errs by its square), and most trials.
 _NEAR, _MOST_TRIALS = 3e-4, 12
+# Bar on the area, in units of the relative error of a radius; its correction is known to a part of itself.
+_OF_RADIUS = 2.0
 # Largest contact radius, as a share of the modelled body's: beyond it contact has no edge.
 _WIDEST = 0.999
 # Nodes along the radius for the search for rings that lift off, and between two of them the second time.
@@ -154,7 +156,8 @@ class _Search:
     def contact_at(self, patch: _Patch, depth: float, grading: Grading, degree: int) -> Answer:
         """Return the contact at a depth, from solutions of two degrees with nearly the right radii.
 
-        The error bar is that of :func:`error_bar`, plus the squares of the radii's errors.
+        The error bar is that of :func:`error_bar`, plus the squares of the radii's errors. The area's has the errors
+        themselves.
         """
         radius = patch.radius
         arrays, meshes = self.punches.mesh(radius, grading, patch.lost)
@@ -164,10 +167,12 @@ class _Search:
         if not force > 0:
             raise SolveError("the solution is not finite or has no force")
         error = error_bar(coarse.force(depth), force, degree, max(coarse.balance, fine.balance))
+        of_area = patch.off + error
         if patch.power < inf:
             misses = [log(punch.depth / depth) for punch in (coarse, fine)]
             error += max(np.square(misses)) * fine.stiffness * depth / force / patch.power
             radius *= exp(-misses[1] / patch.power)
+            of_area += _OF_RADIUS * max(abs(misses[0] - misses[1]), abs(misses[1])) / patch.power
         error += patch.off**2 * fine.stiffness * depth / force
         with stage("solve"):
             solution = depth * fine.punch + fine.pressed
@@ -185,5 +190,6 @@ class _Search:
             cells=len(arrays.cells),
             iterations=self.punches.count,
             area=patch.area(radius),
+            area_error=of_area,
             energy=pi * float(solution @ residual),
         )

@@ -13,7 +13,10 @@ Lengths are in units of the contact radius of the mesh, stresses in units of μ 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any
+
+import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
@@ -29,6 +32,9 @@ from pipeline.solve.physics import MaterialLaw
 # Bar: these multiples of the differences of the degrees, on one mesh, and of two meshes, and the square of the distance
 # of nodes at the edge.
 _BETWEEN_DEGREES, _BETWEEN_MESHES = 2.0, 1.0
+# The same for each result in units of those of F: F itself, friction, the contact area and the part that slides; and
+# the area in units of the distance of nodes at the edge. F is stationary with respect to the area, which errs by more.
+_OF_RESULTS, _OF_EDGE = np.array([1.0, 1.5, 0.5, 1.0]), 0.3
 # With friction: load steps of each mesh, whose bar is rarely below a tenth of a per cent, the accuracy that is tried,
 # and a degree whose error is well below that of the steps.
 _STEPS = {Grading(0.1, 1.0, 4.0): 8, Grading(0.02, 0.7, 4.0): 16}
@@ -74,32 +80,39 @@ class LargeMeridianContact(LargeSolver):
             return MeridianTouch.of(arrays, meshes, degree, law, self._tool)
 
         try:
-            fine, bar = self._from(begins_with, at, depth) or self._along_path(at, depth, _STEPS.get(grading, 0))
+            fine, bars = self._from(begins_with, at, depth) or self._along_path(at, depth, _STEPS.get(grading, 0))
         except LargeError as stop:
             raise stopped(stop, arrays, law, depth, is_found=True, friction=self._tool.friction) from stop
         fine.check()
         deep, force, balance = depth / arrays.unit, fine.force, fine.balance
+        of_force, of_friction, of_area, of_slip = (_OF_RESULTS * bars).tolist()
+        error, area = of_force / fine.results[0] + fine.resolution**2 + 3 * balance, fine.area * arrays.unit**2
+        # Sliding may begin between the last two nodes. Tissue that sticks by definition does not slide.
+        of_slip += fine.slip_resolution * arrays.unit**2 + fine.resolution * area
         return _Found(
             stiffness=force / deep,
             on_probe=-force / deep,
             balance=balance,
-            error=bar + fine.resolution**2 + 3 * balance,
+            error=error,
             unit=arrays.unit,
             max_strain=max_strain(fine.tissue.system.forms, arrays),
             dofs=fine.tissue.system.forms.dofs,
             cells=len(arrays.cells),
             iterations=fine.tissue.iterations,
-            area=fine.area * arrays.unit**2,
+            area=area,
+            area_error=of_area / area + _OF_EDGE * fine.resolution,
             slip_area=fine.slip_area * arrays.unit**2,
+            slip_area_error=of_slip if self._tool.friction < inf else 0.0,
             friction=fine.friction / deep,
+            friction_error=of_friction / arrays.unit**2 / deep + error * fine.friction / deep,
             energy=fine.energy * arrays.unit**2,
             touch=fine,
         )
 
     def _from(
         self, before: MeridianTouch | None, at: Callable[[int], MeridianTouch], depth: float
-    ) -> tuple[MeridianTouch, float] | None:
-        """Return the contact at a ``depth`` (m), found from that on the mesh ``before``, and its relative bar.
+    ) -> tuple[MeridianTouch, FloatArray] | None:
+        """Return the contact at a ``depth`` (m), found from that on the mesh ``before``, and bars on its results (4,).
 
         ``at`` makes the tissue of a degree. None if there is no such mesh, or contact is not found.
         """
@@ -109,28 +122,30 @@ class LargeMeridianContact(LargeSolver):
             fine = at(self._degree).moved(before, depth)
         except LargeError:
             return None
-        return fine, _BETWEEN_MESHES * abs(before.force_in_metres / fine.force_in_metres - 1)
+        return fine, _BETWEEN_MESHES * np.abs(before.results - fine.results)
 
-    def _along_path(self, at: Callable[[int], MeridianTouch], depth: float, steps: int) -> tuple[MeridianTouch, float]:
-        """Return the contact at a ``depth`` (m), and its relative bar: of the degrees, and of load steps with friction.
+    def _along_path(
+        self, at: Callable[[int], MeridianTouch], depth: float, steps: int
+    ) -> tuple[MeridianTouch, FloatArray]:
+        """Return the contact at a ``depth`` (m), and bars on its results (4,): of degrees, and of steps with friction.
 
         ``at`` makes the tissue of a degree.
 
         Raises:
             LargeError: if a path ends before; ``reached`` are the depth and the force there.
         """
-        coarse, fine, bar = at(self._degree - 1), at(self._degree), 0.0
+        coarse, fine, bars = at(self._degree - 1), at(self._degree), np.zeros(4)
         if self._tool.friction:
-            rough = coarse.pressed_with_friction(depth, steps // 2).force
+            rough = coarse.pressed_with_friction(depth, steps // 2).results
             coarse = coarse.pressed_with_friction(depth, steps)
-            fine, bar = fine.pressed_with_friction(depth, steps), abs(rough / coarse.force - 1)
+            fine, bars = fine.pressed_with_friction(depth, steps), np.abs(rough - coarse.results)
         else:
             coarse = coarse.pressed(depth)
             try:
                 fine = fine.raised(coarse, depth)
             except LargeError:  # its own path tells how far it comes
                 fine = fine.pressed(depth)
-        return fine, bar + _BETWEEN_DEGREES * abs(coarse.force / fine.force - 1)
+        return fine, bars + _BETWEEN_DEGREES * np.abs(coarse.results - fine.results)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

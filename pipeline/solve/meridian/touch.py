@@ -225,22 +225,48 @@ class MeridianTouch:
         return (outer - inner) / self.edge
 
     @property
+    def _radii(self) -> FloatArray:
+        """The radii (n) of the nodes, in linear elasticity at rest, else at the deformed place."""
+        return (self.tissue.places if self.law.is_linear else self.tissue.positions())[:, 0]
+
+    @property
     def areas(self) -> FloatArray:
-        """The areas (n) of the nodes normal to the axis, in linear elasticity at rest, else at the deformed place."""
-        radii = (self.tissue.places if self.law.is_linear else self.tissue.positions())[:, 0]
+        """The areas (n) of the nodes normal to the axis, between the middles to their neighbours."""
+        radii = self._radii
         ends = np.append((radii[:-1] + radii[1:]) / 2, radii[-1])
         return pi * (ends**2 - np.insert(ends[:-1] ** 2, 0, 0.0))
 
     @property
     def area(self) -> float:
-        """The contact area."""
-        return float(self.areas[self._contact.active].sum())
+        """The contact area. It ends where the gap would be zero, which grows with the distance to the power 3/2."""
+        touched, radii = self._contact, self._radii
+        last = int(np.flatnonzero(touched.active)[-1])
+        inner, outer, beside = radii.take([last, last + 1, last + 2], mode="clip")
+        near, far = np.maximum(touched.gap.take([last + 1, last + 2], mode="clip"), 0.0) ** (2 / 3)
+        edge = outer - (beside - outer) * near / (far - near) if far > near else outer
+        beyond = max(edge, inner) ** 2 - ((inner + outer) / 2) ** 2
+        return float(self.areas[touched.active].sum() + pi * beyond)
 
     @property
     def slip_area(self) -> float:
         """The part of the contact area that slides, NaN without friction."""
         touched = self._contact
         return nan if touched.slide is None else touched.slide.share(self.areas, touched.active) * self.area
+
+    @property
+    def slip_resolution(self) -> float:
+        """The area of the nodes beside which sliding begins or ends."""
+        touched = self._contact
+        if touched.slide is None:
+            return nan
+        slides = touched.slide.sliding & touched.active
+        areas, changes = self.areas, np.diff(slides.astype(int)) != 0
+        return float((areas[:-1] + areas[1:])[changes].sum()) / 2
+
+    @property
+    def results(self) -> FloatArray:
+        """F and the friction in units of μ times m², the contact area and the part that slides in m²: (4,)."""
+        return self.unit**2 * np.array([self.force, self.friction, self.area, self.slip_area])
 
     @property
     def friction(self) -> float:
