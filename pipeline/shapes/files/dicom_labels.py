@@ -90,7 +90,7 @@ def _of_segments(data: Any) -> LabelMap:
     if kind == "LABELMAP":
         padding = data.get("PixelPaddingValue", 0)
         values = _stacked(np.where(frames == padding, 0, frames) if padding else frames, grid)
-        return LabelMap(values, grid.affine, notices, _without_background(names))
+        return _with_room(LabelMap(values, grid.affine, notices, _without_background(names)))
     if kind == "FRACTIONAL":
         frames = 2.0 * frames >= float(data.MaximumFractionalValue)
         notices += ("a voxel is part of a segment from half of the largest fraction on",)
@@ -102,7 +102,19 @@ def _of_segments(data: Any) -> LabelMap:
         index = (slice(None), slice(None), int(grid.places[k]))
         pieces.setdefault(int(groups.ReferencedSegmentNumber), []).append((index, frame.T, 1))
     values, told = painted(grid.shape, pieces, names)
-    return LabelMap(values, grid.affine, notices + told, names)
+    return _with_room(LabelMap(values, grid.affine, notices + told, names))
+
+
+def _with_room(found: LabelMap) -> LabelMap:
+    """Return a segmentation with an empty voxel more on each side if its slices were cropped to its segments."""
+    values = found.values
+    if not all(side.any() for side in (values[0], values[-1], values[:, 0], values[:, -1])):
+        return found
+    affine = found.affine.copy()
+    affine[:, 3] -= affine[:, 0] + affine[:, 1]
+    told = "its slices are as large as its segments: it is not known whether the image ends at them"
+    padded = np.pad(values, ((1, 1), (1, 1), (0, 0)))
+    return LabelMap(padded, affine, (*found.notices, told), found.names)
 
 
 def _source_slices(data: Any) -> float:

@@ -45,6 +45,23 @@ def test_a_segmentation_is_the_nifti_of_the_same_labels(tmp_path: Path):
     assert read_image(path, "tumour").triangles.hash == read_image(path, 3).triangles.hash
 
 
+def test_slices_that_were_cropped_to_the_segments_are_no_end_of_the_image(tmp_path: Path):
+    inside = np.argwhere(dicoms.values())
+    (i, j, _), (m, n, _) = inside.min(axis=0), inside.max(axis=0) + 1
+    frames = [(segment, k, pixels[i:m, j:n]) for segment, k, pixels in dicoms.frames(dicoms.values())]
+    path = dicoms.segmentation(tmp_path / "cropped.dcm", frames, Columns=int(m - i), Rows=int(n - j))
+    cropped, whole = (
+        read_image(path, 1, inner=((3, None),)),
+        read_image(_nifti(tmp_path / "scan.nii"), 1, inner=((3, None),)),
+    )
+    assert not any("cut off flat" in notice for notice in cropped.notices)
+    assert any("not known whether the image ends at them" in notice for notice in cropped.notices)
+    assert cropped.triangles.volume == pytest.approx(whole.triangles.volume, rel=1e-6)
+    np.testing.assert_allclose(
+        np.ptp(cropped.triangles.bounds, axis=0), np.ptp(whole.triangles.bounds, axis=0), atol=1e-9
+    )
+
+
 def test_a_label_map_is_the_nifti_of_the_same_labels(tmp_path: Path):
     values = dicoms.values()
     frames = [(0, k, np.where(values[:, :, k] == 0, 9, values[:, :, k])) for k in (*range(1, 22), 0)]
