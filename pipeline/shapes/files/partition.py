@@ -6,6 +6,7 @@ one, times a factor by which the label keeps its volume.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import pi, sqrt
 from typing import Any
 
@@ -25,7 +26,9 @@ from pipeline.shapes.files.label_surface import (
 from pipeline.shapes.files.labels import LabelMap, of_label
 from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.files.marching import march
+from pipeline.shapes.section import in_mm
 from pipeline.shapes.triangles import SurfaceError, doubled_normals
+from pipeline.units import canonical
 
 # Tolerance on volumes in the search for the factors, most steps, and largest step (of a logarithm).
 _SAME_VOLUME, _STEPS, _LARGEST = 5e-4, 12, 0.5
@@ -33,6 +36,8 @@ _SAME_VOLUME, _STEPS, _LARGEST = 5e-4, 12, 0.5
 _LEAST_GAIN, _MOST_GAIN = 0.1, 3.0
 # A region must keep its volume within this share; parts below this number of voxels are left to their neighbours.
 MOST_VOLUME, CRUMB = 0.01, 8
+# Widths of the filter of a label that is too thin for others, in voxels.
+_NARROW = (0.5, 0.0)
 # Labels meet if there are at most so many voxels between them.
 _BETWEEN = 2
 # Neighbours of a voxel in the tetrahedra of :func:`march`.
@@ -68,9 +73,48 @@ def partition_of(found: LabelMap, labels: Sequence[tuple[int | str, float | None
     body's own tissue, the others 1 and so on. Each has the standard deviation (m) of its filter, None for the default.
     ``offset`` (m) shifts the body's surface outward; regions that it bounds follow.
 
+    A label that is too thin for its default filter has a narrower one.
+
     Raises:
         SurfaceError: if a label has no voxels, or is thinner than the filter, or that is too narrow for the offset.
     """
+    try:
+        return _parted(found, labels, offset)
+    except _ThinError as thin:
+        narrower = _narrower(found, labels, offset, thin)
+        if narrower is None:
+            raise SurfaceError(f"{thin}: give its voxels to a neighbour") from None
+        length, made = narrower
+        if thin.number == 0 or labels[thin.number][1] is not None:
+            raise SurfaceError(f'{thin}: give it `smooth = "{in_mm(length)}"`, which suffices') from None
+        told = f"label {labels[thin.number][0]} is thin: its filter is {in_mm(length)} wide"
+        return replace(made, notices=(*made.notices, told))
+
+
+def _narrower(
+    found: LabelMap, labels: Sequence[tuple[int | str, float | None]], offset: float, thin: "_ThinError"
+) -> tuple[float, Loaded] | None:
+    """Return the widest filter (m) tried with which a thin label keeps its volume, and the surfaces; None if none."""
+    voxel = float(np.prod(found.spacing)) ** (1 / 3)
+    for share in _NARROW:
+        length = canonical(share * voxel)
+        own = [(label, length if n == thin.number else given) for n, (label, given) in enumerate(labels)]
+        try:
+            return length, _parted(found, own, offset)
+        except SurfaceError:
+            continue
+    return None
+
+
+class _ThinError(SurfaceError):
+    """The label of a ``number`` is thinner than its filter."""
+
+    def __init__(self, number: int, what: str):
+        super().__init__(what)
+        self.number = number
+
+
+def _parted(found: LabelMap, labels: Sequence[tuple[int | str, float | None]], offset: float) -> Loaded:
     names, lengths = [label for label, _ in labels], [length for _, length in labels]
     masks = [of_label(found, label) for label in names]
     body, start, notices = one_piece(np.logical_or.reduce(masks), found)
@@ -198,10 +242,8 @@ def _keeping_volumes(
     off = np.abs(shares - 1)
     if move and (off > MOST_VOLUME).any():
         worst = int(off.argmax())
-        raise SurfaceError(
-            f"label {labels[worst]} is thinner than the width of the filter, which would change its volume by "
-            f"{shares[worst] - 1:+.0%}: give a smaller `smooth`"
-        )
+        change = "by which it would vanish" if shares[worst] <= 0 else f"which changes its volume by {off[worst]:.0%}"
+        raise _ThinError(worst, f"label {labels[worst]} is thinner than the width of the filter, {change}")
     weights *= factors
     return points, facets, sides, 1 / (1 + float(np.exp(of_body)))
 

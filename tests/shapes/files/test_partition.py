@@ -7,6 +7,7 @@ from pipeline.shapes.complex import OUTSIDE
 from pipeline.shapes.files.crossings import crossings
 from pipeline.shapes.files.labels import LabelMap
 from pipeline.shapes.files.marching import march
+from pipeline.shapes.files.partition import partition_of
 from pipeline.shapes.triangles import SurfaceError, doubled_normals
 from tests.complexes import AXES, CENTRE, INNER, are_closed, neighbours, parted, scene
 
@@ -65,8 +66,16 @@ def test_what_is_too_thin_or_too_small_is_told():
     sheet = np.zeros_like(values, dtype=bool)
     sheet[:, values.shape[1] // 2] = True
     values[sheet & (values == 1)] = 3
-    with pytest.raises(SurfaceError, match=r"label 3 is thinner than the width of the filter.*smaller `smooth`"):
-        parted(LabelMap(values, image.affine), 1, 7, 5, 3, smooth=6e-3)
+    thin = LabelMap(values, image.affine)
+    with pytest.raises(SurfaceError, match=r'label 3 is thinner than the width of the filter.* `smooth = "1 mm"`'):
+        parted(thin, 1, 7, 5, 3, smooth=6e-3)
+    body = partition_of(thin, [(1, 6e-3), (7, 6e-3), (5, 6e-3), (3, 1e-3)]).partition
+    assert body.volume(3) == pytest.approx((values == 3).sum() * 8e-9, rel=1e-3)
+    values = image.values.copy()
+    values[20, 18, 10:30][values[20, 18, 10:30] == 1] = 3
+    line = parted(LabelMap(values, image.affine), 1, 7, 5, 3)  # the default filter is narrowed
+    assert line.partition.volume(3) == pytest.approx((values == 3).sum() * 8e-9, rel=0.01)
+    assert any("label 3 is thin: its filter is 1 mm wide" in notice for notice in line.notices)
     values = image.values.copy()
     values[20, 20, 12] = 7
     assert values.shape > (20, 20, 12) and image.values[20, 20, 12] == 1
