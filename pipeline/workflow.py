@@ -217,6 +217,13 @@ def abort_on_exception(comm: MPI.Comm, *agreed: type[Exception]) -> Iterator[Non
 
 
 @contextmanager
+def ended_at_once() -> Iterator[None]:
+    """Let the signals that ask the program to end do so, also in a library's call: for what keeps all it has."""
+    with _heard_by(signal.SIG_DFL):
+        yield
+
+
+@contextmanager
 def ended_soon() -> Iterator[None]:
     """Turn the signals that ask the program to end into KeyboardInterrupt: for what has no records to write."""
 
@@ -312,7 +319,7 @@ def _interruptible() -> Iterator[list[int]]:
 
 
 @contextmanager
-def _heard_by(handler: Callable[..., None]) -> Iterator[None]:
+def _heard_by(handler: Callable[..., None] | signal.Handlers) -> Iterator[None]:
     """Let ``handler`` answer what asks the program to end: Ctrl-C and SIGTERM, and a closed terminal but for nohup."""
     before = {number: signal.getsignal(number) for number in ENDING}
     if before[signal.SIGHUP] is signal.SIG_IGN:

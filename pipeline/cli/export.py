@@ -15,7 +15,11 @@ from pipeline.printable import counted
 
 if TYPE_CHECKING:
     from pipeline.export.export import Exported
+    from pipeline.export.scope import Scope
 
+_BEFORE = (
+    "Ctrl-C ends the export at once; what is solved is kept beside the model, and the next export goes on from there"
+)
 # The page on what can be exported; refusals refer to it.
 _HOWTO = "docs/realtime.md"
 _FMU = "docs/howto/fmu.md"
@@ -108,6 +112,16 @@ def export(
     _check_evaluator()
     with refusing(ExportError, file=file, howto=_HOWTO):
         scope = scope_of(study)
+    exported, status = _make(scope, wanted, checks, path, file, surface=surface)
+    if exported is not None:
+        _print_result(exported, wanted, path, _pack(path, fmu))
+    raise typer.Exit(status)
+
+
+def _make(
+    scope: "Scope", wanted: float, checks: int, path: Path, file: Path, *, surface: bool
+) -> tuple["Exported | None", int]:
+    """Make the model of ``file`` and write it to ``path``, or exit; return it on the first rank, and the status."""
     from threadpoolctl import threadpool_limits
 
     from pipeline import workflow
@@ -115,19 +129,25 @@ def export(
     workflow.load_solvers()
     from pipeline.export.export import export as make_model
     from pipeline.export.export import write
+    from pipeline.export.kept import Kept
     from pipeline.export.ranks import Ranks
+    from pipeline.export.scope import ExportError
     from pipeline.mesh.generate import MeshError
     from pipeline.solve import SolveError
 
     comm = workflow.world()
-    ranks = Ranks(comm, (lambda text: print(text, file=sys.stderr, flush=True)) if comm.rank == 0 else lambda _: None)
+    tell = (lambda text: print(text, file=sys.stderr, flush=True)) if comm.rank == 0 else lambda _: None
+    ranks = Ranks(comm, tell, Kept(path, scope))
+    tell(_BEFORE)
     fault, status = Fault(""), DONE
     # With several ranks, one BLAS thread each: more would compete for the cores.
     threads = threadpool_limits(1 if comm.size > 1 else None, user_api="blas")
     with workflow.abort_on_exception(comm), workflow.ended_soon(), threads:
         try:
-            exported = make_model(scope, wanted, checks, surface=surface, ranks=ranks)
+            with workflow.ended_at_once():
+                exported = make_model(scope, wanted, checks, surface=surface, ranks=ranks)
             ranks.on_first(lambda: write(exported, path, scope, file, __version__))
+            ranks.kept.remove()
         except ExportError as problem:
             fault, status = Fault(str(problem), file=str(file), howto=_HOWTO), BAD_INPUT
         except OSError as problem:
@@ -136,9 +156,7 @@ def export(
             fault, status = of_file(file, str(problem)), SOME_FAILED
     if status != DONE:
         fail(fault, status=status)
-    if comm.rank == 0:
-        _print_result(exported, wanted, path, _pack(path, fmu))
-    raise typer.Exit(DONE if exported.covered >= _COVERED else SOME_FAILED)
+    return (exported if comm.rank == 0 else None), DONE if exported.covered >= _COVERED else SOME_FAILED
 
 
 def _share(accuracy: str) -> float:

@@ -1,6 +1,6 @@
 """Local compliances c and h of a body with E = 1, at any place of a region: one coarse mesh, one factorisation."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import pi
 from typing import Any
@@ -30,6 +30,8 @@ from pipeline.study.schema import Mesh
 _NEAR, _THROUGH, _TO_TISSUE, _GROWTH = 2.5, 4, 2, 0.4
 # A mid node this far from the middle, in units of its edge's length, is a quarter point.
 _ASIDE = 0.2
+# Point forces at a place: one along the normal, two along the face.
+_FORCES = 3
 
 
 @stage("export mesh")
@@ -84,7 +86,6 @@ def per_newton(force: PointForce) -> float:
     return 2 * (1 + force.poisson) / (4 * pi * force.radius)
 
 
-@stage("regular parts")
 def compliances(
     body: BodyMesh,
     region: Region,
@@ -92,7 +93,19 @@ def compliances(
     poisson: float,
     law: MaterialLaw | None = None,
 ) -> FloatArray:
-    """Return the values to tabulate, shape (places, 9); ``law`` gives the tissues of a body with several.
+    """Return the values to tabulate, shape (places, 9): see :func:`each_compliance`."""
+    return np.array(list(each_compliance(body, region, places, poisson, law)))
+
+
+@stage("regular parts")
+def each_compliance(
+    body: BodyMesh,
+    region: Region,
+    places: Sequence[tuple[float, float]],
+    poisson: float,
+    law: MaterialLaw | None = None,
+) -> Iterator[FloatArray]:
+    """Yield the values to tabulate at each place, shape (9,); ``law`` gives the tissues of a body with several.
 
     The values are c (1/m); h, A₁, A_xy (1/m³); and of R (1/m): R_xz, R_yz, the mean of R_xx and R_yy, half their
     difference, R_xy. See ``epsmesh_realtime.table``.
@@ -100,18 +113,16 @@ def compliances(
     Raises:
         SolveError: if a solve fails, or if the mesh is too coarse.
     """
-    centres = [((x, y, 0.0), region.room(x, y)) for x, y in places]
-    down = [PointForce(poisson, *centre) for centre in centres]
-    aside = [SideForce(poisson, *centre, direction) for centre in centres for direction in (0, 1)]
-    parts = list(regular_parts(body, [*down, *aside], law))
-    found = []
-    for number, force in enumerate(down):
-        scale = per_newton(force)
-        pressed, *pulled = parts[number], *parts[len(down) + 2 * number : len(down) + 2 * number + 2]
+    forces: list[PointForce] = []
+    for x, y in places:
+        centre = (x, y, 0.0), region.room(x, y)
+        forces += [PointForce(poisson, *centre), *(SideForce(poisson, *centre, direction) for direction in (0, 1))]
+    parts = regular_parts(body, forces, law)
+    for force, pressed, *pulled in zip(forces[::_FORCES], parts, parts, parts, strict=True):
         at, bent = pressed.at_centre()
         apart, twist = pressed.bends()
-        x, y = (part.at_centre()[0] for part in pulled)
+        along, across = (part.at_centre()[0] for part in pulled)
         # The pressing force points down.
         normal = (-at[2], -bent[2], -apart[2], -twist[2], -at[0], -at[1])
-        found.append(scale * np.array([*normal, (x[0] + y[1]) / 2, (x[0] - y[1]) / 2, (x[1] + y[0]) / 2]))
-    return np.array(found)
+        aside = (along[0] + across[1]) / 2, (along[0] - across[1]) / 2, (along[1] + across[0]) / 2
+        yield per_newton(force) * np.array([*normal, *aside])

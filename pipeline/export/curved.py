@@ -13,7 +13,8 @@ from pipeline.export.full import Solver, Tool
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
-from pipeline.export.tabulate import Places, ratios_of, tabulate
+from pipeline.export.tabulate import Places, counts, ratios_of, tabulate
+from pipeline.run.remaining import format_seconds
 from pipeline.shapes.contact import mean_curvature, paraboloid
 from pipeline.shapes.frame import PlaceError, Vector
 
@@ -58,6 +59,15 @@ def curved_model(
     middle = scope.case.probe.at[:2]
     region, face, off, bend_error = _region_and_face(scope, room, middle)
     ratios = ratios_of(scope.poissons).tolist()
+    least, most = counts(region, _SIZES, sparse=not region.is_round)
+    one = sum(
+        replace(solver, accuracy=share * solver.accuracy).seconds(
+            tool, middle, [_DEPTH * tool.radius], ratios if len(ratios) > 1 else None
+        )
+        for share, tool in _discs(radius)
+    )
+    first, last = (format_seconds(number * one / ranks.comm.size) for number in (least, most))
+    ranks.note(f"{least} to {most} places are to be solved in about {first} to {last}")
     known: dict[tuple[float, float], FloatArray] = {}
     smooth = Table.none(region.reach, is_round=region.is_axial, even=region.even).with_arrays(face.numbers())
 
@@ -126,6 +136,15 @@ def curved_region(scope: Scope, room: float, half: float) -> Region:
     return Region(reach, (reach[0] + 2 * room, reach[1] + 2 * room), room, is_round, even, is_axial=is_round)
 
 
+def _discs(radius: float) -> list[tuple[float, Tool]]:
+    """Return the discs of a place by the study's ``radius``, each with its accuracy as a share of the solver's."""
+    bonded = Tool("disc", radius, contact="bonded", motion="all")
+    return [
+        *((share, Tool("disc", size * radius)) for size, share in zip(RADII, (_FINER, 1.0), strict=True)),
+        (1.0, bonded),
+    ]
+
+
 def _regular(
     solver: Solver, at: tuple[float, float], normal: Vector, radius: float, scope: Scope, ratios: Sequence[float]
 ) -> FloatArray:
@@ -134,13 +153,13 @@ def _regular(
     c and h satisfy d/F = 1/(2aE*) + c + a²h/3 - 2E*h²a⁵/45 for both radii. A₁ and A_xy are 0: second derivatives of R
     do not exist at a force on a curved face. R is the compliance of a bonded disc beyond that on a half-space.
     """
-    radii, rests = [share * radius for share in RADII], []
+    *discs, _ = _discs(radius)
+    radii, rests = [tool.radius for _, tool in discs], []
     planes = 1 / (1 - np.square(ratios))
-    for a, share in zip(radii, (_FINER, 1.0), strict=True):
-        # The study's own materials, or all ratios on one mesh.
-        fulls = replace(solver, accuracy=share * solver.accuracy).press_all(
-            Tool("disc", a), at, [_DEPTH * a], ratios if len(ratios) > 1 else None
-        )
+    several = ratios if len(ratios) > 1 else None  # the study's own materials, or all ratios on one mesh
+    for share, tool in discs:
+        a = tool.radius
+        fulls = replace(solver, accuracy=share * solver.accuracy).press_all(tool, at, [_DEPTH * a], several)
         rests.append(scope.young * _DEPTH * a / np.array([full.force for full in fulls]) - 0.5 / (planes * a))
     (a, b), h = radii, np.zeros(len(ratios))
     for _ in range(_STEPS):

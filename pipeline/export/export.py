@@ -9,11 +9,11 @@ from epsmesh_realtime.model import Model
 from epsmesh_realtime.surface import SurfaceTable
 from pipeline.arrays import FloatArray
 from pipeline.export.checks import TOOLS, Check, check_touches, columns, narrowest, random_touches, with_bar
-from pipeline.export.compliance import coarse_mesh, compliances, law_of
+from pipeline.export.compliance import coarse_mesh, each_compliance, law_of
 from pipeline.export.curved import curved_model
 from pipeline.export.far import far_fields
 from pipeline.export.file import write_model
-from pipeline.export.full import Solver
+from pipeline.export.full import Solver, Tool
 from pipeline.export.near import near_field, with_near
 from pipeline.export.pairs import tabulate_pairs
 from pipeline.export.ranks import ALONE, Ranks
@@ -21,7 +21,9 @@ from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
 from pipeline.export.surface import tabulate_surface
 from pipeline.export.surface_body import surface_body
-from pipeline.export.tabulate import Places, tabulate
+from pipeline.export.tabulate import Places, counts, ratios_of, tabulate
+from pipeline.printable import counted
+from pipeline.run.remaining import format_seconds
 from pipeline.shapes.body import Layered
 
 # Margin beside the sides, in units of half the width or the thickness, whichever is smaller. Largest contact, in units
@@ -32,6 +34,8 @@ MARGIN, LARGEST = 0.15, 0.4
 # fourth power.
 _SHARE, _PRECISE, _PRECISE_CURVED, _PRECISE_TABLE, _BARS = 0.4, 0.05, 0.5, 1.0, (1e-3, 0.03, 0.1)
 _SEEDS = (1, 2)
+# Depth over radius of a touch whose time is estimated.
+_TOUCH = 0.02
 _UNSEEN = "at large displacements there is only a force"
 # Largest distance of a query from a flat face, in units of the thickness.
 _OFF = 1e-6
@@ -106,7 +110,11 @@ def export(
         MeshError, SolveError, RuntimeError: if a mesh, a Green's function or a full solve fails.
     """
     precise = _PRECISE * accuracy if scope.is_flat else _PRECISE_CURVED * accuracy
-    solver = Solver(scope.sections, scope.file, scope.young, precise)
+    solver = Solver(scope.sections, scope.file, scope.young, precise, kept=ranks.kept)
+    size, ratios = scope.case.expected.circumradius, None if scope.poissons[0] == scope.poissons[1] else [scope.poisson]
+    one = solver.seconds(Tool("disc", size), scope.case.probe.at[:2], [_TOUCH * size], ratios)
+    seconds = format_seconds(checks * one / ranks.comm.size)
+    ranks.note(f"{counted(checks, 'full solve')} for the error bar will take about {seconds}")
     make = _flat if scope.is_flat else curved_model
     of_table = replace(solver, accuracy=_PRECISE_TABLE * accuracy)
     bare, error, places = make(scope, of_table, accuracy, largest, (*_BARS, precise), margin, ranks)
@@ -151,17 +159,25 @@ def _flat(
     region = Region.of(scope.body, margin)
     if min(region.reach) <= 0:
         raise ExportError("the body leaves no region: make it wider")
+    if told := too_large(scope, largest * region.room(0.0, 0.0)):
+        ranks.note(f"warning: {told}")
+    (least, most), of = counts(region), counted(len(ratios_of(scope.poissons)), "value")
+    ranks.note(
+        f"{least} to {most} places are to be solved for each of {of} of ν; the first ones tell how long it takes"
+    )
     ranks.note("meshing the body")
     mesh = coarse_mesh(scope.case, region, ranks=ranks)
     solved: list[tuple[float, float]] = []
 
-    def counted(places: Places, poisson: float) -> FloatArray:
+    def found(places: Places, poisson: float) -> FloatArray:
         solved.extend(places)
-        ranks.note(f"places solved: {len(solved)}, ν = {poisson:.3g}")
-        law = law_of(scope, poisson)
-        return np.array(ranks.together(places, lambda some: list(compliances(mesh, region, some, poisson, law))))
+        law, what = law_of(scope, poisson), f"places solved for ν = {poisson:.3g}"
+        given = (region, poisson)
+        return np.array(
+            ranks.keeping(places, lambda some: each_compliance(mesh, region, some, poisson, law), what, given)
+        )
 
-    table, error = tabulate(region, scope.poissons, counted, _SHARE * accuracy)
+    table, error = tabulate(region, scope.poissons, found, _SHARE * accuracy)
     model = Model(
         table,
         np.array([0.0, 0.0, scope.body.heights[1]]),
@@ -176,6 +192,17 @@ def _flat(
         relaxation=scope.relaxation,
     )
     return model, error, len(solved)
+
+
+def too_large(scope: Scope, most: float) -> str:
+    """Return why a model with contact radii up to ``most`` (m) refuses the study's own tool everywhere, "" if not."""
+    size = scope.case.expected.circumradius
+    if size <= most:
+        return ""
+    return (
+        f"the model will refuse the study's own tool: its contact radius is {1e3 * size:.3g} mm, and a model of this "
+        f"body answers up to {1e3 * most:.3g} mm: give a wider and thicker body, or a smaller tool"
+    )
 
 
 def write(exported: Exported, path: Path, scope: Scope, study: Path, version: str) -> None:

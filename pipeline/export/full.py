@@ -8,7 +8,8 @@ from typing import Any
 from mpi4py import MPI
 
 from pipeline.arrays import FloatArray, np
-from pipeline.plan.plan import make_plan
+from pipeline.export.kept import NONE, Kept
+from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.execute import compute
 from pipeline.shapes.tissue import KEYS_OF_LAWS
 from pipeline.study.read import parse
@@ -61,12 +62,24 @@ class Full:
     radius: float = nan
     stiffness: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
+    @property
+    def numbers(self) -> FloatArray:
+        """All of it as one array."""
+        return np.array([self.force, self.error, self.radius, *self.vector, *np.ravel(self.stiffness)])
+
+    @staticmethod
+    def of(numbers: FloatArray) -> "Full":
+        """Return the result with these :attr:`numbers`."""
+        force, error, radius, *rest = numbers.tolist()
+        stiffness = np.array(rest[3:]).reshape(6, 6) if len(rest) > 3 else np.zeros((0, 0))
+        return Full(force, error, np.array(rest[:3]), radius, stiffness)
+
 
 @dataclass(frozen=True)
 class Solver:
     """Full solves on the body of a study with these ``sections``, to a relative ``accuracy``.
 
-    ``law`` are the keys of the law of large displacements, none for linear elasticity.
+    ``law`` are the keys of the law of large displacements, none for linear elasticity. What is solved is ``kept``.
     """
 
     sections: Mapping[str, Any]
@@ -74,6 +87,7 @@ class Solver:
     young: float
     accuracy: float
     law: Mapping[str, Any] = field(default_factory=dict)
+    kept: Kept = field(default=NONE, repr=False, compare=False)
 
     def press(self, tool: Tool, at: tuple[float, ...], depth: float, poisson: float | None) -> Full:
         """Return the force of a tool at x and y, or x, y and z (m), at a ``depth`` (m).
@@ -94,6 +108,25 @@ class Solver:
         Raises:
             RuntimeError: if a solve failed.
         """
+        work = (self, tool, tuple(at), tuple(depths), poissons and tuple(poissons))
+        if (found := self.kept.get(work)) is None:
+            fulls = _solved(
+                self._plan(tool, at, depths, poissons), f"a full solve of a {tool.name} at {[_mm(x) for x in at]}"
+            )
+            self.kept.put(work, np.array([full.numbers for full in fulls]))
+            return fulls
+        return [Full.of(numbers) for numbers in found]
+
+    def seconds(
+        self, tool: Tool, at: tuple[float, ...], depths: Sequence[float], poissons: Sequence[float] | None = None
+    ) -> float:
+        """Return about how long :meth:`press_all` takes (s)."""
+        plan = self._plan(tool, at, depths, poissons)
+        return sum(plan.cost.step(step).seconds for step in plan.meshes)
+
+    def _plan(
+        self, tool: Tool, at: tuple[float, ...], depths: Sequence[float], poissons: Sequence[float] | None
+    ) -> Plan:
         left_out = ("relaxation",) if self.law else ("relaxation", *KEYS_OF_LAWS)
         own = {name: _without(left_out, value) for name, value in self.sections.items() if name in ("body", "material")}
         if poissons is not None:
@@ -101,22 +134,25 @@ class Solver:
         place: dict[str, Any] = {"at": [_mm(x) for x in at], "depth": [_mm(depth) for depth in depths]}
         mesh = {"accuracy": f"{100 * self.accuracy:.6g} %"}
         raw = own | {"probe": tool.section | place, "mesh": mesh, "solve": {"exact": False}}
-        plan = make_plan(parse(raw, file=self.file))
-        records = compute(plan, MPI.COMM_SELF)
-        found = [records[key] for key in plan.keys]
-        for record in found:
-            if not record.is_ok or not isfinite(record.force_error):
-                raise RuntimeError(f"a full solve of a {tool.name} at {place['at']} failed: {record.message}")
-        return [
-            Full(
-                record.force,
-                record.force_error,
-                np.array(record.force_vector),
-                record.contact_radius,
-                np.array(record.stiffness),
-            )
-            for record in found
-        ]
+        return make_plan(parse(raw, file=self.file))
+
+
+def _solved(plan: Plan, what: str) -> list[Full]:
+    records = compute(plan, MPI.COMM_SELF)
+    found = [records[key] for key in plan.keys]
+    for record in found:
+        if not record.is_ok or not isfinite(record.force_error):
+            raise RuntimeError(f"{what} failed: {record.message}")
+    return [
+        Full(
+            record.force,
+            record.force_error,
+            np.array(record.force_vector),
+            record.contact_radius,
+            np.array(record.stiffness),
+        )
+        for record in found
+    ]
 
 
 def _without(keys: Sequence[str], section: Any) -> Any:

@@ -43,7 +43,7 @@ def tabulate(
     known: list[dict[tuple[float, float], FloatArray]] = [{} for _ in ratios]
     table, error = None, np.inf
     used: set[tuple[float, float]] = set()
-    grids = [(size, few) for n, size in enumerate(sizes) for few in ((True, False) if sparse and n else (False,))]
+    grids = _grids(sizes, sparse=sparse)
     for number, (size, few) in enumerate(grids):
         places = _places(region, size, few=few)
         # The first table is never the last, so the nodes of the second are solved with its own.
@@ -66,6 +66,20 @@ def tabulate(
             break
     assert table is not None
     return table, float(error)
+
+
+def counts(region: Region, sizes: Sequence[int] = _SIZES, *, sparse: bool = False) -> tuple[int, int]:
+    """Return the least and the largest number of places that a table of :func:`tabulate` needs."""
+    grids = _grids(sizes, sparse=sparse)
+    least, most = (
+        len({_image(region, place) for place in _places(region, n, few=few)}) for n, few in (grids[1], grids[-1])
+    )
+    return least, most
+
+
+def _grids(sizes: Sequence[int], *, sparse: bool) -> list[tuple[int, bool]]:
+    """Return the tables to try, in turn: the number of intervals, and whether only some of the nodes are solved."""
+    return [(size, few) for n, size in enumerate(sizes) for few in ((True, False) if sparse and n else (False,))]
 
 
 def ratios_of(poissons: tuple[float, float], count: int = _POISSONS) -> FloatArray:

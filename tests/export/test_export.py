@@ -14,6 +14,7 @@ from epsmesh_realtime.table import Table
 from pipeline.export.checks import check_touches, margin, narrowest, random_touches, with_bar, with_full
 from pipeline.export.compliance import coarse_mesh, compliances
 from pipeline.export.curved import curved_model, upright
+from pipeline.export.export import too_large
 from pipeline.export.full import Full, Solver, Tool
 from pipeline.export.ranks import Ranks
 from pipeline.export.region import Region
@@ -163,6 +164,15 @@ def test_a_flat_body_with_a_hollow_region_has_no_model(tmp_path):
 
 def test_the_range_of_poissons_ratio_holds_that_of_the_study():
     assert scope_of(study(material=SOFT | {"poisson": [0.2, 0.4]})).poissons == (0.2, 0.49)
+
+
+@pytest.mark.parametrize(
+    ("radius", "word"),
+    [("2 mm", ""), ("10 mm", "contact radius is 10 mm, and a model of this body answers up to 8 mm")],
+)
+def test_a_model_that_refuses_its_own_tool_is_told_before(radius, word):
+    told = too_large(scope_of(study(probe=DISC | {"radius": radius})), 8e-3)
+    assert (bool(told), word in told) == (bool(word), True)
 
 
 def test_a_study_that_relaxes_makes_a_model_that_does_and_is_solved_as_it_is_at_once():

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.export import far, tabulate
+from pipeline.export import curved, far, tabulate
 from pipeline.export.curved import curved_model
 from pipeline.export.export import export
+from pipeline.export.kept import Kept
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.scope import scope_of
 from tests.export.test_export import CYLINDER, DOME, SOFT, Known, study
@@ -58,6 +59,48 @@ def test_what_fails_on_one_rank_is_raised_on_all(share):
 def test_ranks_that_ask_for_different_work_are_told_so():
     with pytest.raises(RuntimeError, match="disagree on the number"):
         squares("together", 3 + WORLD.comm.rank)
+
+
+class Stopped(Exception):
+    """In place of a kill."""
+
+
+@pytest.mark.parametrize("body", [CYLINDER, pytest.param(DOME, marks=pytest.mark.nightly)])
+def test_an_export_that_was_killed_goes_on_from_there(monkeypatch, tmp_path, body):
+    """Nothing is solved twice, and the model is right; the files are removed when it is done."""
+    if WORLD.comm.size > 1:
+        pytest.skip("of one rank")
+    for module, name, value in ((tabulate, "_SIZES", (2, 4)), (tabulate, "_POISSONS", 1), (curved, "_SIZES", (1, 2))):
+        monkeypatch.setattr(module, name, value)
+    scope = replace(scope_of(study(body=body)), sections={"body": body, "material": SOFT}, poissons=(0.45, 0.45))
+    put, kept = Kept.put, list[object]()
+
+    def made(most: int):
+        def counted(self, work, array):
+            put(self, work, array)
+            kept.append(repr(work))
+            if len(kept) >= most:
+                raise Stopped
+
+        monkeypatch.setattr(Kept, "put", counted)
+        keepers.append(Kept(tmp_path / "m.epsm", scope))
+        ranks = Ranks(MPI.COMM_SELF, told.append, keepers[-1])
+        return export(scope, 0.1, 4, margin=0.5, ranks=ranks)
+
+    told, keepers = list[str](), list[Kept]()
+    with pytest.raises(Stopped):
+        made(5)
+    (part,) = tmp_path.iterdir()
+    with part.open("ab") as file:
+        file.write(b'{"key": "torn')
+    again = made(1000)
+    assert len(kept) == len({*kept}) > 7
+    assert any("full solves for the error bar will take about" in line for line in told)
+    assert any("left" in line for line in told)
+    assert max(abs(check.error) for check in again.judged) < 0.02
+    for one in keepers:
+        one.remove()
+    assert not [*tmp_path.iterdir()]
 
 
 @several
