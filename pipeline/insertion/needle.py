@@ -54,6 +54,7 @@ class NeedleScene(InsertionScene[Needle]):
         if cut is None:
             return Path(message=message)
         steps, punctures, press = [Step(INDENTATION, 0.0, 0.0)], list[Puncture | None](), None
+        reached: Step | None = None
         for number, top in enumerate(cut.tops):
             punctures.append(None)
             if number:
@@ -68,6 +69,7 @@ class NeedleScene(InsertionScene[Needle]):
             if pierced is None:
                 message = why or message
                 steps += self._presses(press, end)
+                reached = press.step(min(press.deepest, end)) if message else None
                 break
             if number and pierced == self._touch(press):
                 continue
@@ -77,7 +79,7 @@ class NeedleScene(InsertionScene[Needle]):
         else:
             steps += self._cuts(cut, steps[-1], end)
         back = self._withdrawn(cut, press, steps[-1]) if any(punctures) and not message else []
-        return Path(self._own(steps), tuple(punctures), message, self._own(back))
+        return Path(self._own(steps), tuple(punctures), message, self._own(back), reached=reached)
 
     def _own(self, steps: list[Step]) -> tuple[Step, ...]:
         """Return the steps at the depths of the path, from the surface down."""
@@ -171,7 +173,26 @@ class NeedleScene(InsertionScene[Needle]):
             if not isinstance(one, str):
                 press = Press(Pressed.of(found | {depth: one}), arrived, added)
             why = ""
+        elif why and press.is_reached:
+            why = self._too_tough(cut, press, number)
         return press, why
+
+    def _too_tough(self, cut: NeedleCut, press: Press, number: int) -> str:
+        """Return why tissue below a ``number`` of layers is not pierced where load steps end, and what would be.
+
+        What a cut takes goes like a power of the toughness Γ. Its exponent is the share of the work of fracture, since
+        the length of the crack makes the energy least. By dimensions, half of Γ is as good as twice the radius.
+        """
+        depth, layer = press.deepest, cut.layers[number]
+        has, takes = press.energy(depth)[0], cut.energy(depth) - cut.energy(press.arrived.depth)
+        share = (has / takes) ** (layer.force / layer.torn)
+        toughness = self.layers[number].toughness
+        return (
+            f"{1e3 * depth:.3g} mm: the tissue folds before it is pierced: too tough for this law and tool. It stores "
+            f"{1e3 * has:.3g} mJ, and a cut takes {1e3 * takes:.3g} mJ. Tissue of about {share * toughness:.2g} J/m^2 "
+            f"would be pierced (here {toughness:.4g} J/m^2), or by a tool {1 / share:.2g} times as wide. With a law "
+            "that stiffens more (Ogden: a larger alpha) the tool can be pressed deeper"
+        )
 
     def _touch(self, press: Press) -> float:
         return press.arrived.depth + _TOUCH * self.tool.limit

@@ -67,6 +67,7 @@ class Path:
     The punctures are those of the layers from the surface down, None for one that is not pierced from a state of
     indentation. Without any, the tissue stays whole. The ``withdrawal``, if any, has steps at the same depths.
     ``message`` says at which depth the path ended early, and why; ``is_pending`` that states are still to be solved.
+    ``reached`` is the last step that is known of a path whose load steps ended, at a depth of its own.
     """
 
     steps: tuple[Step, ...] = ()
@@ -74,6 +75,7 @@ class Path:
     message: str = ""
     withdrawal: tuple[Step, ...] = ()
     is_pending: bool = False
+    reached: Step | None = None
 
     @property
     def status(self) -> str:

@@ -84,6 +84,9 @@ def along_path(dataset: xr.Dataset, plan: Plan, records: Mapping[str, Record]) -
     for number, name in enumerate(AT_PUNCTURE):
         what = f"{attributes(name)['long_name']}; on both sides of the puncture"
         variables[f"{name}_at_puncture"] = variable(name, both[..., number], *of_puncture, "side", long_name=what)
+    reached = [(path.reached.depth, path.reached.force) if path.reached else (np.nan, np.nan) for path in found]
+    for name, ends in zip(("depth_reached", "force_reached"), zip(*reached, strict=True), strict=True):
+        variables[name] = variable(name, ends)
     for name in ("status", "message"):
         texts = np.array([getattr(path, name) for path in found], dtype=object)
         variables[name] = variable(name, texts)

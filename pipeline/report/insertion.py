@@ -36,9 +36,9 @@ def _lines(dataset: xr.Dataset) -> Iterator[str]:
         where = f" of layer {number}" if number > 1 else ""
         yield f"puncture{where} at {depth} ± {bar}, F = {force:.4g} ± {of_force:.2g} mN"
     if not pierced.sizes["puncture"]:
-        yield f"the tissue stays whole down to {write('depth', float(last['depth']))}: F is {_force(last)} there"
+        yield f"the tissue stays whole down to {write('depth', float(last['depth']))}: F is {_last(last)}"
     elif PHASES[int(last["phase"])] == INDENTATION:
-        yield f"a tougher layer is indented down to {write('depth', float(last['depth']))}: F is {_force(last)} there"
+        yield f"a tougher layer is indented down to {write('depth', float(last['depth']))}: F is {_last(last)}"
     else:
         parts = ", ".join(
             f"{part} {1e3 * float(last[f'force_{part}']):.4g}" for part in ("elastic", "cutting", "friction")
@@ -49,6 +49,13 @@ def _lines(dataset: xr.Dataset) -> Iterator[str]:
         yield f"withdrawal: F from {pulled[-1]:.4g} to {pulled[0]:.4g} mN, at least {pulled.min():.4g} mN"
     worst = float(np.nanmax(np.abs(whole["energy_balance"].values)))
     yield f"work is stored energy + fracture + friction within {100 * worst:.2g} %"
+
+
+def _last(step: xr.Dataset) -> str:
+    """Return the force at the last step, and where load steps ended beyond it."""
+    depth, force = (float(step[f"{name}_reached"]) for name in ("depth", "force"))
+    further = f", and {1e3 * force:.4g} mN at {1e3 * depth:.4g} mm, the last depth solved" if np.isfinite(depth) else ""
+    return f"{_force(step)} there{further}"
 
 
 def _force(step: xr.Dataset) -> str:

@@ -1,5 +1,6 @@
 """Insertion of a round needle: paths through states with closed forms, and what is refused."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 from math import nan, pi
@@ -11,10 +12,11 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from pipeline import workflow
-from pipeline.insertion.paths import paths, possible
+from pipeline.insertion.paths import followed, paths, possible
 from pipeline.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
+from pipeline.report.insertion import answer
 from pipeline.run.record import Record
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
@@ -111,7 +113,23 @@ def test_a_puncture_before_the_depth_that_load_steps_reached_is_found():
     assert found[1.5e-3].punctures[0].depth == pytest.approx(free.depth, rel=2e-3)
     short = found[1.03e-3]
     assert (short.punctures, short.status) == ((None,), PARTIAL)
-    assert short.message.startswith("2 mm: ") and short.steps[-1].depth == 1e-3
+    assert short.steps[-1].depth == 1e-3
+
+
+def test_tissue_too_tough_for_the_depth_that_load_steps_reached_names_a_toughness_that_is_pierced():
+    """What is known there is kept, though it is at no depth of the path."""
+    fails, end = lambda solve: solve.case.probe.depth > 1.03e-3, 0.99 * 1.03e-3
+    plan, records = solved(scene(), fails=fails, reached=1.03e-3)
+    ((short, _),) = followed(plan, records)
+    known = build(plan, records)
+    assert known["depth_reached"].item() == pytest.approx(end, rel=1e-3)
+    assert known["force_reached"].item() == pytest.approx(STIFFNESS * end**2, rel=1e-3)
+    assert short.message.startswith("1.02 mm: the tissue folds before it is pierced: too tough")
+    (toughness,) = re.findall(r"about (\S+) J/m\^2 would be pierced \(here 5 J", short.message)
+    assert 0.5 < float(toughness) < 5
+    weaker = path_of(scene(toughness=f"{toughness} J/m^2"), fails=fails, reached=1.03e-3)
+    assert weaker.status == OK and weaker.punctures[0] and weaker.reached is None
+    assert any("the last depth solved" in line for line in answer(known))
 
 
 def test_the_shaft_cuts_at_a_constant_force_and_its_friction_grows(path):
