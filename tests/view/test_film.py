@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+import xarray as xr
+from matplotlib.figure import Figure
 from PIL import Image
 
 from pipeline.report.dataset import build
 from pipeline.study.read import read_mapping
 from pipeline.view.blade_pictures import BladePictures
-from pipeline.view.film import frames_of, write_film
+from pipeline.view.film import Frame, frames_of, write_film
 from pipeline.view.needle_pictures import NeedlePictures
 from pipeline.view.section import Section
 from tests.insertion import test_needle as needles
@@ -23,6 +25,7 @@ def test_a_needle_is_pressed_drawn_in_its_crack_and_pulled_out(tmp_path):
     needle = study.tool(case)
     pressed = {1e-3: Section(np.zeros((1, 3, 2)), np.zeros((1, 3, 2)), np.zeros((1, 3)))}
     half = NeedlePictures.half_length(path, needle)
+    assert NeedlePictures.reach(path) == 1  # though the crack is below a tip that is pulled out
     assert half == pytest.approx(needles.TORN / (2 * needle.toughness), rel=1e-3)
     across = NeedlePictures.across(case, needle, 4 * needle.limit)
     assert np.abs(across.at(1.0)[..., 1]).max() > 2 * needle.limit
@@ -33,6 +36,33 @@ def test_a_needle_is_pressed_drawn_in_its_crack_and_pulled_out(tmp_path):
         assert film.n_frames == len(list(frames_of(path)))
         film.seek(film.n_frames - 1)
         assert np.asarray(film.convert("L")).std() > 20
+
+
+def test_a_ring_crack_is_drawn_as_far_as_its_front_and_round_across(tmp_path):
+    """Nearly incompressible tissue: circles at rest keep their area beyond the hole that is opened to the shaft."""
+    study = needles.scene(shape="disc", edge="0.1 mm", insertion={"to": "6 mm", "steps": 2})
+    case = next(study.cases())
+    needle = study.tool(case)
+    known = {"depth": ("depth", [3e-3, 6e-3]), "puncture_depth": 1e-3}
+    radius = 0.4e-3
+    for name, values in {
+        "crack_depth": [6e-3, 12e-3],
+        "force_cutting": [4 * np.pi * radius * needle.toughness] * 2,
+    }.items():
+        known[name] = ("depth", values)
+    path = xr.Dataset(known)
+    assert (NeedlePictures.reach(path), NeedlePictures.half_length(path, needle)) == pytest.approx((2, radius))
+    across = NeedlePictures.across(case, needle, radius, is_ring=True)
+    before, after = (np.hypot(*np.moveaxis(across.at(share), -1, 0)) for share in (0.0, 1.0))
+    assert (before.min(), after.min()) == pytest.approx((radius, needle.limit), rel=1e-3)
+    grown = after**2 - before**2
+    near = before < 2 * radius
+    assert grown[near] == pytest.approx(needle.limit**2 - radius**2, rel=0.2)
+    pressed = {1e-3: Section(np.zeros((1, 3, 2)), np.zeros((1, 3, 2)), np.zeros((1, 3)))}
+    figure = Figure()
+    panels = ax, _ = figure.subplots(1, 2)
+    NeedlePictures(path, needle, pressed, across, radius).draw(panels, Frame(6e-3, "cutting", 1.0, 12e-3))
+    assert min(line.get_ydata().min() for line in ax.lines) == pytest.approx(-12) and ax.get_ylim()[0] < -12
 
 
 def test_the_intact_body_of_a_path_that_ended_early_is_drawn_at_the_share_of_the_depth_it_was_solved_at(tmp_path):

@@ -40,6 +40,8 @@ MESHES = (HoleMesh(4, 1e3), HoleMesh(8, 3e3))
 DEGREE = 3
 # The first growth of the area, and the factor to the next one.
 _FIRST, _FACTOR = 1e-2, 1.5
+# In a picture: the extent of the body, in radii of the opened hole, and points of a quarter of a circle.
+_SHOWN, _ANGLES = 8.0, 13
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +59,7 @@ def open_hole(law: MaterialLaw, mesh: HoleMesh, is_enough: Callable[[Hole], bool
     Raises:
         SolveError: if a state before cannot be solved.
     """
-    with stage("meshing"):
-        meshed = meridian_mesh(slice_round_hole(mesh.extent, mesh.columns))
-    with stage("assembly"):
-        forms = MeridianForms({0: meshed}, DEGREE, law)
-    dofs, places = forms.on(FACE)
-    free = np.setdiff1d(np.arange(forms.dofs), forms.on(LEVEL)[0][:, 1])
-    tissue = MeridianTissue(FreeSystem(forms, free), dofs, places)
+    tissue = _slice(law, mesh)
     path, found = ContactPath(Stage(0.0, np.zeros_like(tissue.state))), list[tuple[float, float, float, float]]()
     growth = _FIRST
     while len(found) < 2 or not is_enough(_hole(found)):
@@ -75,10 +71,51 @@ def open_hole(law: MaterialLaw, mesh: HoleMesh, is_enough: Callable[[Hole], bool
         assert touched is not None
         # Forms are per radian, and the slice is as high as the hole is wide: the whole is 2π times, over π.
         force = float(touched.pressed.sum())
-        state = growth, 2 * forms.energy(tissue.state), force / np.sqrt(1 + growth), tissue.unbalanced() / force
+        state = (
+            growth,
+            2 * tissue.system.forms.energy(tissue.state),
+            force / np.sqrt(1 + growth),
+            tissue.unbalanced() / force,
+        )
         found.append(state)
         growth *= _FACTOR
     return _hole(found)
+
+
+def section(law: MaterialLaw, across: float) -> tuple[FloatArray, FloatArray]:
+    """Return a quarter of the section of a hole that is opened to ``across`` times its radius.
+
+    That is triangles (n, 3, 2) at rest, and displacements (n, 3, 2).
+
+    Raises:
+        SolveError: if it cannot be opened so far.
+    """
+    tissue = _slice(law, HoleMesh(MESHES[0].columns, _SHOWN * across))
+    path = ContactPath(Stage(0.0, np.zeros_like(tissue.state)))
+    steps = max(round(np.log((across**2 - 1) / _FIRST) / np.log(_FACTOR)), 1)
+    for growth in np.geomspace(_FIRST, across**2 - 1, steps + 1):
+        press(tissue, lambda wider: _cylinder(tissue, wider), path, np.sqrt(1 + growth) - 1)
+    dofs, places = tissue.system.forms.on(LEVEL)
+    radii, first = np.unique(places[:, 0].round(9), return_index=True)
+    moved = path.last.state[dofs[first, 0]]
+    angles = np.linspace(0.0, np.pi / 2, _ANGLES)
+    ends = np.array([((0, 0), (1, 0), (1, 1)), ((0, 0), (1, 1), (0, 1))])  # of a ring and a sector, two triangles
+    ring, sector = np.meshgrid(np.arange(len(radii) - 1), np.arange(_ANGLES - 1), indexing="ij")
+    rings, turns = (ends[..., n] + each.reshape(-1, 1, 1) for n, each in enumerate((ring, sector)))
+    rays = np.stack([np.cos(angles), np.sin(angles)], axis=-1)[turns.reshape(-1, 3)]
+    rings = rings.reshape(-1, 3)
+    return radii[rings][..., None] * rays, moved[rings][..., None] * rays
+
+
+def _slice(law: MaterialLaw, mesh: HoleMesh) -> MeridianTissue:
+    """Return a slice of tissue at rest, seen from the nodes of the hole."""
+    with stage("meshing"):
+        meshed = meridian_mesh(slice_round_hole(mesh.extent, mesh.columns))
+    with stage("assembly"):
+        forms = MeridianForms({0: meshed}, DEGREE, law)
+    dofs, places = forms.on(FACE)
+    free = np.setdiff1d(np.arange(forms.dofs), forms.on(LEVEL)[0][:, 1])
+    return MeridianTissue(FreeSystem(forms, free), dofs, places)
 
 
 def _hole(found: list[tuple[float, float, float, float]]) -> Hole:
