@@ -1,7 +1,8 @@
 """Code blocks of the documentation, with the comments that say how the tests run them.
 
 ``<!-- test: replace A with B -->``, ``<!-- test: status 2 -->`` and ``<!-- test: not run: why -->`` stand directly
-above the block; all other blocks run as they are.
+above the block; all other blocks run as they are. A TOML block is a whole study, or has
+``<!-- test: part of a study: NAME -->``, the study that ``epsmesh new NAME`` writes and into which it is put.
 """
 
 import re
@@ -26,6 +27,7 @@ class Block:
     expected: tuple[str, ...] = ()
     status: int = 0
     why_not: str = ""
+    part_of: str = ""
 
     def __str__(self) -> str:
         return f"{self.page.relative_to(ROOT)}:{self.line}"
@@ -50,12 +52,14 @@ def blocks(page: Path, languages: tuple[str, ...] = (*SHELLS, PYTHON)) -> list[B
 
 
 def _block(page: Path, line: int, language: str, code: str, marks: list[str]) -> Block:
-    status, why_not = 0, ""
+    status, why_not, part_of = 0, "", ""
     for mark in marks:
         if mark.startswith("not run: "):
             why_not = mark.removeprefix("not run: ")
         elif mark.startswith("status "):
             status = int(mark.removeprefix("status "))
+        elif mark.startswith("part of a study: "):
+            part_of = mark.removeprefix("part of a study: ")
         else:
             old, new = re.fullmatch(r"replace (.+?) with (.+)", mark).groups()  # type: ignore[union-attr]
             assert old in code, f"{page}:{line}: the block below does not hold {old!r}"
@@ -65,7 +69,7 @@ def _block(page: Path, line: int, language: str, code: str, marks: list[str]) ->
         lines = code.splitlines()
         code = "\n".join(text.removeprefix("$ ") for text in lines if text.startswith("$ "))
         expected = tuple(text for text in lines if not text.startswith("$ "))
-    return Block(page, line, language, code, expected, status, why_not)
+    return Block(page, line, language, code, expected, status, why_not, part_of)
 
 
 def missing(expected: tuple[str, ...], output: str) -> str:

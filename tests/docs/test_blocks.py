@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.report.dataset import write
+from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
 from pipeline.study.starter import starter
 from tests.docs.blocks import PYTHON, ROOT, blocks, missing, pages
@@ -92,29 +93,21 @@ def test_blocks_of_a_page_run(page, checkout):
             assert not absent, f"{block}: no line {absent!r} in\n{done.stdout}\n{done.stderr}"
 
 
-_PARTS = {"body", "material", "probe", "mesh"}
 _PIECES = [block for page in pages() for block in blocks(page, ("toml",))]
 
 
-@pytest.fixture(scope="module")
-def begun():
-    """The text of the study that ``epsmesh new`` writes."""
-    return starter("mine")
-
-
 @pytest.mark.parametrize("block", _PIECES, ids=str)
-def test_pieces_of_studies_are_valid(block, begun):
-    """Each, put into the study that ``epsmesh new`` writes, makes a study, in the folder of the project's own.
-
-    One with body, tissue, tool and mesh is a study by itself.
-    """
-    pieces = tomllib.loads(block.text)
-    is_study = pieces.keys() >= _PARTS and "shape" in pieces["probe"]
-    study = {} if is_study else tomllib.loads(begun)
-    for name, piece in pieces.items():
+def test_each_toml_block_is_a_study_or_says_which_study_it_is_a_part_of(block):
+    """It is read in the folder of the project's own studies."""
+    given = tomllib.loads(block.text)
+    study = tomllib.loads(starter(block.part_of)) if block.part_of else {}
+    for name, piece in given.items():
         whole = not isinstance(piece, dict) or "shape" in piece
         study[name] = piece if whole else {**study.get(name, {}), **piece}
     assert parse(study, file=str(ROOT / "studies" / "mine.toml")).shape
+    if block.part_of:
+        with pytest.raises(StudyError):
+            parse(given, file=str(ROOT / "studies" / "mine.toml"))
 
 
 def test_few_blocks_are_not_run_and_all_say_why():

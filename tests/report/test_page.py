@@ -2,9 +2,11 @@
 
 import json
 import re
+import shlex
 import subprocess
 import sys
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,12 +18,15 @@ from pipeline.report.figures import choose, draw
 from pipeline.report.guide import USUAL_ACCURACY, guide, guide_if_any
 from pipeline.report.page import render, write_page
 from pipeline.report.page.cases import case_table
+from pipeline.report.page.facts import reproduce
 from pipeline.report.read import read_file
 from pipeline.report.table import case_at, study_of
 from tests.cases import BLADE, raw
 from tests.commands import epsmesh
 from tests.report import chosen
 from tests.report.synthetic import dataset
+
+ROOT = Path(__file__).parents[2]
 
 NASTY = """</script><script>alert(1)</script><b onclick="x">&amp; "quoted" 'text' \u2028"""
 # As a name may be: a formula that is none, ends of elements, and what keeps a script's element from ending.
@@ -225,6 +230,21 @@ def test_commands_take_a_study_file(tmp_path):
     assert "changed since" not in epsmesh("report", study, "--output", tmp_path).stderr
     done = epsmesh("report", study, "--figures", "--output", tmp_path)
     assert done.stdout.split() == [str(tmp_path / f"small.{suffix}") for suffix in ("png", "svg")]
+
+
+@pytest.mark.parametrize("is_own", [True, False])
+def test_the_commands_that_run_it_again_name_a_file_that_is_there(is_own, tmp_path):
+    """The project's own studies are named by their path in a clone, others by their path."""
+    text = (ROOT / "studies/quick.toml").read_text() + ("" if is_own else "# mine")
+    (tmp_path / "a b").mkdir()
+    (tmp_path / "a b/quick.toml").write_text(text)
+    commands = reproduce(
+        dataset().assign_attrs(study=text, study_folder=str(tmp_path / "a b"), study_file="quick.toml"), "quick"
+    )
+    (run,) = (shlex.split(line) for line in commands if " run " in line)
+    (file,) = (word for word in run if word.endswith(".toml"))
+    assert not Path(file).is_absolute() if is_own else file == str(tmp_path / "a b/quick.toml")
+    assert (ROOT / file).read_text() == text
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ def test_a_ring_crack_is_drawn_as_far_as_its_front_and_round_across(tmp_path):
     figure = Figure()
     panels = ax, _ = figure.subplots(1, 2)
     NeedlePictures(path, needle, pressed, across, radius).draw(panels, Frame(6e-3, "cutting", 1.0, 12e-3))
-    assert min(line.get_ydata().min() for line in ax.lines) == pytest.approx(-12) and ax.get_ylim()[0] < -12
+    assert min(min(line.get_ydata()) for line in ax.lines) == pytest.approx(-12) and ax.get_ylim()[0] < -12
 
 
 def test_the_intact_body_of_a_path_that_ended_early_is_drawn_at_the_share_of_the_depth_it_was_solved_at(tmp_path):

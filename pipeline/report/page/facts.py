@@ -4,6 +4,7 @@ import json
 import re
 from collections import defaultdict
 from datetime import datetime
+from pathlib import Path
 from shlex import quote
 from typing import Any
 
@@ -18,6 +19,7 @@ from pipeline.states import FAILED, LOST, OK, PARTIAL, PENDING, SKIPPED
 
 # Of git, with a sign for changes that were not committed.
 _COMMIT = re.compile(r"[0-9a-f]{7,64}\+?")
+_STUDIES = Path(__file__).resolve().parents[3] / "studies"
 # Cases that a message names; the table shows all of them.
 _MOST_NAMED = 5
 _STATES = {
@@ -122,12 +124,22 @@ def provenance(dataset: xr.Dataset) -> list[tuple[str, str]]:
     return versions + [(text, attributes[name]) for name, text in known if attributes.get(name)]
 
 
+def study_path(dataset: xr.Dataset, name: str) -> str:
+    """Return the path of the dataset's study in a command: one of the project's studies by its path in a clone.
+
+    The command is to be pasted into a shell, and the dataset may be a stranger's: the path is quoted.
+    """
+    attributes = dataset.attrs
+    file = Path(str(attributes.get("study_folder", "."))) / str(attributes.get("study_file", f"{name}.toml"))
+    own = _STUDIES / file.name
+    is_own = own.is_file() and own.read_text(encoding="utf-8") == attributes.get("study")
+    return quote(str(own.relative_to(_STUDIES.parent) if is_own else file))
+
+
 def reproduce(dataset: xr.Dataset, name: str) -> list[str]:
     """Return the commands that make the dataset and this page again."""
     commit = str(dataset.attrs.get("git_commit", ""))
     ranks = str(dataset.attrs.get("ranks", "1"))
-    # These lines are to be pasted into a shell, and the dataset may be a stranger's.
-    file = quote(str(dataset.attrs.get("study_file", f"{name}.toml")))
     lines = []
     if _COMMIT.fullmatch(commit):
         changed = "  # and changes that were not committed" if commit.endswith("+") else ""
@@ -136,7 +148,7 @@ def reproduce(dataset: xr.Dataset, name: str) -> list[str]:
     return [
         *lines,
         "make setup",
-        f"{launcher}.venv/bin/epsmesh run {file} --fresh",
+        f"{launcher}.venv/bin/epsmesh run {study_path(dataset, name)} --fresh",
         f".venv/bin/epsmesh report {quote(f'results/{name}.nc')}",
     ]
 

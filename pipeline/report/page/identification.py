@@ -12,7 +12,7 @@ from pipeline.pages import joined, render_page
 from pipeline.report.figures.identification import identification
 from pipeline.report.figures.style import STYLE, stack
 from pipeline.report.identified import answer, bar, hidden_words, material, parts, title, wanted, written
-from pipeline.report.page.facts import provenance
+from pipeline.report.page.facts import provenance, study_path
 from pipeline.report.page.inline import inline_svg
 from pipeline.study.identified import FITS
 
@@ -29,7 +29,6 @@ def render(dataset: xr.Dataset, name: str) -> str:
     is_one = "file" not in dataset.dims
     fits = not is_one or dataset.attrs["verdict"] == FITS
     columns, rows = _of_one(dataset) if is_one else _of_files(dataset)
-    file = quote(str(dataset.attrs.get("study_file", f"{name}.toml")))
     return render_page(
         _TEMPLATES / "identification.html.j2",
         "",
@@ -44,7 +43,7 @@ def render(dataset: xr.Dataset, name: str) -> str:
         parts=[parts(dataset, one) for one in wanted(dataset)] if is_one and fits else [],
         material=material(dataset),
         study=str(dataset.attrs.get("study", "")),
-        commands=[f"epsmesh identify {file}", f"epsmesh report {quote(f'results/{name}.nc')}"],
+        commands=[f"epsmesh identify {study_path(dataset, name)}", f"epsmesh report {quote(f'results/{name}.nc')}"],
         provenance=provenance(dataset),
     )
 

@@ -146,7 +146,7 @@ function curves(x, y) {
       showlegend: isFirst,
       x: rows.map((row) => (x.words ? place(x, x.values[row]) : x.values[row])),
       y: rows.map((row) => y.values[row]),
-      text: rows.map((row) => escaped(`case ${row}: ${nameOf(columns.filter((c) => c.is_axis).map(alone), row)}`)),
+      text: rows.map((row) => escaped(`case ${byName.get("case").values[row]}: ${nameOf(columns.filter((c) => c.is_axis).map(alone), row)}`)),
       error_y: bars ? { array: rows.map((row) => (y.values[row] * bars.values[row]) / 100), thickness: 1 } : undefined,
       line: { color: style(`--curve-${(number % 7) + 1}`), dash: number < 7 ? "solid" : "dash" },
       marker: { symbol: number % 7 },
