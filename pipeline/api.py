@@ -145,6 +145,7 @@ class RunnableStudy:
         """
         from pipeline import workflow  # noqa: PLC0415 (MPI starts as it is imported)
         from pipeline.mesh.generate import MeshError  # noqa: PLC0415
+        from pipeline.run.at_its_depth import at_its_depth  # noqa: PLC0415
         from pipeline.run.case_solution import CaseSolution  # noqa: PLC0415
         from pipeline.run.mesh_cache import MeshCache  # noqa: PLC0415
         from pipeline.run.problem import CaseFailure  # noqa: PLC0415
@@ -159,7 +160,10 @@ class RunnableStudy:
         cache, agreed = MeshCache(Path(meshes)) if meshes else None, (CaseFailure, MeshError, SolveError)
         try:
             with workflow.abort_on_exception(comm, *agreed):
-                solved = solve_fields(solve_alone(self.declared, case), comm, cache=cache)
+                study, case, unreached = at_its_depth(self.declared, case, comm)
+                if unreached:
+                    raise CaseFailure(unreached)
+                solved = solve_fields(solve_alone(study, case), comm, cache=cache)
         except agreed as failure:
             raise RuntimeError(f"{case}: {failure}") from failure
         if solved.record.status in FAILURES:

@@ -82,6 +82,11 @@ def _probe(**keys: Any) -> Callable[[Study], None]:
     return change
 
 
+def _given_force(study: Study) -> None:
+    study["probe"]["force"] = "5 mN"
+    study["probe"].pop("depth", None)
+
+
 def _insertion(study: Study) -> None:
     _probe(**_BLADE, contact="unilateral", toughness="5 J/m^2", insertion={"to": "5 mm", "steps": 2})(study)
     del study["probe"]["depth"]
@@ -250,6 +255,7 @@ FEATURES = (
     Feature("path", "place", _path),
     Feature("tilted", "tilt", _update("probe", axis=[0.1736, 0.0, -0.9848])),
     Feature("six motions", "motion", _update("probe", motion="all")),
+    Feature("given force", "depth", _given_force),
     Feature("2 mm deep", "depth", _update("probe", depth="2 mm")),
     Feature("degree 1", "degree", _update("mesh", degree=1)),
     Feature("degree 3", "degree", _update("mesh", degree=3)),
@@ -327,6 +333,7 @@ def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> 
     from mpi4py import MPI
 
     from pipeline.run.execute import compute
+    from pipeline.run.given_force import with_depths
 
     try:
         plan = make_plan(study)
@@ -334,9 +341,12 @@ def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> 
     except Exception:
         return done("traceback", traceback.format_exc(limit=-3), seconds=time.process_time() - start)
     seconds = time.process_time() - start
+    plan = with_depths(plan, records)
     for key in (*plan.keys, *plan.reference_keys):
         if key and not records[key].is_ok:
             return done("failed", records[key].message, seconds=seconds)
+    if unreached := [found.message for found in plan.found_depths.values() if found.message]:
+        return done("failed", unreached[0], seconds=seconds)
     first = records[plan.keys[0]]
     outcome = "taken" if math.isfinite(first.force) and math.isfinite(first.force_error) else "failed"
     return done(outcome, "" if outcome == "taken" else "no finite force", first.force, first.force_error, seconds)

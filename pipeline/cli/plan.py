@@ -231,9 +231,11 @@ def _list_steps(steps: list[dict[str, Any]], most: int | None) -> None:
 def _tell(made: "Plan", records: "dict[str, Record]", case: "Case") -> None:
     """Print one case's story."""
     from pipeline.plan.describe import story
+    from pipeline.run.given_force import at_force, with_depths
 
+    made = with_depths(made, records)
     found = story(made, case.index)
-    record = records.get(found["key"])
+    record = at_force(made, made.study.case(case.index), records.get(found["key"]))
     if record:
         found["record"] = {
             "status": record.status,

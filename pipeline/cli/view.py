@@ -152,6 +152,7 @@ def fields_of(
 ) -> "Fields | None":
     """Return the case's fields for an ``export``, on the first rank; if it cannot be computed, exit on all of them."""
     from pipeline.mesh.generate import MeshError
+    from pipeline.run.at_its_depth import at_its_depth
     from pipeline.run.mesh_cache import MeshCache
     from pipeline.run.problem import CaseFailure
     from pipeline.run.solved import solve_alone
@@ -164,6 +165,9 @@ def fields_of(
     note = error if comm.rank == 0 else lambda _: None
     note(str(case))
     try:
+        study, case, unreached = at_its_depth(study, case, comm)
+        if unreached:
+            raise CaseFailure(unreached)
         solve = solve_alone(study, case)
         wanted = {"bar": export in ("html", "sofa"), "stress": export in ("vtu", "xdmf")}
         return compute_fields(solve, comm, mesh_only=mesh_only, cache=MeshCache(meshes), note=note, **wanted)

@@ -28,6 +28,8 @@ _UNPHYSICAL = ("action", "toughness", "insertion", "crack_shape")
 _MANY = 200_000  # sections of a large study
 # Keys of what follows from the elastic force without a solve: pipeline/report/history.py.
 _OF_TIME = ("history", "relaxation")
+# Keys that no record depends on: a record has a depth, and not the force for which it was tried.
+_NOT_SOLVED = (*_OF_TIME, "force")
 
 
 def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
@@ -224,7 +226,7 @@ def digest(text: str) -> str:
 @lru_cache(_MANY)
 def text_of(section: Section, without: tuple[str, ...] = ()) -> str:
     """Return a section in canonical form, ``without`` some of its keys."""
-    return _text({key: value for key, value in section.model_dump().items() if key not in (*without, *_OF_TIME)})
+    return _text({key: value for key, value in section.model_dump().items() if key not in (*without, *_NOT_SOLVED)})
 
 
 def _mesh_text(mesh: Mesh, is_full: bool, half_width: float, element: str) -> str:

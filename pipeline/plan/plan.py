@@ -36,6 +36,10 @@ __all__ = [
 EXACT, _EXACT_SHARE = 1e-3, 0.3
 # A slit has many edges: an error of 1e-3 would need three times the cells and ten times the time.
 EXACT_OF_SLIT = 3e-3
+_SEEKS = (
+    "Forces are given: these solves are at the expected depths. Further ones follow, until the depth of each case is "
+    "found: none where F is proportional to the depth, else mostly three to five. F_exact is at the depths found."
+)
 _LOST = "Places where the tool does not touch the body need no solve."
 
 
@@ -78,9 +82,14 @@ def make_plan(
             if name not in left_out:
                 plan = reduction(plan)
                 plan = replace(plan, used=plan.used | {name})
-    plan = ask_for_exact(plan)
+    plan = _seeking(plan) if study.seeks_depths else ask_for_exact(plan)
     plan = take(first_attempts(plan), shard) if shard is not None else ask_for_ends(plan, without)
     return first_attempts(leave_out_stored(plan, stored, without))
+
+
+def _seeking(plan: Plan) -> Plan:
+    """Return the plan of the first trials of depths at given forces. F_exact follows, at the depths that are found."""
+    return replace(plan, struck=(*plan.struck, Struck("depths", 0, _SEEKS)))
 
 
 def leave_out_stored(plan: Plan, stored: Collection[str], without: Collection[str] = ()) -> Plan:

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 from pipeline.plan.cost import CostModel
 from pipeline.plan.equivalent_places import EquivalentPlace
+from pipeline.plan.given_force import FoundDepth
 from pipeline.plan.place_path import PlacePath
 from pipeline.plan.proportional_depths import ProportionalDepth
 from pipeline.plan.steps import MeshStep, Solve, Solves, mesh_steps
@@ -47,6 +48,7 @@ class Plan:
             scenes: see :func:`pipeline.plan.plan.of_unit_scene`.
         equivalent: by index of a case, the equivalent place that is solved instead.
         proportional: by index of a case, the proportional depth that is solved instead.
+        found_depths: by index of a case with a given force, its depth, once it is found.
         place_paths: paths of which some places are solved, and F at the others is interpolated.
         ends: the plans of the study at the ends of the bars of its material and image; their solves are among these.
     """
@@ -66,6 +68,7 @@ class Plan:
     unasked: tuple[Solve, ...] = ()
     equivalent: Mapping[tuple[int, ...], EquivalentPlace] = field(default_factory=dict)
     proportional: Mapping[tuple[int, ...], ProportionalDepth] = field(default_factory=dict)
+    found_depths: Mapping[tuple[int, ...], FoundDepth] = field(default_factory=dict)
     place_paths: tuple[PlacePath, ...] = ()
     ends: tuple["EndPlans", ...] = ()
 

@@ -26,7 +26,7 @@ SAME = 1e-6
 # Keys that a message names where scenes differ.
 _MOST_KEYS = 4
 # What is compared: each has an error bar.
-_JUDGED = ("force", "load_force", "energy_release")
+_JUDGED = ("force", "depth", "load_force", "energy_release")
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,7 @@ def _not_run(a: xr.Dataset, i: tuple[int, ...], b: xr.Dataset, j: tuple[int, ...
 def _pairs(case: str, a: xr.Dataset, i: tuple[int, ...], b: xr.Dataset, j: tuple[int, ...]) -> Iterator[Pair]:
     """Yield what is compared of one case."""
     for quantity in _JUDGED:
-        if quantity not in a or quantity not in b:
+        if not all(quantity in data and f"{quantity}_error" in data for data in (a, b)):
             continue
         (one, bar_a, time_a), (other, bar_b, time_b) = (
             [_number(data, name, at) for name in (quantity, f"{quantity}_error", "time_total")]

@@ -13,6 +13,7 @@ import xarray as xr
 from pipeline import __version__
 from pipeline.netcdf import write_netcdf
 from pipeline.plan.equivalent_places import EquivalentPlace
+from pipeline.plan.given_force import FoundDepth
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST, MESH_DIMENSIONS, RUN, attributes, quantity_of
@@ -20,6 +21,7 @@ from pipeline.report.along_path import along_path
 from pipeline.report.history import over_time
 from pipeline.report.uncertainty import uncertainties
 from pipeline.report.values import at_full_order, with_flags
+from pipeline.run.given_force import at_force, with_depths
 from pipeline.run.outcome import without_contact
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
@@ -49,6 +51,10 @@ def _has_slit(case: Case) -> bool:
     return case.probe.slit is not None
 
 
+def _may_end_early(case: Case) -> bool:
+    return case.has_load_steps or case.is_stepped or case.probe.force is not None
+
+
 _COSTS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total", "time_spread")
 _COUNTS = ("dofs", "cells", "iterations")
 _OF_LOADS = ("load_force", "load_force_error", "load_energy", "sag", "load_force_vector")
@@ -60,7 +66,7 @@ _PARTS = (
         of=lambda case: case.probe.is_unilateral,
     ),
     _Part(_OF_FRICTION, of=lambda case: case.probe.friction > 0),
-    _Part(("depth_reached", "force_reached"), of=lambda case: case.has_load_steps or case.is_stepped),
+    _Part(("depth_reached", "force_reached"), of=_may_end_early),
     _Part(("surface_deviation",), of=lambda case: isinstance(case.body, Scanned)),
     _Part((*LARGEST, *_COUNTS)),
     _Part(("force_exact", "force_exact_error"), is_exact=True),
@@ -87,12 +93,13 @@ _MISSING = -1  # of counts, which have no NaN
 
 def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | None = None) -> xr.Dataset:
     """Arrange ``records`` (by key) as the dataset of the plan's study; ``run`` adds attributes of the run."""
+    plan = with_depths(plan, records)
     study = plan.study
     cases = list(study.cases())
     flat = _records_of(plan, cases, plan.keys, records)
     flat = [_imaged(record, plan.equivalent.get(case.index)) for record, case in zip(flat, cases, strict=True)]
     reference_keys = plan.reference_keys or [""] * len(cases)
-    exact = _records_of(plan, cases, reference_keys, records)
+    exact = _records_of(plan, cases, reference_keys, records, is_exact=True)
     variables, of_scene = {}, ["force_exact_message"]
     for part in _PARTS:
         if any(map(part.of, cases)):
@@ -103,6 +110,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
                 ]
                 variables[name] = _variable(study, name, values, *part.dims)
                 of_scene += [name] if part.is_exact else []
+    if study.gives_force:
+        variables |= _depths(plan, cases, flat)
     for output in study.outputs:
         for name in output.variables:
             values = [record.largest.get(name, nan) if record and record.is_ok else nan for record in flat]
@@ -116,8 +125,10 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     dataset = along_path(over_time(dataset, study, cases, flat), plan, records)
     if any(case.is_closed for case in cases if not case.lost_contact):
         dataset["force_error"].attrs["comment"] = _OF_CLOSURE
+    # At a given force each mesh has its own depth.
+    alike = {} if study.gives_force else _shared(study, reference_keys)
     for name in (name for name in of_scene if name in dataset):
-        dataset[name] = dataset[name].isel(_shared(study, reference_keys), drop=True)
+        dataset[name] = dataset[name].isel(alike, drop=True)
     path = {axis.name for axis in study.axes if axis.off}
     for name in {*_PLACE, "axis", "body_message", "tool_depth"} & {*dataset.variables}:
         dataset[name] = _along(dataset[name], {*path, "component", "time"})
@@ -137,13 +148,14 @@ def _shared(study: Study, keys: Sequence[str], at: Mapping[str, int] | None = No
 
 
 def _records_of(
-    plan: Plan, cases: Sequence[Case], keys: Sequence[str], records: Mapping[str, Record]
+    plan: Plan, cases: Sequence[Case], keys: Sequence[str], records: Mapping[str, Record], *, is_exact: bool = False
 ) -> list[Record | None]:
     """Return the record of each case, at its scale; None if there is none."""
     found = []
     for key, case in zip(keys, cases, strict=True):
         record = records.get(key)
-        found.append(record.scaled(plan.scale_of(case)) if record else without_contact(case))
+        here = at_force(plan, case, record and record.scaled(plan.scale_of(case)), is_exact=is_exact)
+        found.append(here or without_contact(case))
     return found
 
 
@@ -193,6 +205,18 @@ def _of_places(study: Study, cases: Sequence[Case]) -> dict[str, Any]:
     return variables | {"axis": _variable(study, "axis", axes, "component")}
 
 
+def _depths(plan: Plan, cases: Sequence[Case], flat: Sequence[Record | None]) -> dict[str, Any]:
+    """Return the depths at given forces, with their error bars; not a number where the force is not reached."""
+    found = [
+        depth if record and record.is_ok and (depth := plan.found_depths.get(case.index)) else FoundDepth(nan)
+        for case, record in zip(cases, flat, strict=True)
+    ]
+    return {
+        "depth": _variable(plan.study, "depth", [one.depth for one in found]),
+        "depth_error": _variable(plan.study, "depth_error", [one.error for one in found]),
+    }
+
+
 def _texts(
     plan: Plan, cases: Sequence[Case], flat: Sequence[Record | None], exact: Sequence[Record | None]
 ) -> dict[str, Any]:
@@ -229,6 +253,8 @@ def _add_ratios(dataset: xr.Dataset, plan: Plan) -> xr.Dataset:
     """Add F_max, F/F_max and speed-up: against the full-order case of the same scene and mesh settings."""
     force, seconds = dataset["force"], dataset["time_total"]
     full_force = _of_full_order(dataset, "force")
+    if plan.study.gives_force:
+        full_force = full_force * _by_depth(dataset, plan)
     ratios = {
         "force_exact_ratio": force / dataset["force_exact"],
         "force_ratio": force / full_force,
@@ -241,8 +267,19 @@ def _add_ratios(dataset: xr.Dataset, plan: Plan) -> xr.Dataset:
         ratios["linear_ratio"] = force / force.sel(law="linear", drop=True)
     ratios = {name: values.transpose(*force.dims, missing_dims="ignore") for name, values in ratios.items()}
     full = {"epsilon": int(np.argmax(dataset["epsilon"].values))} if "epsilon" in dataset.dims else {}
-    ratios["force_max"] = full_force.isel(_shared(plan.study, plan.keys, full), drop=True)
+    alike = {} if plan.study.gives_force else _shared(plan.study, plan.keys, full)
+    ratios["force_max"] = full_force.isel(alike, drop=True)
     return dataset.assign({name: values.assign_attrs(attributes(name)) for name, values in ratios.items()})
+
+
+def _by_depth(dataset: xr.Dataset, plan: Plan) -> xr.DataArray:
+    """Return the factor of the full order's force from its own depth to that of each case, by F's power of the depth.
+
+    At one force the depths of meshes differ; F_max is the force at the same depth.
+    """
+    powers = [found.exponent if (found := plan.found_depths.get(i)) else nan for i in plan.study.indices()]
+    power = dataset["depth"].copy(data=np.array(powers).reshape(dataset["depth"].shape))
+    return (dataset["depth"] / _of_full_order(dataset, "depth")) ** power
 
 
 def _of_full_order(dataset: xr.Dataset, name: str) -> xr.DataArray:

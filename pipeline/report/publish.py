@@ -8,6 +8,7 @@ from pipeline.files import result_files
 from pipeline.launcher import is_interrupt
 from pipeline.plan.plan import Plan
 from pipeline.report.made import are_made, inputs_of, note_made
+from pipeline.run.given_force import with_depths
 from pipeline.run.record import Record
 
 
@@ -49,6 +50,7 @@ def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, 
     what = f"{output}: the results of {plan.study.file} cannot be"
     files = result_files(output, plan.study.name)
     try:
+        plan = with_depths(plan, records)
         inputs = inputs_of(plan, records)
         if are_made(files, inputs):
             return Results(unchanged=tuple(files))

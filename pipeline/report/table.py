@@ -1,9 +1,9 @@
 """A dataset as a table: a row for each mesh setting, a column for each scene, and why a cell cannot be judged."""
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from math import isinf
+from math import isfinite, isinf
 from typing import Any
 
 import numpy as np
@@ -143,7 +143,11 @@ def study_of(dataset: xr.Dataset) -> Study | None:
     name = str(dataset.attrs.get("study_file", "")) or "study.toml"
     folder = str(dataset.attrs.get("study_folder", "."))
     text = str(dataset.attrs.get("study", ""))
-    return _study(text, f"{folder}/{name}") or _study(text, name)
+    study = _study(text, f"{folder}/{name}") or _study(text, name)
+    if study is None or not study.gives_force or "depth_error" not in dataset:
+        return study
+    found = dict(zip(study.indices(), dataset["depth"].values.ravel().tolist(), strict=True))
+    return replace(study, depths={index: depth for index, depth in found.items() if isfinite(depth)}, seeks=False)
 
 
 def warnings_of(dataset: xr.Dataset) -> list[str]:

@@ -32,6 +32,11 @@ def relative(dataset: xr.Dataset, error: str) -> xr.DataArray:
     return share.rename(error).assign_attrs(units="1", long_name=f"{error} as a share of {value}")
 
 
+def answer_of(dataset: xr.Dataset) -> str:
+    """Return the variable that a study asks for: ``force``, or ``depth`` where the force is given."""
+    return "depth" if "depth_error" in dataset else "force"
+
+
 def by_case(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Return a variable on all dimensions of the study, in the order of ``force``."""
     force = dataset["force"]

@@ -1,6 +1,7 @@
 """What a study needs beyond its first plan, since earlier results decide it; and what follows without a solve.
 
-Insertions need further states, and paths further places, until F at the others can be interpolated.
+Insertions need further states; paths further places, until F at the others can be interpolated; and given forces
+further depths.
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -9,6 +10,7 @@ from dataclasses import replace
 from pipeline.plan.interpolation import together
 from pipeline.plan.plan import Plan, first_attempts
 from pipeline.plan.steps import Solve
+from pipeline.run import given_force
 from pipeline.run.record import Record
 from pipeline.states import OK
 
@@ -38,7 +40,9 @@ def complete(
 
 
 def lacking(plan: Plan, records: Mapping[str, Record]) -> Plan | None:
-    """Return the plan of the places to solve next along paths; None if all others can be interpolated."""
+    """Return the plan of the places to solve next along paths, or of the next depths; None if there are none."""
+    if plan.study.seeks_depths:
+        return given_force.lacking(plan, records)
     solves: dict[str, Solve] = {}
     for one in _with_ends(plan):
         error = one.study.planning.path_error or 0.0
@@ -49,6 +53,8 @@ def lacking(plan: Plan, records: Mapping[str, Record]) -> Plan | None:
 
 def possible(plan: Plan, records: Mapping[str, Record]) -> Plan | None:
     """Return the plan of all that may have to be solved besides ``plan``; None if that is nothing, or unknown."""
+    if plan.study.seeks_depths:
+        return None
     if plan.study.is_insertion:
         from pipeline.insertion.paths import possible as possible_states  # noqa: PLC0415 (it loads scipy)
 

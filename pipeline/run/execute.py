@@ -66,7 +66,8 @@ def execute(
 def compute(plan: Plan, comm: MPI.Comm) -> dict[str, Record]:
     """Run ``plan`` without a store and return its records by key, on every rank; collective.
 
-    Further places along paths are solved, too, and the others interpolated; not the further states of insertions.
+    Further places along paths are solved, too, and the others interpolated, and depths at given forces are found; not
+    the further states of insertions.
     """
     records: dict[str, Record] = {}
 
@@ -77,7 +78,7 @@ def compute(plan: Plan, comm: MPI.Comm) -> dict[str, Record]:
     while todo:
         execute(todo, comm, keep, Progress())
         records.update(comm.bcast(records))
-        todo = complete(plan, records, lambda _: {}) if plan.place_paths else None
+        todo = complete(plan, records, lambda _: {}) if plan.place_paths or plan.study.seeks_depths else None
     return records
 
 

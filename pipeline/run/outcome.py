@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST
+from pipeline.run.given_force import at_force, with_depths
 from pipeline.run.record import Record
 from pipeline.states import FAILED, FAILURES, LOST, OK, PARTIAL, PENDING, SKIPPED, worst
 from pipeline.study.case import Case
@@ -52,11 +53,12 @@ def count_states(plan: Plan, records: Mapping[str, Record]) -> dict[str, int]:
 
     The stages of a history are one case, and so is an insertion, the path through them.
     """
+    plan = with_depths(plan, records)
     if plan.study.is_insertion and plan.part is None:
         return _counted([path.status for path in _paths(plan, records)])
     own = [None if plan.part is not None and key not in plan.part else key for key in plan.keys]
     each = [
-        None if key is None else _status(records.get(key) or without_contact(case))
+        None if key is None else _status(at_force(plan, case, records.get(key)) or without_contact(case))
         for key, case in zip(own, plan.study.cases(), strict=True)
     ]
     grouped = [[state for state in stages if state is not None] for stages in plan.study.by_case(each)]
@@ -70,9 +72,9 @@ def _counted(states: Sequence[str]) -> dict[str, int]:
 
 def failures(plan: Plan, records: Mapping[str, Record]) -> tuple[tuple[str, str], ...]:
     """Return (case, message) of failed cases, and of failed F_exact, which fail no case."""
-    failed = [
-        (str(case), records[key].message) for key, case in _cases(plan) if key in records and records[key].has_failed
-    ]
+    plan = with_depths(plan, records)
+    each = [(case, at_force(plan, case, records.get(key))) for key, case in _cases(plan)]
+    failed = [(str(case), record.message) for case, record in each if record and record.has_failed]
     if plan.study.is_insertion:
         whole = [case for _, case in plan.study.whole_cases()]
         ended = zip(whole, _paths(plan, records), strict=True)

@@ -17,7 +17,7 @@ from pipeline.shapes.history import History
 from pipeline.shapes.revolved import Revolved
 from pipeline.shapes.section import Problems, Words
 from pipeline.shapes.slit import Slit
-from pipeline.units import Coordinate, Length
+from pipeline.units import Coordinate, Force, Length
 
 # Candidate planes of symmetry, by the coordinate that is zero on them, and their normals.
 PLANES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
@@ -74,6 +74,14 @@ class Probe(Footprint):
             is_used=True,
         ),
     ]
+    force: Annotated[
+        Force | None,
+        Words(
+            "Force on the tool along its axis, instead of `depth`: the depth at this force is computed.",
+            '["50 mN", "100 mN"]',
+            default="none: the depth is given",
+        ),
+    ] = None
     at: Annotated[
         tuple[Coordinate, ...],
         AfterValidator(_two_or_three),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pipeline.quantities import write
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
-_AMBIGUOUS = ("radius", "shape", "accuracy", "axis")
+_AMBIGUOUS = ("radius", "shape", "accuracy", "axis", "force")
 
 
 @dataclass(frozen=True)

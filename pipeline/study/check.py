@@ -30,6 +30,7 @@ from pipeline.study.check_mesh import (
     check_support,
 )
 from pipeline.study.closure import check_ball
+from pipeline.study.expected_depth import gives_force
 from pipeline.study.insertion import check_insertion, check_same_path
 from pipeline.study.insertion_stages import has_insertion
 from pipeline.study.place import place_error
@@ -76,12 +77,30 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for planning in cast(Sequence[Planning], sections["plan"]):
         if planning.path_error is not None and way is None:
             problems.error("plan.path_error", planning.path_error, "is for places along [probe.path]: omit it")
+    _check_forces(sections, probes, problems)
     check_same_path(probes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
         if solve.exact and "exact" in solve.model_fields_set and has_insertion(probes):
             problems.error("solve.exact", solve.exact, "the path of an insertion has no F_exact: omit it")
         if "repeats" in solve.model_fields_set and not solve.timing:
             problems.error("solve.repeats", solve.repeats, "is of timing studies: add `timing = true`, or omit it")
+
+
+def _check_forces(sections: dict[str, tuple[Section, ...]], probes: Sequence[Probe], problems: Problems) -> None:
+    """Report what does not go with forces that are given, and depths that are found."""
+    if not any(map(gives_force, probes)):
+        return
+    if not all(map(gives_force, probes)):
+        problems.error("probe.force", None, "is in some of the [[probe]] tables only: give it, or a depth, in all")
+    for planning in cast(Sequence[Planning], sections["plan"]):
+        if planning.stop_near_exact is not None:
+            problems.error("plan.stop_near_exact", planning.stop_near_exact, "is for depths that are given: omit it")
+    for solve in cast(Sequence[Solving], sections["solve"]):
+        if solve.timing:
+            problems.error("solve.timing", solve.timing, "times solves at depths that are given: give a depth")
+    for body in cast(Sequence[Body], sections["body"]):
+        if is_uncertain(body):
+            problems.error("body.boundary_uncertainty", None, "has a bar for forces, not for depths: give a depth")
 
 
 def check_steps(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -145,8 +164,14 @@ def warn_of_depth(probe: Probe, problems: Problems) -> None:
             in_mm(insertion.to),
             "assumes small strains: before the puncture, and at the blade's tip, linear elasticity is an extrapolation",
         )
-    else:
-        probe.warn_of_strains(problems)
+        return
+    found = Problems()
+    probe.warn_of_strains(found)
+    for one in found.warnings:
+        if probe.force is None:
+            problems.warn(one.key, one.found, one.allowed)
+        else:
+            problems.warn("probe.force", f"{probe.force:.6g} N", f"expected depth {one.found}: {one.allowed}")
 
 
 def _tell_notices(body: Body, problems: Problems) -> None:
@@ -186,7 +211,7 @@ def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:
             f"must be below {in_mm(thickness)}, the thickness of the tissue under the tool, along its axis",
         )
         return False
-    if LINEAR * thickness < probe.deepest <= LINEAR * probe.half_width:
+    if LINEAR * thickness < probe.deepest <= LINEAR * probe.half_width and probe.force is None:
         problems.warn(
             "probe.depth",
             in_mm(probe.deepest),

@@ -33,6 +33,7 @@ _QUANTITIES = {
     "Hz": ("frequency", "frequencies"),
     "kg/m^3": ("density", "densities"),
     "m/s^2": ("acceleration", "accelerations"),
+    "N": ("force", "forces"),
     "N/m": ("stiffness", "stiffnesses"),
     "J/m^2": ("toughness", "toughnesses"),
     "": ("number", "numbers"),

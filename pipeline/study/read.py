@@ -13,6 +13,7 @@ from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
 from pipeline.study.check import check_sense, check_steps
 from pipeline.study.check_loads import check_loads
+from pipeline.study.expected_depth import with_expected_depths
 from pipeline.study.identification import Identification, check_shared, read_identify, read_measurements
 from pipeline.study.identified import with_identified
 from pipeline.study.insertion_stages import has_insertion, with_steps
@@ -100,6 +101,10 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene:
     if has_insertion(sections["probe"]) and (is_scene or _OF_ONE_FORCE & given.keys()):
         told = "has no place in [[measurement]], [identify] and [sensitivity], which are of one force: omit it, or them"
         problems.error("probe.insertion", None, told)
+    if any(getattr(probe, "force", None) for probe in sections["probe"]) and (
+        is_scene or identified.values or _OF_ONE_FORCE & given.keys()
+    ):
+        problems.error("probe.force", None, "has no place in studies of measured curves: give a depth")
     measurements, identification = _read_experiment(given, sections, file, problems)
     outputs = _read_outputs(given, sections, axes, Path(file).parent, problems)
     spread = _read_spread(given, sections, outputs, problems)
@@ -209,6 +214,8 @@ def _check_together(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, 
     if not problems.errors:
         sections["material"] = sections["material"] or (material_without_section(sections["body"]),)
     sections["load"] = sections["load"] or (Load(),)
+    if not problems.errors:
+        sections["probe"] = with_expected_depths(sections)
     check_sense(problems.sound(sections), axes, problems)
     check_loads(problems.sound(sections), axes, problems)
 

@@ -14,6 +14,7 @@ from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
 from pipeline.study.case import Case
+from pipeline.study.expected_depth import at_depth, expected_depth, gives_force
 from pipeline.study.identification import Identification
 from pipeline.study.identified import NOTHING, Identified
 from pipeline.study.insertion_stages import punctures
@@ -45,6 +46,8 @@ class Study:
     spread: Spread = field(default_factory=Spread)
     outputs: tuple[Output, ...] = ()
     lacking: tuple[Problem, ...] = ()  # what its cases need, and the study of measured curves does not say
+    depths: Mapping[tuple[int, ...], float] = field(default_factory=dict)  # of cases with a given force, where known
+    seeks: bool = True  # whether depths at given forces are still to be found
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -71,6 +74,16 @@ class Study:
     def is_insertion(self) -> bool:
         """Whether its tools are inserted: a case is then a path through its stages."""
         return "tool" in self.sections
+
+    @property
+    def gives_force(self) -> bool:
+        """Whether its cases have a given force, and a depth that is found."""
+        return any(map(gives_force, self.probes))
+
+    @property
+    def seeks_depths(self) -> bool:
+        """Whether depths at given forces are still to be found."""
+        return self.seeks and self.gives_force
 
     @property
     def insertion(self) -> Insertion:
@@ -148,7 +161,10 @@ class Study:
         """Return the case at ``index``, one number for each axis."""
         scene = self.scene(index)
         if (known := self._scenes.get(scene)) is None:
-            known = self._scenes[scene] = *self._parts(index), {}
+            body, material, probe, load = self._parts(index)
+            if gives_force(probe):
+                probe = at_depth(probe, self.depths.get(index) or expected_depth(body, material, probe))
+            known = self._scenes[scene] = body, material, probe, load, {}
         body, material, probe, load, shared = known
         case = Case(index, self.axes, body, material, probe, self.mesh(index), self.solve, load, None, self.outputs)
         object.__setattr__(case, "shared", shared)
@@ -156,7 +172,8 @@ class Study:
 
     def scene(self, index: tuple[int, ...]) -> Hashable:
         """Return what is the same for the cases that differ in the mesh alone."""
-        return self._axes_of_scene(index)
+        scene, depth = self._axes_of_scene(index), self.depths.get(index)
+        return scene if depth is None else (scene, depth)
 
     def mesh(self, index: tuple[int, ...]) -> Mesh:
         """Return the mesh section of the case at ``index``."""

@@ -24,6 +24,8 @@ from pipeline.study.vocabulary import NOT_COMPUTED, OTHER_NAMES
 
 # Limits of a list and of a study. Each case costs a few hundred bytes and a tenth of a millisecond.
 _MOST_VALUES = 10_000
+# The depth of a tool that a file gives a force of, until one is expected.
+ANY_DEPTH = "1 µm"
 MOST_CASES = 200_000
 
 
@@ -40,7 +42,10 @@ def read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
 
 
 def _reaching(raw: Any, problems: Problems) -> Any:
-    """Return the probe's tables with the depth that a table of a history, or an insertion, reaches."""
+    """Return the probe's tables with the depth that a table of a history, or an insertion, reaches.
+
+    Where a force is given, the depth is found, and any number takes its place.
+    """
     if isinstance(raw, list):
         return [_reaching(table, problems) for table in raw]
     history, insertion = (raw.get(key) if isinstance(raw, dict) else None for key in ("history", "insertion"))
@@ -48,6 +53,8 @@ def _reaching(raw: Any, problems: Problems) -> Any:
         depth, own = last_depth(insertion), "[probe.insertion]: its last depth is `to`"
     elif isinstance(history, dict) and "table" in history:
         depth, own = deepest(history["table"]), "`table` in [probe.history], which has depths of its own"
+    elif isinstance(raw, dict) and "force" in raw:
+        depth, own = ANY_DEPTH, "`force`, whose depth is computed: give one of both"
     else:
         return raw
     if "depth" in raw:

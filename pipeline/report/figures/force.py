@@ -12,7 +12,7 @@ from pipeline.quantities import symbol
 from pipeline.report.figures.curves import Panel, draw
 from pipeline.report.figures.facets import arrange, swept
 from pipeline.report.figures.style import FAILED, LINE, QUIET, finish, look, new_figure, write_above
-from pipeline.report.values import by_case, relative
+from pipeline.report.values import answer_of, by_case, relative
 from pipeline.report.words import at_most, choices, heading, scale
 
 _MOST_PANELS, _MOST_CURVES = 4, 4
@@ -26,14 +26,15 @@ _SHARES = ("linear_ratio", "force_exact_ratio")
 
 
 def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
-    """The force, area in contact, loads and F/F_exact, where a study has them, against each swept quantity."""
+    """The force, or the depth at a given one, and what a study has besides, against each swept quantity."""
     dims = swept(dataset)
     if not dims:
         return _one(dataset, title, warning)
     shown = sorted(dims, key="depth".__ne__)[:_MOST_PANELS]
-    tells = "The force against each quantity that the study varies; bars are 95\N{NO-BREAK SPACE}% error bars."
+    first = answer_of(dataset)
+    tells = f"The {first} against each quantity that the study varies; bars are 95\N{NO-BREAK SPACE}% error bars."
     more = f"Not shown: against {', '.join(map(symbol, dims[_MOST_PANELS:]))}." if dims[_MOST_PANELS:] else ""
-    quantities = ["force", *(name for name in _WITH_FORCE if _varies(dataset, name))]
+    quantities = [first, *(name for name in _WITH_FORCE if _varies(dataset, name))]
     return _columns(dataset, shown, quantities, (title, tells, more, warning))
 
 
@@ -103,17 +104,18 @@ def _legend_lines(ax: Axes) -> int:
 
 
 def _one(dataset: xr.Dataset, title: str, warning: str) -> Figure:
-    """Draw the force of the one case."""
-    factor, unit = scale(dataset["force"])
-    value, bar = (factor * float(dataset[name].squeeze()) for name in ("force", "force_error"))
-    share = float(relative(dataset, "force_error").squeeze())
+    """Draw the force, or the depth, of the one case."""
+    name = answer_of(dataset)
+    factor, unit = scale(dataset[name])
+    value, bar = (factor * float(dataset[one].squeeze()) for one in (name, f"{name}_error"))
+    share = float(relative(dataset, f"{name}_error").squeeze())
     figure = new_figure(4.6, 3.3)
     ax = figure.subplots()
     ax.errorbar([0], [value], [np.nan_to_num(bar)], capsize=3, linestyle="none", **look(0))
     ax.set_xticks([0], [f"{value:.4g} {unit} ± {100 * share:.2g} %"])
     ax.set_ylim(min(0.0, 1.2 * value), max(0.0, 1.2 * value))
-    ax.set_ylabel(heading(dataset["force"]))
-    finish(figure, title, "The force of the one case, with its 95\N{NO-BREAK SPACE}% error bar.", warning)
+    ax.set_ylabel(heading(dataset[name]))
+    finish(figure, title, f"The {name} of the one case, with its 95\N{NO-BREAK SPACE}% error bar.", warning)
     return figure
 
 

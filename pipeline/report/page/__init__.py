@@ -30,7 +30,7 @@ from pipeline.report.page.facts import (
 from pipeline.report.page.inline import inline_svg
 from pipeline.report.table import warnings_of
 from pipeline.report.uncertainty import unknowns
-from pipeline.report.values import at_peak
+from pipeline.report.values import answer_of, at_peak
 from pipeline.states import FAILURES, SKIPPED
 
 # What the answer says of times, and the headlines need not say again.
@@ -82,7 +82,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         tissue=unknowns(dataset),
         table=table,
         many_cases=counted(len(table.order), "case"),
-        main=next((name for name in _MAIN if name in varying), "force"),
+        main=next((name for name in _MAIN if name in varying), answer_of(dataset)),
         first_rows=FIRST_ROWS,
         struck=struck(dataset),
         origins=origins(dataset),

@@ -20,6 +20,8 @@ from pipeline.states import WORST_FIRST
 FIRST_ROWS = 50
 # The columns of numbers; some are shown only when asked for.
 _QUANTITIES = (
+    "depth",
+    "depth_error",
     "force",
     "force_error_share",
     "force_error",
@@ -42,7 +44,7 @@ _QUANTITIES = (
     "balance",
 )
 _SHARE = "force_error_share"  # of F: what errors of different forces are compared by
-_SHOWN = {"force", _SHARE, "force_ratio", "force_exact_ratio", "speedup", "time_total"}
+_SHOWN = {"depth", "depth_error", "force", _SHARE, "force_ratio", "force_exact_ratio", "speedup", "time_total"}
 _DIGITS = 4
 
 

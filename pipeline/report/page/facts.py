@@ -58,6 +58,9 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
     ):
         if np.isfinite(values).any() and not (unit == " ×" and np.nanmax(values) == 1):
             found.append((text, f"{np.nanmax(values):.2g}{unit}"))
+    if "depth_error" in dataset and dataset["depth"].notnull().any():
+        least, most = (write("depth", float(f"{f(dataset['depth']):.4g}")) for f in (np.nanmin, np.nanmax))
+        found.insert(1, ("depth", least if least == most else f"{least} to {most}"))
     if any(name == "largest speed-up" for name, _ in found):
         found += [("speed-ups", text) for text in doubts(dataset)]
     if taken := _taken(dataset):
@@ -71,6 +74,11 @@ def summary(dataset: xr.Dataset) -> str:
     known = int(np.isfinite(force).sum())
     if not known:
         return "No case has a force."
+    if "depth_error" in dataset and known:
+        least, most = (write("depth", float(f"{f(dataset['depth']):.4g}")) for f in (np.nanmin, np.nanmax))
+        share = 100 * float(relative(dataset, "depth_error").max())
+        bars = f", with error bars up to {share:.2g} %" if np.isfinite(share) else ""
+        return f"The depth at the given force is {least if least == most else f'{least} to {most}'}{bars}."
     if size == 1:
         bar = float(relative(dataset, "force_error").squeeze())
         return (

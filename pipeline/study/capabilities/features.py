@@ -164,6 +164,7 @@ FEATURES: dict[str, Feature] = {
     "inclined touch of a linear law": Feature(
         "probe.axis", lambda s: _touches_beside(s) and not _is_large(s), ("body", "material"), list
     ),
+    "given force": Feature("probe.force", lambda s: s.probe.force is not None, write=lambda force: f"{force:.6g} N"),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
     "bent surface of a linear law": Feature(
         "load",

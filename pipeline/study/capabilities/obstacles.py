@@ -60,6 +60,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "outputs": "outputs of a function need the solution of each depth",
     },
     "path": {
+        "given force": "the depth at the given force is found at each place",
         "F_exact": "F_exact is computed at each place (exact = false omits it)",
         "history": "a history needs the solution of each place",
         "insertion": "an insertion needs the states of each place",
@@ -84,6 +85,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "insertion": "probe.insertion: a scene of SOFA has one state, without a path",
     },
     "real-time model": {
+        "given force": "probe.force: a real-time model has its force for every depth. Give a depth",
         "rounded edge": "probe.edge: real-time models have sharp edges. Omit it",
         "friction": "probe.friction: real-time models have no friction. Omit it and export the frictionless force",
         "loads": "[load]: gravity, tractions and pressure in hollow regions have no real-time model",

@@ -138,6 +138,11 @@ REFUSALS: tuple[Refusal, ...] = (
         "accuracy",
         "needs given element sizes: with `accuracy`, each depth has a mesh of its own. Omit one of the two",
     ),
+    # A given force, whose depth is found.
+    Refusal("given force", "loads", f"loads press on the tool at depth 0 already: {_NO_LOADS}, or give a depth"),
+    Refusal("given force", "history", "a history has depths of its own: omit [probe.history], or give a depth"),
+    Refusal("given force", "slit", "the opening of a slit presses on the blade at depth 0 already: give a depth"),
+    Refusal("given force", "slice", "the travel of a slice presses on the blade at depth 0 already: give a depth"),
     # A tool that is inserted.
     Refusal("slit", "insertion", "a blade that is inserted makes its own slit: omit `incision`"),
     Refusal("slice", "insertion", "a blade that is inserted moves along its axis: omit it"),

@@ -1,0 +1,178 @@
+"""Forces that are given: the depth is that at which F was found to be this force, for every tool and law."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.plan.given_force import FoundDepth, Trial, next_depth
+from pipeline.plan.plan import make_plan
+from pipeline.report.compare import compare
+from pipeline.report.dataset import build
+from pipeline.report.figures import figure
+from pipeline.report.values import relative
+from pipeline.run.execute import compute
+from pipeline.run.outcome import count_states, failures
+from pipeline.study.problems import StudyError
+from pipeline.study.read import parse
+
+BOX = {"shape": "box", "size": ["30 mm", "30 mm", "15 mm"], "fixed": "bottom"}
+CYLINDER = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm", "fixed": "bottom"}
+MESH = {"epsilon": "full", "fine": "4 mm", "coarse": "8 mm", "rim": "1 mm"}
+SOFT = {"young": "10 kPa", "poisson": 0.45}
+LAWS = {
+    "linear": {"young": "10 kPa", "poisson": 0.3},
+    "neo-hookean": SOFT | {"law": "neo-hookean"},
+    "ogden": SOFT | {"law": "ogden", "terms": [{"share": 1.0, "alpha": 6.0}]},
+}
+BALL = {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm"}
+BLADE = {"shape": "blade", "length": "8 mm", "width": "1 mm", "depth": "0.4 mm"}
+# Tool and law, on a body that makes them axisymmetric or not.
+SCENES = {
+    "disc, meridian": (CYLINDER, "linear", {"shape": "disc", "radius": "2 mm", "depth": "0.3 mm"}),
+    "disc that may lift off": (
+        BOX,
+        "linear",
+        {"shape": "disc", "radius": "2 mm", "depth": "0.3 mm", "contact": "unilateral"},
+    ),
+    "blade": (BOX, "linear", BLADE),
+    "ball": (BOX, "linear", BALL),
+    "ball with friction": (BOX, "linear", BALL | {"friction": 0.3}),
+    "wedge": (BOX, "linear", {"shape": "wedge", "angle": "70 deg", "length": "6 mm", "depth": "0.5 mm"}),
+    "cone, meridian": (CYLINDER, "linear", {"shape": "cone", "angle": "70 deg", "radius": "8 mm", "depth": "0.5 mm"}),
+    "ball, meridian, large": (CYLINDER, "neo-hookean", BALL),
+    "ball, large": (BOX, "neo-hookean", BALL),
+    "blade, large": (BOX, "ogden", BLADE),
+}
+
+
+def content(body, law, probe, **changes):
+    scene = {"body": body, "material": LAWS[law], "probe": probe, "mesh": MESH, "solve": {"exact": False}}
+    return scene | changes
+
+
+def solved(study):
+    plan = make_plan(parse(study))
+    records = compute(plan, MPI.COMM_SELF)
+    return plan, records, build(plan, records)
+
+
+def given(probe, force):
+    return {key: value for key, value in probe.items() if key != "depth"} | {"force": force}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_depth_at_the_force_of_a_depth_is_this_depth(scene):
+    body, law, probe = SCENES[scene]
+    *_, there = solved(content(body, law, probe))
+    force, depth = float(there["force"]), 1e-3 * float(str(probe["depth"]).split()[0])
+    _, records, found = solved(content(body, law, given(probe, f"{force!r} N")))
+    assert str(found["status"].values) == "ok"
+    assert float(found["force"]) == pytest.approx(force, rel=1e-11)
+    assert abs(float(found["depth"]) - depth) <= float(found["depth_error"]) / 4
+    # The bar of the depth is that of F over the stiffness, which is between F/d and 3 F/d.
+    ratio = float(relative(found, "force_error") / relative(found, "depth_error"))
+    assert 0.8 < ratio < 3
+    if "disc" in scene or scene == "blade":
+        assert len(records) <= 2, "F is proportional to the depth: one solve, and a division"
+        assert ratio == pytest.approx(1, rel=1e-6)
+    assert len(records) <= 6
+
+
+def test_known_depths_of_disc_and_cone():
+    """On a body that is wide and deep for the contact: Love's disc, and the cone of Love and Sneddon."""
+    wide = {"shape": "cylinder", "radius": "200 mm", "height": "200 mm", "fixed": "bottom"}
+    tool = {"shape": "cone", "angle": "70 deg", "radius": "8 mm"}
+    modulus = 10e3 / (1 - 0.3**2)
+    for probe, force, depth in (
+        (tool, 5e-3, np.sqrt(5e-3 * np.pi / (2 * modulus * np.tan(np.radians(70))))),
+        ({"shape": "disc", "radius": "1 mm", "contact": "frictionless"}, 5e-3, 5e-3 / (2 * modulus * 1e-3)),
+    ):
+        *_, found = solved(content(wide, "linear", given(probe, f"{force} N"), mesh={"accuracy": "1 %"}))
+        assert float(found["depth"]) == pytest.approx(depth, rel=5e-3)  # the body ends
+
+
+def test_force_that_is_not_reached_fails_with_the_largest_one():
+    tool = {"shape": "cone", "angle": "70 deg", "radius": "3 mm"}
+    study = content(CYLINDER, "linear", given(tool, ["5 mN", "1 N"]))
+    plan, records, found = solved(study)
+    assert found["status"].values.tolist() == ["ok", "partial"]
+    assert np.isnan(found["depth"].values[1])
+    # The cone ends at its shaft.
+    assert float(found["depth_reached"][1]) == pytest.approx(3e-3 / np.tan(np.radians(70)), rel=1e-3)
+    assert 5e-3 < float(found["force_reached"][1]) < 1.0
+    assert "the force is not reached: at 1.092 mm it is 24.8" in str(found["message"].values[1])
+    assert count_states(plan, records)["partial"] == len(failures(plan, records)) == 1
+
+
+def test_sweeps_ratios_and_figures():
+    """F over E decides the depth; F_max and F_exact are at the depth of the case."""
+    swept = content(
+        BOX,
+        "linear",
+        given(BLADE, ["5 mN", "10 mN"]),
+        material={"young": ["10 kPa", "20 kPa"], "poisson": 0.3},
+        mesh=MESH | {"epsilon": ["4 mm", "full"], "fine": "2 mm", "outside": "free"},
+        solve={"exact": True},
+    )
+    *_, found = solved(swept)
+    depth = found["depth"]
+    assert depth.dims == ("young", "probe_force", "epsilon")
+    assert depth.sel(young=10e3, probe_force=5e-3).values == pytest.approx(depth.sel(young=20e3, probe_force=10e-3))
+    softer = float(found["force_ratio"].isel(young=0, probe_force=0, epsilon=0))
+    ratio = (depth.sel(epsilon=np.inf) / depth).isel(young=0, probe_force=0, epsilon=0)
+    assert softer == pytest.approx(float(ratio), rel=1e-9)
+    assert softer < 0.95
+    *_, same = solved(content(BOX, "linear", BLADE, mesh=swept["mesh"], solve={"exact": True}))
+    for name in ("force_exact_ratio", "force_ratio"):
+        here = found[name].isel(young=0, probe_force=0)
+        assert here.values == pytest.approx(same[name].values, rel=1e-9)
+    assert all(pair.state == "agree" for pair in compare(found, found).pairs)
+    assert {pair.quantity for pair in compare(found, found).pairs} == {"force", "depth"}
+    assert "depth" in figure(found, "force").axes[0].get_ylabel()
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0, 6.0])
+@pytest.mark.parametrize("start", [1e-5, 1e-3, 8e-3])
+def test_search_finds_powers_of_the_depth_despite_jumps_from_mesh_to_mesh(exponent, start):
+    def force(depth):
+        return depth**exponent * (1 + 2e-4 * np.sin(1e7 * depth))
+
+    wanted, depth, trials = 1e-3**exponent, start, []
+    while not isinstance(depth, FoundDepth):
+        trials.append(Trial(depth, force(depth), 2e-3))
+        depth = next_depth(wanted, trials, 1e-2, None)
+    assert not depth.message
+    assert depth.depth == pytest.approx(1e-3, abs=depth.error / 2)
+    assert depth.error == pytest.approx(1e-3 * 2e-3 / exponent, rel=0.25)
+    assert len(trials) < 12
+
+
+def test_search_goes_round_depths_that_fail():
+    depth, trials = 5e-3, []
+    while not isinstance(depth, FoundDepth):
+        fails = depth > 2e-3
+        trials.append(Trial(depth, message="it fails") if fails else Trial(depth, depth**1.5, 1e-3))
+        depth = next_depth(1e-3**1.5, trials, 1e-2, None)
+    assert depth.depth == pytest.approx(1e-3, rel=1e-3)
+    trials, depth = [], 1e-3
+    while not isinstance(depth, FoundDepth):
+        trials.append(Trial(depth, message="it fails") if depth > 2e-3 else Trial(depth, depth**1.5, 1e-3))
+        depth = next_depth(3e-3**1.5, trials, 1e-2, None)
+    assert "it fails" in depth.message
+    assert depth.reached == pytest.approx(2e-3**1.5, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"probe": {"depth": "1 mm"}}, "give one of both"),
+        ({"probe": {"history": {"ramp": "1 s", "hold": "1 s"}}}, "a history has depths of its own"),
+        ({"load": {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}}, "loads press on the tool at depth 0"),
+        ({"solve": {"timing": True}}, "times solves at depths that are given"),
+    ],
+)
+def test_what_does_not_go_with_a_given_force_is_refused(changes, message):
+    probe = given(BALL, "10 mN") | changes.pop("probe", {})
+    material = LAWS["linear"] | {"density": "1000 kg/m^3"}
+    with pytest.raises(StudyError, match=message):
+        parse(content(BOX, "linear", probe, material=material) | changes)
