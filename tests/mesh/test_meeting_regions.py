@@ -8,7 +8,7 @@ import pytest
 from pipeline.export.scope import ExportError, scope_of
 from pipeline.mesh.generate import GeometryError
 from pipeline.mesh.of_case import mesh_arrays
-from pipeline.run import solved
+from pipeline.run import meshing
 from pipeline.shapes.files.labels import LabelMap
 from pipeline.study.problems import StudyError
 from tests.cases import solve, study
@@ -71,12 +71,12 @@ def test_parts_of_one_material_have_the_force_of_the_whole(given, monkeypatch):
         made.append(mesh_arrays(case, mirrors))
         return made[-1]
 
-    monkeypatch.setattr(solved, "cached_arrays", kept)
+    monkeypatch.setattr(meshing, "_cached_unrefined", kept)
     parts, whole = (next(iter(solve(**given(*regions)).values())) for regions in ((TUMOUR, LOBE), ()))
     assert made[0].regions is not None and made[1].regions is None
     assert abs(parts.force - whole.force) < parts.force_error + whole.force_error
     undivided = replace(made[0], regions=np.zeros_like(made[0].regions))
-    monkeypatch.setattr(solved, "cached_arrays", lambda *_: undivided)
+    monkeypatch.setattr(meshing, "_cached_unrefined", lambda *_: undivided)
     (same,) = solve(**given(TUMOUR, LOBE)).values()
     assert parts.force == pytest.approx(same.force, rel=1e-6)
 
