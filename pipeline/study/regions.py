@@ -220,7 +220,8 @@ def _check_cavities(body: Body, places: Sequence[str], problems: Problems) -> No
             at = _point(parts.points[parts.facets[walls][0]].mean(axis=0))
             problems.error(
                 *_place_of(piece, places[number - 1]),
-                f"{piece.name} is hollow and meets {what} at {at}: it must be inside tissue",
+                f"{piece.name} is hollow and meets {what} at {at}: it must be inside tissue. End it three "
+                "voxels below the surface, or give it `young` and `poisson` of its filling, and omit `hollow`",
             )
             break
 

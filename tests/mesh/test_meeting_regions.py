@@ -1,5 +1,6 @@
 """Regions of an image that meet each other and the body's surface: meshes and forces of cases, and what is refused."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -88,6 +89,18 @@ def test_a_hollow_region_leaves_its_neighbours_alone(given):
     found = volumes(mesh)
     np.testing.assert_allclose(found[[0, 2]], [parts.volume(0), parts.volume(2)], rtol=0.03)
     assert found[1] == 0
+
+
+def test_places_on_a_border_are_told_before_the_run(given):
+    """Those of a path together; a place beside the border, or far above it, is not among them."""
+    sections = given(TUMOUR, LOBE)
+    del sections["probe"]["at"]
+    sections["probe"]["path"] = {"points": [[f"{x} mm", "3 mm", "17 mm"] for x in (0, 17, 19, 28)]}
+    (warning,) = (said for said in study(**sections).warnings if "meet" in said)
+    assert re.search(
+        r"tissue and lobe meet at the body's surface at \(.*\) mm, below the footprint: this case", warning
+    )
+    assert "So do 1 more of the 4 places" in warning
 
 
 def test_what_cannot_be_is_refused_by_name_and_place(given):
