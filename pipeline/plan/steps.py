@@ -164,7 +164,9 @@ def _scene_of(solve: Solve) -> Hashable:
     """Return all that distinguishes solves of one operator, except the depth."""
     case = solve.case
     return (
-        tuple((*tissue.lame, *tissue.further.values()) for tissue in case.tissues),
+        tuple((tissue.is_large and tissue.law, *tissue.lame, *tissue.further.values()) for tissue in case.tissues),
+        case.relaxations,
+        case.probe.history,
         case.load,
         case.densities,
         case.probe.at,

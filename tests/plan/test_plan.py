@@ -90,3 +90,21 @@ def test_one_mesh_for_many_depths_is_not_recommended_where_it_is_refused():
     for changes, is_told in (({}, True), ({"mesh": mesh}, False)):
         plan = make_plan(study(probe=sphere, **changes))
         assert any("depth_range" in struck.reason for struck in plan.struck) == is_told
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"material": {"law": ["gent", "veronda-westmann"], "limit": 20.0, "alpha": 20.0}},
+        {"material": {"law": "neo-hookean"}, "probe": {"history": {"ramp": ["1 s", "2 s"], "hold": "2 s"}}},
+    ],
+)
+def test_a_sweep_is_of_one_law_and_one_history_in_the_order_of_its_depths(changes):
+    probe = {"depth": ["0.5 mm", "1 mm"], **changes.get("probe", {})}
+    relaxing = {"relaxation": [{"share": 0.3, "time": "1 s"}]} if "history" in probe else {}
+    plan = make_plan(study(probe=probe, material=changes["material"] | relaxing))
+    sweeps = [sweep for step in plan.meshes for operator in step.operators for sweep in operator.sweeps]
+    assert len(sweeps) == 2
+    for sweep in sweeps:
+        assert len({(solve.case.material.law, solve.case.probe.history) for solve in sweep}) == 1
+        assert [solve.case.probe.depth for solve in sweep] == [5e-4, 1e-3]
