@@ -17,8 +17,9 @@ class Kept:
 
     def __init__(self, output: Path, study: Study):
         self._folder = output / "identified"
-        bodies = {case.body.model_dump_json() for case in cases_of(study)}  # with what is in their files
-        self._study = "\n".join((f"{__version__} {git_commit()}", study.text, *sorted(bodies)))
+        # With what is in the files that the study names.
+        read = {f"{case.body.model_dump_json()} {case.material.model_dump_json()}" for case in cases_of(study)}
+        self._study = "\n".join((f"{__version__} {git_commit()}", study.text, *sorted(read)))
 
     def read(self, specimen: Specimen) -> xr.Dataset | None:
         """Return what was kept of a specimen, None if nothing was, or if it cannot be read."""

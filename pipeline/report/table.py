@@ -1,9 +1,12 @@
 """A dataset as a table: a row for each mesh setting, a column for each scene, and why a cell cannot be judged."""
 
 import itertools
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import isfinite, isinf
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +21,7 @@ from pipeline.study.case import Case
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_text
 from pipeline.study.sweep import Study
+from pipeline.study.text import toml_of
 
 Labels = dict[str, Any]
 # What F is compared with, by its name: the variable of the dataset.
@@ -155,12 +159,27 @@ def warnings_of(dataset: xr.Dataset) -> list[str]:
     return str(dataset.attrs.get("warnings", "")).splitlines()
 
 
-@lru_cache(8)  # figures, report and guide of a dataset ask for it again and again
-def _study(text: str, file: str) -> Study | None:
+def _read(text: str, file: str) -> Study | None:
     try:
-        return read_text(text, file)
+        return _study(text, file, tuple(_states(toml_of(text, file), Path(file).parent)))
     except StudyError:
         return None
+
+
+@lru_cache(8)  # figures, report and guide of a dataset ask for it again and again
+def _study(text: str, file: str, _states: tuple[tuple[str, int, int], ...]) -> Study:
+    return read_text(text, file)
+
+
+def _states(part: Any, folder: Path) -> Iterator[tuple[str, int, int]]:
+    """Yield each file that a part of a study names, with the time of its last change (ns) and its size."""
+    if isinstance(part, str):
+        with suppress(OSError, ValueError):  # no file, or no name of one
+            state = (folder / part).stat()
+            yield part, state.st_ctime_ns, state.st_size
+        return
+    for one in part.values() if isinstance(part, dict) else part if isinstance(part, list) else ():
+        yield from _states(one, folder)
 
 
 def _labels(dataset: xr.Dataset, dims: list[str]) -> list[Labels]:

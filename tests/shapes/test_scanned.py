@@ -1,12 +1,15 @@
 """Bodies of triangles: frames of probes on them, their size, and their keys."""
 
+import os
 import shutil
 from math import hypot, pi
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from pipeline.plan.key import case_key, mesh_key
+from pipeline.report.table import study_of
 from pipeline.shapes.bodies.surface import FromSurface
 from pipeline.shapes.frame import PlaceError
 from pipeline.shapes.skin import Skin
@@ -167,12 +170,28 @@ def test_what_makes_no_sense_is_refused(folder, changes, words):
         study(body={key: value for key, value in body.items() if value is not None})
 
 
+TEXT = (
+    '[body]\nshape = "surface"\nfile = "ellipsoid.stl"\nunit = "mm"\nfixed = {below = "-10 mm"}\n'
+    '[material]\nyoung = "1 kPa"\npoisson = 0.3\n[probe]\nshape = "disc"\nradius = "3 mm"\ndepth = "0.1 mm"\n'
+    '[mesh]\naccuracy = "2 %"\n'
+)
+
+
 def test_a_file_is_sought_beside_the_study(folder):
     from pipeline.study.read import read_study
 
-    (folder / "s.toml").write_text(
-        '[body]\nshape = "surface"\nfile = "ellipsoid.stl"\nunit = "mm"\nfixed = {below = "-10 mm"}\n'
-        '[material]\nyoung = "1 kPa"\npoisson = 0.3\n[probe]\nshape = "disc"\nradius = "3 mm"\ndepth = "0.1 mm"\n'
-        '[mesh]\naccuracy = "2 %"\n'
-    )
+    (folder / "s.toml").write_text(TEXT)
     assert read_study(folder / "s.toml").case(()).body.extent == pytest.approx(120e-3, rel=2e-3)
+
+
+def test_a_file_that_changes_is_read_again_also_with_its_old_time_and_size(tmp_path):
+    """Also for the study in a dataset."""
+    points, facets = sphere(24)
+    path, text = tmp_path / "body.stl", TEXT.replace("ellipsoid.stl", "body.stl")
+    dataset = xr.Dataset(attrs={"study": text, "study_file": "s.toml", "study_folder": str(tmp_path)})
+    extents = []
+    for radius in (30e-3, 33e-3):
+        write_stl(path, radius * points, facets)
+        os.utime(path, (0, 0))
+        extents.append([case(path).body.extent, study_of(dataset).case(()).body.extent])
+    assert extents[1] == pytest.approx([1.1 * extent for extent in extents[0]], rel=1e-3)

@@ -121,7 +121,7 @@ class FromImage(Segmented, Scanned):
         from pipeline.shapes.files.image import spacing_of  # noqa: PLC0415
 
         path = Path(self.file)
-        return np.array(spacing_of(path, UNITS[self.unit] if self.unit else None, path.stat().st_mtime_ns))
+        return np.array(spacing_of(path, UNITS[self.unit] if self.unit else None, path.stat().st_ctime_ns))
 
     @property
     def voxel(self) -> float | None:

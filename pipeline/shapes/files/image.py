@@ -53,7 +53,7 @@ def read_image(
 
 def _changed(path: Path) -> int:
     """Return the time of a last change (ns) of a file, or of a folder, with DICOM files."""
-    return path.stat().st_mtime_ns if path.is_dir() else state_of(path)[0]
+    return path.stat().st_ctime_ns if path.is_dir() else state_of(path)[0]
 
 
 @lru_cache(maxsize=8)

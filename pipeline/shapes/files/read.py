@@ -37,7 +37,7 @@ def read_surface(
 
 
 def state_of(path: Path) -> tuple[int, int]:
-    """Return the time of a file's last change (ns) and its size (bytes), by which it is cached.
+    """Return the time of a file's last change (ns), which no program sets, and its size (bytes): it is cached by both.
 
     Raises:
         SurfaceError: if it does not exist, or is not a regular file.
@@ -48,7 +48,7 @@ def state_of(path: Path) -> tuple[int, int]:
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
     if not S_ISREG(state.st_mode):
         raise SurfaceError("cannot be read: it is not a regular file, but a directory, a device or a pipe")
-    return state.st_mtime_ns, state.st_size
+    return state.st_ctime_ns, state.st_size
 
 
 @lru_cache(maxsize=8)
