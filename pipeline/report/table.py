@@ -147,7 +147,7 @@ def study_of(dataset: xr.Dataset) -> Study | None:
     name = str(dataset.attrs.get("study_file", "")) or "study.toml"
     folder = str(dataset.attrs.get("study_folder", "."))
     text = str(dataset.attrs.get("study", ""))
-    study = _study(text, f"{folder}/{name}") or _study(text, name)
+    study = _read(text, f"{folder}/{name}") or _read(text, name)
     if study is None or not study.gives_force or "depth_error" not in dataset:
         return study
     found = dict(zip(study.indices(), dataset["depth"].values.ravel().tolist(), strict=True))
@@ -167,7 +167,7 @@ def _read(text: str, file: str) -> Study | None:
 
 
 @lru_cache(8)  # figures, report and guide of a dataset ask for it again and again
-def _study(text: str, file: str, _states: tuple[tuple[str, int, int], ...]) -> Study:
+def _study(text: str, file: str, _files: tuple[tuple[str, int, int], ...]) -> Study:
     return read_text(text, file)
 
 
