@@ -18,9 +18,9 @@ def main() -> None:
 
     try:
         from pipeline.cli import main as run  # noqa: PLC0415 (takes time to load)
-        from pipeline.launcher import prepare_mpi  # noqa: PLC0415
+        from pipeline.launcher import prepare_libraries  # noqa: PLC0415
 
-        prepare_mpi()
+        prepare_libraries()
         if listens:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         run()

@@ -12,6 +12,7 @@ _RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 _LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "MPI_LOCALNRANKS")
 # For one process Open MPI need neither start its daemon nor look for a network: half a second, mostly of waiting.
 _ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_pml": "ob1"}
+_NO_SIGNALS = "-no_signal_handler"
 _PREFIXES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_")
 
 
@@ -20,8 +21,15 @@ def is_launched() -> bool:
     return any(name in os.environ for name in _LAUNCHED)
 
 
-def prepare_mpi() -> None:
-    """Let MPI, which is loaded later, start quickly in a process that no launcher started; what the user set stays."""
+def prepare_libraries() -> None:
+    """Prepare libraries that are loaded later, wherever that is; what the user set stays.
+
+    PETSc leaves signals alone: it takes a reader that closes a pipe for a crash. MPI starts quickly in a process that
+    no launcher started.
+    """
+    options = os.environ.get("PETSC_OPTIONS", "")
+    if _NO_SIGNALS not in options:
+        os.environ["PETSC_OPTIONS"] = f"{options} {_NO_SIGNALS}".strip()
     if not is_launched():
         for name, value in _ALONE.items():
             os.environ.setdefault(name, value)
