@@ -1,6 +1,7 @@
 """What a study of measured curves need not declare: meshes, the tool's depth, and values of what is to be found."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from math import sqrt
 from typing import Any
 
@@ -18,6 +19,9 @@ _SHALLOW = "1 nm"
 _ANY = {"young": "10 kPa", "poisson": 0.4}
 _UNITS = {"young": "Pa", "thickness": "m"}
 _ABSENT = "is required for the study's cases; only `epsmesh identify` does without it"
+OF_MEASUREMENTS = (
+    "is that of each measurement, and required for the study's cases; only `epsmesh identify` does without it"
+)
 _VALUES = "has no value of what [identify] is to find; only `epsmesh identify` does without it"
 
 
@@ -41,6 +45,23 @@ def completed(raw: Mapping[str, Any], *, is_scene: bool) -> tuple[dict[str, Any]
     told = {"probe": ("probe.depth", _ABSENT), "body": ("[body]", _VALUES), "material": ("[material]", _VALUES)}
     changed = (told[section] for section in told if found.get(section) != raw.get(section))
     return found, (*lacking, *(Problem(key, None, why) for key, why in changed))
+
+
+def borrowed(raw: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the sections that a study leaves out since every measurement has its own: those of the first one."""
+    tables = raw.get("measurement")
+    if not (isinstance(tables, list) and tables and all(isinstance(table, dict) for table in tables)):
+        return {}
+    sections = [key for key in ("body", "probe") if key not in raw]
+    return {key: tables[0][key] for key in sections if all(isinstance(table.get(key), dict) for table in tables)}
+
+
+def of_measurement(problems: Sequence[Problem], sections: Collection[str]) -> list[Problem]:
+    """Return problems of borrowed ``sections`` with the keys of the measurement that they are of."""
+    return [
+        replace(one, key=f"measurement[1].{one.key}") if one.key.partition(".")[0] in sections else one
+        for one in problems
+    ]
 
 
 def _each(tables: Any, change: Callable[[dict[str, Any]], dict[str, Any]]) -> Any:

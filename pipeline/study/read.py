@@ -18,7 +18,7 @@ from pipeline.study.identification import Identification, check_shared, read_ide
 from pipeline.study.identified import with_identified
 from pipeline.study.insertion_stages import has_insertion, with_steps
 from pipeline.study.loads import Load
-from pipeline.study.measured import MESH, completed
+from pipeline.study.measured import MESH, OF_MEASUREMENTS, borrowed, completed, of_measurement
 from pipeline.study.measurement import Measurement
 from pipeline.study.output import Output, check_outputs, read_outputs
 from pipeline.study.own_lengths import own_errors
@@ -81,8 +81,11 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene:
     """
     problems = Problems(tables=_names_of(raw))
     given, text, identified = with_identified(raw, text, file, problems)
-    given, lacking = completed(given, is_scene=is_scene)
-    raw = _beside(given if "mesh" in given or not lacking else given | {"mesh": MESH}, Path(file).parent)
+    own = borrowed(given)
+    whole, lacking = completed(given | own, is_scene=is_scene)
+    lacking = (*(Problem(f"[{section}]", None, OF_MEASUREMENTS) for section in own), *lacking)
+    given, _ = completed(given, is_scene=is_scene)
+    raw = _beside(whole if "mesh" in whole or not lacking else whole | {"mesh": MESH}, Path(file).parent)
     _check_top(raw, problems)
     axes: list[Axis] = []
     sections: dict[str, tuple[Section, ...]] = {}
@@ -108,6 +111,7 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene:
     measurements, identification = _read_experiment(given, sections, file, problems)
     outputs = _read_outputs(given, sections, axes, Path(file).parent, problems)
     spread = _read_spread(given, sections, outputs, problems)
+    problems.errors[:] = of_measurement(problems.errors, own)
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))
     sections, every_axis = with_steps(*with_stages(sections, tuple(axes)))

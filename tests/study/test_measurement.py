@@ -201,6 +201,26 @@ def test_a_measurement_has_its_own_tool_and_body():
     assert case_key(again.case(())) == case_key(first.case(()))
 
 
+def test_measurements_with_tools_and_bodies_of_their_own_need_no_others():
+    disc = {"shape": "disc", "radius": "2 mm", "contact": "frictionless", "at": ["1 mm", "0 mm"]}
+    ball = {"shape": "sphere", "radius": "5 mm", "contact": "unilateral"}
+    whole, body = raw(), raw()["body"]
+    tables = [CURVE | {"probe": disc, "body": body}, CURVE | {"name": "ball", "probe": ball, "body": body}]
+    alone = {"material": whole["material"], "mesh": whole["mesh"], "measurement": tables}
+    study = parse(alone)
+    first, second = (scene_of(study, one) for one in study.measurements)
+    for scene, probe in ((first, disc), (second, ball)):
+        same = parse(whole | {"probe": probe, "measurement": [CURVE]})
+        assert case_key(scene.case(())) == case_key(scene_of(same, same.measurements[0]).case(()))
+    assert "[probe]" in {problem.key for problem in study.lacking}
+    tables[0] = CURVE | {"probe": disc | {"radius": "-1 mm"}, "body": body}
+    with pytest.raises(StudyError, match=r"measurement\[1\].probe.radius"):
+        parse(alone)
+    del tables[1]["probe"]
+    with pytest.raises(StudyError, match=r"\[probe\]: this section is required"):
+        parse(alone)
+
+
 def test_a_measurement_chooses_one_of_several_tools():
     tools = [{"name": n, "shape": "disc", "radius": r, "depth": "0.1 mm"} for n, r in (("a", "1 mm"), ("b", "2 mm"))]
     content = raw() | {"probe": tools, "measurement": [CURVE | {"probe": {"name": "b"}}]}
