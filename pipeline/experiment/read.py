@@ -3,7 +3,7 @@
 import os
 import re
 from collections.abc import Sequence
-from glob import has_magic
+from glob import escape, glob, has_magic
 from pathlib import Path
 
 import numpy as np
@@ -34,8 +34,11 @@ def files_of(pattern: str, folder: Path) -> tuple[Path, ...]:
     path = folder / pattern
     if path.is_file() or not has_magic(pattern):
         return (path,)
-    root = Path(path.anchor)
-    found = [one for one in root.glob(os.fspath(path.relative_to(root))) if one.is_file()]
+    base, *parts = Path(path.anchor or "."), *path.relative_to(path.anchor).parts
+    while len(parts) > 1 and (base / parts[0]).is_dir():  # brackets in the name of a folder are its own
+        base /= parts.pop(0)
+    found = [Path(one) for one in glob(os.path.join(escape(os.fspath(base)), *parts), recursive=True)]
+    found = [one for one in found if one.is_file()]
     if not found:
         raise ExperimentError(os.fspath(path), "no file has a name of this pattern")
     return tuple(sorted(found, key=_by_number))

@@ -219,6 +219,11 @@ def test_a_folder_of_curves_in_the_order_of_their_numbers(tmp_path):
     assert [curve.name for curve in curves] == ["well_1", "well_2", "well_10"]
     assert [round(curve.force.max() / FORCE.max()) for curve in curves] == [1, 2, 10]
     assert files_of(str(tmp_path / "curves" / "*.csv"), Path("elsewhere")) == files_of("curves/*.csv", tmp_path)
+    (tmp_path / "gels [2025] a?").mkdir()
+    for name in ("gel [1].csv", "gel [2].csv"):
+        write(tmp_path / "gels [2025] a?" / name, IN_MM)
+    for pattern, folder in (("*.csv", tmp_path / "gels [2025] a?"), ("gels [2025] a?/*.csv", tmp_path)):
+        assert [path.name for path in files_of(pattern, folder)] == ["gel [1].csv", "gel [2].csv"]
     (tmp_path / "curves" / "well_2.csv").write_text("nothing")
     first, second, third = read_curves("curves/*.csv", Reading(), tmp_path)
     assert (first.name, third.name) == ("well_1", "well_10")
