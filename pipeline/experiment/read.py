@@ -3,7 +3,7 @@
 import os
 import re
 from collections.abc import Sequence
-from glob import escape, glob, has_magic
+from glob import has_magic
 from pathlib import Path
 
 import numpy as np
@@ -37,8 +37,7 @@ def files_of(pattern: str, folder: Path) -> tuple[Path, ...]:
     base, *parts = Path(path.anchor or "."), *path.relative_to(path.anchor).parts
     while len(parts) > 1 and (base / parts[0]).is_dir():  # brackets in the name of a folder are its own
         base /= parts.pop(0)
-    found = [Path(one) for one in glob(os.path.join(escape(os.fspath(base)), *parts), recursive=True)]
-    found = [one for one in found if one.is_file()]
+    found = [one for one in base.glob("/".join(parts)) if one.is_file() and not one.name.startswith(".")]
     if not found:
         raise ExperimentError(os.fspath(path), "no file has a name of this pattern")
     return tuple(sorted(found, key=_by_number))

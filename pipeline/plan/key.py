@@ -74,11 +74,12 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
 
 
 def _output_text(output: Output) -> str:
-    """Return an output in canonical form, with the content of the file of its function."""
+    """Return an output in canonical form, with the content of the file of its function, and of what that imports."""
     content = output.model_dump(exclude={"unit"}) | {"name": output.name}
     if output.function is not None:
-        file, name = output.path
-        content["function"] = [digest(file.read_text(encoding="utf-8")), name]
+        _, name = output.path
+        first, *others = (digest(file.read_text(encoding="utf-8")) for file in output.sources)
+        content["function"] = [first, name, *others]
     return _text(content)
 
 

@@ -3,7 +3,8 @@
 import hashlib
 import importlib.util
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from math import isfinite, nan
 from pathlib import Path
@@ -104,21 +105,45 @@ def function_of(output: Output) -> Callable[[CaseSolution], Any]:
         Exception: what the file raises; AttributeError, if it has no such function.
     """
     file, name = output.path
-    found: Callable[[CaseSolution], Any] = getattr(_module(file.resolve()), name)
-    return found
+    function: Callable[[CaseSolution], Any] = getattr(_module(file.resolve(), output.sources), name)
+
+    def called(solution: CaseSolution) -> Any:
+        with _beside(file.resolve().parent):
+            return function(solution)
+
+    return called
 
 
-def _module(path: Path) -> Any:
-    # By content, too: the file may have changed since this process last executed it.
-    content = hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+def _module(path: Path, sources: Sequence[Path]) -> Any:
+    # By content, too: the files may have changed since this process last executed them.
+    content = hashlib.sha256(b"\0".join(source.read_bytes() for source in sources)).hexdigest()[:16]
     key = f"_epsmesh_output_{path.stem}_{content}_{abs(hash(path))}"
     if key not in sys.modules:
         specification = importlib.util.spec_from_file_location(key, path)
         assert specification is not None and specification.loader is not None
-        module = importlib.util.module_from_spec(specification)
-        specification.loader.exec_module(module)
-        sys.modules[key] = module
+        module = sys.modules[key] = importlib.util.module_from_spec(specification)
+        with _beside(path.parent, {source.resolve() for source in sources}):
+            try:
+                specification.loader.exec_module(module)
+            except BaseException:
+                del sys.modules[key]
+                raise
     return sys.modules[key]
+
+
+@contextmanager
+def _beside(folder: Path, changed: Collection[Path] = ()) -> Iterator[None]:
+    """Import modules of a ``folder`` first, as a script there does, and afresh those that may have changed."""
+    loaded = {name: getattr(module, "__file__", None) for name, module in [*sys.modules.items()] if changed}
+    for name in (name for name, file in loaded.items() if file and Path(file).resolve() in changed):
+        if not name.startswith("_epsmesh_output_"):
+            del sys.modules[name]
+    importlib.invalidate_caches()
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
 
 
 def _bar(output: Output, number: Number) -> float:

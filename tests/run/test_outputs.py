@@ -1,12 +1,16 @@
 """Outputs are numbers of the case's own solution, in bars that hold a finer one; what cannot be told is said."""
 
+import sys
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 import pipeline
+from pipeline.plan.key import case_key
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
+from pipeline.run.outputs import function_of
 from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
 from tests.cases import raw
@@ -161,3 +165,39 @@ def test_ranks_agree():
     together, alone = (records(comm=comm, body={"inclusion": [TUMOUR]})[0].largest for comm in (WORLD, MPI.COMM_SELF))
     for name, value in alone.items():
         assert together[name] == pytest.approx(value, rel=2e-2 if name.endswith("_error") else 1e-4), name
+
+
+OWN = """from __future__ import annotations
+from dataclasses import dataclass
+from own_numbers import TWICE
+
+@dataclass
+class Pair:
+    one: float
+    other: float = 1.0
+
+def number(solution):
+    from own_package.later import ADDED
+    return TWICE * Pair(1.0).other + ADDED
+"""
+
+
+def test_functions_have_dataclasses_and_modules_beside_them_that_are_part_of_the_key(tmp_path):
+    def found():
+        study = parse(raw(output=[{"name": "own", "function": "outputs.py:number"}]), file=str(tmp_path / "study.toml"))
+        case = study.case(())
+        return function_of(case.outputs[0])(None), case_key(case)
+
+    later = tmp_path / "own_package" / "later.py"
+    later.parent.mkdir()
+    for file, text in {"outputs.py": OWN, "own_numbers.py": "TWICE = 2.0", "own_package/__init__.py": ""}.items():
+        (tmp_path / file).write_text(text)
+    later.write_text("ADDED = 1.0")
+    first, key = found()
+    (tmp_path / "own_numbers.py").write_text("TWICE = 4.00")
+    second, other = found()
+    later.write_text("ADDED = 10.0")
+    third, last = found()
+    assert (first, second, third) == (3.0, 5.0, 14.0)
+    assert len({key, other, last}) == 3
+    assert sys.path[0] != str(tmp_path)
