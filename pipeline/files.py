@@ -143,3 +143,11 @@ def _beside(path: Path) -> Iterator[Path]:
 def _to_disk(path: Path) -> None:
     with path.open("rb") as file:
         os.fsync(file.fileno())
+
+
+def matching(path: Path) -> list[Path]:
+    """Return the files that a path with wildcards names. Brackets in the name of a folder that exists are its own."""
+    base, *parts = Path(path.anchor or "."), *path.relative_to(path.anchor).parts
+    while len(parts) > 1 and (base / parts[0]).is_dir():
+        base /= parts.pop(0)
+    return [one for one in base.glob("/".join(parts)) if one.is_file() and not one.name.startswith(".")]

@@ -1,7 +1,10 @@
 """The command that begins a study file: from an example, another study, or one with old key names."""
 
 import json
+import os
 import shutil
+from collections.abc import Iterator
+from glob import has_magic
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,10 +14,12 @@ from pipeline.class_maps import CLASS_MAPS
 from pipeline.cli.console import say
 from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study
 from pipeline.cli.words import Json
-from pipeline.files import atomic, write_new, write_whole
+from pipeline.files import atomic, matching, write_new, write_whole
 from pipeline.study.named import NAME, SCHEMA, SHORT, examples, is_name
 
 _FOLDER = Path("studies")
+# Keys of a study that name files: of bodies, regions, labels, measurements; a dataset of identified material.
+_FILES = ("file", "names", "from")
 _HOWTO = "docs/howto/own-body.md"
 
 
@@ -155,7 +160,7 @@ def _carried(text: str, source: Path, target: Path) -> list[Path]:
         OSError: if it cannot be written.
     """
     copied = []
-    for name in _named(text):
+    for name in _named(text, source):
         here, there = source / name, target / name
         try:
             if there.exists() or not here.is_file():
@@ -172,18 +177,44 @@ def _carried(text: str, source: Path, target: Path) -> list[Path]:
     return copied
 
 
-def _named(text: str) -> list[str]:
-    """Return the files that a study names: of its body, and of its measurements."""
+def _named(text: str, source: Path) -> list[str]:
+    """Return the files that a study in the folder ``source`` names, wherever in it, and those that they import."""
     import tomllib
 
     try:
         study = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         return []
-    measurements = study.get("measurement")
-    tables = [study.get("body"), *(measurements if isinstance(measurements, list) else [])]
-    names = [table.get(key) for table in tables if isinstance(table, dict) for key in ("file", "names")]
-    return list(dict.fromkeys(name for name in names if isinstance(name, str) and name not in CLASS_MAPS))
+    names = (name for name in _files_in(study) if name and name not in CLASS_MAPS)
+    return list(dict.fromkeys(file for name in names for file in _with_others(name, source)))
+
+
+def _files_in(value: Any, key: str = "") -> Iterator[str]:
+    """Yield the values of keys that name files."""
+    if isinstance(value, dict):
+        for inner, one in value.items():
+            yield from _files_in(one, inner)
+    elif isinstance(value, list):
+        for one in value:
+            yield from _files_in(one, key)
+    elif isinstance(value, str) and key in _FILES:
+        yield value
+    elif isinstance(value, str) and key == "function":
+        yield value.rpartition(":")[0]
+
+
+def _with_others(name: str, source: Path) -> list[str]:
+    """Return a name of a file, or those of the files of a pattern, with the modules that a file of Python imports."""
+    from pipeline.study.sources import with_imported
+
+    path = source / name
+    try:
+        if has_magic(name) and not path.is_file():
+            return [os.fspath(one.relative_to(source)) for one in matching(path) if one.is_relative_to(source)]
+        files = with_imported(path) if path.suffix == ".py" else ()
+    except (OSError, ValueError):  # a name with a NUL
+        return [name]
+    return [name, *(os.fspath(one.relative_to(source)) for one in files[1:])]
 
 
 def _known() -> dict[str, Path]:

@@ -18,6 +18,7 @@ from pipeline.experiment.segments import Cycle, cycles_of
 from pipeline.experiment.signs import signed
 from pipeline.experiment.table import table_of
 from pipeline.experiment.text import read_lines
+from pipeline.files import matching
 
 # Files of a folder whose errors are told; the others are counted.
 _MOST_TOLD = 5
@@ -34,10 +35,7 @@ def files_of(pattern: str, folder: Path) -> tuple[Path, ...]:
     path = folder / pattern
     if path.is_file() or not has_magic(pattern):
         return (path,)
-    base, *parts = Path(path.anchor or "."), *path.relative_to(path.anchor).parts
-    while len(parts) > 1 and (base / parts[0]).is_dir():  # brackets in the name of a folder are its own
-        base /= parts.pop(0)
-    found = [one for one in base.glob("/".join(parts)) if one.is_file() and not one.name.startswith(".")]
+    found = matching(path)
     if not found:
         raise ExperimentError(os.fspath(path), "no file has a name of this pattern")
     return tuple(sorted(found, key=_by_number))

@@ -1,9 +1,7 @@
 """``[[output]]``: numbers that a study asks for besides the force, at a point, over a region, or of a function."""
 
-import ast
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -17,6 +15,7 @@ from pipeline.shapes.section import Section, Words
 from pipeline.study.axis import Axis
 from pipeline.study.insertion_stages import has_insertion
 from pipeline.study.problems import Problems, nearest, tuples
+from pipeline.study.sources import with_imported
 from pipeline.units import Coordinate, parse_quantity
 
 # What an output is of, with its unit and its meaning.
@@ -132,7 +131,7 @@ class Output(Section):
     def sources(self) -> tuple[Path, ...]:
         """The file of the function, and the modules beside it that it imports, as those import others."""
         file, _ = self.path
-        return _with_imported(file, {file})
+        return with_imported(file)
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -150,34 +149,6 @@ class Output(Section):
         """Variables of the dataset with their attributes: the number, and its error bar."""
         own = self.attributes
         return {self.name: own, f"{self.name}_error": own | {"long_name": f"error bar (95 %) on {self.name}"}}
-
-
-def _with_imported(file: Path, known: set[Path]) -> tuple[Path, ...]:
-    """Return a file of Python, and the modules in its folder that it imports and that are not yet ``known``."""
-    found, folder = [file], file.parent
-    for name in sorted(_imported(file.read_bytes()) if file.is_file() else ()):
-        parts = folder.joinpath(*name.split("."))
-        packages = [folder.joinpath(*name.split(".")[:end], "__init__.py") for end in range(1, name.count(".") + 2)]
-        for module in (parts.with_suffix(".py"), *packages):
-            if module not in known and module.is_file():
-                known.add(module)
-                found += _with_imported(module, known)
-    return tuple(found)
-
-
-@lru_cache(64)
-def _imported(text: bytes) -> frozenset[str]:
-    """Return the names that a text of Python imports, wherever in it; none if it is no Python."""
-    try:
-        nodes = [*ast.walk(ast.parse(text))]
-    except (SyntaxError, ValueError):
-        return frozenset()
-    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
-    for node in nodes:
-        if isinstance(node, ast.ImportFrom):
-            names |= {node.module} if node.module else set()
-            names |= {".".join(filter(None, (node.module, alias.name))) for alias in node.names if alias.name != "*"}
-    return frozenset(names)
 
 
 def _refused(allowed: str) -> PydanticCustomError:

@@ -195,15 +195,51 @@ def test_the_file_of_a_body_is_taken_along_within_the_project(elsewhere):
     assert not (elsewhere.parent / "meshes").exists()
 
 
-def test_the_curves_of_a_study_are_taken_along(elsewhere):
-    curve = elsewhere / "old" / "curves" / "a.csv"
-    curve.parent.mkdir(parents=True)
-    curve.write_text("depth (mm),force (N)\n")
-    measured = '\n[[measurement]]\nname = "a"\nfile = "curves/a.csv"\n'
-    (elsewhere / "old" / "mine.toml").write_text(examples()["pad"].read_text() + measured)
+ALL_FILES = """
+[[body]]
+name = "one"
+shape = "surface"
+file = ["one.stl", "two.stl"]
+
+[[body.region]]
+name = "tumour"
+file = "meshes/tumour.stl"
+
+[[body]]
+name = "other"
+shape = "image"
+file = "scan [2].nii.gz"
+names = "labels.txt"
+
+[material]
+from = "results/gel.nc"
+
+[[measurement]]
+name = "a"
+file = "curves [1]/*.csv"
+probe = {shape = "disc", radius = "1 mm"}
+body = {shape = "cad", file = "phantom.step"}
+
+[[output]]
+name = "energy"
+function = "outputs.py:energy"
+"""
+
+
+def test_all_files_of_a_study_are_taken_along(elsewhere):
+    (elsewhere / "old").mkdir()
+    texts = {"outputs.py": "import own, json\n", "own.py": "from inner.deep import f\n", "inner/deep.py": ""}
+    named = ("one.stl", "two.stl", "meshes/tumour.stl", "scan [2].nii.gz", "labels.txt", "results/gel.nc")
+    curves = ("phantom.step", "curves [1]/a.csv", "curves [1]/b.csv")
+    for name in (*named, *curves, *texts):
+        file = elsewhere / "old" / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(texts.get(name, name))
+    (elsewhere / "old" / "mine.toml").write_text(ALL_FILES)
     copied = json.loads(new("yours", "--like", "old/mine.toml", "--json").stdout)["carried"]
-    assert copied == ["studies/curves/a.csv"]
-    assert (elsewhere / copied[0]).read_text() == curve.read_text()
+    assert sorted(copied) == sorted(f"studies/{name}" for name in (*named, *curves, *texts))
+    for name in (*named, *curves, *texts):
+        assert (elsewhere / "studies" / name).read_text() == texts.get(name, name)
 
 
 def test_the_evaluator_in_c_is_copied_and_nothing_overwritten(elsewhere):
