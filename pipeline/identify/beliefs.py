@@ -55,16 +55,19 @@ def size_of(hypothesis: int) -> float:
     return DEVIATIONS[hypothesis // len(GRID)]
 
 
-def beliefs(products: Grams, precision: FloatArray, mean: FloatArray) -> Beliefs:
+def beliefs(products: Grams, precision: FloatArray, mean: FloatArray, least: float) -> Beliefs:
     """Return what a curve says, given what else is known of the step: a normal ``precision`` (u, u) and ``mean`` (u,).
 
-    The standard deviation of the noise has its most probable value, by as many points as are left by the unknowns.
+    The standard deviation of the noise has its most probable value, by as many points as are left by the unknowns, but
+    not below the ``least`` (N).
     """
-    found = [_of_size(products, precision, mean, size) for size in DEVIATIONS]
+    found = [_of_size(products, precision, mean, least, size) for size in DEVIATIONS]
     return Beliefs(*(np.concatenate(part) for part in zip(*found, strict=True)))
 
 
-def _of_size(products: Grams, precision: FloatArray, mean: FloatArray, deviation: float) -> tuple[FloatArray, ...]:
+def _of_size(
+    products: Grams, precision: FloatArray, mean: FloatArray, least: float, deviation: float
+) -> tuple[FloatArray, ...]:
     """Return the fields of ``Beliefs`` (noises, ...) for one of ``DEVIATIONS``."""
     size = len(mean)
     used = size + (TERMS if deviation else 0)
@@ -80,13 +83,13 @@ def _of_size(products: Grams, precision: FloatArray, mean: FloatArray, deviation
     value = np.maximum(value, 0.0)
     turned = np.einsum("hij,ki,hk->hj", axes, inverse.T, right, optimize=True)
     centre = np.einsum("hij,i->hj", axes, root.T @ np.concatenate([mean, np.zeros(used - size)]))
-    variance = square / products.count
+    variance = np.maximum(square / products.count, least**2)
     for _ in range(_SCALES):
         inner = value / variance[:, None]
         step = (turned / variance[:, None] + centre) / (inner + 1)
         rest = square + np.sum(step * (value * step - 2 * turned), axis=1)
         fitted = np.sum(inner / (inner + 1), axis=1)
-        variance = np.maximum(rest, 1e-30 * square) / (products.count - fitted)
+        variance = np.maximum(rest / (products.count - fitted), least**2)
     constant = -products.half - 0.5 * products.count * np.log(variance)
     away = np.sum((step - centre) ** 2, axis=1)
     evidence = constant - 0.5 * rest / variance - 0.5 * away - 0.5 * np.log1p(inner).sum(axis=1)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 from pipeline.experiment.reading import ExperimentError
-from pipeline.identify.experiment import depth_of
+from pipeline.identify.model import depth_of
 from pipeline.report.identified import engineering
 from pipeline.shapes.probe import Probe
 from pipeline.study.case import Case
@@ -31,12 +31,15 @@ _DEEPEST = 0.5
 class Trial:
     """A test: a scene pressed to its depth (m), after ``air`` (a share of the depth), then held.
 
+    ``may_tilt`` is that of its curve.
+
     ``hold`` is in units of the longest relaxation time.
     """
 
     name: str
     scene: Study
     machine_compliance: float | None = 0.0
+    may_tilt: bool = True
     air: float = _AIR
     hold: float = _HOLD
 
@@ -79,7 +82,9 @@ def planned_trials(study: Study) -> tuple[Trial, ...]:
         return (Trial("test", _parsed(study, study.raw)),)
     if not has_depth:
         study = pressed_to(study, _recorded(study))
-    return tuple(Trial(one.name, scene_of(study, one), one.machine_compliance) for one in study.measurements)
+    return tuple(
+        Trial(one.name, scene_of(study, one), one.machine_compliance, one.may_tilt) for one in study.measurements
+    )
 
 
 def pressed_to(study: Study, depths: Sequence[float]) -> Study:

@@ -107,8 +107,8 @@ class Designer:
             SurrogateError: if a test cannot be computed.
         """
         measured = [self.measured(number, trial) for number, trial in enumerate(trials)]
-        model = Model.of(measured, self.unknowns)
-        declared = _OF_UNKNOWN_NOISE * _half_widths(model, self._at(model, self.values), self._noise)
+        model, x = self._tilted(Model.of(measured, self.unknowns), self.values)
+        declared = _OF_UNKNOWN_NOISE * _half_widths(model, x, self._noise)
         hidden = [declared]
         for kind in self._kinds:
             sizes = [_half_widths(*made, self._noise)[: len(declared)] for made in self._hidden(kind, trials, measured)]
@@ -125,7 +125,7 @@ class Designer:
         compliance = trial.machine_compliance
         yields = 1 / self.values["machine_stiffness"] if compliance is None else compliance
         curve = Curve(f"{trial.name} {number}", down + yields * force, force, time)
-        return Measured(curve, forward, compliance)
+        return Measured(curve, forward, compliance, may_tilt=trial.may_tilt)
 
     def _forward(self, trial: Trial) -> Forward:
         scene, depth = trial.scene, trial.depth
@@ -138,11 +138,11 @@ class Designer:
             self._forces[key] = build(domain_of(scene, bounds, depth), solve, _TOLERANCE)
         return self._forces[key]
 
-    def _at(self, model: Model, values: Values) -> FloatArray:
-        """Return the coordinates of values; contact points, baselines and drifts are 0."""
-        return np.array(
-            [np.clip(model.space.coordinate(k, values.get(name, 0.0)), 0.0, 1.0) for k, name in enumerate(model.names)]
-        )
+    @staticmethod
+    def _tilted(model: Model, values: Values) -> tuple[Model, FloatArray]:
+        """Return the model with baselines that may tilt, and the coordinates of values; those of curves are 0."""
+        places = [model.space.coordinate(k, values.get(name, 0.0)) for k, name in enumerate(model.names)]
+        return model.tilted(np.clip(places, 0.0, 1.0))
 
     def _hidden(
         self, kind: str, trials: Sequence[Trial], measured: Sequence[Measured]
@@ -162,7 +162,7 @@ class Designer:
         ]
         model = Model.of(with_parts, self.unknowns).with_unknowns(part.unknowns)
         for found in _sizes(kind, radius):
-            yield model, self._at(model, {**self.values, **found})
+            yield self._tilted(model, {**self.values, **found})
 
 
 def rank(study: Study, solve: Solve, say: Callable[[str], None] = lambda _: None) -> Design:

@@ -12,6 +12,7 @@ from pipeline.experiment.curve import Curve
 from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.forward import OwnForce, SceneForce, forward_of, unknown_domain
 from pipeline.identify.may_hide import hidden_parts
+from pipeline.identify.model import depth_of
 from pipeline.identify.parts import Estimate, Hidden, Measured, Unknown
 from pipeline.identify.tools import tip_of_probe
 from pipeline.report.identified import engineering
@@ -29,7 +30,7 @@ from pipeline.surrogate.ranges import Range
 
 # The force is computed this much deeper than from a twentieth of the largest force on: a ball has that at an eighth of
 # its depth, a cone at a fifth, and the contact point is not known beforehand.
-_SMALL, _DEEPER = 0.05, 1.4
+_DEEPER = 1.4
 # Curves this many times as deep as most are another test, or have another unit.
 _ODD = 2.0
 
@@ -59,7 +60,9 @@ class Scenes:
     def measured(self, specimen: Specimen) -> tuple[Measured, ...]:
         """Return the curves of a specimen with their scenes."""
         rows = zip(specimen.curves, self.measurements, self.forwards, self.hidden, strict=True)
-        return tuple(Measured(curve, forward, one.machine_compliance, own) for curve, one, forward, own in rows)
+        return tuple(
+            Measured(curve, forward, one.machine_compliance, own, one.may_tilt) for curve, one, forward, own in rows
+        )
 
     def ranges(self, found: Estimate) -> Near:
         """Return over which ranges the force of each scene is to be corrected for a fit."""
@@ -210,16 +213,6 @@ def deepest_of(curves: Sequence[Curve], times: float = 1.0) -> float:
     most = times * _DEEPER * max(map(depth_of, curves))
     digit = 10.0 ** (floor(log10(most)) - 1)
     return ceil(most / digit) * digit
-
-
-def depth_of(curve: Curve) -> float:
-    """Return about how deep (m) a curve is, from where its force is small."""
-    force = curve.force - np.median(curve.force[: max(1, len(curve.force) // 20)])
-    top = int(np.argmax(curve.depth))
-    pressed = np.flatnonzero(force[: top + 1] > _SMALL * force.max())
-    start = curve.depth[pressed[0]] if pressed.size else curve.depth[0]
-    whole = float(np.ptp(curve.depth))
-    return max(min(float(curve.depth[top] - start), whole), whole / len(curve.depth))
 
 
 def _poisson(study: Study, unknowns: Sequence[Unknown]) -> float:

@@ -12,8 +12,14 @@ from pipeline.identify.noise import GRID, Noise, deviation, grams
 
 # Precision of an unknown that is only known to be within its range: that of a uniform distribution.
 _UNIFORM = 12.0
+# No measured force is exact to this share of the largest one: ISO 7500-1 allows five times as much in its finest class.
+FINEST = 1e-3
+# That is so many standard deviations of the noise at least.
+_SURE = 3.0
 # Sweeps until the middle of all hypotheses moves by less than this share of their spread.
 _SWEEPS, _CLOSE = 12, 0.1
+# A step may lower the logarithm of the evidence by so much, as what curves know of each other does; halvings of others.
+_FALL, _HALVINGS = 5.0, 6
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,11 @@ class Fit:
         return GRID[top % len(GRID)], float(self.beliefs[number].scale[top])
 
     @property
+    def evidence(self) -> float:
+        """Logarithm of the evidence of all hypotheses of all curves, each given what others say of the unknowns."""
+        return float(sum(np.logaddexp.reduce(belief.probable.ravel()) for belief in self.beliefs))
+
+    @property
     def misfit(self) -> float:
         """Logarithm of the evidence for deviations from the law, relative to that for none, in the worst curve.
 
@@ -57,8 +68,24 @@ def fit(model: Model, start: FloatArray) -> Fit:
         # What curves know of each other is of the sweep before.
         if is_close and (len(found.beliefs) == 1 or before):
             break
-        found, before = _linear(model, found.x + step, found), found
+        after = _stepped(model, found, step)
+        if after is None:
+            break
+        found, before = after, found
     return found
+
+
+def _stepped(model: Model, found: Fit, step: FloatArray) -> Fit | None:
+    """Return the fit after a ``step`` (u,), or a part of it; None if the model is linear over none.
+
+    Where a direction is hardly seen, as contact point and baseline of a flat punch without air, a whole step leaves the
+    range over which the derivatives hold: the evidence then falls.
+    """
+    for halving in range(_HALVINGS):
+        after = _linear(model, found.x + step / 2**halving, found)
+        if after.evidence > found.evidence - _FALL:
+            return after
+    return None
 
 
 def _linear(model: Model, x: FloatArray, before: Fit | None) -> Fit:
@@ -81,7 +108,8 @@ def _linear(model: Model, x: FloatArray, before: Fit | None) -> Fit:
                 top = before.top(other)
                 known += belief.information[top]
                 pull = pull + belief.pull[top] - belief.information[top] @ (x - before.x)
-        found.append(beliefs(products, known, np.linalg.solve(known, pull)))
+        least = FINEST / _SURE * float(np.ptp(measured.curve.force))
+        found.append(beliefs(products, known, np.linalg.solve(known, pull), least))
     count = sum(len(model.thinned(force)) for force in forces)
     return Fit(model, x, forces, jacobians, tuple(found), mixture_of(found, precision, mean, x, count))
 

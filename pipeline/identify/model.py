@@ -1,8 +1,8 @@
-"""The model of measured force curves: F(t) = baseline + drift t + Relax[F_elastic(d)], d = z - contact point - F/k.
+"""The model of measured force curves: F(t) = baseline + tilt z + drift t + Relax[F_elastic(d)], d = z - z_0 - F/k.
 
-z is the recorded depth and k the stiffness of the machine. The force that bends the machine is that of the model, so
-that noise of the measured force does not enter the depth. Several curves share all unknowns but contact point,
-baseline and drift.
+z is the recorded depth, z_0 that of contact, and k the stiffness of the machine. The force that bends the machine is
+that of the model, so that noise of the measured force does not enter the depth. Several curves share all unknowns but
+contact point, baseline, tilt and drift. Air before contact tells the tilt; a curve without air has none.
 """
 
 from collections.abc import Sequence
@@ -13,10 +13,11 @@ from math import isfinite
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.experiment.curve import Curve
 from pipeline.identify.parts import Measured, Unknown, Values
 from pipeline.identify.relaxing import relaxed
 
-OF_CURVE = ("contact_point", "baseline", "drift")
+OF_CURVE = ("contact_point", "baseline", "tilt", "drift")
 """Unknowns of which every curve has its own."""
 
 ALWAYS = ("contact_point", "baseline")
@@ -25,6 +26,13 @@ ALWAYS = ("contact_point", "baseline")
 REACH = 0.5
 """Contact is this much before the first depth at most, in recorded depths, of a curve that begins in air or near it."""
 
+# What is known of a tilt beforehand: its standard deviation, as a share of the mean slope in contact, and its range in
+# standard deviations. Force microscopes and testing machines have some per cent.
+_TILT, _TILTS = 0.03, 8.0
+# A curve has air from so many rows before contact on, and this share of the depth in contact.
+_AIR_ROWS, _AIR = 10, 0.05
+# A force is small below this share of the largest.
+_SMALL = 0.05
 # Step of finite differences, as a share of an unknown's range, and of the largest depth.
 _STEP = 1e-6
 # Longer curves are averaged over blocks of neighbours: their noise is then correlated and white noise as before.
@@ -34,7 +42,7 @@ _NEWTON = 1
 
 
 def default_unknown(name: str, measured: Measured, reach: float = REACH) -> Unknown:
-    """Return contact point, baseline or drift with a range that the curve gives.
+    """Return contact point, baseline, tilt or drift with a range that the curve gives.
 
     Contact is at most ``reach`` times the recorded depths before the first of them.
     """
@@ -46,8 +54,21 @@ def default_unknown(name: str, measured: Measured, reach: float = REACH) -> Unkn
     if name == "baseline":
         low, high = float(curve.force.min()) - 2 * reach * force, float(curve.force.max()) + force
         return Unknown(name, low, high, "N", is_wanted=False)
+    if name == "tilt":
+        deviation = _TILT * force / depth_of(curve)
+        return Unknown(name, -_TILTS * deviation, _TILTS * deviation, "N/m", False, (0.0, deviation), is_wanted=False)
     duration = float(np.ptp(times_of(measured)))
     return Unknown(name, -force / duration, force / duration, "N/s", is_wanted=False)
+
+
+def depth_of(curve: Curve) -> float:
+    """Return about how deep (m) a curve is, from where its force is small."""
+    force = curve.force - np.median(curve.force[: max(1, len(curve.force) // 20)])
+    top = int(np.argmax(curve.depth))
+    pressed = np.flatnonzero(force[: top + 1] > _SMALL * force.max())
+    start = curve.depth[pressed[0]] if pressed.size else curve.depth[0]
+    whole = float(np.ptp(curve.depth))
+    return max(min(float(curve.depth[top] - start), whole), whole / len(curve.depth))
 
 
 def times_of(measured: Measured) -> FloatArray:
@@ -120,6 +141,20 @@ class Model:
         """
         return cls(measured, Space(_all_unknowns(measured, unknowns, reach)))
 
+    def tilted(self, x: FloatArray) -> tuple["Model", FloatArray]:
+        """Return the model with a tilt of each curve that has air before the contact at ``x``, and its coordinates."""
+        values, found = self.space.values(x), dict(zip(self.space.unknowns, x.tolist(), strict=True))
+        for number, one in enumerate(self.measured):
+            name = self.own("tilt", number)
+            if one.may_tilt and name not in self.names and self.has_air(number, values):
+                found[replace(default_unknown("tilt", one), name=name)] = 0.5
+        return Model(self.measured, Space(tuple(found))), np.array(list(found.values()))
+
+    def has_air(self, number: int, values: Values) -> bool:
+        """Return whether curve ``number`` has a part before contact, from which its tilt is seen."""
+        depth = self.measured[number].curve.depth - values[self.own("contact_point", number)]
+        return bool(np.sum(depth < 0) >= _AIR_ROWS and -depth.min() >= _AIR * depth.max())
+
     def with_unknowns(self, unknowns: Sequence[Unknown]) -> "Model":
         """Return the model with further shared unknowns after its own, such as those of a hidden layer."""
         return Model(self.measured, Space((*self.space.unknowns, *unknowns)))
@@ -169,6 +204,8 @@ class Model:
             span = unknown.high - unknown.low
             if unknown.name == self.own("baseline", number):
                 found[:, k] = span
+            elif unknown.name == self.own("tilt", number):
+                found[:, k] = span * self.way(number)
             elif unknown.name == self.own("drift", number):
                 found[:, k] = span * self.times[number]
             elif self._concerns(unknown.name, number):
@@ -188,9 +225,15 @@ class Model:
         )
 
     def offset(self, number: int, values: Values) -> FloatArray:
-        """Return baseline and drift (n,) of curve ``number``, in N."""
-        drift = values.get(self.own("drift", number), 0.0)
-        return np.asarray(values[self.own("baseline", number)] + drift * self.times[number])
+        """Return baseline, tilt and drift (n,) of curve ``number``, in N: the force without contact."""
+        drift, tilt = (values.get(self.own(name, number), 0.0) for name in ("drift", "tilt"))
+        level = values[self.own("baseline", number)]
+        return np.asarray(level + tilt * self.way(number) + drift * self.times[number])
+
+    def way(self, number: int) -> FloatArray:
+        """Return the recorded depth (m) of curve ``number`` from its first row on."""
+        depth = self.measured[number].curve.depth
+        return np.asarray(depth - depth[0])
 
     def _compliance(self, number: int, values: Values) -> float:
         compliance = self.measured[number].machine_compliance
@@ -222,7 +265,8 @@ def _all_unknowns(measured: Sequence[Measured], unknowns: Sequence[Unknown], rea
         if given is None:
             return usual
         low, high = (own if isfinite(own) else by for own, by in ((given.low, usual.low), (given.high, usual.high)))
-        return replace(given, low=low, high=high)
+        is_asked = not (isfinite(given.low) or isfinite(given.high))
+        return replace(given, low=low, high=high, prior=given.prior or (usual.prior if is_asked else None))
 
     shared = [unknown for unknown in unknowns if unknown.name not in OF_CURVE]
     own = [

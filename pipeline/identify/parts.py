@@ -83,19 +83,21 @@ class Measured:
     """One curve and the scene it was measured on.
 
     ``machine_compliance`` (m/N) is what the machine yields: the tool is where the recorded depth says, less the force
-    times it; None if it is the unknown "machine_stiffness" (N/m). ``hidden`` is what this body may hide.
+    times it; None if it is the unknown "machine_stiffness" (N/m). ``hidden`` is what this body may hide. ``may_tilt``
+    tells whether the force without contact may be linear in the depth, instead of constant.
     """
 
     curve: Curve
     forward: Forward
     machine_compliance: float | None = 0.0
     hidden: tuple[Hidden, ...] = ()
+    may_tilt: bool = True
 
 
 # ---- what came out -----------------------------------------------------------------------------------------
 
 SOURCES = ("noise", "contact", "machine", "thickness", "law", "mesh")
-"""Where a bar is from: "contact" includes baseline and drift, "thickness" all known ± of the geometry."""
+"""Where a bar is from: "contact" includes baseline, tilt and drift, "thickness" all known ± of the geometry."""
 
 
 @dataclass(frozen=True)

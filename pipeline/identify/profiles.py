@@ -23,7 +23,7 @@ _CLOSE, _GOOD = 1e-2, 0.7
 
 
 @dataclass(frozen=True)
-class _Curve:
+class MostProbable:
     """The most probable noise of one curve: deviations from the law are taken out by the base ``bent`` (n + k, k)."""
 
     noise: Noise
@@ -49,7 +49,7 @@ class Likelihood:
         The deviation is relative to the force, as in ``DEVIATIONS``.
         """
         self.model = model or found.model
-        self._curves = tuple(_most_probable(found, number, deviation) for number in range(len(found.force)))
+        self._curves = tuple(most_probable(found, number, deviation) for number in range(len(found.force)))
         self._mean, precision = prior(self.model)
         # Uniform unknowns have no prior but their range.
         self._root = np.sqrt(np.where(self.model.space.prior[1] > 0, np.diag(precision), 0.0))
@@ -121,16 +121,17 @@ def _bounded(matrix: FloatArray, slope: FloatArray, x: FloatArray, held: Sequenc
     return step
 
 
-def _most_probable(found: Fit, number: int, least: float) -> _Curve:
+def most_probable(found: Fit, number: int, least: float = 0.0) -> MostProbable:
+    """Return the most probable noise of curve ``number``, with a deviation from the law of at least that size."""
     model, (noise, scale), size = found.model, found.noise(number), max(size_of(found.top(number)), least)
     values = model.space.values(found.x)
     contact = found.force[number] - model.offset(number, values)
     share = model.thinned(contact) / np.maximum(np.abs(contact).max(), np.finfo(float).tiny)
     if size == 0:
-        return _Curve(noise, scale, share, np.empty((0, 0)))
+        return MostProbable(noise, scale, share, np.empty((0, 0)))
     bent, _ = whiten(model.thinned(deviation(contact, model.depth(number, values, found.force[number]))), share, noise)
     base, _ = np.linalg.qr(np.vstack([bent / scale, np.eye(TERMS) / size]))
-    return _Curve(noise, scale, share, base)
+    return MostProbable(noise, scale, share, base)
 
 
 def profile(likelihood: Likelihood, x: FloatArray, place: int, spread: float, most: float) -> tuple[Profile, float]:

@@ -7,8 +7,8 @@ from pipeline.identify.bars import interval
 from pipeline.identify.fit import Fit
 from pipeline.identify.mixture import Mixture
 from pipeline.identify.model import is_of_curve
-from pipeline.identify.noise import whiten
 from pipeline.identify.parts import SOURCES, TooDeepError
+from pipeline.identify.profiles import most_probable
 
 
 def shares(found: Fit) -> FloatArray:
@@ -53,18 +53,15 @@ def mesh(found: Fit) -> FloatArray:
     model, values = found.model, found.model.space.values(found.x)
     square = np.zeros(len(found.x))
     for number, measured in enumerate(model.measured):
-        noise, scale = found.noise(number)
         contact = found.force[number] - model.offset(number, values)
         depth = model.depth(number, values, found.force[number])
         error = measured.forward.error(depth, values)
         if not np.isfinite(error).all():
             name, deepest = measured.curve.name, 1e3 * float(depth.max())
             raise TooDeepError(name, f"the fit is {deepest:.4g} mm deep, for which the force is not computed")
-        wrong = contact * error
-        share = contact / np.maximum(np.abs(contact).max(), np.finfo(float).tiny)
-        columns = model.thinned(np.column_stack([found.jacobian[number], wrong]))
-        whitened, _ = whiten(columns, model.thinned(share), noise)
-        pull = whitened[:, :-1].T @ whitened[:, -1] / scale**2
+        columns = model.thinned(np.column_stack([found.jacobian[number], contact * error]))
+        whitened = most_probable(found, number).white(columns)
+        pull = whitened[:, :-1].T @ whitened[:, -1]
         square += (top @ pull) ** 2
     return np.sqrt(square)
 

@@ -29,7 +29,7 @@ def start(model: Model) -> FloatArray:
         if all(np.abs(place - before).max() > _SAME for before in places):
             places.append(place)
     ranked = sorted(places, key=lambda x: _square(model, x))[:_FOLLOWED]
-    fits = [_least_squares(model, x) for x in ranked]
+    fits = [least_squares_from(model, x) for x in ranked]
     return min(fits, key=lambda x: _square(model, x))
 
 
@@ -105,7 +105,8 @@ def _square(model: Model, x: FloatArray) -> float:
     return float(np.sum(_residual(model, x) ** 2))
 
 
-def _least_squares(model: Model, x: FloatArray) -> FloatArray:
+def least_squares_from(model: Model, x: FloatArray) -> FloatArray:
+    """Return the coordinates (u,) of the fit by least squares that begins at ``x`` (u,)."""
     found = least_squares(
         lambda at: _residual(model, at),
         np.clip(x, 1e-6, 1 - 1e-6),

@@ -29,11 +29,12 @@ _NAMES = {
     "contact_point": "contact point",
     "machine_stiffness": "stiffness of the machine",
     "baseline": "baseline",
+    "tilt": "tilt of the baseline",
     "drift": "drift",
 }
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Unknowns whose error is told as a number, not as a share of their value: it may be 0, or is a share itself.
-_ABSOLUTE = ("poisson", "friction", "baseline", "drift", "contact_point", "share")
+_ABSOLUTE = ("poisson", "friction", "baseline", "tilt", "drift", "contact_point", "share")
 _SHARES = "relaxation_share_"
 # Error bars whose sides differ by more than this share have no ±.
 _UNEVEN = 0.25

@@ -270,4 +270,4 @@ def is_of_test(name: str) -> bool:
 
 
 # Several curves have one each, with the name of the curve behind.
-_OF_TEST = ("contact_point", "machine_stiffness", "baseline", "drift", "hidden_")
+_OF_TEST = ("contact_point", "machine_stiffness", "baseline", "tilt", "drift", "hidden_")

@@ -129,6 +129,14 @@ class Measurement(Section):
             takes='"rigid" | stiffness > 0 | 2 stiffnesses | "unknown"',
         ),
     ] = inf
+    baseline: Annotated[
+        Literal["tilted", "level"],
+        Words(
+            "The force without contact: linear in the depth, or constant. Its tilt is an unknown if the curve has a "
+            "part before contact, known to ± 6 % of the mean slope in contact beforehand.",
+            '"level"',
+        ),
+    ] = "tilted"
     probe: Annotated[
         dict[str, Any] | None,
         _TABLE,
@@ -171,6 +179,11 @@ class Measurement(Section):
     def machine_compliance(self) -> float | None:
         """What the machine yields (m/N): 0 if it is rigid; None if it is to be found."""
         return 1 / self.machine_stiffness if isinstance(self.machine_stiffness, float) else None
+
+    @property
+    def may_tilt(self) -> bool:
+        """Whether the force without contact may be linear in the depth."""
+        return self.baseline == "tilted"
 
     @property
     def reading(self) -> Reading:

@@ -132,7 +132,7 @@ def _of_probe(probe: Probe) -> Iterator[Parameter]:
 
 def _of_measurements() -> Iterator[Parameter]:
     """Yield what is no part of a scene. Infinite ranges are those of the recorded curve."""
-    for name, unit in (("contact_point", "m"), ("baseline", "N"), ("drift", "N/s")):
+    for name, unit in (("contact_point", "m"), ("baseline", "N"), ("tilt", "N/m"), ("drift", "N/s")):
         yield Parameter(name, unit, -inf, inf, -inf, inf)
     yield Parameter("machine_stiffness", "N/m", *_STIFFNESSES, *_SPRINGS, is_logarithmic=True)
     for number in range(1, MOST_RELAXATIONS + 1):

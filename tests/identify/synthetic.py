@@ -56,10 +56,19 @@ def noise(rng: np.random.Generator, count: int, correlation: float, white: float
 
 
 def measured(
-    forward: Ball | Punch, values: Values, error: FloatArray, deepest: float, air: float = 0.5, name: str = "curve"
+    forward: Ball | Punch,
+    values: Values,
+    error: FloatArray,
+    deepest: float,
+    air: float = 0.5,
+    name: str = "curve",
+    tilt: float = 0.0,
 ) -> Measured:
-    """Return a curve to a ``deepest`` point (m) after ``air``, a share of it; ``error`` (n,) is relative to F_max."""
+    """Return a curve to a ``deepest`` point (m) after ``air``, a share of it; ``error`` (n,) is relative to F_max.
+
+    The baseline has a ``tilt``, relative to the mean slope in contact.
+    """
     depth = np.linspace(-air * deepest, deepest, len(error))
     force = forward.force(depth, values)
-    recorded = force + force.max() * (error + 0.1)
+    recorded = force + force.max() * (error + 0.1 + tilt * depth / deepest)
     return Measured(Curve(name, depth + 1e-4, recorded, np.linspace(0, 1, len(error))), forward)

@@ -16,7 +16,7 @@ PAD = {
     "body": {"shape": "cylinder", "radius": "100 mm", "height": "10 mm", "fixed": "bottom"},
     "material": {"young": "10 kPa", "poisson": 0.4},
     "probe": {"shape": "disc", "radius": "1 mm", "contact": "frictionless"},
-    "measurement": [{"name": "narrow", "file": "narrow.csv"}],
+    "measurement": [{"name": "narrow", "file": "narrow.csv", "baseline": "level"}],
     "identify": {"young": ["1 kPa", "1 MPa"], "poisson": [0.2, 0.5]},
 }
 

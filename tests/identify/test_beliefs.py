@@ -37,7 +37,7 @@ def density(residual, covariance):
 @pytest.mark.parametrize("place", [0, 20, 60])
 def test_evidence_is_that_of_the_dense_covariance(size, place):
     made, share = columns(1)
-    found, hypothesis = beliefs(grams(made, share), PRECISION, MEAN), size * len(GRID) + place
+    found, hypothesis = beliefs(grams(made, share), PRECISION, MEAN, 0.0), size * len(GRID) + place
     slopes, bent, residual = made[:, :2], made[:, 2 : 2 + TERMS], made[:, -1]
     of_noise = found.scale[hypothesis] ** 2 * dense(GRID[place], share) + DEVIATIONS[size] ** 2 * bent @ bent.T
     whole = of_noise + slopes @ np.linalg.solve(PRECISION, slopes.T)
@@ -49,7 +49,7 @@ def test_evidence_is_that_of_the_dense_covariance(size, place):
 
 
 def test_noise_is_that_of_one_machine_or_of_each_curve():
-    found = [beliefs(grams(*columns(seed)), PRECISION, MEAN) for seed in (1, 2)]
+    found = [beliefs(grams(*columns(seed)), PRECISION, MEAN, 0.0) for seed in (1, 2)]
     drawn = mixture_of(found, PRECISION, MEAN, np.zeros(2), 2 * COUNT)
     # All combinations, one by one, but for the least probable.
     chosen, beforehand = [], []
@@ -77,7 +77,7 @@ def test_noise_is_that_of_one_machine_or_of_each_curve():
 
 def test_curves_of_like_noise_have_it_in_common_and_others_do_not():
     def alike(correlations):
-        found = [beliefs(grams(*columns(3 + k, one)), PRECISION, MEAN) for k, one in enumerate(correlations)]
+        found = [beliefs(grams(*columns(3 + k, one)), PRECISION, MEAN, 0.0) for k, one in enumerate(correlations)]
         mixture = mixture_of(found, PRECISION, MEAN, np.zeros(2), 2 * COUNT)
         first, second = mixture.hypotheses.T % len(GRID)
         return mixture.weight[first == second].sum()

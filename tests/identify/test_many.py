@@ -41,7 +41,7 @@ def made(tmp_path_factory):
         lambda case: _force(case.material.young, case.body.layer[0].young, case.probe.depth), 1e-5, asked=asked
     )
     force = SceneForce(domain, solve, build(domain, solve, 0.2))
-    before, measurement = len(asked), SimpleNamespace(machine_compliance=0.0)
+    before, measurement = len(asked), SimpleNamespace(machine_compliance=0.0, may_tilt=True)
     scenes = Scenes((measurement,), (next(study.cases()),), (force,), ((),))
     exact = _force(*TRUTH.values(), DEPTH)
     curves = [
