@@ -22,7 +22,7 @@ def find_case(study: "Study", text: str, word: str = "CASE") -> "Case":
     if text.strip().isdecimal():
         number = int(text)
         if number >= len(cases):
-            fail(_of_case(word, text, f"there are {counted(len(cases), 'case')}, counted from 0"))
+            fail(_of_case(word, text, f"the study has {counted(len(cases), 'case')}, numbered from 0"))
         return cases[number]
     from pipeline.study.select import cases_with
 

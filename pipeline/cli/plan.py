@@ -211,7 +211,10 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool) 
     if found["steps"]:
         print(f"  estimate: {cost}")
         ground = f"{counted(found['fitted_to'], 'case')} on record" if found["fitted_to"] else "no case on record yet"
-        print(f"    ({ground}; a step's time is typically right within a factor of {found['factor']:.1f})")
+        print(
+            f"    ({ground}; a step's time is typically right within a factor of {found['factor']:.1f}, "
+            "on an idle machine)"
+        )
         _list_steps(found["steps"], None if verbose else _MOST_STEPS)
     if rest := found["besides"]:
         most, seconds = counted(rest["solves"], "solve"), format_seconds(rest["seconds"])

@@ -243,7 +243,9 @@ def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, sh
         if not count and state != FAILED:
             continue
         reasons = _reasons(plan, opened, state)
-        most = [shorten(text, _LONGEST_REASON, placeholder=" …") for text, _ in reasons.most_common(_MOST_REASONS)]
+        most = [text for text, _ in reasons.most_common(_MOST_REASONS)]
+        if len(most) > 1:  # what one message says to do is at its end
+            most = [shorten(text, _LONGEST_REASON, placeholder=" …") for text in most]
         why = "; ".join(dict.fromkeys(filter(None, most)))
         more = "; …" if len(reasons) > _MOST_REASONS else ""
         counts.append(f"{count} {state}{f' ({why}{more})' if why and state in (*FAILURES, SKIPPED) else ''}")

@@ -1,6 +1,7 @@
 """Arguments and options that commands share, and the checks of their values."""
 
 import difflib
+import errno
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -146,9 +147,15 @@ def check_output(*files: Path, folder: Path | None = None) -> None:
     """Exit, before any computation, if one of the files, or a file in ``folder``, cannot be written."""
     for file in files:
         if why := why_not_writable(file):
-            fail(Fault(why, file=str(file)))
+            fail(Fault(or_elsewhere(why), file=str(file)))
     if folder and (why := _why_no_files(folder)):
-        fail(Fault(why, file=str(folder)))
+        fail(Fault(or_elsewhere(why), file=str(folder)))
+
+
+def or_elsewhere(why: str) -> str:
+    """Return why a file cannot be written, and that another folder can be given, if this one is read-only."""
+    is_closed = why.endswith(tuple(map(os.strerror, (errno.EACCES, errno.EPERM, errno.EROFS))))
+    return f"{why}; `--output FOLDER` writes elsewhere" if is_closed else why
 
 
 def check_kind(file: Path, *, identified: bool) -> None:

@@ -32,6 +32,7 @@ _SIZES = {"radius": 0.12, "length": 0.3, "width": 0.03}
 _ANGLE = 1.0
 _UNITS = {
     "m": {"m": 1},
+    "s": {"s": 1},
     "rad": {"rad": 1},
     "Pa": {"kg": 1, "m": -1, "s": -2},
     "N": {"kg": 1, "m": 1, "s": -2},
@@ -71,7 +72,7 @@ def variables(model: Model) -> list[Variable]:
         "direction of pressing; 0, 0, 0: inward normal",
         "direction of a blade",
     )
-    found = [Variable("time", "independent", "", "s")]
+    found = [Variable("time", "independent", "s", "time")]
     for name, text, start in (("tip", tip, (x, y, z)), ("axis", axis, (0.0,) * 3), ("along", along, (0.0,) * 3)):
         unit = "m" if name == "tip" else ""
         found += [

@@ -242,7 +242,17 @@ def _merged(plan: Plan, keys: Sequence[str], name: str, reason: str) -> Plan:
     changed = {solve.key: key for solve, key in zip(plan.solves, keys, strict=True) if solve.key != key}
     merged = tuple(_joined(key, solves) for key, solves in same.items())
     of_cases = tuple(changed.get(key, key) for key in plan.keys) if changed else plan.keys
-    return replace(plan, solves=merged, keys=of_cases).struck_by(name, len(plan.solves) - len(merged), reason)
+    count = sum(_of_paths(plan, solves) - 1 for solves in same.values())
+    return replace(plan, solves=merged, keys=of_cases).struck_by(name, count, reason)
+
+
+def _of_paths(plan: Plan, solves: Sequence[Solve]) -> int:
+    """Return the number of solves; of an insertion, whose stages may be one state, that of different paths."""
+    if not plan.study.is_insertion:
+        return len(solves)
+    stages = [axis.is_stage for axis in plan.study.axes]
+    paths = [tuple(n for n, is_stage in zip(one.case.index, stages, strict=True) if not is_stage) for one in solves]
+    return len(set(paths))
 
 
 def _joined(key: str, solves: Sequence[Solve]) -> Solve:

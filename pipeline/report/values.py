@@ -50,7 +50,8 @@ def at_peak(dataset: xr.Dataset) -> xr.Dataset:
     if along not in dataset.dims:
         return dataset
     last = abs(dataset["force"]).fillna(-1.0).argmax(along)
-    return dataset.isel({along: last}).drop_vars(along)
+    peak = dataset.isel({along: last})
+    return peak.reset_coords(along) if along == "depth" else peak.drop_vars(along)
 
 
 def has_path(dataset: xr.Dataset) -> bool:

@@ -117,7 +117,7 @@ class Terminal(Progress):
 
     def _times(self) -> str:
         gone = format_seconds(time.monotonic() - self._start)
-        if self._remaining is None or self._count == self._total:
+        if self._remaining is None or self._count == self._total or not self._remaining.is_known:
             return gone
         left = f"{gone}, about {format_seconds(self._remaining.seconds())} left"
         if self._step is None or self._remaining.steps == 1 or self._bar is None:

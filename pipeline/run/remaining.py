@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 _TRUST = 0.005
 # Neighbouring solves are similar: each new one reduces the weight of earlier ones by this factor.
 _MEMORY = 0.95
+# The time left is told once so many solves, and this share of the estimated time, have been measured: the first solve
+# also compiles.
+_ENOUGH, _KNOWN = 3, 0.03
 # An overdue solve still has this share of its expected time left.
 _LEAST = 0.05
 
@@ -55,7 +58,14 @@ class Remaining:
             for step in (None, e.step):
                 self._to_come.setdefault(step, defaultdict(float))[e.kind] += e.seconds
         self.steps = len(self._to_come) - 1
+        self._total, self._finished = sum(e.seconds for e in expected.values()), 0
         self._last = clock()
+
+    @property
+    def is_known(self) -> bool:
+        """Whether enough has been measured to tell the time left."""
+        done = self._total - sum(self._to_come[None].values())
+        return self._finished >= _ENOUGH and done >= _KNOWN * self._total
 
     def done(self, label: str, *, counts: bool = True) -> None:
         """Note a finished solve; with ``counts`` its time corrects the estimates (a failed one's should not)."""
@@ -63,6 +73,7 @@ class Remaining:
         if label in self._pending:
             self._pending.remove(label)
             expected = self._expected[label]
+            self._finished += counts
             for step in (None, expected.step):
                 self._to_come[step][expected.kind] -= expected.seconds
             for sums, seconds in ((self._measured, now - self._last), (self._estimated, expected.seconds)):

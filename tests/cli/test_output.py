@@ -11,6 +11,7 @@ import subprocess
 
 import pytest
 
+from pipeline.cli.words import or_elsewhere
 from pipeline.study.named import EXAMPLES
 from tests.commands import ENVIRONMENT, command, talk
 from tests.commands import epsmesh as epsmesh_here
@@ -216,3 +217,10 @@ def test_a_folder_whose_name_is_no_utf8_is_refused_before_anything_is_computed(e
     done = epsmesh("run", "small.toml")
     assert done.exit_code == 2
     assert "cannot be written" in done.stderr and "UTF-8" in done.stderr
+
+
+@pytest.mark.parametrize("number", [errno.EACCES, errno.EROFS, errno.ENOSPC])
+def test_a_closed_folder_names_the_option_for_another(number):
+    """Another folder on a full disk would be of no use."""
+    why = f"out/small.nc: cannot be written: {os.strerror(number)}"
+    assert ("`--output FOLDER` writes elsewhere" in or_elsewhere(why)) == (number != errno.ENOSPC)

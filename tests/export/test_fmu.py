@@ -82,6 +82,7 @@ def test_a_host_finds_the_unit_valid_and_gets_the_evaluators_forces(made):
             assert np.all(force == 0) if status == "lost" else np.isnan(force).all()
     assert seen >= {"ok", "lost", "outside"}
     assert largest > 1e-3
+    assert fmpy.read_model_description(str(unit)).modelVariables[0].unit == "s"
 
 
 def test_a_step_can_be_repeated_and_its_result_returns(made):

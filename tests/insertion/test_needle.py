@@ -17,6 +17,7 @@ from pipeline.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.report.insertion import answer
+from pipeline.report.page.facts import of_paths
 from pipeline.run.record import Record
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
@@ -94,6 +95,13 @@ def test_tissue_is_pierced_where_the_intact_body_has_the_energy_of_the_cut_one(p
     depth = brentq(lambda d: STIFFNESS * d**3 / 3 - CUT * energy(d), 0.4e-3, 3e-3)
     assert path.status == OK
     assert path.punctures[0].depth == pytest.approx(depth, rel=1e-4)
+    plan, records = solved(scene())
+    assert all(struck.name != "duplicates" for struck in plan.struck)  # its stages are one state
+    told = of_paths(build(plan, records))
+    assert (
+        told.startswith(f"Puncture at {1e3 * path.punctures[0].depth:.4g}")
+        and f"{1e3 * path.steps[-1].force:.4g} mN, at 6 mm" in told
+    )
     assert path.punctures[0].force == pytest.approx(STIFFNESS * depth**2, rel=1e-4)
     assert path.punctures[0].after.force < path.punctures[0].force
     # Half a radius of what a cut takes per depth is the bar of the energy.

@@ -24,9 +24,12 @@ def test_begins_with_the_estimates_and_follows_what_is_measured():
     clock = Clock()
     left = Remaining(run_of(10), clock)
     assert left.seconds() == pytest.approx(10)
+    known = []
     for i in range(5):
         clock.now += 3
         left.done(f"solve {i}")
+        known.append(left.is_known)
+    assert known == [False, False, True, True, True]
     assert left.seconds() == pytest.approx(15, rel=0.05)
     clock.now += 2
     assert left.seconds() == pytest.approx(13, rel=0.05)

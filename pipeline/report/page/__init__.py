@@ -20,6 +20,7 @@ from pipeline.report.page.cases import FIRST_ROWS, case_table
 from pipeline.report.page.facts import (
     by_status,
     facts,
+    of_paths,
     origins,
     provenance,
     reproduce,
@@ -30,7 +31,7 @@ from pipeline.report.page.facts import (
 from pipeline.report.page.inline import inline_svg
 from pipeline.report.table import warnings_of
 from pipeline.report.uncertainty import unknowns
-from pipeline.report.values import answer_of, at_peak
+from pipeline.report.values import answer_of, at_peak, has_path
 from pipeline.states import FAILURES, SKIPPED
 
 # What the answer says of times, and the headlines need not say again.
@@ -78,7 +79,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         warnings=warnings_of(dataset),
         figures=_figures(over_time),
         guide=guide,
-        answer=guide.sentence if guide else summary(dataset),
+        answer=guide.sentence if guide else of_paths(over_time) if has_path(over_time) else summary(dataset),
         tissue=unknowns(dataset),
         table=table,
         many_cases=counted(len(table.order), "case"),

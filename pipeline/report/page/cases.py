@@ -25,6 +25,8 @@ _QUANTITIES = (
     "force",
     "force_error_share",
     "force_error",
+    "puncture_depth",
+    "puncture_force",
     "force_ratio",
     "force_exact_ratio",
     "force_exact_error",
@@ -44,7 +46,18 @@ _QUANTITIES = (
     "balance",
 )
 _SHARE = "force_error_share"  # of F: what errors of different forces are compared by
-_SHOWN = {"depth", "depth_error", "force", _SHARE, "force_ratio", "force_exact_ratio", "speedup", "time_total"}
+_SHOWN = {
+    "puncture_depth",
+    "puncture_force",
+    "depth",
+    "depth_error",
+    "force",
+    _SHARE,
+    "force_ratio",
+    "force_exact_ratio",
+    "speedup",
+    "time_total",
+}
 _DIGITS = 4
 
 
@@ -117,7 +130,11 @@ def case_table(dataset: xr.Dataset) -> Table:
         "case", "case", [stages * (n + 1) - 1 for n in range(size)], "the number by which `epsmesh plan` knows it"
     )
     axes = [_axis(dataset, dim, position, dims) for position, dim in enumerate(dims)]
-    quantities = [_quantity(by_case(dataset, name), name) for name in _QUANTITIES if name in dataset]
+    quantities = [
+        _quantity(by_case(dataset, name), name)
+        for name in _QUANTITIES
+        if name in dataset and {*dataset[name].dims} <= {*dims}
+    ]
     status = _texts("status", states, QUANTITIES["status"].meaning, is_filter=True)
     origin = _texts(
         "origin",

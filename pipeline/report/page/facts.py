@@ -3,6 +3,7 @@
 import json
 import re
 from collections import defaultdict
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from shlex import quote
@@ -12,8 +13,9 @@ import numpy as np
 import xarray as xr
 
 from pipeline.quantities import write
+from pipeline.report.insertion import answer
 from pipeline.report.times import doubts
-from pipeline.report.values import by_case, relative
+from pipeline.report.values import at_peak, by_case, relative
 from pipeline.report.words import choices
 from pipeline.states import FAILED, LOST, OK, PARTIAL, PENDING, SKIPPED
 
@@ -87,6 +89,22 @@ def summary(dataset: xr.Dataset) -> str:
     lowest, highest = (write("force", float(f"{value:.4g}")) for value in (np.nanmin(force), np.nanmax(force)))
     many = f"{known} of {size} cases have a force, from {lowest} to {highest}"
     return f"{many}." if known > 1 else f"One of {size} cases has a force, {lowest}."
+
+
+def of_paths(dataset: xr.Dataset) -> str:
+    """Return what came out of insertions: punctures, forces and their depths, the largest force; of one, or of all."""
+    if dataset["status"].size == 1:
+        return ". ".join(f"{line[0].upper()}{line[1:]}" for line in [*answer(dataset), *_largest(dataset)]) + "."
+    pierced = int(np.isfinite(dataset["puncture_depth"].values).reshape(dataset["status"].size, -1).any(axis=1).sum())
+    return f"{pierced} of {dataset['status'].size} tools pierce the tissue. {summary(at_peak(dataset))}"
+
+
+def _largest(dataset: xr.Dataset) -> Iterator[str]:
+    """Yield the largest force of one path, and its depth."""
+    peak = at_peak(dataset)
+    if np.isfinite(force := peak["force"].item()):
+        depth = write("depth", round(peak["depth"].item(), 8))
+        yield f"at the depths of the path, F is at most {1e3 * force:.4g} mN, at {depth}"
 
 
 def by_status(dataset: xr.Dataset, status: str) -> list[dict[str, Any]]:
