@@ -23,6 +23,7 @@ ORDER = (
     "sphere",
     "rounded",
     "cone",
+    "paraboloid",
     "wedge",
     "tilted",
     "cad",

@@ -10,6 +10,7 @@ from pipeline.layered.body import LayeredBody
 from pipeline.layered.compliance import Layer
 from pipeline.layered.contact import Profile
 from pipeline.run.record import Record
+from pipeline.shapes.parabola import Parabola
 from pipeline.shapes.rounded import Rounded
 from pipeline.verify import known
 from pipeline.verify.compare import ACCURACY, against_meridian, force_row, solve, solved
@@ -69,6 +70,13 @@ def _half_space(comm: MPI.Comm) -> Iterator[Row]:
             deep,
             known.half_space_cone(_YOUNG, _POISSON, cone.angle, deep),
             cone,
+        ),
+        (
+            "paraboloid as deep as its radius",
+            {"shape": "paraboloid", "radius": "1 mm", "shaft": "4 mm"},
+            deep,
+            known.half_space_ball(_YOUNG, _POISSON, 1e-3, deep),
+            Parabola.up_to(4e-3, 1e-3),
         ),
     )
     for name, tool, depth, force, section in tools:

@@ -40,6 +40,11 @@ SCENES = {
     "wedge": (BOX, "linear", {"shape": "wedge", "angle": "70 deg", "length": "6 mm", "depth": "0.5 mm"}),
     "cone, meridian": (CYLINDER, "linear", {"shape": "cone", "angle": "70 deg", "radius": "8 mm", "depth": "0.5 mm"}),
     "ball, meridian, large": (CYLINDER, "neo-hookean", BALL),
+    "paraboloid, meridian": (
+        CYLINDER,
+        "linear",
+        {"shape": "paraboloid", "radius": "1 mm", "shaft": "4 mm", "depth": "1 mm"},
+    ),
     "ball, large": (BOX, "neo-hookean", BALL),
     "blade, large": (BOX, "ogden", BLADE),
 }

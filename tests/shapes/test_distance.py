@@ -16,6 +16,7 @@ TOOLS = {
     "sharp cone": example(PROBES["cone"]),
     "cone": example(PROBES["cone"], tip="0.4 mm"),
     "needle": example(PROBES["cone"], angle="10 deg", tip="0.4 mm", radius="1 mm"),
+    "paraboloid": example(PROBES["paraboloid"], radius="3 mm"),
     "sharp wedge": example(PROBES["wedge"]),
     "wedge": example(PROBES["wedge"], tip="0.4 mm"),
     "rounded wedge": example(PROBES["wedge"], tip="0.4 mm", edge="0.3 mm"),

@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.plan.key import case_key, mesh_key
 from pipeline.plan.plan import make_plan
+from pipeline.shapes.parabola import Parabola
 from pipeline.shapes.rounded import Rounded, quarter_turn
 from pipeline.study.problems import StudyError
 from pipeline.verify import known
@@ -17,7 +18,8 @@ CONE = {"shape": "cone", "angle": "80 deg", "radius": "3 mm", "depth": "0.1 mm",
 WEDGE = {"shape": "wedge", "angle": "80 deg", "length": "6 mm", "depth": "0.1 mm", "contact": "unilateral"}
 DISC = {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "unilateral"}
 FLAT = {"shape": "blade", "length": "4 mm", "width": "1 mm", "depth": "0.1 mm", "contact": "unilateral"}
-TOOLS = {"sphere": SPHERE, "cone": CONE, "wedge": WEDGE}
+PARABOLOID = SPHERE | {"shape": "paraboloid", "shaft": "2 mm"}
+TOOLS = {"sphere": SPHERE, "paraboloid": PARABOLOID, "cone": CONE, "wedge": WEDGE}
 
 
 def test_a_section_is_smooth_where_its_rounding_ends():
@@ -40,7 +42,8 @@ def test_a_ball_ends_at_its_equator_and_is_a_paraboloid_at_its_pole():
 
 
 def test_the_contact_on_a_half_space_is_that_of_closed_forms():
-    """I. N. Sneddon (1965): cone, ball, and rounded cone."""
+    """I. N. Sneddon (1965): cone, ball, rounded cone, and paraboloid at any depth."""
+    assert Parabola.up_to(9e-3, 2e-3).contact_radius(3e-3) == pytest.approx(sqrt(2e-3 * 3e-3))
     assert Rounded(pi / 3).contact_radius(1e-3) == pytest.approx(2 / pi * tan(pi / 3) * 1e-3)
     a = Rounded(0.0, 3e-3).contact_radius(0.5e-3)
     assert a / 2 * log((3e-3 + a) / (3e-3 - a)) == pytest.approx(0.5e-3)
