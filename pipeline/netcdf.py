@@ -1,5 +1,6 @@
 """netCDF files: written whole or not at all, with a checksum behind every array of numbers or letters."""
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,17 +23,22 @@ def write_netcdf(dataset: "xr.Dataset", path: Path, groups: "Mapping[str, xr.Dat
 
     Texts become arrays of characters, which checksums cover, too: HDF5 keeps texts of varying length elsewhere. Single
     numbers (arrays without a dimension) and attributes have no checksum: HDF5 filters work on arrays stored in chunks.
-    HDF5 ends the process if the disk fills while it writes, so that room for the whole file is taken first.
+    HDF5 ends the process if the disk fills while it writes: each part is written where room was taken for it. It gives
+    back what it does not need.
 
     Raises:
         OSError: if it cannot be written.
     """
-    parts = [(None, dataset), *(groups or {}).items()]
+    import netCDF4  # noqa: PLC0415 (slow to load)
+
     with atomic(path) as temporary:
-        temporary.write_bytes(bytes(sum(most_bytes(part) for _, part in parts)))
-        for group, part in parts:
+        temporary.write_bytes(bytes(_FILE))
+        netCDF4.Dataset(temporary, "w").close()
+        for group, part in ((None, dataset), *(groups or {}).items()):
+            with temporary.open("rb+") as file:  # a new file, opened to write, would lose it
+                os.posix_fallocate(file.fileno(), 0, temporary.stat().st_size + most_bytes(part))
             guarded = {name: _guarded(part[name]) for name in part.variables}
-            part.to_netcdf(temporary, mode="a" if group else "w", group=group, engine="netcdf4", encoding=guarded)
+            part.to_netcdf(temporary, mode="a", group=group, engine="netcdf4", encoding=guarded)
 
 
 def _guarded(array: "xr.DataArray") -> dict[str, Any]:
