@@ -122,7 +122,11 @@ class Segment(Embedded):
         if not self.surface.is_thin:
             return found
         least = in_mm(2 * self.surface.least)
-        return *found, f"is thin for its size, at most {least} over a tenth of its surface: it needs many elements"
+        way_out = "" if self.label is None else ", or make it one with its neighbour, by a list of labels"
+        return *found, (
+            f"is thin for its size, at most {least} over a tenth of its surface: it needs many elements, and meshing "
+            f"may take long, or fail. Segment it thicker{way_out}"
+        )
 
 
 @lru_cache(_FEW)
