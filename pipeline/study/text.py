@@ -9,6 +9,7 @@ from typing import Any
 
 from pipeline.shapes.files.foreign import why_no_study
 from pipeline.study.problems import Problem, Problems, StudyError
+from pipeline.study.syntax import meant
 
 # A hundred times the longest study with a path of its own points: what is larger is another kind of file.
 _MOST_BYTES = 1_000_000
@@ -67,7 +68,7 @@ def toml_of(text: str, file: str) -> dict[str, Any]:
     except RecursionError:
         raise _refused(file, "TOML syntax", "is nested too deeply") from None
     except ValueError as error:  # besides its own, those of numbers with thousands of digits and of days that are none
-        raise _refused(file, "TOML syntax", str(error)) from None
+        raise _refused(file, "TOML syntax", meant(text, error)) from None
     layer: list[Any] = [raw]
     for _ in range(_DEEPEST):
         if any(isinstance(value, int) and not -LARGEST <= value < LARGEST for value in layer):

@@ -300,11 +300,35 @@ def test_all_mistakes_at_once():
     assert keys == {"material.young", "material.poisson", "probe.radius", "mesh.fien", "mesh.fine"}
 
 
-def test_syntax_error_has_line_and_column(tmp_path):
+SYNTAX = {
+    "shape = box": ['line 2, column 9, `shape = box`: text is in quotation marks: write shape = "box"'],
+    "poisson = 0,45 # of fat": ["line 2", "write poisson = 0.45"],
+    "radius = 10 mm": ['write radius = "10 mm"'],
+    "radius = 2,5 mm": ['write radius = "2.5 mm"'],
+    'shape = "box': ["line 2", '`shape = "box`', "a quotation mark is not closed"],
+    "shape = “box”": ["quotation marks are straight"],
+    "poisson = .45": ["write poisson = 0.45"],
+    "top = True": ["small letters"],
+    "a = 1\n# a = 2\na = 3": ["line 4: `a` is there twice, first in line 2", "sweep"],
+    "a = 1\n[body]\nb = 2": ["line 3: [body] is there twice, first in line 1", "[[body]] for each"],
+    "[[body]]\na = 1": ["line 2", "[body]"],
+    'size = ["1 mm", 2 mm]': ["line 2", "within a list, too"],
+    'size = ["1 mm",\nradius = 2': ["line 3", "a list that begins above is not closed"],
+    'radius: "3 mm"': ["line 2", "not a colon"],
+    "[probe": ["line 2", "the bracket of a heading is not closed"],
+    r'file = "C:\Users\a.stl"': ["line 2", "a backslash"],
+    "radius =": ["line 2", "no value"],
+}
+
+
+@pytest.mark.parametrize("lines", SYNTAX)
+def test_an_error_of_syntax_has_its_line_and_what_was_meant(tmp_path, lines):
     file = tmp_path / "bad.toml"
-    file.write_text("[body]\nshape = box\n")
-    with pytest.raises(StudyError, match=r"bad.toml: TOML syntax: .*line 2, column 9"):
+    file.write_text(f"[body]\n{lines}\n")
+    with pytest.raises(StudyError, match=r"bad.toml: TOML syntax: ") as caught:
         read_study(file)
+    for part in SYNTAX[lines]:
+        assert part in str(caught.value)
 
 
 def test_missing_file():
