@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 from pipeline.printable import printable
 from pipeline.shapes.section import Section, words_of
 from pipeline.study.howto import page_of
+from pipeline.study.meant import OTHER_VALUES, other_name
 
 # Letters of a value, or of a key, that a message repeats.
 _QUOTED = 200
@@ -175,7 +176,10 @@ class Problems:
             what = f"must be an array of tables: write [[{where}.{key}]]" if inner else "must be a table"
             self.error(f"{where}.{key}".rstrip("."), found, what)
         else:
-            self.error(f"{where}.{key}".rstrip("."), found, allowed({**item, "loc": place}, model))
+            told = other_name(where, key) if item["type"] == "extra_forbidden" else ""
+            told = told or allowed({**item, "loc": place}, model)
+            hint = OTHER_VALUES.get(found.casefold(), "") if isinstance(found, str) else ""
+            self.error(f"{where}.{key}".rstrip("."), found, told + hint)
 
     def _add(self, problems: list[Problem], problem: Problem) -> None:
         """Add a problem. If it is known for other tables, these are added to it."""

@@ -13,6 +13,7 @@ from pipeline.shapes.insertion import last_depth
 from pipeline.shapes.registry import specialised
 from pipeline.shapes.section import Section
 from pipeline.study.axis import Axis
+from pipeline.study.meant import OTHER_SHAPES, other_name
 from pipeline.study.path import Way, read_path
 from pipeline.study.problems import MOST_ERRORS, Problems, closest, nearest, tuples
 from pipeline.study.ranges import without_ranges
@@ -20,7 +21,6 @@ from pipeline.study.renamed import renamed
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE
 from pipeline.study.swept import Place, axis_of, placed, sweeps, written
 from pipeline.study.text import check_text
-from pipeline.study.vocabulary import NOT_COMPUTED, OTHER_NAMES
 
 # Limits of a list and of a study. Each case costs a few hundred bytes and a tenth of a millisecond.
 _MOST_VALUES = 10_000
@@ -240,8 +240,8 @@ def _lacking(name: str, model: type[Section], shape: str, key: str) -> str:
     models = SECTIONS[name]
     if new := renamed(name, key):
         return new
-    if key in (told := NOT_COMPUTED | OTHER_NAMES):
-        return told[key]
+    if told := other_name(name, key):
+        return told
     if not isinstance(models, Mapping):
         return f"unknown key; {nearest(key, model.model_fields)}"
     article = "an" if shape[0] in "aeiou" else "a"
@@ -282,11 +282,16 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
             f"{where}.shape", shape, f"must be one shape: for a sweep over shapes, write one [[{name}]] for each"
         )
     else:
-        problems.error(f"{where}.shape", shape, f"unknown shape; {nearest(str(shape), model)}")
+        told = OTHER_SHAPES.get(name, {}).get(str(shape).casefold()) or nearest(str(shape), model)
+        problems.error(f"{where}.shape", shape, f"unknown shape; {told}")
     known = dict.fromkeys(key for kind in model.values() for key in kind.model_fields)
     unknown = [key for key in raw if key not in known]
     for key in unknown[:MOST_ERRORS]:
-        problems.error(f"{where}.{key}", raw[key], renamed(name, key) or f"unknown key; {nearest(key, known)}")
+        problems.error(
+            f"{where}.{key}",
+            raw[key],
+            renamed(name, key) or other_name(name, key) or f"unknown key; {nearest(key, known)}",
+        )
     if len(unknown) > MOST_ERRORS:
         problems.error(where, None, f"… and {len(unknown) - MOST_ERRORS} more")
     return None

@@ -331,6 +331,31 @@ def test_an_error_of_syntax_has_its_line_and_what_was_meant(tmp_path, lines):
         assert part in str(caught.value)
 
 
+WORDS = {
+    "mu": ({"material": {"mu": "3 kPa"}}, ["material.mu", "2 (1 + poisson) times the shear modulus"]),
+    "mu of a tool": ({"probe": {"mu": 0.2}}, ["probe.mu", "`friction`"]),
+    "bulk": ({"material": {"bulk": "1 GPa"}}, ["poisson = (3 K - young) / (6 K)"]),
+    "c1": ({"material": {"c1": "3 kPa"}}, ["4 (1 + poisson) C1"]),
+    "c1 of a layer": ({"body": {"layer": [{"name": "skin", "c1": "3 kPa"}]}}, ["layer[1].c1", "4 (1 + poisson) C1"]),
+    "permeability": ({"material": {"permeability": 1e-12}}, ["flow of fluid", "[[material.relaxation]]"]),
+    "a cylinder for a punch": ({"probe": {"shape": "cylinder"}}, ['"cylinder"', 'shape = "disc"']),
+    "a pyramid": ({"probe": {"shape": "Berkovich"}}, ["70.3 deg"]),
+    "a sphere for a body": ({"body": {"shape": "sphere"}}, ['shape = "ellipsoid" with three equal `axes`']),
+    "a half-space": ({"body": {"shape": "half-space"}}, ["20 contact radii"]),
+    "a roller": ({"body": {"roller": "sides"}}, ["body.roller", "`fixed`", "not computed"]),
+    "a roller as a support": ({"body": {"fixed": "roller"}}, ["body.fixed", "'bottom'", "a roller", "not computed"]),
+}
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_a_word_of_other_programs_has_a_sentence_that_says_what_to_write(word):
+    changes, parts = WORDS[word]
+    with pytest.raises(StudyError) as caught:
+        study(**changes)
+    for part in parts:
+        assert part in str(caught.value)
+
+
 def test_missing_file():
     with pytest.raises(StudyError, match=r"nowhere\.toml: file: No such file"):
         read_study("nowhere.toml")
