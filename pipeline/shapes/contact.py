@@ -12,6 +12,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import MOST_INCLINED, Frame, PlaceError
+from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import in_mm
 
@@ -148,17 +149,40 @@ def check_contact(body: Body, probe: Probe, frame: Frame) -> None:
 
 
 def check_first_touch(body: Body, probe: Probe, frame: Frame) -> None:
-    """Check that a tool with unilateral contact first touches the body well within the searched region.
+    """Check that a tool with unilateral contact touches the body well within the searched region, first and at depth.
 
     Raises:
         PlaceError: if not; the message says where it would touch.
     """
-    x, y, _ = first_touch(body, probe, frame)
+    x, y, first = first_touch(body, probe, frame)
     beside, most = hypot(max(0.0, abs(x) - probe.half_length), y), _WELL_WITHIN * probe.half_width
     if not probe.has_singular_edge and beside > most:
         raise PlaceError(
             f"the {probe.shape} would touch the body first {in_mm(beside)} from its axis, outside the region that is "
             f"searched for contact: at most {in_mm(most)} is allowed; use another place or axis, or a larger depth"
+        )
+    if isinstance(probe, Indenter) and not is_level(body, frame):
+        _check_rim(body, probe, frame, first)
+
+
+def _check_rim(body: Body, probe: Indenter, frame: Frame, first: float) -> None:
+    """Check that contact ends before the searched region does: there, the undeformed tool is less deep.
+
+    On a half-space contact ends where the tool is still this deep below the undeformed surface.
+    """
+    rim = outline_points(probe)
+    rim = rim[~probe.ends_at(rim)]
+    if not len(rim):
+        return
+    points, _ = body.lift(frame, rim)
+    deep = probe.depth - float(np.nanmin(probe.profile(rim) - frame.local(points)[:, 2] - first))
+    most = probe.depth - float(probe.section.height(np.array([probe.contact_width]))[0])
+    if deep > most:
+        inclined = _angles(np.array([frame.outward]), -np.array(frame.normal))
+        raise PlaceError(
+            f"at its depth of {in_mm(probe.depth)} the {probe.shape}, inclined by {inclined:.3g}° to the surface, "
+            f"would be {in_mm(deep)} below it at the edge of the region that is searched for contact, which is at most "
+            f"{in_mm(most)} where contact ends: use an axis closer to the surface's normal, or another place"
         )
 
 

@@ -23,7 +23,7 @@ from pipeline.solve.contact.search import ContactSearch
 from pipeline.solve.contact.tool import Tool
 from pipeline.solve.crack import Advance
 from pipeline.solve.elements import elements_of
-from pipeline.solve.elements.base import Elements, Equilibrium
+from pipeline.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
 from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.elements.fields import Column
 from pipeline.solve.estimate import error_bar, stiffness_bars
@@ -32,7 +32,7 @@ from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.points.state import State
 from pipeline.solve.prescribed import PrescribedMotion, respond
-from pipeline.solve.response import LoadResponse, Response, shares
+from pipeline.solve.response import Contact, LoadResponse, Response, shares
 from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.time_steps import Pressed, TimeSteps
@@ -192,7 +192,7 @@ class QuasiStaticProblem(Problem):
         )
         return replace(
             solution,
-            contact=found.contact and replace(found.contact, bar=finer.area_bar, friction_bar=finer.friction_bar),
+            contact=found.contact and _with_bars(found.contact, finer),
             plain=plain,
             is_solved=finer.is_solved,
             unseen=None if unseen is None else unseen[: len(movement.motions)],
@@ -249,3 +249,7 @@ class QuasiStaticProblem(Problem):
 def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:
     """Return the stiffness, with one more row and column for loads."""
     return response.stiffness if load_response is None else load_response.form
+
+
+def _with_bars(contact: Contact, finer: HierarchicalEstimate) -> Contact:
+    return replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)

@@ -41,7 +41,8 @@ class Contact:
     has a 95 % bar in its own unit, NaN if unknown.
     ``friction_bar`` is the relative bar on what friction adds to the force. ``sag`` (m) is the displacement of the
     first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere the
-    tool's own edge bounds the contact, where the pressure is singular.
+    tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's bar by the
+    size of elements there.
     """
 
     area: float
@@ -56,6 +57,7 @@ class Contact:
     sag: float = nan
     load_energy: float = nan
     is_ended: bool = False
+    at_edge: float = 0.0
 
     @property
     def radius(self) -> float:

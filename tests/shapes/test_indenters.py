@@ -208,3 +208,15 @@ def test_the_closed_form_of_a_rounded_punch_tends_to_the_flat_one():
         assert known.rounded_punch(1e4, 0.3, 1e-3, edge, depth) == pytest.approx(force, rel=1e-4)
     flat = known.half_space_disc(1e4, 0.3, 1e-3, 1e-6, "frictionless")[0]
     assert known.rounded_punch(1e4, 0.3, 1e-3, 1e-8, 1e-6) == pytest.approx(flat, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("tool", "taken", "refused"),
+    [(CONE | {"angle": "70 deg"}, 8, 12), (SPHERE | {"radius": "5 mm", "depth": "0.5 mm"}, 15, 25)],
+)
+def test_a_tilted_tool_whose_contact_leaves_the_searched_region_is_refused_when_the_study_is_read(tool, taken, refused):
+    """The solver finds contact at the first of the two angles (degrees), at the second it reaches the region's edge."""
+    axis = {angle: {"axis": [tan(angle * pi / 180), 0.0, -1.0]} for angle in (taken, refused)}
+    study(probe=tool | axis[taken])
+    with pytest.raises(StudyError, match=f"inclined by {refused}° to the surface"):
+        study(probe=tool | axis[refused])

@@ -171,3 +171,14 @@ def test_bodies_are_linear_at_small_depths(body):
     probe, mesh = SPHERE | {"depth": "0.04 mm"}, COARSE | {"rim": "0.5 mm"}
     found = force(body=body, material=TISSUE, probe=probe, mesh=mesh)
     assert found == pytest.approx(force(body=body, material={"poisson": 0.4}, probe=probe, mesh=mesh), rel=0.01)
+
+
+def test_a_contact_that_ends_with_the_wedge_is_found_at_large_displacements_too():
+    """F is nearly that of linear elasticity. How much of the area lies beyond the ends is unknown."""
+    wedge = {"shape": "wedge", "angle": "60 deg", "length": "6 mm", "tip": "0.5 mm", "edge": "0.3 mm"}
+    wedge |= {"depth": "1 mm", "contact": "unilateral"}
+    changes, laws = {"probe": wedge, "mesh": COARSE | {"rim": "0.3 mm"}}, ("linear", "neo-hookean")
+    (linear,), (large,) = (solve(material=TISSUE | {"law": law}, **changes).values() for law in laws)
+    assert large.status == "ok", large.message
+    assert large.force == pytest.approx(linear.force, rel=0.1)
+    assert np.isnan(large.contact_area_error)

@@ -119,6 +119,7 @@ class FoundContact:
             decrements=np.array([[taken * self.force / depth]]),
             relative=np.array([share]),
             area_bar=at_edge + share,
+            at_edge=at_edge,
         )
 
     def _estimated(self, area_bar: float) -> tuple[float, float]:

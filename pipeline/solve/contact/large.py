@@ -146,6 +146,11 @@ class LargeContactSolution:
         return -float(self.touched.forces[:, 2].sum())
 
     @property
+    def is_ended(self) -> bool:
+        """Whether the contact reaches the edge of the candidates, where the tool itself ends."""
+        return bool((self.touched.active & self.body.candidates.is_edge).any())
+
+    @property
     def whole_area(self) -> float:
         """The contact area (m²) of the whole body, normal to the axis."""
         return float(2.0 ** len(self.body.elements.body.mirrored) * self._area().value)
@@ -162,7 +167,8 @@ class LargeContactSolution:
     def summary(self) -> Contact:
         """Return the area of the whole contact, with friction the part that slides, with loads their effects."""
         touched, body, whole = self.touched, self.body, 2.0 ** len(self.body.elements.body.mirrored)
-        contact = Contact(self.whole_area, sag=self.sagged.sag, load_energy=whole * self.sagged.stored)
+        loaded = whole * self.sagged.stored
+        contact = Contact(self.whole_area, sag=self.sagged.sag, load_energy=loaded, is_ended=self.is_ended)
         if touched.slide is None:
             return contact
         places, share = body.positions(), touched.slide.share(body.candidates.weights, touched.active)
@@ -181,7 +187,7 @@ class LargeContactSolution:
         body, candidates = self.body, self.body.candidates
         if np.any(self.touched.gap[body.fixed.all(axis=1)] < 0):
             raise ContactError("the probe reaches the fixed part of the body: no displacement satisfies both")
-        if np.any(self.touched.active & candidates.is_edge):
+        if not np.all(self.tool.ends_at(candidates.points[self.touched.active & candidates.is_edge])):
             raise ContactError(
                 "the contact reaches the edge of the surface region that is searched for contact: use a smaller depth"
             )
@@ -216,12 +222,16 @@ class LargeContactSolution:
         finer = self._found_again(movement.loads, stack)
         share, at_edge = 1 - finer.force / self.force, self._area().bar
         taken, bar = found_again_bar(share, at_edge, AT_EDGE_LARGE[self.body.elements.degree])
+        # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue
+        # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
+        of_area = nan if self.is_ended else at_edge + bar + abs(finer.whole_area / self.whole_area - 1)
         return HierarchicalEstimate(
             finer.body.elements,
             [],
             decrements=np.array([[taken * self.force / self.depth]]),
             relative=np.array([bar]),
-            area_bar=at_edge + bar,
+            area_bar=of_area,
+            at_edge=at_edge,
         )
 
     @stage("contact sets")
