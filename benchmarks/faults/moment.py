@@ -94,6 +94,17 @@ class Scene:
                 file.unlink()
 
     @property
+    def cache(self) -> Path:
+        """The folder of compiled code."""
+        return self.folder / "cache"
+
+    @property
+    def words(self) -> list[str]:
+        """The command line."""
+        places = {"--output": self.folder / "results", "--meshes": self.folder / "meshes"}
+        return ["run", str(self.file), *(str(word) for pair in places.items() for word in pair)]
+
+    @property
     def store(self) -> Path:
         """The case store."""
         return self.folder / "results" / "cases.sqlite"
@@ -105,20 +116,12 @@ class Scene:
 
     def start(self, ranks: int) -> subprocess.Popen[bytes]:
         """Start a run in a session of its own; its output goes to a file."""
-        words = [
-            "run",
-            str(self.file),
-            "--output",
-            str(self.folder / "results"),
-            "--meshes",
-            str(self.folder / "meshes"),
-        ]
         launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
-        command = [*launcher, sys.executable, "-m", "benchmarks.faults.victim", str(self.folder / "stage"), *words]
+        command = [*launcher, sys.executable, "-m", "benchmarks.faults.victim", str(self.folder / "stage"), *self.words]
         for told in self.folder.glob("stage-*"):
             told.unlink()
         kept = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-        own = {"EPSMESH_CACHE": str(self.folder / "cache"), _MARK: str(self.folder), "PYTHONPATH": str(ROOT)}
+        own = {"EPSMESH_CACHE": str(self.cache), _MARK: str(self.folder), "PYTHONPATH": str(ROOT)}
         with (self.folder / "said").open("wb") as said:
             return subprocess.Popen(
                 command,

@@ -1,10 +1,12 @@
 """The command ``epsmesh``, which writes its current stage to a file: ``python -m benchmarks.faults.victim FILE run …``.
 
-Each process has a file of its own, ``FILE-<number of the process>``, with the padded name of the stage.
+Each process has a file of its own, ``FILE-<number of the process>``, with the padded name of the stage; and another,
+``done-<number of the process>``, to which it appends what it finishes, before the program itself can keep it.
 """
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 WIDTH = 40
@@ -30,6 +32,35 @@ class _Told(list[str]):
         return name
 
 
+def tell_done(path: Path, command: str) -> None:
+    """Append to a file the key of every record that is finished, of every array of an export, and of fitted files."""
+    file = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND, 0o600)
+
+    def told(kind: type, name: str, of: Callable[..., str]) -> None:
+        before = getattr(kind, name)
+
+        def after(self: object, *arguments: object) -> object:
+            found = before(self, *arguments) if name == "judge" else None
+            if key := of(self, found, *arguments):
+                os.write(file, f"{key}\n".encode())
+            return found if name == "judge" else before(self, *arguments)
+
+        setattr(kind, name, after)
+
+    from pipeline.run.attempts import Attempts
+
+    if command == "export":
+        from pipeline.export.kept import Kept
+
+        told(Kept, "put", lambda kept, _, work, __: f"array {kept._key(work)}")
+        return  # its solves have no store
+    if command == "identify":
+        from pipeline.identify.kept import Kept as Fitted
+
+        told(Fitted, "write", lambda kept, _, specimen, __: f"file {kept._path(specimen).name}")
+    told(Attempts, "judge", lambda _, record, *__: f"case {record.key}" if record is not None else "")
+
+
 def main() -> None:
     """Run the command in the remaining arguments."""
     from pipeline import stages
@@ -38,6 +69,7 @@ def main() -> None:
     path = Path(f"{sys.argv[1]}-{os.getpid()}")
     sys.argv[1:] = sys.argv[2:]
     stages._names = _Told(path)
+    tell_done(path.with_name(f"done-{os.getpid()}"), sys.argv[1])
     run()
 
 

@@ -44,9 +44,10 @@ class Kept:
             with suppress(OSError):
                 self._found.update(_read(path))
 
-    def __bool__(self) -> bool:
-        """Whether anything was read."""
-        return bool(self._found)
+    @property
+    def keys(self) -> frozenset[str]:
+        """The keys of what was read."""
+        return frozenset(self._found)
 
     def get(self, work: object) -> FloatArray | None:
         """Return the array of some ``work``, which its repr identifies; None if it is not kept."""
