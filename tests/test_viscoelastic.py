@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.shapes.history import History
 from pipeline.viscoelastic import Motion, follow, moduli, respond
 
 TERMS = ((0.4, 2.0), (0.2, 30.0))
@@ -169,3 +170,13 @@ def test_a_force_proportional_to_the_depth_is_that_of_prescribed_contact():
     times = np.linspace(0, 4.5, 31)
     found = follow(TOUCH, TERMS, times, DEPTHS, 1.0)
     assert found.weights @ DEPTHS == pytest.approx(respond(TOUCH, TERMS, times)[0], rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("time", [0.01, 0.1, 1.0])
+def test_a_line_between_the_times_of_a_hold_follows_a_decay_of_any_duration(time):
+    """The hold is as long as the slowest decay; equal steps would be off by more than half of the fastest."""
+    times = History(ramp="1 s", hold="100 s").times()
+    dense = np.linspace(1.0, 101.0, 20001)
+    decay = np.exp(-(dense - 1) / (100 * time))
+    line = np.interp(dense, times, np.exp(-(np.maximum(times, 1.0) - 1) / (100 * time)))
+    assert np.abs(line - decay).max() < 0.015

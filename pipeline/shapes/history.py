@@ -83,8 +83,9 @@ class History(BaseModel):
         Field(ge=1, le=1000),
         Words(
             "Number of time steps of the dataset: in the ramp, in the hold, in each period of the sine, or in the "
-            "whole table, whose own times are added. Forces depend on it only where they are computed in time steps; "
-            "`force_error` has that error.",
+            "whole table, whose own times are added. In the hold, each time after the first is the same factor later "
+            "after the ramp; the first step is the hold over the square of `steps`. All other steps are equal. Forces "
+            "depend on it only where they are computed in time steps; `force_error` has that error.",
             "20",
         ),
     ] = 20
@@ -130,8 +131,11 @@ def _times(history: History) -> FloatArray:
         found = [*np.linspace(0.0, motion.end, steps + 1), *motion.times]
     else:
         found = [*motion.times]
-        for start, end in pairwise(motion.times):
-            found += [*np.linspace(start, end, steps + 1)]
+        if history.ramp:
+            found += [*np.linspace(0.0, history.ramp, steps + 1)]
+        if history.hold:
+            # Decays are fast at first, and of any duration: each time is the same factor after the one before.
+            found += [*(history.ramp + history.hold * np.geomspace(steps**-2.0, 1.0, steps))]
         if history.sine is not None:
             count = max(1, round(steps * history.sine.periods))
             found += [*np.linspace(motion.times[-1], motion.end, count + 1)]
