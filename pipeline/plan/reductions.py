@@ -99,7 +99,7 @@ def _sweeps_places(plan: Plan) -> bool:
 
 
 def use_axisymmetry(plan: Plan) -> Plan:
-    """Axisymmetric scenes are solved in two dimensions, on their own mesh, if the study does not compare meshes."""
+    """Round scenes are solved in two dimensions, on a mesh of their own, unless `[mesh]` gives meshes to compare."""
     if not _asks_for_accuracy_or_truncation(plan):
         return plan
     solves = tuple(map(_on_meridian, plan.solves))

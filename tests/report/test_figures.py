@@ -103,6 +103,8 @@ def test_where_contact_is_found_force_and_area_are_drawn_against_the_depth():
     below = figure(found, "force").axes[2]
     assert (below.get_xlabel(), below.get_ylabel()) == ("depth d, mm", "area in contact, mm²")
     np.testing.assert_allclose(below.lines[0].get_ydata(), 2.0)
+    deep = dataset(probe={"depth": ["0.01 mm", "0.1 mm", "1 mm"]})
+    assert figure(deep, "force").axes[0].get_xscale() == "linear"  # its slope is the stiffness
 
 
 def test_the_papers_claim_is_shown_where_a_study_asks_for_it_beside_bodies_that_are_cut_free_alone():

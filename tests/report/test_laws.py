@@ -223,6 +223,8 @@ def test_lines_of_the_figure_are_as_far_apart_as_the_compliances():
     data = discs()
     assert "compliance" in choose(data)
     assert "compliance" not in choose(data.isel(probe_radius=[0]))
+    one = data.assign(force=data["force"].where(data["probe_radius"] == data["probe_radius"][0]))
+    assert "compliance" not in choose(one)  # its axes would be empty
     drawn = figure(data, "compliance")
     columns = {ax.get_title(): ax for ax in drawn.axes}
     ax = columns["20 mm, outside free"] if "20 mm, outside free" in columns else drawn.axes[1]

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 
 from pipeline.files import FIGURE_FORMATS
 from pipeline.printable import counted
-from pipeline.report.compliance import tool_dimension
-from pipeline.report.figures.compliance import compliance
+from pipeline.report.figures.compliance import compliance, shows_tools
 from pipeline.report.figures.error import error, error_facets
 from pipeline.report.figures.facets import Facets, is_meshed, rest, swept
 from pipeline.report.figures.force import force, history, nothing
@@ -74,7 +73,7 @@ def choose(dataset: xr.Dataset) -> list[str]:
         "map": all(dataset.sizes.get(name, 0) > 1 for name in ("x", "y")),
     }
     kinds = [*(kind for kind, is_suited in suits.items() if is_suited), *([] if is_path else ["force"])]
-    kinds += ["compliance"] if "ratio" in kinds and tool_dimension(dataset) else []
+    kinds += ["compliance"] if "ratio" in kinds and shows_tools(dataset) else []
     study = study_of(dataset)
     asked = study.drawing.kind if study else "auto"
     return sorted(dict.fromkeys(kinds), key=asked.__ne__)

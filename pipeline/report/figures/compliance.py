@@ -33,10 +33,20 @@ def compliance(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     # All share it: not before all are drawn.
     figure.axes[0].set_xlim(0, _ROOM * figure.axes[0].get_xlim()[1])
     contacts = np.unique(data["touch"].values.astype(str))
-    tells = "Each line is one ε. Parallel lines: an ε-mesh adds the same compliance to every tool."
+    tells = "Each line is one ε. Parallel lines: an ε-mesh adds the same compliance to every tool. "
+    tells += "E is that of [material], or of the top layer."
     bonded = "Dashed: bonded." if "bonded" in contacts and len(contacts) > 1 else ""
     finish(figure, title, " ".join(filter(None, (tells, bonded, facets.note))), warning)
     return figure
+
+
+def shows_tools(dataset: xr.Dataset) -> bool:
+    """Tell whether two tools at least have places on the axis: else there is nothing to draw."""
+    if not tool_dimension(dataset):
+        return False
+    data, _ = _with_positions(dataset)
+    places = data["position"].where(np.isfinite(data[_WHOLE])).values
+    return len(np.unique(places[np.isfinite(places)].round(6))) > 1
 
 
 def _with_positions(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:

@@ -19,6 +19,7 @@ from pipeline.states import FAILURES
 _HEIGHT = 2.0  # inches of a panel
 _BESIDE = 1.6  # inches: what a figure takes besides its panels, above and below them
 _LONG = 30.0  # values that span more than this have a logarithmic axis
+_LINEAR = {"depth"}  # F over it is read as a stiffness
 _WORD, _LINE, _TITLE = 14, 36, 34  # letters: of a word's line at an axis, of all words there, of a panel's title
 _MARKED = 40  # points of a curve up to which each has a marker
 BARS = {"capsize": 2, "elinewidth": 0.8}
@@ -118,7 +119,7 @@ def write_ticks(ax: Axes, coordinate: xr.DataArray) -> None:
         ax.set_xlim(-0.5, len(x) - 0.5)
         return
     finite = x[np.isfinite(values)]
-    if finite.size and _is_long(finite):
+    if finite.size and _is_long(finite) and coordinate.name not in _LINEAR:
         log_scale(ax, "x")
     if finite.size == len(x):
         return

@@ -50,7 +50,7 @@ def error(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     parts = [
         f"Distance of F from F_{reference}: lower is better.",
         "Unknowns and run time: the line joins cases that no other case beats in both."
-        " A case whose error a finer mesh does not confirm is not on it.",
+        " Cases that a finer mesh does not confirm, since its error is larger, are left out.",
         f"Grey: below the error bar of F_exact{bar}." if reference == "exact" and np.isfinite(floor) else "",
         "" if spread is None else "Bars: how far repeats are apart.",
         facets.note,
