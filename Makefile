@@ -146,8 +146,9 @@ pairs: setup ## run every feature of a study alone and with every other, into re
 soak: setup ## memory and pace over 20,000 cases on 2,000 meshes (a quarter of an hour; SOAK_ARGS=2000: fewer)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.soak $(SOAK_ARGS)
 
-faults: setup ## kill runs at a hundred moments, and check that no finished case is lost (a quarter of an hour; FAULTS_ARGS=20: fewer)
+faults: setup ## kill runs at a hundred moments, and check that no finished case is lost (an hour; FAULTS_ARGS=20 SLOW_ARGS=8: fewer)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.faults $(FAULTS_ARGS)
+	$(MPI_ENV) $(PYTHON) -m benchmarks.faults.slow $(SLOW_ARGS)
 
 mutants: setup ## change numbers in the code, and count those that tests notice (hours; MUTANTS_ARGS='--seed 2 --room solve')
 	$(MPI_ENV) $(PYTHON) -m benchmarks.mutants $(MUTANTS_ARGS)

@@ -31,10 +31,10 @@ from tests.studies import small_text
 ROOT = Path(__file__).parents[2]
 MOMENTS, SEED = 60, 1
 # Seconds after the first stage of a case within which the signal is sent, and that a command may take to get there.
-_WITHIN, _PATIENCE = 25.0, 300.0
+_WITHIN, _PATIENCE = 12.0, 300.0
 # Twelve cases of some seconds each, on meshes of their own.
 _RUN = small_text(
-    probe={"radius": [f"{2 + 0.1 * i:.1f} mm" for i in range(6)], "at": ["1 mm", "2 mm"]},
+    probe={"radius": [f"{2 + 0.1 * i:.1f} mm" for i in range(12)], "at": ["1 mm", "2 mm"]},
     mesh={"epsilon": "full", "fine": "0.6 mm", "coarse": "1.5 mm", "rim": "0.25 mm"},
     solve={"exact": False},
 )
