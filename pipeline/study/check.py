@@ -37,14 +37,12 @@ from pipeline.study.expected_depth import gives_force
 from pipeline.study.insertion import check_insertion, check_same_path
 from pipeline.study.insertion_stages import has_insertion
 from pipeline.study.place import place_error
+from pipeline.study.plausible import check_extent, check_moduli, check_tools
 from pipeline.study.problems import Problems
-from pipeline.study.regions import tissues_of
 from pipeline.study.schema import Material, Mesh, Planning, Solving
 from pipeline.study.slit import check_slit, check_slit_in
 from pipeline.study.stages import check_history
 
-# No tissue is softer (Pa): brain and fat have some hundred.
-_SOFTEST = 1.0
 # Forces of all cases and times: a dataset then has a few hundred megabytes.
 _MOST_FORCES = 2_000_000
 _OR_LOST = '. To go on without contact at such places, write `off = "lost"` in [probe.path]'
@@ -72,9 +70,11 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         for check in (check_column, check_ball, check_gap, check_slit_in):
             problems.each(check, body=(body,), probe=(probe,), mesh=meshes)
     _warn_of_borders(placed, way, problems)
+    check_tools(placed, problems)
     check_features(sections, placed, problems)
     check_laws(bodies, materials, problems)
-    problems.each(_check_softness, body=bodies, material=materials)
+    problems.each(check_moduli, body=bodies, material=materials)
+    problems.each(check_extent, body=bodies)
     problems.each(check_locking, body=bodies, material=materials, mesh=meshes)
     check_reference(meshes, axes, problems)
     _check_times(probes, axes, problems)
@@ -192,17 +192,6 @@ def _check_boundary(body: Body, problems: Problems) -> None:
                 body.varied(offset=sign * body.boundary_range)
         except SurfaceError as error:
             problems.error("body.boundary_uncertainty", body.boundary_uncertainty, f"is too large: {error}")
-
-
-def _check_softness(body: Body, material: Material, problems: Problems) -> None:
-    """Warn of moduli that no tissue has: an m may be meant as an M."""
-    for key, tissue in tissues_of(body, material):
-        if tissue.young < _SOFTEST:
-            problems.warn(
-                f"{key}.young",
-                f"{tissue.young:g} Pa",
-                "is softer than any tissue. mPa are thousandths of a pascal, MPa are millions",
-            )
 
 
 def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:

@@ -14,7 +14,7 @@ MESH = {"accuracy": "1 %"}
 """The mesh with which a scene without one is checked: forces over the ranges of unknowns have meshes of their own."""
 
 # The depth with which it is checked: forces are computed to that of the curves.
-_SHALLOW = "1 nm"
+SHALLOW = "1 nm"
 # Values of what has no range yet: forces are proportional to the one, and the default range has the other in it.
 _ANY = {"young": "10 kPa", "poisson": 0.4}
 _UNITS = {"young": "Pa", "thickness": "m"}
@@ -75,7 +75,7 @@ def _pressed(probe: dict[str, Any]) -> dict[str, Any]:
     """Return a probe with a depth: those of a table of a history, and of an insertion, are their own."""
     history = probe.get("history")
     has_depth = "insertion" in probe or (isinstance(history, dict) and "table" in history)
-    return probe if has_depth else {"depth": _SHALLOW} | probe
+    return probe if has_depth else {"depth": SHALLOW} | probe
 
 
 def _with_pieces(body: dict[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:

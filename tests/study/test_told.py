@@ -7,8 +7,9 @@ import pytest
 
 from pipeline.study.howto import page_of, pages
 from pipeline.study.keys import all_sections, keys_of
+from pipeline.study.named import examples
 from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from pipeline.study.read import parse, read_text
 from pipeline.study.renamed import RENAMED
 from tests.cases import BLADE, raw, study
 
@@ -126,14 +127,37 @@ def test_pages_are_there_and_keys_are_those_of_studies():
     assert page_of("file") == ""
 
 
-def test_moduli_in_thousandths_of_a_pascal_are_doubted():
-    """An m for an M: nothing else would tell."""
-    layer = {"name": "skin", "thickness": "2 mm", "young": "20 mPa", "poisson": 0.4}
-    (warning,) = study(body={"layer": [layer]}).warnings
-    assert 'body.layer[1].young = "0.02 Pa"' in warning
-    (warning,) = study(material={"young": "10 mPa"}).warnings
-    assert 'material.young = "0.01 Pa"' in warning and "MPa are millions" in warning
-    assert not study(material={"young": "10 MPa"}).warnings
+SKIN = {"name": "skin", "thickness": "2 mm", "young": "20 mPa", "poisson": 0.4}
+BONE = SKIN | {"name": "bone", "young": "18 GPa"}
+BALL = {"shape": "sphere", "radius": "200 mm", "depth": "0.01 mm", "contact": "unilateral"}
+IMPLAUSIBLE = {
+    "thousandths of a pascal": ({"material": {"young": "10 mPa"}}, ["material.young", "0.01 Pa", "10 kPa meant"]),
+    "of a layer": ({"body": {"layer": [SKIN]}}, ["body.layer[1].young", "0.02 Pa", "20 kPa meant"]),
+    "pascals": (
+        {"material": {"young": "10 Pa"}},
+        ["material.young", "10 Pa", "softer than any tissue", "10 kPa meant"],
+    ),
+    "gigapascals": ({"material": {"young": "10 GPa"}}, ["10 GPa", "stiffer than soft tissue", "10 kPa meant"]),
+    "a layer of steel": ({"body": {"layer": [BONE | {"young": "210 GPa"}]}}, ["stiffer than bone", "210 kPa meant"]),
+    "micrometres": ({"probe": {"depth": "0.2 µm"}}, ["probe.depth", "0.2 µm", "0.2 mm meant"]),
+    "a ball larger than the body": ({"probe": BALL}, ["probe: is 400 mm wide", "a unit"]),
+    "metres": ({"body": {"size": ["40 m", "40 m", "20 m"]}, "mesh": {"epsilon": "full"}}, ["40 m large", "in mm"]),
+}
+
+
+@pytest.mark.parametrize("value", IMPLAUSIBLE)
+def test_a_value_that_no_tissue_and_no_tool_has_is_doubted(value):
+    changes, parts = IMPLAUSIBLE[value]
+    assert any(all(part in warning for part in parts) for warning in study(**changes).warnings), study(
+        **changes
+    ).warnings
+    assert not study(body={"layer": [BONE]}).warnings
+
+
+def test_a_needle_as_thick_as_a_thumb_is_doubted():
+    text = examples()["needle-epsilon"].read_text(encoding="utf-8").replace('radius = "0.5 mm"', 'radius = "20 mm"')
+    text = re.sub(r'"(40|8) mm"', lambda size: f'"{20 * int(size[1])} mm"', text)
+    assert any("probe.radius" in told and "Is 2 mm meant" in told for told in read_text(text, "needle.toml").warnings)
 
 
 @pytest.mark.parametrize(("section", "old", "value"), [
