@@ -104,6 +104,24 @@ def test_many_files_are_a_dimension_and_each_is_kept(folder, epsmesh, found, mon
     xr.testing.assert_equal(xr.load_dataset(folder / "results" / "three.nc"), dataset)
 
 
+def test_an_interrupted_folder_loses_no_more_than_the_curve_in_hand(folder, epsmesh, found, monkeypatch):
+    (folder / "ended.toml").write_text(STUDY.format(file="curves/*.csv", may_hide="[]").replace("Punch", "Ended"))
+    fitted = []
+
+    def ended(measured, unknowns):
+        fitted.append(measured)
+        if len(fitted) == 3:
+            raise KeyboardInterrupt
+        return identify(measured, unknowns)
+
+    monkeypatch.setattr("pipeline.identify.many.identify", ended)
+    epsmesh("identify", folder / "ended.toml", "--output", folder / "results")
+    assert (len(fitted), (folder / "results" / "ended.nc").exists()) == (3, False)
+    again = epsmesh("identify", folder / "ended.toml", "--output", folder / "results")
+    assert again.exit_code == 0, again.output
+    assert len(fitted) == 4
+
+
 def test_a_bad_file_is_a_row_and_what_is_told_of_files_is_told_once(folder, epsmesh, found, monkeypatch):
     many, head = folder / "many", "depth (mm),force (mN)"
     many.mkdir()
