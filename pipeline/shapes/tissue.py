@@ -277,3 +277,7 @@ def lame(young: float, poisson: float) -> tuple[float, float]:
     """Return Lamé's λ and μ (Pa) from Young's modulus (Pa) and Poisson's ratio; λ is infinite for ½."""
     mu = young / (2 * (1 + poisson))
     return (2 * mu * poisson / (1 - 2 * poisson) if poisson < 0.5 else inf), mu
+
+
+NUMBERS_OF_LAWS = tuple(key for key in KEYS_OF_LAWS if Tissue.model_fields[key].annotation == float | None)
+"""Keys of laws that are numbers, not tables of them."""

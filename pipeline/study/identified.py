@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.section import Words
+from pipeline.shapes.tissue import NUMBERS_OF_LAWS
 from pipeline.study.problems import Problems, StudyError, tuples
 from pipeline.study.text import toml_of
 from pipeline.study.toml import to_toml
@@ -39,7 +40,7 @@ _READ = (*_NEEDED, "low_hidden", "high_hidden", "wanted", "unknown_2")
 _MOST_UNKNOWNS = 1000
 FITS = "fits"  # the verdict of a model that suits the curves
 # Keys that are filled in, of [material] or of a layer or an inclusion by its name, and units of values.
-_KEYS = ("young", "poisson", "thickness", "radius", "c2", "c3", "limit")
+_KEYS = ("young", "poisson", "thickness", "radius", *NUMBERS_OF_LAWS)
 _UNITS = {"young": " Pa", "thickness": " m", "radius": " m", "time": " s"}
 
 

@@ -1,13 +1,15 @@
 """Parameters of a scene that can be identified: their names, units, bounds, and their places in a study."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from math import inf, nan
 
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.probe import MOST_FRICTION, Probe
 from pipeline.shapes.regions import Embedded
-from pipeline.shapes.tissue import Tissue
+from pipeline.shapes.section import Section
+from pipeline.shapes.tissue import Fibres, Term, Tissue
 from pipeline.study.schema import Material
 from pipeline.study.swept import Place
 
@@ -22,17 +24,11 @@ _SPRINGS = (1e-3, 1e9)
 # Terms of relaxation that can be found, and their times (s).
 MOST_RELAXATIONS = 3
 _TIMES = (1e-3, 1e5)
-# Bounds and default ranges of the parameters of laws: those of their keys, and those that tissues have.
-_OF_LAWS = {
-    "c2": (-1000.0, 1000.0, 0.0, 1.0),
-    "c3": (0.0, 1000.0, 0.0, 10.0),
-    "limit": (0.01, 1e6, 0.1, 100.0),
-    "alpha": (0.25, 100.0, 0.25, 30.0),
-    "k1": (0.0, 1000.0, 0.0, 10.0),
-    "k2": (1e-3, 1000.0, 0.1, 100.0),
-    "dispersion": (0.0, 1 / 3, 0.0, 1 / 3),
-    "share": (0.0, 1.0, 0.0, 1.0),
-    "exponent": (-50.0, 50.0, 1.0, 30.0),
+# Default ranges of parameters of laws, as tissues have them; of others, the bounds of their keys.
+_USUAL: dict[type[Section], dict[str, tuple[float, float]]] = {
+    Tissue: {"c2": (0.0, 1.0), "c3": (0.0, 10.0), "limit": (0.1, 100.0), "alpha": (0.25, 30.0)},
+    Fibres: {"k1": (0.0, 10.0), "k2": (0.1, 100.0)},
+    Term: {"alpha": (1.0, 30.0)},
 }
 
 
@@ -87,21 +83,43 @@ def _of_tissues(body: Body, material: Material) -> Iterator[Parameter]:
 
 
 def _of_law(prefix: str, place: Place, tissue: Tissue) -> Iterator[Parameter]:
-    """Yield the numbers of a tissue's own law."""
+    """Yield the numbers of a tissue's own law: keys of it, of a table of it, and of each table of a list."""
     for key, value in tissue.given.items():
-        if key in _OF_LAWS and value is not None:
-            yield Parameter(f"{prefix}{key}", "1", *_OF_LAWS[key], value, (*place, key))
-    if tissue.fibres is not None:
-        for key in ("k1", "k2", "dispersion"):
-            value = getattr(tissue.fibres, key)
-            yield Parameter(f"{prefix}{key}", "1", *_OF_LAWS[key], value, (*place, "fibres", key))
-    for number, term in enumerate(tissue.terms):
-        name = f"{prefix}{term.name}_alpha" if term.name else f"{prefix}alpha_{number + 1}"
-        bounds = _OF_LAWS["exponent"]
-        yield Parameter(name, "1", *bounds, term.alpha, (*place, "terms", number, "alpha"))
-        if term.share is not None:
-            name = f"{prefix}{term.name}_share" if term.name else f"{prefix}share_{number + 1}"
-            yield Parameter(name, "1", *_OF_LAWS["share"], term.share, (*place, "terms", number, "share"))
+        if isinstance(value, Section):
+            yield from _numbers(value, (*place, key), lambda name: f"{prefix}{name}")
+        elif isinstance(value, tuple):
+            for number, term in enumerate(value):
+                yield from _numbers(term, (*place, key, number), partial(_of_term, prefix, term.name, number))
+        elif value is not None:
+            yield _number(Tissue, f"{prefix}{key}", value, (*place, key))
+
+
+def _of_term(prefix: str, own: str, number: int, key: str) -> str:
+    """Return the name of a key of a table of a list, which may have its ``own`` name."""
+    return f"{prefix}{own}_{key}" if own else f"{prefix}{key}_{number + 1}"
+
+
+def _numbers(section: Section, place: Place, name: Callable[[str], str]) -> Iterator[Parameter]:
+    """Yield the numbers that a table gives, by the ``name`` of their keys."""
+    for key in type(section).model_fields:
+        if isinstance(value := getattr(section, key), float):
+            yield _number(type(section), name(key), value, (*place, key))
+
+
+def _number(section: type[Section], name: str, value: float, place: Place) -> Parameter:
+    """Return a number of a law with the bounds of its key."""
+    key = str(place[-1])
+    least, most = _bounds(section, key)
+    low, high = _USUAL.get(section, {}).get(key, (least, most))
+    return Parameter(name, "1", least, most, low, high, value, place)
+
+
+def _bounds(section: type[Section], key: str) -> tuple[float, float]:
+    """Return the bounds of a key, infinite if it has none."""
+    found = section.model_fields[key].metadata
+    least = [getattr(one, name) for one in found for name in ("ge", "gt") if hasattr(one, name)]
+    most = [getattr(one, name) for one in found for name in ("le", "lt") if hasattr(one, name)]
+    return max(least, default=-inf), min(most, default=inf)
 
 
 def _of_body(body: Body) -> Iterator[Parameter]:

@@ -1,18 +1,24 @@
 """Keys of material laws: what each law needs, its bounds, laws of regions, and keys of cases."""
 
+from math import inf
+
 import pytest
 
 from pipeline.plan.key import case_key, mesh_key
 from pipeline.plan.plan import make_plan
 from pipeline.plan.symmetry import model_planes
+from pipeline.shapes.tissue import LAWS, NUMBERS_OF_LAWS
+from pipeline.study.parameters import parameters_of
 from pipeline.study.problems import StudyError
 from pipeline.study.read import parse
+from pipeline.study.swept import placed
 from tests.cases import raw, study
 
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}
 BALL = {"name": "tumour", "at": ["0 mm", "0 mm", "-10 mm"], "radius": "4 mm", "young": "50 kPa", "poisson": 0.4}
 FIBRES = {"direction": [1, 0, 0], "k1": 0.5, "k2": 2.0}
 YEOH = {"law": "yeoh", "c2": 0.4}
+PARTS = ("body", "material", "probe")
 
 # changes of the study -> parts of the message: key, value, what is allowed
 MISTAKES = {
@@ -239,3 +245,42 @@ def test_fibres_are_swept_and_break_symmetry():
     assert model_planes(study(material=inclined).case(())) == ("x",)
     everywhere = {"law": "holzapfel", "fibres": FIBRES | {"direction": [1, 1, 0], "dispersion": 1 / 3}}
     assert model_planes(study(material=everywhere).case(())) == ("x", "y")
+
+
+OF_LAWS = {
+    "linear": {},
+    "neo-hookean": {},
+    "mooney-rivlin": {"c2": 0.3},
+    "yeoh": {"c2": 0.4, "c3": 0.1},
+    "ogden": {"terms": [{"share": 0.7, "alpha": 2.0}, {"name": "steep", "alpha": 9.0}]},
+    "gent": {"limit": 2.0},
+    "holzapfel": {"fibres": FIBRES},
+    "veronda-westmann": {"alpha": 2.0},
+}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_every_number_of_a_law_can_be_found_and_goes_on_by_its_key(law):
+    """Bounds are those of the schema: a value at them can be read, and one beyond them not."""
+    body, material, probe = (study(material={"law": law} | OF_LAWS[law]).sections[name][0] for name in PARTS)
+    found = {one.place: one for one in parameters_of(body, material, probe).values() if one.place[:1] == ("material",)}
+    numbers = {place for place, value in leaves(OF_LAWS[law]) if isinstance(value, float)}
+    assert {place[1:] for place in found if place[1] not in ("young", "poisson")} >= numbers
+    for place, one in found.items():
+        assert one.least <= one.low <= one.value <= one.high <= one.most
+        if one.most < inf and place[1] not in ("young", "poisson"):
+            with pytest.raises(StudyError, match=str(place[-1])):
+                parse(placed(raw(material={"law": law} | OF_LAWS[law]), [(place, 1.01 * one.most)]))
+    assert {key for key in LAWS[law] if key not in ("terms", "fibres")} <= set(NUMBERS_OF_LAWS)
+
+
+def leaves(value, place=()):
+    """Yield places and values of a table in its tables and lists of tables."""
+    if isinstance(value, dict):
+        for key, own in value.items():
+            yield from leaves(own, (*place, key))
+    elif isinstance(value, list) and value and isinstance(value[0], dict):
+        for number, own in enumerate(value):
+            yield from leaves(own, (*place, number))
+    else:
+        yield place, value
