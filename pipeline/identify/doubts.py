@@ -1,7 +1,7 @@
 """Doubts about units: what is measured does not go with the scene, or with any tissue."""
 
 from collections.abc import Iterator, Sequence
-from math import inf, sqrt
+from math import inf, nan, sqrt
 
 import numpy as np
 import xarray as xr
@@ -19,6 +19,8 @@ _DEPTHS = (1e-4, 30.0)
 _MODULI = (100.0, 1e10)
 # Contact begins, roughly, at this share of the force; a depth less the machine's way is at least this share of it.
 _BEGUN, _LEAST_WAY = 0.05, 1e-3
+# Powers of the radius that F goes as, and how much more it may be.
+_POWERS, _MORE = {"sphere": 0.5, "disc": 1.0}, 1.1
 # Forces that are this many times off the ends of the moduli's ranges are none of them.
 _ROUGH = 3.0
 
@@ -56,6 +58,25 @@ def doubts_of_depth(cases: Sequence[Case], found: Sequence[CurveFit]) -> Iterato
         for problem in problems.warnings:
             depth = f"its depth of {engineering(deepest, 'm')}"
             yield f"{curve.name}: {depth if problem.allowed.startswith('is ') else f'at {depth}'} {problem.allowed}"
+
+
+def doubts_of_radius(cases: Sequence[Case], sought: Sequence[Unknown]) -> Iterator[str]:
+    """Yield what an error of the tool's radius does to E, if it is taken for exact.
+
+    On a deep body F goes as E √R of a ball and as E R of a flat punch.
+    """
+    of_tools = [case.probe for case in cases if case.probe.shape in _POWERS]
+    has_error = any(one.name.partition(" of ")[0] == "radius" for one in sought)
+    if has_error or not of_tools or not any(one.name.endswith("young") for one in sought):
+        return
+    remedy = 'give its error, such as errors = {radius = "5 %"} in the [[measurement]]'
+    if len(cases) > 1:
+        yield f"The radius of each tool is taken for exact: {remedy}"
+        return
+    (tool,) = of_tools
+    less = 100 * (1 - _MORE ** -_POWERS[tool.shape])
+    radius = engineering(getattr(tool, "radius", nan), "m")
+    yield f"The radius of {radius} is taken for exact. If it is 10 % more, E is about {less:.0f} % less: {remedy}"
 
 
 def doubts_of_force(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> tuple[str, ...]:

@@ -12,10 +12,10 @@ from pipeline.experiment.curve import Curve
 from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.air import levels, off_the_air
 from pipeline.identify.attraction import attractions
-from pipeline.identify.bars import TAIL, interval
+from pipeline.identify.bars import interval, tail
 from pipeline.identify.fit import FINEST, Fit, fit
 from pipeline.identify.hidden import hidden_bars
-from pipeline.identify.limits import begins_later, cut, out_of_range
+from pipeline.identify.limits import at_an_end, begins_later, cut, out_of_range
 from pipeline.identify.model import REACH, Model
 from pipeline.identify.parts import SOURCES, CurveFit, Estimate, Measured, NoiseFound, Profile, Unknown, Window
 from pipeline.identify.profiles import Likelihood, ends, profile
@@ -91,7 +91,7 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
         profiles=profiles,
         windows=() if does_fit or beyond else _windows(measured, found),
         evidence=found.misfit,
-        told=(*combinations(found, seen), *(_told(found) if does_fit else ())),
+        told=(*combinations(found, seen), *(_told(found) if does_fit else at_an_end(replace(found, x=x)))),
     )
 
 
@@ -137,7 +137,7 @@ def _bars(found: Fit) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, Pro
         return x, low, high, {}
     # The profile has the most probable noise: its threshold is raised as bars of all noises are wider than that one's.
     top = mixture.covariance[mixture.top]
-    student = float(stdtrit(mixture.freedom, 1 - TAIL))
+    student = float(stdtrit(mixture.freedom, 1 - tail(mixture)))
     wider = float(np.median((high - low) / 2 / np.sqrt(np.diag(top)) / student))
     squared = (student * max(wider, 1.0)) ** 2
     threshold = mixture.freedom * np.log1p(squared / mixture.freedom)
@@ -145,7 +145,10 @@ def _bars(found: Fit) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, Pro
     for place in shared:
         spread = float(np.sqrt(top[place, place]))
         curve, best = profile(likelihood, np.clip(found.x, 0.0, 1.0), place, spread, threshold)
-        low[place], high[place] = ends(curve, threshold)
+        first, last = ends(curve, threshold)
+        # A mixture within the range has also what noises say that are less probable.
+        within = low[place] >= 0 and high[place] <= 1
+        low[place], high[place] = (min(first, low[place]), max(last, high[place])) if within else (first, last)
         x[place] = best
         values = np.array([float(model.space.value(place, at)) for at in curve.value])
         profiles[model.names[place]] = Profile(values, curve.fall * _AT_BAR / threshold)

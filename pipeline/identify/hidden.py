@@ -48,13 +48,14 @@ class _Cell:
 def hidden_bars(found: Fit, wanted: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
     """Return the ends (u,) of the bars in coordinates over all kinds of hidden parts, at least those without any.
 
-    Only ``wanted`` unknowns are looked at; others are NaN.
+    Only ``wanted`` unknowns are looked at; others are NaN, and all if nothing may be hidden.
     """
     low, high = np.full(len(found.x), np.nan), np.full(len(found.x), np.nan)
+    kinds = sorted({hidden.kind for measured in found.model.measured for hidden in measured.hidden})
     mixtures = [found.mixture]
-    for kind in sorted({hidden.kind for measured in found.model.measured for hidden in measured.hidden}):
+    for kind in kinds:
         mixtures += _of_kind(found, kind)
-    for place in wanted:
+    for place in wanted if kinds else ():
         bars = [interval(mixture, place) for mixture in mixtures]
         low[place], high[place] = min(bar[0] for bar in bars), max(bar[1] for bar in bars)
     return low, high

@@ -1,11 +1,15 @@
 """Ranges that are too narrow: no value within fits, or the bar ends where the range does."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from pipeline.identify.bars import interval
 from pipeline.identify.fit import Fit
 from pipeline.report.identified import engineering, title
 
+# Coordinates this near to an end are at it.
+_AT_END = 1e-3
 # An unknown that is out of its range by as many half widths of its bar is not there by chance.
 _OUT = 1.0
 # Forces of the model, relative to the measured ones, below which the noise is what is fitted.
@@ -36,6 +40,16 @@ def cut(found: Fit) -> tuple[str, ...]:
             text = f"The error bar of {title(unknown.name)} ends where its range does, at {where}"
             told.append(f"{text}{'' if unknown.is_wanted else _TOO_SMALL}.")
     return tuple(told)
+
+
+def at_an_end(found: Fit) -> Iterator[str]:
+    """Yield in sentences which wanted unknowns have an end of their range as value, though no natural one."""
+    space = found.model.space
+    for place, unknown in enumerate(space.unknowns):
+        value = float(np.clip(found.x[place], 0.0, 1.0))
+        if unknown.is_wanted and unknown.is_logarithmic and min(value, 1 - value) < _AT_END:
+            where = engineering(unknown.low if value < 0.5 else unknown.high, unknown.unit)
+            yield f"{title(unknown.name)} is the end of its range, {where}: it may be anything beyond."
 
 
 def begins_later(found: Fit) -> bool:

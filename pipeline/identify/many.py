@@ -11,7 +11,13 @@ import xarray as xr
 from pipeline.experiment.reading import ExperimentError
 from pipeline.identify.advice import advice
 from pipeline.identify.dataset import dataset_of, described
-from pipeline.identify.doubts import doubts_of_depth, doubts_of_force, doubts_of_moduli, doubts_of_scale
+from pipeline.identify.doubts import (
+    doubts_of_depth,
+    doubts_of_force,
+    doubts_of_moduli,
+    doubts_of_radius,
+    doubts_of_scale,
+)
 from pipeline.identify.estimate import identify
 from pipeline.identify.experiment import Near, Scenes, Specimen, without_odd
 from pipeline.identify.hertz import hertz_young
@@ -152,7 +158,9 @@ class Work:
         """Return the dataset of a fit, with all that is said of it."""
         measured, sought = scenes.measured(specimen), unknowns(self.study)
         told = [*doubts_of_scale(scenes.cases, specimen.curves), *doubts_of_force(measured, sought), *found.told]
-        told += doubts_of_depth(scenes.cases, found.curves) if found.fits else ()
+        if found.fits:
+            told += doubts_of_depth(scenes.cases, found.curves)
+            told += doubts_of_radius(scenes.cases, found.unknowns)
         told += advice(self.study, found) if len(self.specimens) == 1 else ()
         dataset = dataset_of(found, _attributes(self.study), [curve.time for curve in specimen.curves])
         told += doubts_of_moduli(dataset)

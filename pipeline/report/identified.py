@@ -113,7 +113,7 @@ def of_unknown(dataset: xr.Dataset, name: str, *, is_short: bool = False) -> str
     value = f"{what} = {written(dataset, name, float(one['estimate']))}"
     first, second = bar(dataset, name), bar(dataset, name, hidden=True)
     first = first if first.startswith("±") else f"({first})"
-    if not second or second == first:
+    if not second or second == first or not hidden_words(dataset):
         return f"{value} {first}."
     if is_short:
         return f"{value} {first} as declared; {second} with what it may hide."

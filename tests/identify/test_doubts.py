@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from pipeline.experiment.curve import Curve
-from pipeline.identify.doubts import doubts_of_force, doubts_of_moduli, doubts_of_scale
+from pipeline.identify.doubts import doubts_of_force, doubts_of_moduli, doubts_of_radius, doubts_of_scale
 from pipeline.identify.experiment import cases_of
 from pipeline.identify.parts import Measured, Unknown
 from pipeline.study.read import parse
@@ -72,3 +72,21 @@ def test_a_soft_machine_is_no_doubt():
     assert "is below" in doubts_of_force([Measured(curve, Ball())], [RANGE])[0]
     assert not doubts_of_force([Measured(curve, Ball(), machine_compliance=0.2)], [RANGE])
     assert not doubts_of_force([Measured(curve, Ball(), machine_compliance=None)], [RANGE, MACHINE])
+
+
+@pytest.mark.parametrize(
+    ("probe", "radius", "less"),
+    [
+        ({"shape": "sphere", "radius": "3 mm", "depth": "0.1 mm"}, "3.00 mm", 5),
+        ({"shape": "disc", "radius": "2 mm", "depth": "0.1 mm"}, "2.00 mm", 9),
+        ({"shape": "blade", "length": "4 mm", "width": "1 mm", "depth": "0.1 mm"}, "", 0),
+    ],
+)
+def test_what_an_error_of_the_radius_does(probe, radius, less):
+    contact = "unilateral" if probe["shape"] == "sphere" else "frictionless"
+    unset = {"radius": None} if "radius" not in probe else {}
+    case = next(parse(raw(probe={**unset, **probe, "contact": contact})).cases())
+    said = list(doubts_of_radius([case], [RANGE]))
+    assert len(said) == bool(radius)
+    assert not radius or (f"radius of {radius}" in said[0] and f"E is about {less} % less" in said[0])
+    assert not list(doubts_of_radius([case], [RANGE, Unknown("radius of a", 1e-3, 4e-3, "m")]))

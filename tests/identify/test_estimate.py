@@ -43,6 +43,8 @@ def test_a_baseline_tilts_where_there_is_air_and_is_level_by_assumption_elsewher
     deep = identify([measured(Ball(), values, error, 2e-4, 0.0)], [YOUNG])
     assert any("taken for level" in sentence for sentence in deep.told)
     assert not any("taken for level" in sentence for sentence in found.told)
+    # Nothing may be hidden: there is one bar.
+    assert np.all(found.low_hidden == found.low) and np.all(found.high_hidden == found.high)
 
 
 def test_parts_add_up_and_the_mesh_is_one_of_them():
@@ -156,6 +158,7 @@ def test_a_modulus_beyond_its_range_is_no_fit():
     found = identify([measured(Ball(), {"young": 5e6}, error, 2e-4)], [YOUNG])
     assert found.verdict.startswith("does not fit within the ranges")
     assert np.isnan(found.high[0])
+    assert any("E is the end of its range, 1.00 MPa" in sentence for sentence in found.told)
 
 
 @pytest.mark.parametrize("air", [0.0, 0.5])
