@@ -13,7 +13,7 @@ import xarray as xr
 
 from pipeline.report import guide_text
 from pipeline.report.guideline import Guideline
-from pipeline.report.table import DatasetError, arrange
+from pipeline.report.table import EXACT, DatasetError, arrange
 from pipeline.units import parse_quantity
 
 # The accuracy that the report asks for; `epsmesh guide` answers for any.
@@ -55,6 +55,8 @@ def guide(dataset: xr.Dataset, accuracy: str | float | None = None, budget: str 
     if table.lost.all():
         reasons = "; ".join(f"{count} {why}" for why, count in Counter(table.why.ravel()).most_common())
         raise DatasetError(f"no case can be judged: {reasons}")
+    if len(table.settings) == 1 and table.reference != EXACT:
+        raise DatasetError("the study has one mesh setting, and F_max is its own force: it compares no meshes")
     return Guide(dataset, table, wanted, seconds)
 
 

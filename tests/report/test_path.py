@@ -8,6 +8,8 @@ import xarray as xr
 
 import pipeline.report.accessor  # noqa: F401
 from pipeline.report.figures import choose, figure
+from pipeline.report.guide import guide_if_any
+from pipeline.report.page.facts import summary
 from pipeline.report.table import DatasetError
 from tests.cases import raw
 from tests.report.synthetic import dataset
@@ -98,3 +100,12 @@ def test_what_cannot_be_located_is_said(change, words):
         change(mapped(RASTER)).epsmesh.locate("ill", "healthy")
     with pytest.raises(DatasetError, match="no body"):
         mapped(RASTER).epsmesh.locate("ill", "well")
+
+
+def test_a_map_of_one_mesh_setting_is_not_compared_with_itself_and_begins_with_what_came_out():
+    one = mapped(RASTER, centre=(5e-3, -2e-3), mesh={"epsilon": "full"}, solve={"exact": False})
+    assert guide_if_any(one) is None
+    text = summary(one)
+    assert "70 of 70 cases have a force, from" in text
+    assert "error bars up to" in text
+    assert "largest at (5, -2, " in text

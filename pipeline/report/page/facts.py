@@ -87,8 +87,21 @@ def summary(dataset: xr.Dataset) -> str:
             f"F = {write('force', float(f'{force.item():.4g}'))}{f' ± {100 * bar:.2g} %' if np.isfinite(bar) else ''}."
         )
     lowest, highest = (write("force", float(f"{value:.4g}")) for value in (np.nanmin(force), np.nanmax(force)))
-    many = f"{known} of {size} cases have a force, from {lowest} to {highest}"
-    return f"{many}." if known > 1 else f"One of {size} cases has a force, {lowest}."
+    if known == 1:
+        return f"One of {size} cases has a force, {lowest}."
+    bars = 100 * relative(dataset, "force_error").values
+    worst = f", with error bars up to {np.nanmax(bars):.2g} %" if np.isfinite(bars).any() else ""
+    return f"{known} of {size} cases have a force, from {lowest} to {highest}{worst}.{_at_largest(dataset)}"
+
+
+def _at_largest(dataset: xr.Dataset) -> str:
+    """Say where on the body F is largest, if the study has several places."""
+    if "at_x" not in dataset.coords:
+        return ""
+    force = dataset["force"]
+    there = force.isel(force.fillna(-np.inf).argmax([*force.dims]))
+    x, y, z = (f"{1e3 * float(there[name]):.4g}" for name in ("at_x", "at_y", "at_z"))
+    return f" The force is largest at ({x}, {y}, {z}) mm."
 
 
 def of_paths(dataset: xr.Dataset) -> str:
