@@ -109,7 +109,7 @@ def compare(a: xr.Dataset, b: xr.Dataset) -> Comparison:
     ours, theirs = _cases(a, "A", alike=alike), _cases(b, "B", alike=alike)
     scene, settings = differing([one.parameters for one in ours], [one.parameters for one in theirs])
     if scene:
-        raise DatasetError(f"they are of different scenes: {_differences(scene)}")
+        raise DatasetError(f"they are of different scenes: {_differences(scene)}{_between(a, b)}")
     keys = varied([one.parameters for one in ours], [one.parameters for one in theirs])
     left, right = _by_values(ours, keys), _by_values(theirs, keys)
     common = [values for values in left if values in right]
@@ -162,7 +162,20 @@ def _cases(dataset: xr.Dataset, name: str, *, alike: bool) -> list[_Place]:
         return [_Place(one, ", ".join(f"{k} = {v}" for k, v in one.items()), index) for one, index in places]
     if {axis.name: len(axis) for axis in study.axes if not axis.is_stage} != sizes:
         raise DatasetError(f"{name} is part of a dataset, or of another study than it says: compare whole ones")
-    return [_Place(parameters_of(case), case.whole, index) for index, case in study.whole_cases()]
+    return [_Place(parameters_of(case, study.tool(case)), case.whole, index) for index, case in study.whole_cases()]
+
+
+def _between(a: xr.Dataset, b: xr.Dataset) -> str:
+    """Return the forces of two datasets of one case each, and their difference, in words; "" of others."""
+    if not a["force"].size == b["force"].size == 1:
+        return ""
+    (one, bar), (other, other_bar) = ([1e3 * each[name].item() for name in ("force", "force_error")] for each in (a, b))
+    if not all(map(isfinite, (one, other, bar, other_bar))):
+        return ""
+    return (
+        f". F is {one:.5g} mN in A, {other:.5g} mN in B: B less A is {other - one:.4g} ± {bar + other_bar:.2g} mN, "
+        "with both error bars"
+    )
 
 
 def _differences(scene: list[tuple[str, Any, Any]]) -> str:

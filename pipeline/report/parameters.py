@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from pipeline.shapes.probe import Probe
 from pipeline.study.case import Case
 
 # Values by key, as mesh.fine or body.layer[1].young. A key that a shape does not have is not there.
@@ -17,13 +18,14 @@ _DIGITS = 9
 _FILE = "body.file"
 
 
-def parameters_of(case: Case) -> Parameters:
-    """Return the values of all keys of a case, in SI units.
+def parameters_of(case: Case, tool: Probe | None = None) -> Parameters:
+    """Return the values of all keys of a case, in SI units; ``tool`` is that of an insertion, of which it is a state.
 
     Where all of the body is kept, it does not matter what would have become of the rest: ``mesh.outside`` is then
     "coarse". Where it is not, ε is a key of the scene, ``kept.epsilon``.
     """
-    parts = {"body": case.body, "material": case.material, "probe": case.probe, "mesh": case.mesh, "load": case.load}
+    parts = {"body": case.body, "material": case.material, "probe": tool or case.probe}
+    parts |= {"mesh": case.mesh, "load": case.load}
     found = {key: value for name, part in parts.items() for key, value in _flat(name, part)}
     if _FILE in found:
         found[_FILE] = (*_rounded(case.body.heights), *_rounded((case.body.volume, case.body.extent)))
@@ -51,7 +53,7 @@ def differing(
     for key in _keys(ours, theirs):
         one, other = _values(ours, key), _values(theirs, key)
         if len(one) == len(other) == 1 and one != other:
-            is_setting = key.startswith("mesh.") and key != "mesh.outside"
+            is_setting = (key.startswith("mesh.") and key != "mesh.outside") or key == "probe.insertion.steps"
             (settings if is_setting else scene).append((key, *one, *other))
     return scene, settings
 

@@ -5,9 +5,11 @@ import json
 import pytest
 
 from pipeline.report.compare import compare
-from pipeline.report.dataset import write
+from pipeline.report.dataset import build, write
 from pipeline.report.table import DatasetError
+from pipeline.study.read import read_mapping
 from tests.commands import epsmesh
+from tests.insertion import test_needle as needles
 from tests.report.chosen import BAR, TEXT, dataset, ratio, seconds
 
 
@@ -126,3 +128,18 @@ def test_the_command(tmp_path):
     absent = epsmesh("compare", tmp_path / "a.nc", tmp_path / "x.toml", "--output", tmp_path, "--json")
     assert absent.exit_code == 2
     assert [error["file"] for error in json.loads(absent.stdout)["errors"]] == [str(tmp_path / "x.toml")]
+
+
+def test_needles_of_two_toughnesses_are_two_scenes_whose_forces_are_told():
+    """The states that are solved of both are of one tool."""
+
+    def needle(toughness):
+        study = needles.SCENE | {"probe": needles.NEEDLE | {"toughness": f"{toughness} J/m^2"}}
+        return build(*needles.solved(read_mapping(study, "a")))
+
+    tough, weak = needle(5), needle(4)
+    assert compare(tough, tough).agrees
+    one, other = (1e3 * float(each["force"].max()) for each in (tough, weak))
+    with pytest.raises(DatasetError, match=r"probe\.toughness is 5\.0 in A, 4\.0 in B") as told:
+        compare(tough, weak)
+    assert f"B less A is {other - one:.4g} ± " in str(told.value)
