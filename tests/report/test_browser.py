@@ -2,12 +2,16 @@
 
 import json
 import os
+import re
 from base64 import b64encode
 from hashlib import sha256
 
 import pytest
 
+from pipeline.report.dataset import build
 from pipeline.report.page import write_page
+from pipeline.study.read import read_mapping
+from tests.insertion import test_needle as needles
 from tests.report.browser import CHROMIUM, Browser
 from tests.report.synthetic import EPSILONS, dataset
 
@@ -231,3 +235,12 @@ def luminance(colour):
 
 def contrast(one, other):
     return (max(one, other) + 0.05) / (min(one, other) + 0.05)
+
+
+def test_the_hover_names_the_case_as_plan_and_table_do(browser, tmp_path):
+    """Stages of an insertion are no cases: numbers of cases are not those of rows."""
+    probe = needles.NEEDLE | {"toughness": ["5 J/m^2", "4 J/m^2", "3 J/m^2"]}
+    data = build(*needles.solved(read_mapping(needles.SCENE | {"probe": probe}, "a")))
+    browser.open(write_page(data, tmp_path / "a.html"))
+    texts = browser.ask("document.getElementById('plot').data.flatMap(trace => [...trace.text])")
+    assert sorted(re.match(r"case (\d+)", text)[1] for text in texts) == sorted(column(browser, "case"))

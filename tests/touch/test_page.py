@@ -130,14 +130,19 @@ def test_a_mouse_moves_the_tool_on_the_face_and_turns_the_body_beside_it(browser
     assert np.hypot(x, y) == pytest.approx(40 * browser.ask("page.stage.scale()"), rel=0.3)
     spot = model.spot(1e-3 * x, 1e-3 * y)
     touch = model.query("disc", radius=2e-3, depth=3e-4, at=(1e-3 * x, 1e-3 * y, spot.height))
-    force = float(told(browser, "force").removesuffix(" N"))
+    force = newtons(told(browser, "force"))
     assert force == pytest.approx(touch.force @ spot.normal, rel=6e-3)  # of three digits
     assert told(browser, "error") == f"± {100 * touch.force_error:.2g} %"
     angle = browser.ask("page.stage.controls.getAzimuthalAngle()")
     drag(browser, (40, 600), (100, 600))
     assert browser.ask("page.stage.controls.getAzimuthalAngle()") != angle
-    assert float(told(browser, "force").removesuffix(" N")) == force
+    assert newtons(told(browser, "force")) == force
     assert browser.messages == []
+
+
+def newtons(text):
+    number, unit = text.split()
+    return float(number) * {"N": 1.0, "mN": 1e-3}[unit]
 
 
 def drag(browser, start, end):
@@ -166,7 +171,7 @@ def test_the_dent_is_seen_and_outside_the_region_no_number_is(browser, tmp_path)
         label = browser.ask("document.querySelector('[name=depth]').previousElementSibling.textContent")
         assert label == f"{depth / 10:g}"
         assert told(browser, "status") == ""
-        assert told(browser, "force").endswith(" N")
+        assert told(browser, "force").split()[1] == told(browser, "aside").split()[1]  # one unit for both
         sizes = [browser.ask(f"document.querySelector('[name={name}]').parentElement.hidden") for name in SIZES]
         assert sizes == [tool == "blade", tool != "cone", tool != "blade", tool != "blade"]
     assert browser.messages == []

@@ -262,10 +262,12 @@ class Page {
       whisker.style.width = `${(200 * normal * touch.error) / full}%`;
     }
     const known = touch.status === "ok" || touch.status === "lost";
-    say("reading", isIn ? `F = ${short(normal)} N ± ${short(100 * touch.error, 2)} %` : "");
-    say("force", known ? `${short(normal)} N` : "–");
+    // One unit for what is compared.
+    const [factor, unit] = Math.abs(normal) < 1 ? [1e3, "mN"] : [1, "N"];
+    say("reading", isIn ? `F = ${short(factor * normal)} ${unit} ± ${short(100 * touch.error, 2)} %` : "");
+    say("force", known ? `${short(factor * normal)} ${unit}` : "–");
     say("error", isIn ? `± ${short(100 * touch.error, 2)} %` : "");
-    say("aside", known ? `${short(1e3 * aside, 2)} mN` : "–");
+    say("aside", known ? `${short(factor * aside, 2)} ${unit}` : "–");
     say("stiffness", known ? `${short(touch.stiffness)} N/m` : "–");
     say("contact", known ? `${short(MM * touch.radius)} mm` : "–");
     say("took", isIn ? `${took.toFixed(1)} ms` : "–");
