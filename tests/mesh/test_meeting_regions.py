@@ -91,6 +91,22 @@ def test_a_hollow_region_leaves_its_neighbours_alone(given):
     assert found[1] == 0
 
 
+def test_a_hollow_region_that_leaves_the_body_ends_below_its_surface(given):
+    """The body has the surface that it had, and a cavity in it."""
+    solid, vessel = study(**given(TUMOUR, LOBE)).case(()).body, {"name": "vessel", "label": 5, "hollow": True}
+    found = study(**given(TUMOUR, vessel))
+    assert any("label 5 leaves the body: it ends 9 mm below the surface" in said for said in found.warnings)
+    case = found.case(())
+    (cavity,) = case.body.cavities.values()
+    assert 0 < cavity.volume < 0.5 * solid.region[1].surface.volume
+    assert case.body.volume == pytest.approx(solid.volume, rel=0.01)
+    mesh = mesh_arrays(case, ())
+    inside = -cavity.distance(mesh.points[mesh.cells[:, :4]].mean(axis=1))
+    assert inside.max() < 1.5e-3
+    walls = np.abs(cavity.distance(mesh.points[np.unique(mesh.facets["free"])])) < 1e-4
+    assert walls.sum() > 20  # points of the cavity's wall, which nothing holds
+
+
 def test_places_on_a_border_are_told_before_the_run(given):
     """Those of a path together; a place beside the border, or far above it, is not among them."""
     sections = given(TUMOUR, LOBE)
@@ -109,8 +125,6 @@ def test_what_cannot_be_is_refused_by_name_and_place(given):
     disc = {"probe": PROBE | {"contact": "frictionless", "at": ["-4 mm", "4 mm"]}}
     with pytest.raises(ExportError, match=r"body\.region meets the surface"):
         scope_of(study(**given(TUMOUR, LOBE) | disc))
-    with pytest.raises(StudyError, match=r"lobe is hollow and meets the body's surface at x = .*inside tissue"):
-        study(**given(TUMOUR, {"name": "lobe", "label": 5, "hollow": True}))
     under = {"name": "vessel", "label": 7, "hollow": True, "pressure": "1 kPa"}
     sections = given(under, LOBE | {"relaxation": [{"share": 0.4, "time": "2 s"}]})
     sections["probe"] |= {"history": {"ramp": "1 s", "hold": "10 s", "steps": 4}}

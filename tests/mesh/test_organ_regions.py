@@ -154,7 +154,7 @@ def test_mistakes_are_named(folder):
         (body(folder, {k: v for k, v in OF_FILE.items() if k != "unit"}), ["body.region[1].unit", 'unit = "mm"']),
         (body(folder, OF_LABEL), ["body.region[1].label = 2", "needs a body from an image"]),
         (body(folder, OF_LABEL | {"label": 7}, file=image), ["tumour, label 7: no voxel", "labels are 1, 2"]),
-        (body(folder, OF_LABEL | {"label": 1}, file=image), ["tumour, label 1: label = 1 and label = 1 are the same"]),
+        (body(folder, OF_LABEL | {"label": 1}, file=image), ["body.region[1].label = 1", "label of the body"]),
         (body(folder, OF_LABEL | {"unit": "mm"}, file=image), ["body.region[1].unit", "is for `file`"]),
         (body(folder, OF_FILE | {"file": "none.stl"}), ["body.region[1].file", "cannot be read"]),
         (body(folder, OF_FILE | {"unit": "cm"}), ["body.region[1].file", "out of the body", "This is at x = "]),

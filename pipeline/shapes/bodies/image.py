@@ -86,14 +86,17 @@ class FromImage(Segmented, Scanned):
             smooth: float | None,
             inner: tuple[tuple[Label, float | None], ...] = (),
             offset: float = 0.0,
+            hollow: tuple[Label, ...] = (),
+            around: tuple[Label, ...] = (),
         ) -> Loaded:
             unit = UNITS[given["unit"]] if given["unit"] else None
-            return read_image(Path(file), label, unit, smooth, given["names"], inner, offset)
+            return read_image(Path(file), label, unit, smooth, given["names"], inner, offset, hollow, around)
 
         labelled = {piece.label: piece for piece in given["region"] if piece.label is not None}
         smooth = {n: given["smooth"] if piece.smooth is None else piece.smooth for n, piece in labelled.items()}
         try:
-            whole = surface(given["label"], given["smooth"], tuple(smooth.items()), given["offset"])
+            hollow = tuple(label for label, piece in labelled.items() if piece.hollow)
+            whole = surface(given["label"], given["smooth"], tuple(smooth.items()), given["offset"], hollow=hollow)
         except LabelError as error:
             if piece := labelled.get(error.label):
                 raise SurfaceError(f"{piece.name}, label {error.label}: {error}") from error
@@ -103,7 +106,8 @@ class FromImage(Segmented, Scanned):
                 piece.load(_part_of(whole.partition, number), is_part=True)
                 continue
             try:
-                piece.load(surface(label, smooth[label]))
+                cut = ((label,), (given["label"], *labelled)) if piece.hollow else ((), ())
+                piece.load(surface(label, smooth[label], (), 0.0, *cut))
             except SurfaceError as error:
                 raise SurfaceError(f"{piece.name}, label {label}: {error}") from error
         return whole

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from pipeline.class_maps import CLASS_MAPS
 from pipeline.shapes.files.checked import kept_image
-from pipeline.shapes.files.label_map import united
+from pipeline.shapes.files.label_map import cut_off, united
 from pipeline.shapes.files.label_surface import surface_of
 from pipeline.shapes.files.labels import LARGEST_IMAGE, files_of, read_labels
 from pipeline.shapes.files.loaded import Label, Loaded
@@ -25,14 +25,17 @@ def read_image(
     names: str = "",
     inner: tuple[tuple[Label, float | None], ...] = (),
     offset: float = 0.0,
+    hollow: tuple[Label, ...] = (),
+    around: tuple[Label, ...] = (),
 ) -> Loaded:
     """Return the surface of the voxels with a ``label``, a number, a name or several, and notices of what was changed.
 
     Voxels with one of the ``inner`` labels, those of regions of a body, belong to it, too; each has a filter of its own
     (m). If regions meet each other or the body's surface, the result also has the surfaces between all labels, in this
     order. ``unit`` (m) is needed only if the header names none; ``smooth`` (m) is the standard deviation of the filter,
-    None for the default; ``names`` is that of :func:`read_labels`, ``offset`` (m) that of :func:`surface_of`. Files are
-    read again only when they have changed, and the surface is cached on disk.
+    None for the default; ``names`` is that of :func:`read_labels`, ``offset`` (m) that of :func:`surface_of`.
+    ``hollow`` labels end below the surface of the body, of which labels ``around`` are a part, too. Files are read
+    again only when they have changed, and the surface is cached on disk.
 
     Raises:
         SurfaceError: if the label does not bound one piece of tissue; the message says what was found and how to repair
@@ -48,7 +51,7 @@ def read_image(
                 raise
             what = "`names`:" if str(file) == names else "the data file of its header,"
             raise SurfaceError(f"{what} `{file}`, {error}") from error
-    return _load(path, files, tuple(states), ((label, smooth), *inner), unit, names, offset)
+    return _load(path, files, tuple(states), ((label, smooth), *inner), unit, names, offset, (hollow, around))
 
 
 def _changed(path: Path) -> int:
@@ -70,6 +73,7 @@ def _load(
     unit: float | None,
     names: str,
     offset: float,
+    hollow: tuple[tuple[Label, ...], tuple[Label, ...]],
 ) -> Loaded:
     if not all(size for _, size in states):
         raise SurfaceError("is empty: copy or export it again")
@@ -77,13 +81,18 @@ def _load(
         raise SurfaceError(f"has {largest / 1e9:.2g} GB, more than {LARGEST_IMAGE / 1e9:g}: crop or resample it")
 
     def make() -> Loaded:
-        found, (own, *inner) = united(read_labels(path, unit, names), [label for label, _ in labels])
+        every = list(dict.fromkeys((*hollow[1], *(label for label, _ in labels))))
+        found, numbers = united(read_labels(path, unit, names), every)
+        number = dict(zip(every, numbers, strict=True))
+        if hollow[0]:
+            found = cut_off(found, numbers, [number[label] for label in hollow[0]])
+        own, *inner = (number[label] for label, _ in labels)
         lengths = [length for _, length in labels]
         if inner and do_meet(found, (own, *inner)):
             return partition_of(found, list(zip((own, *inner), lengths, strict=True)), offset)
         return surface_of(found, own, lengths[0], tuple(inner), offset)
 
-    given = f" {offset!r}" if offset else ""
+    given = (f" {offset!r}" if offset else "") + (f" hollow {hollow!r}" if hollow[0] else "")
     given = f"{_METHOD} {path.suffix.lower()} {labels!r} {unit!r} {names if names in CLASS_MAPS else ''}{given}"
     try:
         return kept_image(files, given, make)

@@ -18,6 +18,7 @@ MOST_VOXELS = 1_000_000_000
 # Most bytes of values, also after unpacking: a larger label map does not fit into memory.
 LARGEST_IMAGE = 4_000_000_000
 _SHOWN = 20
+_WALL = 3  # voxels of tissue between a cavity and the outside: two or less count as touching
 _MANY = 1_000_000  # labels: numbers beyond are sorted
 # Of the patient, towards lower and higher x, y and z.
 _SIDES = (("left", "right"), ("back", "front"), ("feet", "head"))
@@ -164,6 +165,31 @@ def united(found: LabelMap, labels: Sequence[Label]) -> tuple[LabelMap, list[int
     for first, *others in numbers:
         values[np.isin(found.values, others)] = first
     return replace(found, values=values), [own[0] for own in numbers]
+
+
+def cut_off(found: LabelMap, body: Sequence[int], hollow: Sequence[int]) -> LabelMap:
+    """Return the map in which ``hollow`` labels that meet the outside end below the surface of the ``body``.
+
+    What is cut off of them is tissue with the first of the body's labels: a cavity has a wall all round.
+    """
+    from scipy import ndimage  # noqa: PLC0415
+
+    values, notices = found.values, list(found.notices)
+    outside = np.isin(values, body, invert=True)
+    for label in hollow:
+        mask = values == label
+        if not (ndimage.binary_dilation(mask) & outside).any() and not found.sides(ndimage.find_objects(mask)[0]):
+            continue
+        near = ndimage.binary_dilation(np.pad(outside, 1, constant_values=True), iterations=_WALL)[1:-1, 1:-1, 1:-1]
+        part = mask & near
+        wall = f"{1e3 * _WALL * float(found.spacing.max()):.3g} mm"
+        if part.sum() == mask.sum():
+            raise SurfaceError(
+                f"label {found.written(label)} is hollow, and nowhere {wall} below the surface of the body"
+            )
+        values = np.where(part, body[0], values)
+        notices.append(f"label {found.written(label)} leaves the body: it ends {wall} below the surface, in tissue")
+    return replace(found, values=values, notices=tuple(notices))
 
 
 def _in_study(label: Label) -> str:
