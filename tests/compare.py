@@ -36,18 +36,6 @@ def assert_same(one: Path, two: Path, *, rtol: float = 1e-7, alike: bool = True)
         assert first.attrs[name] == second.attrs[name], name
 
 
-def assert_same_bits(one: Path, two: Path, *, alike: bool = True) -> None:
-    """Assert that two datasets hold the same to the bit, but for times, memory, and the load of the machine.
-
-    ``alike``: none of it was read back from a store.
-    """
-    first, second = read_file(one), read_file(two)
-    assert set(first) == set(second)
-    for name in set(first) - {"speedup", "machine_load", "memory", *([] if alike else ["origin"])}:
-        if not str(name).startswith("time_"):
-            np.testing.assert_array_equal(first[name], second[name], err_msg=str(name))
-
-
 def all_done(path: Path) -> bool:
     """Tell whether every case of a dataset has a force, or needs none."""
     return set(np.unique(read_file(path)["status"])) <= {"ok", "skipped"}
