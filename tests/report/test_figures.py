@@ -103,6 +103,11 @@ def test_where_contact_is_found_force_and_area_are_drawn_against_the_depth():
     below = figure(found, "force").axes[2]
     assert (below.get_xlabel(), below.get_ylabel()) == ("depth d, mm", "area in contact, mm²")
     np.testing.assert_allclose(below.lines[0].get_ydata(), 2.0)
+    many = dataset(probe={"depth": [f"{n / 100} mm" for n in range(1, 51)]})
+    lines = []
+    for data in (many, many.assign(force=many["force"].where(np.arange(50) % 2 == 0))):
+        lines += [line.get_marker() for line in figure(data, "force").axes[0].lines[:1]]
+    assert lines[0] == "none" != lines[1]  # no line joins the points of the second
     deep = dataset(probe={"depth": ["0.01 mm", "0.1 mm", "1 mm"]})
     assert figure(deep, "force").axes[0].get_xscale() == "linear"  # its slope is the stiffness
 

@@ -78,7 +78,7 @@ def draw(panel: Panel, facets: Facets) -> None:
         if not np.isfinite(y).any():
             continue
         style = look(position) | ({} if joins else {"linestyle": "none"})
-        style |= {"marker": "none"} if joins and len(x) > _MARKED else {}
+        style |= {"marker": "none"} if joins and len(x) > _MARKED and not _has_lone(y) else {}
         label = choices(panel.data, curve) or None
         beside = x if joins else x + 0.12 * (position - (len(facets.curves) - 1) / 2)
         if (error := f"{panel.quantity}_error") in line:
@@ -90,6 +90,12 @@ def draw(panel: Panel, facets: Facets) -> None:
         place = {"transform": panel.ax.get_xaxis_transform(), "zorder": 6}
         panel.ax.plot(x[failed], np.full(failed.sum(), 0.04), "x", color=FAILED, **place)
     write_ticks(panel.ax, panel.data[facets.x])
+
+
+def _has_lone(values: np.ndarray) -> bool:
+    """Tell whether a value has no neighbour: no line goes there, and without a marker it is not seen."""
+    known = np.pad(np.isfinite(values), 1)
+    return bool((known[1:-1] & ~known[:-2] & ~known[2:]).any())
 
 
 def positions(coordinate: xr.DataArray) -> np.ndarray:
