@@ -178,7 +178,9 @@ def cut_off(found: LabelMap, body: Sequence[int], hollow: Sequence[int]) -> Labe
     outside = np.isin(values, body, invert=True)
     for label in hollow:
         mask = values == label
-        if not (ndimage.binary_dilation(mask) & outside).any() and not found.sides(ndimage.find_objects(mask)[0]):
+        if not (ndimage.binary_dilation(mask) & outside).any() and not found.sides(
+            ndimage.find_objects(mask.astype(np.int8))[0]
+        ):
             continue
         near = ndimage.binary_dilation(np.pad(outside, 1, constant_values=True), iterations=_WALL)[1:-1, 1:-1, 1:-1]
         part = mask & near
