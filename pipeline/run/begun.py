@@ -22,7 +22,7 @@ from types import TracebackType
 
 from pipeline.locks import hold, is_held
 from pipeline.run.record import Record
-from pipeline.run.store import Store
+from pipeline.run.store import Row, Store
 from pipeline.states import FAILED
 
 KILLED = "the process was killed while it computed this case: usually out of memory, else a crash in a library"
@@ -146,6 +146,13 @@ def store_done(store: Store) -> dict[str, Record]:
         if not is_running:
             path.unlink(missing_ok=True)
     return found
+
+
+def done_beside(store: Path) -> Iterator[Row]:
+    """Yield the records that processes have finished, and that may not be in the ``store`` yet, as its rows."""
+    for path, _ in _files(store, _DONE):
+        at = path.stat().st_mtime
+        yield from ((record.key, record.to_json(), at) for record in _records(path))
 
 
 def _records(path: Path) -> Iterator[Record]:

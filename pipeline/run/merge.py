@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pipeline.run.begun import done_beside
 from pipeline.run.reading import read_rows
 from pipeline.run.record import Record
 from pipeline.run.store import Row, Store, StoreError
@@ -25,7 +26,8 @@ class Source:
 def merge(paths: Sequence[Path], store: Store) -> tuple[Source, ...]:
     """Copy into ``store`` the new or better records of the stores at ``paths``, all or none.
 
-    The stores at ``paths`` are not changed. Damaged ones are left out, and so are records that cannot be read.
+    Records that killed processes have left beside the stores count, too. The stores at ``paths`` are not changed.
+    Damaged ones are left out, and so are records that cannot be read.
 
     Raises:
         StoreError: if ``store`` cannot be read or written; it is then unchanged.
@@ -36,6 +38,8 @@ def merge(paths: Sequence[Path], store: Store) -> tuple[Source, ...]:
         for path in paths:
             try:
                 rows = read_rows(path)
+                known = {row[0] for row in rows}
+                rows += [row for row in done_beside(path) if row[0] not in known]
             except StoreError as error:
                 sources.append(Source(path, problems=(str(error),)))
                 continue

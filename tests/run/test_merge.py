@@ -6,6 +6,7 @@ import sqlite3
 
 import pytest
 
+from pipeline.run.begun import Begun
 from pipeline.run.merge import merge
 from pipeline.run.reading import read_rows
 from pipeline.run.record import Record
@@ -147,3 +148,13 @@ def test_all_or_nothing(tmp_path, sources, monkeypatch):
         raise KeyboardInterrupt
     assert [key for key, _, _ in store.rows()] == ["own"]
     store.close()
+
+
+def test_what_a_killed_process_has_left_beside_a_store_is_merged_once(tmp_path, sources):
+    begun = Begun(sources[0])
+    begun.done(Record("left", "ok", force=4.0))
+    begun.done(Record("both", "ok", force=1.0))
+    for repeated in range(2):
+        found, rows = merged(tmp_path / "whole.sqlite", sources[0])
+        assert (found[0].records, found[0].taken) == (5, 0 if repeated else 5)
+        assert "left" in {row[0] for row in rows}
