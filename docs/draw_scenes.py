@@ -24,6 +24,7 @@ ORDER = (
     "rounded",
     "cone",
     "paraboloid",
+    "pyramid",
     "wedge",
     "tilted",
     "cad",

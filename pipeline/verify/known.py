@@ -56,6 +56,7 @@ CYLINDER_BALL = (1.640007, 2e-6)
 
 DIMITRIADIS = "E. K. Dimitriadis et al., Biophys. J. 82, 2798 (2002)"
 CIAVARELLA = "M. Ciavarella, Int. J. Solids Struct. 36, 4149 (1999)"
+BILODEAU = "G. G. Bilodeau, J. Appl. Mech. 59, 519 (1992)"
 SNEDDON = "I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965)"
 STICKING = "F. M. Borodich, L. M. Keer, Int. J. Solids Struct. 41, 2479 (2004)"
 SPENCE = "D. A. Spence, Proc. R. Soc. A 305, 55 (1968)"
@@ -107,6 +108,14 @@ def half_space_ball(young: float, poisson: float, radius: float, depth: float) -
 def half_space_cone(young: float, poisson: float, angle: float, depth: float) -> float:
     """Return F of a frictionless cone, its half angle to the axis ``angle``, on a half-space (Sneddon)."""
     return 2 / pi * young / (1 - poisson**2) * tan(angle) * depth**2
+
+
+def half_space_pyramid(young: float, poisson: float, angle: float, depth: float) -> float:
+    """Return F of a frictionless pyramid of four faces, at the half ``angle`` to the axis, on a half-space.
+
+    The approximation of G. G. Bilodeau, whose contact area is a square: 0.9 % too large.
+    """
+    return 0.7453 * young / (1 - poisson**2) * tan(angle) * depth**2
 
 
 def stick_ratio(poisson: float, power: float) -> float:

@@ -68,6 +68,7 @@ ROUNDED = {"edge": "0.45 mm", "contact": "unilateral"}
 TOOLS = {name: (name, {}) for name in PROBES} | {
     "rounded disc": ("disc", ROUNDED),
     "rounded blade": ("blade", ROUNDED),
+    "three faces": ("pyramid", {"sides": 3, "tip": "0.3 mm"}),
     "wedge with rounded ends": ("wedge", ROUNDED | {"tip": "0.5 mm"}),
 }
 
@@ -210,11 +211,16 @@ def test_sizes_of_a_footprint_are_those_of_its_outline(a_probe):
 
 
 def test_mirror_lines_and_roundness_of_a_footprint_are_true(a_probe):
-    """The outline is symmetric in exactly those lines in which the probe says so."""
+    """Outline and profile are symmetric in exactly those lines in which the probe says so."""
     outline, sizes = a_probe.outline(), a_probe.circumradius
     dense = np.vstack([np.linspace(start, end, 30) for start, end in pairwise(outline)])
 
+    inside = sizes * np.random.default_rng(3).uniform(-0.6, 0.6, (200, 2))
+
     def is_image(matrix) -> bool:
+        heights, moved = a_probe.profile(inside), a_probe.profile(inside @ matrix.T)
+        if not a_probe.is_flat and not np.allclose(heights, moved, rtol=1e-9, atol=1e-12):
+            return False
         images = outline @ matrix.T
         return bool(
             max(np.hypot(*(dense - image).T).min() for image in images[:: len(images) // 100 + 1]) < 5e-3 * sizes

@@ -17,6 +17,9 @@ TOOLS = {
     "cone": example(PROBES["cone"], tip="0.4 mm"),
     "needle": example(PROBES["cone"], angle="10 deg", tip="0.4 mm", radius="1 mm"),
     "paraboloid": example(PROBES["paraboloid"], radius="3 mm"),
+    "sharp pyramid": example(PROBES["pyramid"], sides=3),
+    "pyramid": example(PROBES["pyramid"], tip="0.4 mm"),
+    "rounded tetrahedron": example(PROBES["pyramid"], sides=3, angle="40 deg", tip="0.4 mm"),
     "sharp wedge": example(PROBES["wedge"]),
     "wedge": example(PROBES["wedge"], tip="0.4 mm"),
     "rounded wedge": example(PROBES["wedge"], tip="0.4 mm", edge="0.3 mm"),
@@ -32,7 +35,8 @@ def tool(request) -> Indenter:
 
 def around(tool, count=3000, share=2.0):
     """Return random points (n, 3) around a tool, to twice its size, in m."""
-    size = share * max(tool.radius if hasattr(tool, "radius") else tool.length / 2, 1e-3)
+    half = tool.radius if hasattr(tool, "radius") else getattr(tool, "length", 2e-3) / 2
+    size = share * max(half, 1e-3)
     return np.random.default_rng(7).uniform((-size, -size, -size / 2), (size, size, size), (count, 3))
 
 

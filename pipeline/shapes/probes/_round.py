@@ -1,5 +1,6 @@
 """Axisymmetric tools with unknown contact area: what sphere and cone have in common."""
 
+from abc import abstractmethod
 from math import pi
 
 import numpy as np
@@ -17,7 +18,43 @@ from pipeline.shapes.revolved import Revolved
 _RINGS = 1000
 
 
-class RoundIndenter(Indenter, Needle):
+class InRing(Indenter):
+    """An indenter whose contact is expected to end in a ring: round, or a polygon."""
+
+    @property
+    @abstractmethod
+    def limit(self) -> float:
+        """Radius (m) at which the tool itself ends; infinite without an end."""
+
+    def touching(self, half_width: float) -> Probe:
+        """Return the disc of that radius."""
+        return Disc.model_construct(shape="disc", radius=half_width, depth=self.depth, at=self.at, axis=self.axis)
+
+    @property
+    def footprint(self) -> Probe:
+        """The disc that contains all that it may touch."""
+        return self.touching(min(self.candidate_width, self.limit))
+
+    @property
+    def expected_radius(self) -> float:
+        """The larger of the radii (m) between which contact is expected to end."""
+        return self.edge_band[1]
+
+    @property
+    def rim_size(self) -> tuple[float, float]:
+        """Length (m) and area (m²) of the ring in which contact is expected to end."""
+        inner, outer = self.edge_band
+        return pi * (inner + outer), pi * (outer**2 - inner**2)
+
+    def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
+        """Return the distance to the ring in which contact is expected to end, including the depth, as text."""
+        inner, outer = (unit * radius for radius in self.edge_band)
+        radius = f"Sqrt({along}^2+{across}^2)"
+        aside = f"Max(Max({inner:.12g}-{radius},{radius}-{outer:.12g}),0)"
+        return f"Sqrt({aside}^2+Max(Fabs({height})-{unit * self.depths[1]:.12g},0)^2)"
+
+
+class RoundIndenter(InRing, Needle):
     """An axisymmetric indenter, the end of a shaft: a needle, if it is inserted."""
 
     NOT_DRAWN = (*Indenter.NOT_DRAWN, "toughness", "insertion", "crack_shape")
@@ -38,15 +75,6 @@ class RoundIndenter(Indenter, Needle):
         """Its section."""
         return Revolved(self.section.slope, self.limit, self.section.flat, self.kinks)
 
-    def touching(self, half_width: float) -> Probe:
-        """Return the disc of that radius."""
-        return Disc.model_construct(shape="disc", radius=half_width, depth=self.depth, at=self.at, axis=self.axis)
-
-    @property
-    def footprint(self) -> Probe:
-        """The disc that contains all that it may touch."""
-        return self.touching(min(self.candidate_width, self.limit))
-
     @property
     def pressed(self) -> float:
         """Radius (m) at which the undeformed tool intersects the surface."""
@@ -56,11 +84,6 @@ class RoundIndenter(Indenter, Needle):
     def contact_width(self) -> float:
         """Contact radius (m) on an elastic half-space, bent as the surface is."""
         return min(self.section.contact_radius(self.depth, self._bump), self.limit)
-
-    @property
-    def expected_radius(self) -> float:
-        """The larger of the radii (m) between which contact is expected to end."""
-        return self.edge_band[1]
 
     def profile(self, points: FloatArray) -> FloatArray:
         """Return the heights (m) of the tool, infinite beyond where it ends."""
@@ -75,16 +98,3 @@ class RoundIndenter(Indenter, Needle):
     def ends_at(self, points: FloatArray) -> BoolArray:
         """Return true if the footprint is as large as the tool."""
         return np.full(len(points), self.footprint.half_width >= (1 - ON_EDGE) * self.limit)
-
-    @property
-    def rim_size(self) -> tuple[float, float]:
-        """Length (m) and area (m²) of the ring in which contact is expected to end."""
-        inner, outer = self.edge_band
-        return pi * (inner + outer), pi * (outer**2 - inner**2)
-
-    def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Return the distance to the ring in which contact is expected to end, including the depth, as text."""
-        inner, outer = (unit * radius for radius in self.edge_band)
-        radius = f"Sqrt({along}^2+{across}^2)"
-        aside = f"Max(Max({inner:.12g}-{radius},{radius}-{outer:.12g}),0)"
-        return f"Sqrt({aside}^2+Max(Fabs({height})-{unit * self.depths[1]:.12g},0)^2)"
