@@ -63,6 +63,7 @@ def test_profiles_are_those_of_the_program_s_tools():
     for tool in (
         BALL,
         probe(shape="cone", angle="60 deg", radius="5 mm", tip="0.2 mm", depth="0.5 mm"),
+        probe(shape="paraboloid", radius="5 mm", shaft="5 mm", depth="0.5 mm"),
         probe(**rod, radius="2 mm", depth="0.1 mm"),
         probe(shape="disc", radius="2 mm", depth="0.1 mm", contact="frictionless"),
     ):

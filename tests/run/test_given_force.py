@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from pipeline.api import RunnableStudy
 from pipeline.plan.given_force import FoundDepth, Trial, next_depth
 from pipeline.plan.plan import make_plan
 from pipeline.report.compare import compare
@@ -134,6 +135,16 @@ def test_sweeps_ratios_and_figures():
     assert all(pair.state == "agree" for pair in compare(found, found).pairs)
     assert {pair.quantity for pair in compare(found, found).pairs} == {"force", "depth"}
     assert "depth" in figure(found, "force").axes[0].get_ylabel()
+
+
+def test_fields_are_those_at_the_depth_of_the_force():
+    study = RunnableStudy(parse(content(BOX, "linear", given(BALL, ["10 mN", "2 N"]))))
+    solution = study.solve(probe_force="10 mN", comm=MPI.COMM_SELF)
+    assert solution.force == pytest.approx(10e-3, abs=solution.force_error / 4)
+    below = solution.at([("0 mm", "0 mm", "0 mm")])["displacement"].values[0, 2]
+    assert -below == pytest.approx(solution.case.probe.depth, rel=1e-6)
+    with pytest.raises(RuntimeError, match="the force is not reached: at 5 mm"):
+        study.solve(probe_force="2 N", comm=MPI.COMM_SELF)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0, 6.0])
