@@ -54,7 +54,7 @@ class _Kind:
 
 # By SI unit.
 _KINDS = {
-    "m": _Kind("a length", "10 mm", {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "µm": 1e-6}),
+    "m": _Kind("a length", "10 mm", {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "µm": 1e-6, "nm": 1e-9}),
     "Pa": _Kind(
         "a pressure",
         "10 kPa",
