@@ -20,8 +20,8 @@ from pipeline.identify.model import REACH, Model
 from pipeline.identify.parts import SOURCES, CurveFit, Estimate, Measured, NoiseFound, Profile, Unknown, Window
 from pipeline.identify.profiles import Likelihood, ends, profile
 from pipeline.identify.seen import combinations
-from pipeline.identify.sources import mesh, shares
-from pipeline.identify.start import least_squares_from, start
+from pipeline.identify.sources import mesh, shares, too_deep
+from pipeline.identify.start import refined, start
 from pipeline.report.identified import engineering, title
 from pipeline.study.identified import FITS
 
@@ -91,7 +91,7 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
         profiles=profiles,
         windows=() if does_fit or beyond else _windows(measured, found),
         evidence=found.misfit,
-        told=(*combinations(found, seen), *(_told(found) if does_fit else at_an_end(replace(found, x=x)))),
+        told=(*combinations(found, seen), *(_told(found) if does_fit else _doubtful(replace(found, x=x)))),
     )
 
 
@@ -103,7 +103,7 @@ def _fitted(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> tuple[
     for reach in _REACHES:
         model = Model.of(measured, unknowns, reach)
         model, x = model.tilted(start(model))
-        x = least_squares_from(model, x)
+        x = refined(model, x)
         found = fit(model, x)
         if not begins_later(found):
             break
@@ -241,6 +241,13 @@ def _told(found: Fit) -> Iterator[str]:
         yield f"{sentence[0].upper()}{sentence[1:]}: E may be off by more than its error bar."
 
 
+def _doubtful(found: Fit) -> Iterator[str]:
+    """Yield what is doubtful about the values of a law that does not fit."""
+    yield from at_an_end(found)
+    for name, why in too_deep(found):
+        yield f"{name}: {why}: values are an extrapolation."
+
+
 def _is_small(found: Fit) -> bool:
     """Return whether what the law leaves of every curve is too small to say anything about the law.
 
@@ -249,6 +256,7 @@ def _is_small(found: Fit) -> bool:
     values = found.model.space.values(found.x)
     for number, (one, force) in enumerate(zip(found.model.measured, found.force, strict=True)):
         error = one.forward.error(found.model.depth(number, values, force), values)
+        error = np.where(np.isfinite(error), error, 0.0)  # beyond the known depths nothing is excused
         ours = float(np.max(error * np.abs(force - found.model.offset(number, values))))
         if np.abs(one.curve.force - force).max() > max(ours, FINEST * np.ptp(one.curve.force)):
             return False

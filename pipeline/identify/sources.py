@@ -1,5 +1,7 @@
 """Bars by source: by how much a bar shrinks once what it is from is known."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from pipeline.arrays import FloatArray
@@ -49,6 +51,8 @@ def mesh(found: Fit) -> FloatArray:
     Raises:
         TooDeepError: if a curve is fitted at depths for which its force is not known.
     """
+    for name, why in too_deep(found):
+        raise TooDeepError(name, why)
     top = found.mixture.covariance[found.mixture.top]
     model, values = found.model, found.model.space.values(found.x)
     square = np.zeros(len(found.x))
@@ -56,14 +60,21 @@ def mesh(found: Fit) -> FloatArray:
         contact = found.force[number] - model.offset(number, values)
         depth = model.depth(number, values, found.force[number])
         error = measured.forward.error(depth, values)
-        if not np.isfinite(error).all():
-            name, deepest = measured.curve.name, 1e3 * float(depth.max())
-            raise TooDeepError(name, f"the fit is {deepest:.4g} mm deep, for which the force is not computed")
         columns = model.thinned(np.column_stack([found.jacobian[number], contact * error]))
         whitened = most_probable(found, number).white(columns)
         pull = whitened[:, :-1].T @ whitened[:, -1]
         square += (top @ pull) ** 2
     return np.sqrt(square)
+
+
+def too_deep(found: Fit) -> Iterator[tuple[str, str]]:
+    """Yield names of curves fitted at depths for which the force of their scene is an extrapolation, and why."""
+    values = found.model.space.values(found.x)
+    for number, measured in enumerate(found.model.measured):
+        depth = found.model.depth(number, values, found.force[number])
+        if not np.isfinite(measured.forward.error(depth, values)).all():
+            deepest = 1e3 * float(depth.max())
+            yield measured.curve.name, f"the fit is {deepest:.4g} mm deep, for which the force is not computed"
 
 
 def _variance(information: FloatArray, place: int, known: list[int]) -> float:

@@ -15,7 +15,7 @@ _FINER = np.linspace(-0.9, 0.9, 7)
 _OTHERS = (0.5, 0.15, 0.85)
 # Least squares follows the best starts, for so many evaluations of derivatives.
 _FOLLOWED, _MOST = 2, 30
-# Weight of the prior: noise is taken for a thousandth of the largest force.
+# Weight of the prior at first: noise is taken for a thousandth of the largest force.
 _WEAK = 1e-3
 # Starts that are nearer, in coordinates, are one.
 _SAME = 1e-6
@@ -29,7 +29,7 @@ def start(model: Model) -> FloatArray:
         if all(np.abs(place - before).max() > _SAME for before in places):
             places.append(place)
     ranked = sorted(places, key=lambda x: _square(model, x))[:_FOLLOWED]
-    fits = [least_squares_from(model, x) for x in ranked]
+    fits = [_least_squares(model, x) for x in ranked]
     return min(fits, key=lambda x: _square(model, x))
 
 
@@ -80,37 +80,46 @@ def _proportion(model: Model, number: int, x: FloatArray, contact: float) -> tup
     return float(np.sum((force - columns @ found) ** 2)), x, float(found[0])
 
 
-def _residual(model: Model, x: FloatArray) -> FloatArray:
+def _residual(model: Model, x: FloatArray, noise: float) -> FloatArray:
     """Return the residuals of all curves, each in units of its largest force, and those of the prior."""
+    mean, precision = prior(model)
+    return np.concatenate([_rest(model, x), noise * np.sqrt(np.diag(precision)) * (x - mean)])
+
+
+def _rest(model: Model, x: FloatArray) -> FloatArray:
+    """Return what the model leaves of all curves, each in units of its largest force."""
     values = model.space.values(x)
     curves = [
         (model.predict(number, values) - measured.curve.force) / np.ptp(measured.curve.force)
         for number, measured in enumerate(model.measured)
     ]
-    mean, precision = prior(model)
-    return np.concatenate([*curves, _WEAK * np.sqrt(np.diag(precision)) * (x - mean)])
+    return np.concatenate(curves)
 
 
-def _jacobian(model: Model, x: FloatArray) -> FloatArray:
+def _jacobian(model: Model, x: FloatArray, noise: float) -> FloatArray:
     values = model.space.values(x)
     rows = [
         model.jacobian(number, x, model.predict(number, values)) / np.ptp(measured.curve.force)
         for number, measured in enumerate(model.measured)
     ]
     _, precision = prior(model)
-    return np.vstack([*rows, _WEAK * np.diag(np.sqrt(np.diag(precision)))])
+    return np.vstack([*rows, noise * np.diag(np.sqrt(np.diag(precision)))])
 
 
 def _square(model: Model, x: FloatArray) -> float:
-    return float(np.sum(_residual(model, x) ** 2))
+    return float(np.sum(_residual(model, x, _WEAK) ** 2))
 
 
-def least_squares_from(model: Model, x: FloatArray) -> FloatArray:
-    """Return the coordinates (u,) of the fit by least squares that begins at ``x`` (u,)."""
+def refined(model: Model, x: FloatArray) -> FloatArray:
+    """Return the coordinates (u,) of least squares from ``x`` (u,), with the noise that is left there."""
+    return _least_squares(model, x, max(_WEAK, float(np.sqrt(np.mean(_rest(model, x) ** 2)))))
+
+
+def _least_squares(model: Model, x: FloatArray, noise: float = _WEAK) -> FloatArray:
     found = least_squares(
-        lambda at: _residual(model, at),
+        lambda at: _residual(model, at, noise),
         np.clip(x, 1e-6, 1 - 1e-6),
-        jac=lambda at: _jacobian(model, at),
+        jac=lambda at: _jacobian(model, at, noise),
         bounds=(0.0, 1.0),
         max_nfev=_MOST,
         xtol=1e-6,

@@ -128,6 +128,24 @@ def test_a_law_that_does_not_fit_has_no_bar_but_windows():
     assert young[-1] > 1.1 * 2e4
 
 
+class Shallow(Ball):
+    """A force that is known down to 0.21 mm."""
+
+    def error(self, depth, values):
+        return np.where(depth > 0.21e-3, np.inf, 1e-3)
+
+
+def test_values_of_a_law_that_does_not_fit_are_told_to_be_extrapolated():
+    """Least squares takes what softens for earlier contact, so that the depth is beyond that of the known forces."""
+    error = 0.001 * noise(np.random.default_rng(5), 300, 0.3)
+    right = measured(Ball(), {"young": 2e4}, error, 2e-4)
+    contact = np.maximum(right.curve.depth - 1e-4, 0.0) / 2e-4
+    soft = replace(right.curve, force=right.curve.force * (1 - 0.3 * contact**2))
+    found = identify([Measured(soft, Shallow())], [YOUNG])
+    assert not found.fits
+    assert any("values are an extrapolation" in sentence for sentence in found.told)
+
+
 class Base:
     """A rigid base under the body, to first order in the contact radius over the thickness."""
 
