@@ -171,9 +171,11 @@ def test_the_study_in_a_dataset_is_held_to_what_a_file_is_held_to(folders, monke
 
 
 def test_commands_to_be_pasted_hold_one_command_each():
-    hostile = dataset().assign_attrs(study_file="x; rm -rf ~.toml", git_commit="$(reboot)", ranks="2; reboot")
+    hostile = dataset().assign_attrs(
+        study_folder="$(reboot)", study_file="x; rm -rf ~.toml", git_commit="$(reboot)", ranks="2; reboot"
+    )
     page = render(hostile, "a b")
-    assert "epsmesh run &#39;x; rm -rf ~.toml&#39; --fresh" in page
+    assert "epsmesh run &#39;$(reboot)/x; rm -rf ~.toml&#39; --fresh" in page
     assert "epsmesh report &#39;results/a b.nc&#39;" in page
     assert "git checkout" not in page
     assert "mpirun" not in page
