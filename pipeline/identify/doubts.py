@@ -9,9 +9,9 @@ import xarray as xr
 from pipeline.experiment.curve import Curve
 from pipeline.identify.parts import CurveFit, Measured, Unknown
 from pipeline.report.identified import engineering
-from pipeline.shapes.probe import Probe
 from pipeline.study.case import Case
 from pipeline.study.check import warn_of_depth
+from pipeline.study.plausible import size_of
 from pipeline.study.problems import Problems
 
 # Depths in half widths of a tool, and moduli (Pa) from gels to hard plastics, beyond which a unit is probably wrong.
@@ -20,7 +20,7 @@ _MODULI = (100.0, 1e10)
 # Contact begins, roughly, at this share of the force; a depth less the machine's way is at least this share of it.
 _BEGUN, _LEAST_WAY = 0.05, 1e-3
 # Powers of the radius that F goes as, and how much more it may be.
-_POWERS, _MORE = {"sphere": 0.5, "disc": 1.0}, 1.1
+_POWERS, _MORE = {"sphere": 0.5, "paraboloid": 0.5, "disc": 1.0}, 1.1
 # Forces that are this many times off the ends of the moduli's ranges are none of them.
 _ROUGH = 3.0
 
@@ -33,19 +33,12 @@ def doubts_of_scale(cases: Sequence[Case], curves: Sequence[Curve]) -> Iterator[
 
 def _of_curve(curve: Curve, case: Case) -> Iterator[str]:
     """Yield a doubt about the depths of a curve that was measured on the scene of a case."""
-    way, width, thickness = float(np.ptp(curve.depth)), _size(case.probe), case.body.thickness(case.frame)
+    way, width, thickness = float(np.ptp(curve.depth)), size_of(case.probe), case.body.thickness(case.frame)
     question = "is its unit right, or that of the study?"
     if not _DEPTHS[0] <= way / width <= _DEPTHS[1]:
         yield f"{curve.name}: the depth changes by {way:.3g} m, {way / width:.3g} half widths of the tool: {question}"
     elif way > thickness:
         yield f"{curve.name}: the depth changes by {way:.3g} m, and the tissue is {thickness:.3g} m thick: {question}"
-
-
-def _size(probe: Probe) -> float:
-    """Return half the width or length (m) of a tool, whatever its depth."""
-    if probe.revolved:
-        return probe.revolved.limit
-    return probe.half_length or probe.half_width
 
 
 def doubts_of_depth(cases: Sequence[Case], found: Sequence[CurveFit]) -> Iterator[str]:
@@ -63,7 +56,7 @@ def doubts_of_depth(cases: Sequence[Case], found: Sequence[CurveFit]) -> Iterato
 def doubts_of_radius(cases: Sequence[Case], sought: Sequence[Unknown]) -> Iterator[str]:
     """Yield what an error of the tool's radius does to E, if it is taken for exact.
 
-    On a deep body F goes as E √R of a ball and as E R of a flat punch.
+    On a deep body F goes as E √R of a ball or a paraboloid and as E R of a flat punch.
     """
     of_tools = [case.probe for case in cases if case.probe.shape in _POWERS]
     has_error = any(one.name.partition(" of ")[0] == "radius" for one in sought)

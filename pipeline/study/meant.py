@@ -58,8 +58,9 @@ NOT_COMPUTED = {
 }
 
 _PUNCH = 'a flat cylindrical punch is shape = "disc"'
-_PYRAMID = 'a pyramid is not computed; the cone of equal area (Berkovich, Vickers) is a "cone" with angle = "70.3 deg"'
-_PARABOLA = 'a paraboloid is not computed; at small depth it is a "sphere" with its radius of curvature'
+_VICKERS = 'the tip of Vickers is shape = "pyramid" with angle = "68 deg" and sides = 4'
+_BERKOVICH = 'the tip of Berkovich is shape = "pyramid" with angle = "65.27 deg" and sides = 3'
+_PARABOLA = 'a parabolic tip is shape = "paraboloid"'
 _EDGE = 'a cutting edge is shape = "blade", a blunt one "wedge"'
 _NEEDLE = 'a needle is a "sphere", "cone" or "disc", the form of its end, with [probe.insertion]'
 _BALL = 'a ball is shape = "ellipsoid" with three equal `axes`, half of its diameter each'
@@ -71,8 +72,9 @@ OTHER_SHAPES = {
         **dict.fromkeys(
             ("ball", "bead", "spherical", "hemisphere", "round"), 'a ball or round tip is shape = "sphere"'
         ),
-        **dict.fromkeys(("pyramid", "berkovich", "vickers"), _PYRAMID),
-        **dict.fromkeys(("paraboloid", "parabola"), _PARABOLA),
+        "vickers": _VICKERS,
+        "berkovich": _BERKOVICH,
+        **dict.fromkeys(("parabola", "parabolic"), _PARABOLA),
         **dict.fromkeys(("knife", "scalpel", "edge"), _EDGE),
         "needle": _NEEDLE,
         "conical": 'a cone is shape = "cone"',

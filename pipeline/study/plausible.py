@@ -37,7 +37,7 @@ def check_moduli(body: Body, material: Material, problems: Problems) -> None:
 
 def check_tools(placed: Sequence[tuple[Body, Probe]], problems: Problems) -> None:
     """Warn of depths and sizes of tools that hardly anyone has; many are those of one tool along a path."""
-    tools = {(body, probe.depth, _size(probe)): probe for body, probe in placed}
+    tools = {(body, probe.depth, size_of(probe)): probe for body, probe in placed}
     for (body, _, size), probe in tools.items():
         with problems.about(body=body, probe=probe):
             _check_tool(body.extent, probe, size, problems)
@@ -48,9 +48,10 @@ def _check_tool(extent: float, probe: Probe, size: float, problems: Problems) ->
         told = f"is less than a thousandth of a millimetre, with a tool of {in_mm(size)}"
         deeper = in_mm(1e3 * probe.depth)
         problems.warn("probe.depth", f"{probe.depth * 1e6:.4g} µm", f"{told}. Is {deeper} meant?")
-    if getattr(probe, "insertion", None) and (radius := getattr(probe, "radius", None) or 0.0) > _NEEDLE:
+    if getattr(probe, "insertion", None) and probe.revolved and size > _NEEDLE:
         told = f"is inserted; needles and trocars have radii up to {in_mm(_NEEDLE)}"
-        problems.warn("probe.radius", in_mm(radius), f"{told}. Is {in_mm(radius / 10)} meant, or is it the diameter?")
+        key = "probe.shaft" if hasattr(probe, "shaft") else "probe.radius"
+        problems.warn(key, in_mm(size), f"{told}. Is {in_mm(size / 10)} meant, or is it the diameter?")
     elif 2 * size > extent:
         problems.warn("probe", None, f"is {in_mm(2 * size)} wide, and the body {in_mm(extent)}: is a unit wrong?")
 
@@ -61,10 +62,11 @@ def check_extent(body: Body, problems: Problems) -> None:
         problems.warn("body", None, f"is {body.extent:.4g} m large. Are its lengths in mm?")
 
 
-def _size(probe: Probe) -> float:
+def size_of(probe: Probe) -> float:
     """Return half the width or length (m) of a tool, whatever its depth."""
-    radius: float | None = getattr(probe, "radius", None)
-    return radius or probe.half_length or probe.half_width
+    if probe.revolved:
+        return probe.revolved.limit
+    return probe.half_length or probe.half_width
 
 
 def _like_tissue(young: float) -> float:

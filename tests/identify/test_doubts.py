@@ -79,11 +79,12 @@ def test_a_soft_machine_is_no_doubt():
     [
         ({"shape": "sphere", "radius": "3 mm", "depth": "0.1 mm"}, "3.00 mm", 5),
         ({"shape": "disc", "radius": "2 mm", "depth": "0.1 mm"}, "2.00 mm", 9),
+        ({"shape": "paraboloid", "radius": "3 mm", "shaft": "2 mm", "depth": "0.1 mm"}, "3.00 mm", 5),
         ({"shape": "blade", "length": "4 mm", "width": "1 mm", "depth": "0.1 mm"}, "", 0),
     ],
 )
 def test_what_an_error_of_the_radius_does(probe, radius, less):
-    contact = "unilateral" if probe["shape"] == "sphere" else "frictionless"
+    contact = "unilateral" if probe["shape"] in ("sphere", "paraboloid") else "frictionless"
     unset = {"radius": None} if "radius" not in probe else {}
     case = next(parse(raw(probe={**unset, **probe, "contact": contact})).cases())
     said = list(doubts_of_radius([case], [RANGE]))

@@ -7,10 +7,12 @@ import pytest
 
 from pipeline.study.howto import page_of, pages
 from pipeline.study.keys import all_sections, keys_of
+from pipeline.study.meant import OTHER_SHAPES
 from pipeline.study.named import examples
 from pipeline.study.problems import StudyError
 from pipeline.study.read import parse, read_text
 from pipeline.study.renamed import RENAMED
+from pipeline.study.schema import SECTIONS
 from tests.cases import BLADE, raw, study
 
 
@@ -152,6 +154,9 @@ def test_a_value_that_no_tissue_and_no_tool_has_is_doubted(value):
         **changes
     ).warnings
     assert not study(body={"layer": [BONE]}).warnings
+    # The radius of a paraboloid is that of its curvature.
+    tip = {"shape": "paraboloid", "radius": "50 mm", "shaft": "3 mm", "depth": "0.01 mm", "contact": "unilateral"}
+    assert not study(probe=tip).warnings
 
 
 def test_a_needle_as_thick_as_a_thumb_is_doubted():
@@ -178,3 +183,13 @@ def test_another_name_of_a_key_is_answered_with_the_key(section, key, words):
     content = raw()
     content[section] |= {key: "3 mm"}
     assert re.search(rf"{section}\.{key} = .*{re.escape(words)}", str(told(content)))
+
+
+@pytest.mark.parametrize("section", OTHER_SHAPES)
+def test_another_name_of_a_shape_is_answered_with_one_that_is_there(section):
+    known = SECTIONS[section]
+    for other, words in OTHER_SHAPES[section].items():
+        assert other not in known, "a shape of its own: these words are never read"
+        assert set(re.findall(r'"([a-z]+)"', words)) & {*known}
+        assert "not computed" not in words
+        assert words in str(told(raw() | {section: {"shape": other}}))
