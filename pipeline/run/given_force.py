@@ -87,6 +87,8 @@ def at_force(plan: Plan, case: Case, record: Record | None, *, is_exact: bool = 
     if found.message:
         status = PARTIAL if isfinite(found.reached) else FAILED
         failed = replace(record or Record("", FAILED), status=status, message=found.message)
+        # Its F is that of a trial.
+        failed = replace(failed, force=nan, force_error=nan)
         return replace(failed, depth_reached=found.depth, force_reached=found.reached)
     if record is None or not record.is_ok:
         return record

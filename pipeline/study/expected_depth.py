@@ -15,6 +15,8 @@ from pipeline.units import canonical
 # Largest depth, as a share of the thickness below the tool, and the smallest one, as a share of the largest.
 _THROUGH, _LEAST = 0.95, 1e-6
 _BISECTIONS = 40
+# A depth before another one, which is not rounded to it.
+_BEFORE = 1 - 1e-6
 _MANY = 10_000
 # Mean of the contact radius over the depth, as a share of the last one: between a ball's 2/3 and a cone's 1/2.
 _MEAN = 0.6
@@ -84,7 +86,8 @@ def _bisected(low: float, high: float, is_below: Callable[[float], bool]) -> flo
     for _ in range(_BISECTIONS):
         middle = sqrt(low * high)
         low, high = (middle, high) if is_below(middle) else (low, middle)
-    return canonical(low)
+    # What is rounded up may be beyond it.
+    return next((depth for depth in (canonical(low), canonical(_BEFORE * low)) if is_below(depth)), low)
 
 
 def _radius(probe: Probe) -> float:

@@ -97,16 +97,24 @@ def test_known_depths_of_disc_and_cone():
         assert float(found["depth"]) == pytest.approx(depth, rel=5e-3)  # the body ends
 
 
-def test_force_that_is_not_reached_fails_with_the_largest_one():
-    tool = {"shape": "cone", "angle": "70 deg", "radius": "3 mm"}
+@pytest.mark.parametrize(
+    ("tool", "deepest", "force"),
+    [
+        ({"shape": "cone", "angle": "70 deg", "radius": "3 mm"}, 3 / np.tan(np.radians(70)), "1.092 mm it is 24.8"),
+        ({"shape": "paraboloid", "radius": "4 mm", "shaft": "3 mm"}, 3**2 / 8, "1.125 mm it is "),
+    ],
+)
+def test_force_that_is_not_reached_fails_with_the_largest_one(tool, deepest, force):
+    """The tools end at their shafts."""
     study = content(CYLINDER, "linear", given(tool, ["5 mN", "1 N"]))
     plan, records, found = solved(study)
     assert found["status"].values.tolist() == ["ok", "partial"]
-    assert np.isnan(found["depth"].values[1])
-    # The cone ends at its shaft.
-    assert float(found["depth_reached"][1]) == pytest.approx(3e-3 / np.tan(np.radians(70)), rel=1e-3)
+    for name in ("depth", "depth_error", "force", "force_error", "force_vector"):
+        assert np.isnan(found[name].values[1]).all()
+        assert np.isfinite(found[name].values[0]).all()
+    assert float(found["depth_reached"][1]) == pytest.approx(1e-3 * deepest, rel=1e-3)
     assert 5e-3 < float(found["force_reached"][1]) < 1.0
-    assert "the force is not reached: at 1.092 mm it is 24.8" in str(found["message"].values[1])
+    assert f"the force is not reached: at {force}" in str(found["message"].values[1])
     assert count_states(plan, records)["partial"] == len(failures(plan, records)) == 1
 
 
