@@ -81,14 +81,21 @@ def next_depth(force: float, trials: Sequence[Trial], most: float, exponent: flo
     above = min((t for t in trials if not t.is_known or t.force >= force), key=lambda t: t.depth, default=None)
     if below and above and not above.is_known and above.depth < _NEAR * below.depth:
         return _unreached(force, below, above.message)
-    tried = {trial.depth for trial in trials}
     depth = _within(_step(force, best, slope), below, above, most)
-    if depth in tried or len(trials) >= _MOST_TRIALS:
-        if slope and abs(log(force / best.force)) <= best.bar:
-            return _found(force, best, slope, further=abs(log(force / best.force)))
+    if _is_tried(depth, trials) or len(trials) >= _MOST_TRIALS:
+        # Forces of meshes of their own need not rise from one depth to a near one.
+        left, beside = abs(log(force / best.force)), canonical(_BESIDE * best.depth)
+        if slope and left <= best.bar:
+            return _found(force, best, slope, further=left)
+        if left <= best.bar and not _is_tried(beside, trials) and len(trials) < _MOST_TRIALS:
+            return beside
         reason = f"the depth was not found in {len(trials)} trials"
         return FoundDepth(force, best.depth, solved=best.depth, message=reason, reached=best.force)
     return depth
+
+
+def _is_tried(depth: float, trials: Sequence[Trial]) -> bool:
+    return any(abs(log(depth / trial.depth)) < _LEAST for trial in trials)
 
 
 def _begin(force: float, trials: Sequence[Trial]) -> float | FoundDepth:

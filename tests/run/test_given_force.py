@@ -200,3 +200,15 @@ def test_what_does_not_go_with_a_given_force_is_refused(changes, message):
     material = LAWS["linear"] | {"density": "1000 kg/m^3"}
     with pytest.raises(StudyError, match=message):
         parse(content(BOX, "linear", probe, material=material) | changes)
+
+
+def test_forces_that_do_not_rise_between_near_depths_ask_for_one_that_is_farther():
+    """Each depth has a mesh of its own, and F scatters by a part of its bar: three near depths give no slope."""
+    near = [
+        Trial(0.305358437985e-3, 1.7638660023e-3, 0.0403),
+        Trial(0.311453521911e-3, 1.8286245506e-3, 0.0492),
+        Trial(0.310125346576e-3, 1.8333234914e-3, 0.0588),
+    ]
+    depth = next_depth(1.81693993611e-3, near, 2.84758410162e-3, None)
+    assert isinstance(depth, float)
+    assert depth < 0.95 * 0.3054e-3
