@@ -11,6 +11,7 @@ PEERS_ARGS ?=
 FUZZ ?= 5000
 LOOP_ARGS ?=
 SOAK_ARGS ?=
+SAME_ARGS ?= --seeds 0:300
 STRESS_ARGS ?=
 COVERAGE_ARGS ?=
 FAULTS_ARGS ?=
@@ -36,7 +37,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's mpirun: another one on PATH does not match Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release slurm-test verify benchmark peers plain-loop realtime wasm resolution stress coverage pairs fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release slurm-test verify benchmark peers plain-loop realtime wasm resolution stress coverage pairs same fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -142,6 +143,9 @@ fuzz: setup ## random study files, damaged surfaces, datasets, stores and models
 
 pairs: setup ## run every feature of a study alone and with every other, into results/pairs.md
 	$(MPI_ENV) nice $(PYTHON) -m tests.pairs
+
+same: setup ## random scenes, each with changes that may not matter, into results/same.md (an hour; SAME_ARGS="--seeds 0:50": fewer)
+	$(MPI_ENV) nice $(PYTHON) -m tests.same.campaign $(SAME_ARGS)
 
 soak: setup ## memory and pace over 20,000 cases on 2,000 meshes (a quarter of an hour; SOAK_ARGS=2000: fewer)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.soak $(SOAK_ARGS)
