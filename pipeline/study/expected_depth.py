@@ -4,7 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from math import pi, sqrt
 
+import numpy as np
+
 from pipeline.shapes.body import Body
+from pipeline.shapes.frame import PlaceError
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.place import place_error
@@ -15,6 +18,8 @@ from pipeline.units import canonical
 # Largest depth, as a share of the thickness below the tool, and the smallest one, as a share of the largest.
 _THROUGH, _LEAST = 0.95, 1e-6
 _BISECTIONS = 40
+# Depths of which the largest one that fits is sought.
+_SCANNED = 61
 # A depth before another one, which is not rounded to it.
 _BEFORE = 1 - 1e-6
 _MANY = 10_000
@@ -62,15 +67,27 @@ def with_expected_depths(sections: Mapping[str, Sequence[Section]]) -> tuple[Sec
 @lru_cache(_MANY)
 def largest_depth(body: Body, probe: Probe) -> float:
     """Return the largest depth (m) that the tool and the body allow."""
-    thickness = body.thickness(probe.frame_on(body)) if place_error(body, probe) is None else 1.0
+    try:
+        thickness = body.thickness(probe.frame_on(body))
+    except PlaceError:  # which its checks tell
+        thickness = 1.0
     least, most = _bounds(probe, _THROUGH * thickness)
 
-    def fits(depth: float) -> bool:
-        found, deeper = Problems(), at_depth(probe, depth)
-        deeper.check(found)
-        return not found.errors and place_error(body, deeper) is None
+    def is_allowed(depth: float) -> bool:
+        found = Problems()
+        at_depth(probe, depth).check(found)
+        return not found.errors
 
-    return _bisected(least, most, fits)
+    def fits(depth: float) -> bool:
+        return is_allowed(depth) and place_error(body, at_depth(probe, depth)) is None
+
+    # An inclined tool fits in no small depths either: it touches beside what is searched for contact.
+    above = most
+    for depth in np.geomspace(most, least, _SCANNED).tolist():
+        if fits(depth):
+            return _bisected(depth, above, fits)
+        above = depth
+    return _bisected(least, most, is_allowed)
 
 
 def _bounds(probe: Probe, most: float) -> tuple[float, float]:

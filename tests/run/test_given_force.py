@@ -155,6 +155,18 @@ def test_fields_are_those_at_the_depth_of_the_force():
         study.solve(probe_force="2 N", comm=MPI.COMM_SELF)
 
 
+@pytest.mark.parametrize("shape", ["sphere", "paraboloid"])
+def test_search_begins_at_the_same_depth_where_a_tool_is_inclined(shape):
+    """At small depths an inclined tool touches beside what is searched for contact, and does not fit."""
+    tool = {"shape": shape, "radius": "20 mm"} | ({"shaft": "12 mm"} if shape == "paraboloid" else {})
+    upright, inclined = (
+        [case.probe.depth for case in parse(content(BOX, "linear", given(tool, ["5 mN", "5 kN"]) | axis)).cases()]
+        for axis in ({}, {"axis": [0.1, 0, -1]})
+    )
+    assert inclined[0] == pytest.approx(upright[0], rel=0.01)
+    assert inclined[1] < 15e-3, "the body is no thicker"
+
+
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0, 6.0])
 @pytest.mark.parametrize("start", [1e-5, 1e-3, 8e-3])
 def test_search_finds_powers_of_the_depth_despite_jumps_from_mesh_to_mesh(exponent, start):
