@@ -72,9 +72,12 @@ def _each(tables: Any, change: Callable[[dict[str, Any]], dict[str, Any]]) -> An
 
 
 def _pressed(probe: dict[str, Any]) -> dict[str, Any]:
-    """Return a probe with a depth: those of a table of a history, and of an insertion, are their own."""
+    """Return a probe with a depth: those of a table of a history, and of an insertion, are their own.
+
+    A given force has one, too; it is refused.
+    """
     history = probe.get("history")
-    has_depth = "insertion" in probe or (isinstance(history, dict) and "table" in history)
+    has_depth = bool({"insertion", "force"} & probe.keys()) or (isinstance(history, dict) and "table" in history)
     return probe if has_depth else {"depth": SHALLOW} | probe
 
 

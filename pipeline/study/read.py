@@ -107,7 +107,8 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene:
     if any(getattr(probe, "force", None) for probe in sections["probe"]) and (
         is_scene or identified.values or _OF_ONE_FORCE & given.keys()
     ):
-        problems.error("probe.force", None, "has no place in studies of measured curves: give a depth")
+        told = "has no place in [[measurement]], [identify] and [sensitivity], nor with what was identified: "
+        problems.error("probe.force", None, f"{told}give a depth")
     measurements, identification = _read_experiment(given, sections, file, problems)
     outputs = _read_outputs(given, sections, axes, Path(file).parent, problems)
     spread = _read_spread(given, sections, outputs, problems)

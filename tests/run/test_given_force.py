@@ -205,6 +205,11 @@ def test_search_goes_round_depths_that_fail():
         ({"probe": {"history": {"ramp": "1 s", "hold": "1 s"}}}, "a history has depths of its own"),
         ({"load": {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}}, "loads press on the tool at depth 0"),
         ({"solve": {"timing": True}}, "times solves at depths that are given"),
+        (
+            {"probe": {"toughness": "5 J/m^2", "insertion": {"to": "2 mm"}}},
+            "an insertion has depths of its own: omit .probe.insertion., or `force`",
+        ),
+        ({"identify": {"unknown": ["young"]}}, "^study: probe.force: has no place in .* give a depth"),
     ],
 )
 def test_what_does_not_go_with_a_given_force_is_refused(changes, message):

@@ -143,6 +143,7 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("given force", "history", "a history has depths of its own: omit [probe.history], or give a depth"),
     Refusal("given force", "slit", "the opening of a slit presses on the blade at depth 0 already: give a depth"),
     Refusal("given force", "slice", "the travel of a slice presses on the blade at depth 0 already: give a depth"),
+    Refusal("given force", "insertion", "an insertion has depths of its own: omit [probe.insertion], or `force`"),
     # A tool that is inserted.
     Refusal("slit", "insertion", "a blade that is inserted makes its own slit: omit `incision`"),
     Refusal("slice", "insertion", "a blade that is inserted moves along its axis: omit it"),
