@@ -90,7 +90,7 @@ typedef struct {
 typedef struct {
     epsmesh_status status;
     double force[3];       /* N: force of the tissue on the tool, in the body's coordinates */
-    double force_error;    /* relative to the force along the normal */
+    double relative_error; /* 95 % error bar, in units of the force along the normal */
     double stiffness;      /* N/m: dF/dd at a fixed place */
     double contact_radius; /* m */
 } epsmesh_touch;

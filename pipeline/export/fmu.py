@@ -91,7 +91,7 @@ def variables(model: Model) -> list[Variable]:
     ]
     found += [Variable(f"force.{c}", "output", "N", f"force of the tissue on the tool, {c} of the body") for c in "xyz"]
     found += [
-        Variable("force_error", "output", "", "95 % error bar, relative to the force along the normal"),
+        Variable("relative_error", "output", "", "95 % error bar, in units of the force along the normal"),
         Variable("stiffness", "output", "N/m", "dF/dd at a fixed place"),
         Variable("contact_radius", "output", "m", "radius of the contact"),
         Variable("depth", "output", "m", "depth below the undeformed face, along its normal"),

@@ -342,12 +342,12 @@ epsmesh_touch epsmesh_patch_touch(epsmesh_patch *t, const epsmesh_model *m, cons
     share = (s.k.radius / room) * (s.k.radius / room);
     bent = fabs(p.h) + 2 * sqrt(p.bent[0] * p.bent[0] + p.bent[1] * p.bent[1]);
     found.status = EPSMESH_OK, found.stiffness = q.young * s.k.stiffness, found.contact_radius = s.k.radius;
-    found.force_error = GOOD + m->bar[3] + s.k.stiffness * ((m->bar[0] + m->bar[2] * share * share) / room +
+    found.relative_error = GOOD + m->bar[3] + s.k.stiffness * ((m->bar[0] + m->bar[2] * share * share) / room +
                                                             m->bar[1] * bent * s.k.mean_square);
     force[0] = s.k.aside[0], force[1] = s.k.aside[1], force[2] = s.k.force;
     for (i = 0; i < 3; i++)
         for (found.force[i] = 0, j = 0; j < 3; j++) found.force[i] += q.young * force[j] * m->axes[j][i];
-    if (!(s.k.force > 0 && is_positive(found.stiffness) && found.force_error >= 0 && isfinite(found.force_error) &&
+    if (!(s.k.force > 0 && is_positive(found.stiffness) && found.relative_error >= 0 && isfinite(found.relative_error) &&
           isfinite(found.force[0]) && isfinite(found.force[1]) && isfinite(found.force[2])))
         return all(EPSMESH_DAMAGED, (double)NAN);
     return found;

@@ -54,7 +54,7 @@ static void go_on(const epsmesh_model *m, epsmesh_moment *at, double step, doubl
     }
     for (k = 0; k < 3; k++) at->force[k] = elastic->force[k];
     at->time += step, at->depth = depth;
-    if (elastic->force_error > at->error) at->error = elastic->force_error;
+    if (elastic->relative_error > at->error) at->error = elastic->relative_error;
 }
 
 /* The same, if contact grows: the force is quadratic in the step, and through that at half of it. */
@@ -94,7 +94,7 @@ static void feel(const epsmesh_model *m, epsmesh_moment *at, double since, epsme
         touch->force[k] = felt(m, at->force[k], at->of_force[0] + k, 3);
         size += touch->force[k] * touch->force[k];
     }
-    touch->force_error = at->error + (doubt > 0 ? doubt / sqrt(size) : 0);
+    touch->relative_error = at->error + (doubt > 0 ? doubt / sqrt(size) : 0);
 }
 
 void epsmesh_memory_begin(epsmesh_memory *memory, epsmesh_moment *moments, size_t room) {

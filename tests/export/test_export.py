@@ -335,7 +335,7 @@ def test_a_region_near_the_end_of_a_face_is_the_largest_that_fits(x, half):
     assert model.query("disc", radius=2e-3, at=(1e-3 * x, 1.01 * half, z), depth=2e-5).status == "outside"
     # On a steep face polynomials know the curvature less well, and so the forces on balls.
     bars = [
-        model.query(tool, radius=radius, at=(1e-3 * x, 0.0, z), depth=2e-4).force_error
+        model.query(tool, radius=radius, at=(1e-3 * x, 0.0, z), depth=2e-4).relative_error
         for tool, radius in (("sphere", 6e-3), ("disc", 1e-3))
     ]
     assert (bars[0] > 3 * bars[1]) == (x > 20)

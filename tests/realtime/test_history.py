@@ -46,7 +46,7 @@ def test_constant_contact_is_the_hereditary_integral_of_the_depth(tool):
     elastic = [relaxing().query(**tool, depth=d) for d in depths.tolist()]
     known = forces(elastic) * (integral / depths)[:, None]
     np.testing.assert_allclose(forces(touches), known, rtol=1e-12, atol=1e-12 * np.abs(known).max())
-    assert [touch.force_error for touch in touches] == pytest.approx([touch.force_error for touch in elastic])
+    assert [touch.relative_error for touch in touches] == pytest.approx([touch.relative_error for touch in elastic])
     assert [touch.stiffness for touch in touches] == pytest.approx([touch.stiffness for touch in elastic])
 
 
@@ -74,7 +74,7 @@ def test_the_bar_holds_what_long_steps_miss(tool, terms):
         history = History(replace(relaxing(terms), bar=(0.0,) * 4))  # without the error of the elastic force
         depths = np.interp(times, (0, 0.8, 1.2, 2.0), (0, 4e-4, 4e-4, 1e-4))
         touches = [history.query(2 / count, **tool, depth=depth) for depth in depths.tolist()]
-        return forces(touches)[:, 2], np.array([touch.force_error for touch in touches])
+        return forces(touches)[:, 2], np.array([touch.relative_error for touch in touches])
 
     fine, _ = over(4000)
     for count in (5, 20, 50):
