@@ -16,7 +16,7 @@ import xarray as xr
 
 from pipeline.printable import counted
 from pipeline.quantities import quantity_of, write
-from pipeline.report.parameters import Parameters, differing, parameters_of, varied
+from pipeline.report.parameters import Parameters, differing, parameters_of, units_of, varied
 from pipeline.report.table import DatasetError, study_of
 from pipeline.report.values import at_peak
 from pipeline.states import OK, PENDING, SKIPPED
@@ -109,7 +109,9 @@ def compare(a: xr.Dataset, b: xr.Dataset) -> Comparison:
     ours, theirs = _cases(a, "A", alike=alike), _cases(b, "B", alike=alike)
     scene, settings = differing([one.parameters for one in ours], [one.parameters for one in theirs])
     if scene:
-        raise DatasetError(f"they are of different scenes: {_differences(scene)}{_between(a, b)}")
+        raise DatasetError(
+            f"they are of different scenes: {_differences(scene, _units(a) | _units(b))}{_between(a, b)}"
+        )
     keys = varied([one.parameters for one in ours], [one.parameters for one in theirs])
     left, right = _by_values(ours, keys), _by_values(theirs, keys)
     common = [values for values in left if values in right]
@@ -178,18 +180,32 @@ def _between(a: xr.Dataset, b: xr.Dataset) -> str:
     )
 
 
-def _differences(scene: list[tuple[str, Any, Any]]) -> str:
+def _units(dataset: xr.Dataset) -> dict[str, str]:
+    """Return the units of the keys of its study; those that differ between studies are in each of its cases."""
+    study = study_of(dataset)
+    case = next(iter(study.cases())) if study else None
+    return units_of(case, study.tool(case)) if study and case else {}
+
+
+def _differences(scene: list[tuple[str, Any, Any]], units: dict[str, str]) -> str:
     """Return in words where two scenes differ: a few keys, those first that both have."""
     both = sorted(scene, key=lambda row: row[1] is None or row[2] is None)
-    shown = [f"{key} is {worded(key, one)} in A, {worded(key, other)} in B" for key, one, other in both[:_MOST_KEYS]]
+    shown = [
+        f"{key} is {worded(key, one, units.get(key))} in A, {worded(key, other, units.get(key))} in B"
+        for key, one, other in both[:_MOST_KEYS]
+    ]
     more = len(both) - _MOST_KEYS
     return "; ".join([*shown, *([f"and {counted(more, 'more key')}"] if more > 0 else [])])
 
 
-def worded(key: str, value: Any) -> str:
-    """Write the value of a key as people read it; "missing" where a study has no such key."""
+def worded(key: str, value: Any, unit: str | None = None) -> str:
+    """Write the value of a key as people read it, with its SI ``unit``; "missing" where a study has no such key."""
+    if value in (None, ()):
+        return "missing"
     name = key.rpartition(".")[2]
-    return "missing" if value in (None, ()) else write(name, value) if quantity_of(name) else str(value)
+    if unit and isinstance(value, tuple):
+        return ", ".join(worded(key, one, unit) for one in value)
+    return write(name, value, unit) if unit or quantity_of(name) else str(value)
 
 
 def _by_values(cases: list[_Place], keys: list[str]) -> dict[tuple[Any, ...], _Place]:

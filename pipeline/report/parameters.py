@@ -8,6 +8,7 @@ from pydantic import BaseModel
 
 from pipeline.shapes.probe import Probe
 from pipeline.study.case import Case
+from pipeline.study.swept import unit_of
 
 # Values by key, as mesh.fine or body.layer[1].young. A key that a shape does not have is not there.
 Parameters = dict[str, Any]
@@ -24,9 +25,7 @@ def parameters_of(case: Case, tool: Probe | None = None) -> Parameters:
     Where all of the body is kept, it does not matter what would have become of the rest: ``mesh.outside`` is then
     "coarse". Where it is not, ε is a key of the scene, ``kept.epsilon``.
     """
-    parts = {"body": case.body, "material": case.material, "probe": tool or case.probe}
-    parts |= {"mesh": case.mesh, "load": case.load}
-    found = {key: value for name, part in parts.items() for key, value in _flat(name, part)}
+    found = {key: value for key, value, _ in _rows(case, tool)}
     if _FILE in found:
         found[_FILE] = (*_rounded(case.body.heights), *_rounded((case.body.volume, case.body.extent)))
     if case.lost_contact:
@@ -38,6 +37,11 @@ def parameters_of(case: Case, tool: Probe | None = None) -> Parameters:
     if case.is_full:
         found["mesh.epsilon"] = "full"
     return found
+
+
+def units_of(case: Case, tool: Probe | None = None) -> dict[str, str]:
+    """Return the SI units of those keys of a case that have one."""
+    return {key: unit for key, _, unit in _rows(case, tool) if unit}
 
 
 def varied(ours: Sequence[Parameters], theirs: Sequence[Parameters]) -> list[str]:
@@ -66,17 +70,24 @@ def _values(cases: Iterable[Parameters], key: str) -> set[Any]:
     return {parameters.get(key) for parameters in cases}
 
 
-def _flat(where: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield key and value of all that a section holds, down to numbers, texts and lists of these; names are none."""
+def _rows(case: Case, tool: Probe | None) -> Iterator[tuple[str, Any, str]]:
+    """Yield key, value and unit of all keys of a case."""
+    parts = {"body": case.body, "material": case.material, "probe": tool or case.probe}
+    for name, part in (parts | {"mesh": case.mesh, "load": case.load}).items():
+        yield from _flat(name, part)
+
+
+def _flat(where: str, value: Any, unit: str = "") -> Iterator[tuple[str, Any, str]]:
+    """Yield key, value and unit of all of a section, down to numbers, texts and lists of these; names are none."""
     if isinstance(value, BaseModel):
         for name in type(value).model_fields:
             if name != "name":
-                yield from _flat(f"{where}.{name}", getattr(value, name))
+                yield from _flat(f"{where}.{name}", getattr(value, name), unit_of(type(value), name))
     elif isinstance(value, tuple | list) and any(isinstance(one, BaseModel) for one in value):
         for number, one in enumerate(value, start=1):
             yield from _flat(f"{where}[{number}]", one)
     else:
-        yield where, _plain(value)
+        yield where, _plain(value), unit
 
 
 def _plain(value: Any) -> Any:

@@ -58,8 +58,7 @@ def axis_of(section: str, place: Place, raw: list[Any], parsed: list[Section], p
     within = [_at(parsed[0], outer[: end + 1]) for end in range(len(outer))]
     names = [one.name for one in within if isinstance(one, Section) and one.name]
     values = [getattr(owner, str(key)) for owner in owners]
-    extra: Any = type(owners[0]).model_fields[str(key)].json_schema_extra or {}
-    unit = extra.get("unit", "") or _unit_of(type(owners[0]), str(key))
+    unit = unit_of(type(owners[0]), str(key))
     if isinstance(values[0], tuple):
         labels = [" ".join(str(part) for part in value) for value in raw]
     elif any(isinstance(value, dict) for value in raw):
@@ -88,10 +87,13 @@ def _at(section: Any, place: list[str | int]) -> Any:
     return section
 
 
-def _unit_of(model: type[BaseModel], key: str) -> str:
-    """Return the unit of an optional number."""
-    parts = getattr(model.model_fields[key].annotation, "__args__", ())
-    extras = [getattr(m, "json_schema_extra", None) for part in parts for m in getattr(part, "__metadata__", ())]
+def unit_of(model: type[BaseModel], key: str) -> str:
+    """Return the SI unit of a key: of a number, an optional one, or those of a list; "" if it has none."""
+    info = model.model_fields[key]
+    parts = getattr(info.annotation, "__args__", ())
+    extras = [info.json_schema_extra] + [
+        getattr(m, "json_schema_extra", None) for part in parts for m in getattr(part, "__metadata__", ())
+    ]
     return next((str(extra["unit"]) for extra in extras if isinstance(extra, dict) and "unit" in extra), "")
 
 

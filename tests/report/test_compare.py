@@ -6,6 +6,7 @@ import pytest
 
 from pipeline.report.compare import compare
 from pipeline.report.dataset import build, write
+from pipeline.report.parameters import units_of
 from pipeline.report.table import DatasetError
 from pipeline.study.read import read_mapping
 from tests.commands import epsmesh
@@ -78,7 +79,11 @@ def test_columns_of_another_radius_are_another_scene_and_coarse_meshes_are_not()
     ("old", "new", "why"),
     [
         ('young = "10 kPa"', 'young = "12 kPa"', "material.young is 10 kPa in A, 12 kPa in B"),
-        ('size = ["60 mm", "60 mm", "20 mm"]', 'size = ["60 mm", "60 mm", "30 mm"]', "different scenes: body.size"),
+        (
+            'size = ["60 mm", "60 mm", "20 mm"]',
+            'size = ["60 mm", "60 mm", "30 mm"]',
+            "body.size is 60 mm, 60 mm, 20 mm in A, 60 mm, 60 mm, 30 mm in B",
+        ),
         ("[0.3, 0.4]", "[0.35, 0.45]", "no value of material.poisson is in both"),
     ],
 )
@@ -140,6 +145,9 @@ def test_needles_of_two_toughnesses_are_two_scenes_whose_forces_are_told():
     tough, weak = needle(5), needle(4)
     assert compare(tough, tough).agrees
     one, other = (1e3 * float(each["force"].max()) for each in (tough, weak))
-    with pytest.raises(DatasetError, match=r"probe\.toughness is 5\.0 in A, 4\.0 in B") as told:
+    with pytest.raises(DatasetError, match=r"probe\.toughness is 5 J/m\^2 in A, 4 J/m\^2 in B") as told:
         compare(tough, weak)
     assert f"B less A is {other - one:.4g} ± " in str(told.value)
+    study = read_mapping(needles.SCENE | {"probe": needles.NEEDLE}, "a")
+    case = next(study.cases())
+    assert units_of(case, study.tool(case))["probe.insertion.to"] == "m"
