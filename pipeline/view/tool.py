@@ -14,8 +14,10 @@ from pipeline.view.fields import Fields
 _LENGTH = 2.5
 # Lines over the surface of a tool that is not flat, and the points of each.
 _LINES, _POINTS = 49, 60
-# Length of these lines, in units of what the tool may touch: round the axis; across a long tool.
+# Length of these lines, in units of what the tool may touch: of a round tool; of a pyramid, or across a long tool.
 _ROUND, _ACROSS = 4.0, 1.5
+# Bisections of a line for the point at a height.
+_HALVINGS = 40
 
 
 @dataclass(frozen=True)
@@ -52,12 +54,15 @@ def tool_of(fields: Fields) -> Tool:
 def _lines(probe: Probe, length: float) -> FloatArray:
     """Return lines (k, n, 3) over its surface, in m and the probe's own coordinates.
 
-    Those of a round tool go from its axis to its axis; those of a long one are sections, the first and last points.
+    Those of a round tool or a pyramid go from its axis to its axis, by a shaft with the outline that the tool has at
+    one height; those of a long one are sections, the first and last points.
     """
-    if probe.is_round:
-        directions = (np.array([np.cos(a), np.sin(a)]) for a in np.linspace(0, 2 * np.pi, _LINES))
-        farthest, top = _ROUND * probe.circumradius, (0.0, 0.0, length)
-        return np.array([[*_line(probe, np.zeros(2), farthest * direction, length), top] for direction in directions])
+    if probe.footprint.is_round:
+        angles, top = np.linspace(0, 2 * np.pi, _LINES), (0.0, 0.0, length)
+        farthest = (_ROUND if probe.is_round else _ACROSS) * probe.circumradius
+        rays = farthest * np.column_stack([np.cos(angles), np.sin(angles)])
+        ends = _at_height(probe, rays, min(length, float(probe.profile(rays).min())))
+        return np.array([[*_line(probe, np.zeros(2), end, length), top] for end in ends])
     along, across = probe.outline().max(axis=0)
     sides = np.array([0.0, _ACROSS * across])
     starts = (np.array([x, 0.0]) for x in np.linspace(-along, along, _LINES))
@@ -65,6 +70,16 @@ def _lines(probe: Probe, length: float) -> FloatArray:
     sections = [[*left[::-1], *right, left[-1]] for left, right in halves]
     ends = [[section[0]] * len(section) for section in (sections[0], sections[-1])]
     return np.array([ends[0], *sections, ends[1]])
+
+
+def _at_height(probe: Probe, rays: FloatArray, height: float) -> FloatArray:
+    """Return the points (n, 2) of ``rays`` (n, 2) from the axis up to which the surface is at most at ``height``."""
+    low, high = np.zeros((len(rays), 1)), np.ones((len(rays), 1))
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        is_below = probe.profile(middle * rays)[:, None] <= height
+        low, high = np.where(is_below, middle, low), np.where(is_below, high, middle)
+    return low * rays
 
 
 def _line(probe: Probe, start: FloatArray, along: FloatArray, length: float) -> FloatArray:

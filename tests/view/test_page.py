@@ -131,6 +131,19 @@ def test_a_ball_has_its_shape_and_its_depth():
     assert (told["start"], told["factor"], told["keeps_depth"]) == (1, found.visible_factor, True)
 
 
+@pytest.mark.parametrize("sides", [3, 4])
+def test_the_shaft_of_a_pyramid_has_the_outline_of_the_pyramid(sides):
+    tip = {"shape": "pyramid", "angle": "65.27 deg", "sides": sides, "depth": "0.5 mm", "contact": "unilateral"}
+    made = study(probe=tip)
+    (case,) = made.cases()
+    found = compute_fields(solve_alone(made, case), MPI.COMM_SELF, mesh_only=True)
+    local = case.frame.local(tool_of(found).points)
+    top = local[local[:, 2] > 0.99 * local[:, 2].max(), :2]
+    to_faces = (top @ case.probe.solid.faces[:, :2].T).max(axis=1)
+    on_edge = to_faces[to_faces > 1e-9]
+    np.testing.assert_allclose(on_edge, on_edge.max(), rtol=1e-6)
+
+
 def test_a_tilted_ball_is_where_tissue_touches_it():
     """Its depth counts from the first touch, beside its axis: the tissue is neither in it nor off it everywhere.
 
