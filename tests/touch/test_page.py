@@ -178,6 +178,27 @@ def test_the_dent_is_seen_and_outside_the_region_no_number_is(browser, tmp_path)
 
 
 @in_browser
+@pytest.mark.parametrize("kind", [{}, {"curved": True}])
+def test_triangles_end_at_the_rim_of_the_contact(browser, tmp_path, kind):
+    surface, _ = opened(browser, tmp_path, **kind)
+    change(browser, x=0.7, y=1.3, radius=4, depth=0.8)
+    found = browser.ask(
+        "(q => { const t = page.model.query(q), s = page.surface, shown = s.press(q, t, true); "
+        "const points = s.rest.subarray(0, 3 * (Math.max(...shown) + 1)); "
+        "return [Array.from(shown), Array.from(points), page.model.local(q.at)]; "
+        "})(page.query)"
+    )
+    triangles, points, place = (np.array(part) for part in found)
+    spot = surface.model.spot(*place[:2].tolist())
+    away = np.linalg.norm((points.reshape(-1, 3) - place) @ np.array(spot.turn).T, axis=1) / 4e-3 - 1
+    corners = away[triangles.reshape(-1, 3)]
+    crossing = np.minimum(-corners.min(axis=1), corners.max(axis=1))
+    assert crossing.max() < 5e-3  # radii
+    assert np.sum(np.abs(away) < 2e-3) > 60
+    assert browser.messages == []
+
+
+@in_browser
 def test_a_body_of_many_vertices_is_drawn(browser, tmp_path):
     opened(browser, tmp_path, side=140)  # 39,200 of them
     change(browser, depth=1)

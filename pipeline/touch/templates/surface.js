@@ -1,8 +1,11 @@
 // What is seen of a touch: realtime/src/surface.c, with triangles made smaller near the tool.
 
-// Edges near the tool are halved until they are shorter than this share of the contact's radius and of the way to its edge; so many
-// vertices are added at most.
-const SEEN = { FINE: 0.18, LEVELS: 6, ADDED: 30000 };
+// Edges near the tool are divided until they are shorter than this share of the contact's radius and of the way to its rim, and
+// until none crosses the rim; so many vertices are added at most. In units of the contact's radius: what is on the rim, and the
+// longest edge between two points of the rim that is divided on it.
+const SEEN = { FINE: 0.07, LEVELS: 7, ADDED: 30000, ON_RIM: 1e-3, ALONG: 0.8 };
+// Bisections of an edge for the point where it crosses the rim.
+const BISECTIONS = 12;
 
 // Where the tool presses: a disc of radius `a`, or a rectangle, in the face's own directions.
 class Footprint {
@@ -14,13 +17,31 @@ class Footprint {
     this.half = [length / 2, width / 2];
     this.a = Math.min(...this.half);
   }
-  // How far a point is from the edge of the contact.
-  away(x, y, z) {
-    if (!this.half) return Math.abs(Math.hypot(x, y, z) - this.a);
+  // The distance of a point to the rim of the contact, negative within.
+  beyond(x, y, z) {
+    if (!this.half) return Math.hypot(x, y, z) - this.a;
     const [c, s] = this.edge;
     const [p, q] = [Math.abs(c * x + s * y) - this.half[0], Math.abs(c * y - s * x) - this.half[1]];
-    return p <= 0 && q <= 0 ? -Math.max(p, q) : Math.hypot(Math.max(p, 0), Math.max(q, 0), z);
+    return p <= 0 && q <= 0 ? Math.max(p, q) : Math.hypot(Math.max(p, 0), Math.max(q, 0), z);
   }
+}
+
+// Where a number that grows from less to more than 0 between 0 and 1 is 0.
+function crossing(grows) {
+  let [low, high] = [0, 1];
+  for (let i = 0; i < BISECTIONS; i++) {
+    const middle = (low + high) / 2;
+    if (grows(middle) < 0) low = middle;
+    else high = middle;
+  }
+  return (low + high) / 2;
+}
+
+// Move a point, and its place from the tool in the face's directions, along the face to a distance from the tool's axis.
+function outTo(place, [px, py, pz], turn, distance) {
+  const far = Math.hypot(px, py);
+  const more = Math.sqrt(Math.max(distance ** 2 - pz ** 2, 0)) / far - 1;
+  for (let i = 0; i < 3; i++) place[i] += more * (px * turn[0][i] + py * turn[1][i]);
 }
 
 class Surface {
@@ -34,6 +55,7 @@ class Surface {
     Object.assign(this, { model, n, m, most, rooms, rest, regular, moved });
     rest.set(new Float32Array(c.memory.buffer, c.page_points(), 3 * n));
     this.triangles = new Int32Array(c.memory.buffer, c.page_corners(), 3 * m);
+    this.away = new Float64Array(most);
     this.shown = new Int32Array(3 * (m + 2 * SEEN.ADDED)); // each new vertex makes two triangles more at most
     this.spans = Float64Array.from({ length: m }, (_, t) => this.spanOf(t));
   }
@@ -61,22 +83,41 @@ class Surface {
   move(count) {
     this.model.c.page_move(count, ...this.rooms);
   }
-  // Halve edges by their own length and place alone, so that neighbours agree.
+  // Divide edges by their own length and place alone, so that neighbours agree.
   refined([x, y, z], turn, foot) {
     const { rest, regular, n, m, most } = this;
     let count = n;
     const between = new Map();
+    const [along, across, up] = turn;
+    const local = (px, py, pz, unit) => (px - x) * unit[0] + (py - y) * unit[1] + (pz - z) * unit[2];
+    const beyond = (px, py, pz) => foot.beyond(local(px, py, pz, along), local(px, py, pz, across), local(px, py, pz, up));
+    const known = this.away.fill(NaN);
+    const beyondOf = (v) => {
+      if (Number.isNaN(known[v])) known[v] = beyond(rest[3 * v], rest[3 * v + 1], rest[3 * v + 2]);
+      return known[v];
+    };
+    const isOnRim = (far) => Math.abs(far) <= SEEN.ON_RIM * foot.a;
+    // The vertex that divides an edge, -1 if it is short and does not cross the rim.
     const middle = (p, q) => {
       const key = Math.min(p, q) * most + Math.max(p, q);
       if (between.has(key)) return between.get(key);
-      const [mx, my, mz] = [0, 1, 2].map((i) => (rest[3 * p + i] + rest[3 * q + i]) / 2);
-      const length = Math.hypot(...[0, 1, 2].map((i) => rest[3 * p + i] - rest[3 * q + i]));
-      const away = foot.away(...turn.map((unit) => inner(unit, [mx - x, my - y, mz - z])));
+      const [px, py, pz] = [rest[3 * p], rest[3 * p + 1], rest[3 * p + 2]];
+      const [dx, dy, dz] = [rest[3 * q] - px, rest[3 * q + 1] - py, rest[3 * q + 2] - pz];
+      const length = Math.hypot(dx, dy, dz);
+      const away = Math.abs(beyond(px + dx / 2, py + dy / 2, pz + dz / 2));
+      const isLong = length > SEEN.FINE * Math.max(foot.a, away) + 0.5 * away;
+      const [first, last] = away <= length ? [beyondOf(p), beyondOf(q)] : [1, 1];
+      const crosses = first * last < 0 && !isOnRim(first) && !isOnRim(last);
       let found = -1;
-      if (length > SEEN.FINE * Math.max(foot.a, away) + 0.5 * away && count < most) {
+      if ((isLong || crosses) && count < most) {
         found = count++;
-        rest.set([mx, my, mz], 3 * found);
-        for (let i = 0; i < 3; i++) regular[3 * found + i] = (regular[3 * p + i] + regular[3 * q + i]) / 2;
+        const share = crosses ? crossing((t) => beyond(px + t * dx, py + t * dy, pz + t * dz) * Math.sign(last)) : 0.5;
+        const place = [px + share * dx, py + share * dy, pz + share * dz];
+        if (isOnRim(first) && isOnRim(last) && !foot.half && length < SEEN.ALONG * foot.a) {
+          outTo(place, turn.map((unit) => local(...place, unit)), turn, foot.a);
+        }
+        rest.set(place, 3 * found);
+        for (let i = 0; i < 3; i++) regular[3 * found + i] = (1 - share) * regular[3 * p + i] + share * regular[3 * q + i];
       }
       between.set(key, found);
       return found;
