@@ -151,13 +151,18 @@ def store_done(store: Store) -> dict[str, Record]:
 def done_beside(store: Path) -> Iterator[Row]:
     """Yield the records that processes have finished, and that may not be in the ``store`` yet, as its rows."""
     for path, _ in _files(store, _DONE):
-        at = path.stat().st_mtime
-        yield from ((record.key, record.to_json(), at) for record in _records(path))
+        with suppress(FileNotFoundError):  # its process has just ended
+            at = path.stat().st_mtime
+            yield from [(record.key, record.to_json(), at) for record in _records(path)]
 
 
 def _records(path: Path) -> Iterator[Record]:
-    """Yield the records in a file; the last one may be torn."""
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+    """Yield the records in a file; the last one may be torn. None in one that its process has just removed."""
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except FileNotFoundError:
+        return
+    for line in text.splitlines():
         with suppress(ValueError):
             yield Record.from_json(line)
 
@@ -177,11 +182,11 @@ def _files(store: Path, what: str) -> Iterator[tuple[Path, bool]]:
 
 def _read(path: Path) -> tuple[set[str], str]:
     """Return the cases in a file, and why they failed: "" if they did not."""
-    text, _, signals = path.read_bytes().partition(b"\n")
     try:
+        text, _, signals = path.read_bytes().partition(b"\n")
         content = json.loads(text)
         keys, why = set(content["keys"]), str(content["why"])
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, FileNotFoundError):
         return set(), ""
     was_asked = why == KILLED and any(number in signals for number in ENDING)
     return keys, "" if was_asked else why

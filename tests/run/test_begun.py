@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
 from pipeline.report.read import read_file
-from pipeline.run.begun import Begun, Ended, fail_begun, store_done
+from pipeline.run.begun import Begun, Ended, done_beside, fail_begun, store_done
 from pipeline.run.outbox import Outbox
 from pipeline.run.reading import open_to_read
 from pipeline.run.record import Record
@@ -177,6 +177,21 @@ def test_a_case_that_ends_its_process_is_left_out_of_a_fresh_run_though_an_older
     opened.store.close()
     assert plan.solves == ()
     assert (opened.records[key].is_ok, bool(opened.notices)) == (not fresh, fresh)
+
+
+def test_a_file_that_its_process_removes_meanwhile_is_none(store: Store, monkeypatch):
+    for what in ("begun", "done"):
+        (store.path.parent / f".{store.path.name}-{what}-here-1-2").write_text(Record("a", "ok").to_json())
+
+    def ends(path: Path, *_: object) -> bool:
+        path.unlink()
+        return False
+
+    monkeypatch.setattr("pipeline.run.begun.is_held", ends)
+    assert not store_done(store)
+    assert not fail_begun(store, ["a"]).failed
+    (store.path.parent / f".{store.path.name}-done-here-1-2").write_text(Record("a", "ok").to_json())
+    assert not [*done_beside(store.path)]
 
 
 def test_a_damaged_file_blames_no_case(store: Store):
