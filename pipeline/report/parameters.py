@@ -23,9 +23,11 @@ def parameters_of(case: Case, tool: Probe | None = None) -> Parameters:
     """Return the values of all keys of a case, in SI units; ``tool`` is that of an insertion, of which it is a state.
 
     Where all of the body is kept, it does not matter what would have become of the rest: ``mesh.outside`` is then
-    "coarse". Where it is not, ε is a key of the scene, ``kept.epsilon``.
+    "coarse". Where it is not, ε is a key of the scene, ``kept.epsilon``. A depth at a given force is a result.
     """
     found = {key: value for key, value, _ in _rows(case, tool)}
+    if case.probe.force is not None:
+        del found["probe.depth"]  # it is found
     if _FILE in found:
         found[_FILE] = (*_rounded(case.body.heights), *_rounded((case.body.volume, case.body.extent)))
     if case.lost_contact:

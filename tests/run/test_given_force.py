@@ -145,6 +145,14 @@ def test_sweeps_ratios_and_figures():
     assert "depth" in figure(found, "force").axes[0].get_ylabel()
 
 
+def test_depths_of_two_meshes_at_a_force_are_compared():
+    meshes = MESH, MESH | {"rim": "0.7 mm"}
+    one, other = (solved(content(BOX, "linear", given(BLADE, "10 mN"), mesh=mesh))[-1] for mesh in meshes)
+    assert float(one["depth"]) != float(other["depth"])
+    compared = {pair.quantity: pair.state for pair in compare(one, other).pairs}
+    assert compared == {"force": "agree", "depth": "agree"}
+
+
 def test_fields_are_those_at_the_depth_of_the_force():
     study = RunnableStudy(parse(content(BOX, "linear", given(BALL, ["10 mN", "2 N"]))))
     solution = study.solve(probe_force="10 mN", comm=MPI.COMM_SELF)
