@@ -10,14 +10,15 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.quantities import RESERVED
+from pipeline.shapes.bodies.image import FromImage
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.closed import Closed
-from pipeline.shapes.complex import OUTSIDE
+from pipeline.shapes.complex import OUTSIDE, TISSUE
 from pipeline.shapes.facetted import Facetted
 from pipeline.shapes.files.loaded import Label
 from pipeline.shapes.regions import Embedded, Inclusion
 from pipeline.shapes.section import Section, in_mm
-from pipeline.shapes.segment import Segment
+from pipeline.shapes.segment import Segment, shell_of
 from pipeline.shapes.shell import Shell
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.axis import Axis
@@ -31,6 +32,9 @@ GAP = 0.1
 # Points on an embedded region that are looked at.
 _POINTS = 2000
 _MANY = 10_000  # cached distances
+# Least thickness in voxels of a label that is a sheet or a thread. Skins around ellipsoids were meshed at once with 2
+# voxels. With 1 to 1.6, meshes of their two sides crossed at every attempt.
+_VOXELS = 1.75
 # Heights at which a message looks for tissue.
 _LEVELS = 401
 # Names of tissues in layers: two of them in a sweep of materials were probably meant as layers.
@@ -64,6 +68,7 @@ def check_regions(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ..
     problems.each(_check_pieces, body=bodies)
     if len(problems.errors) == before:
         problems.each(_check_room, body=bodies)
+        problems.each(_check_sheets, body=bodies)
     _check_axes(axes, problems)
     _check_sweep(bodies, axes, problems)
     _check_material(bodies, cast(Sequence[Material], sections["material"]), axes, problems)
@@ -224,6 +229,29 @@ def _check_cavities(body: Body, places: Sequence[str], problems: Problems) -> No
                 "voxels below the surface, or give it `young` and `poisson` of its filling, and omit `hollow`",
             )
             break
+
+
+def _check_sheets(body: Body, problems: Problems) -> None:
+    """Report labels of an image that are sheets or threads of about a voxel: their surfaces cannot be meshed."""
+    if not isinstance(body, FromImage) or (parts := body.partition) is None:
+        return
+    for number in parts.regions.tolist():
+        key, found = "body.label", body.label
+        if number != TISSUE:
+            piece = cast(Segment, body.regions[number - 1])
+            key, found = _place_of(piece, body.places[number - 1])
+        surface = shell_of(parts.surface(number), is_part=True)
+        # A thick label with steps of voxels is thin at most points; a thread is thicker than volume over surface.
+        thickness = 2 * max(surface.least, surface.volume / surface.triangles.area)
+        if surface.is_thin and thickness < _VOXELS * body.finest_step:
+            problems.error(
+                key,
+                found,
+                f"{body.region_names[number]} is {in_mm(thickness)} thick, {thickness / body.finest_step:.1f} voxels, "
+                f"and its surface {1e4 * surface.triangles.area:,.0f} cm²: a label so thin for its size must be at "
+                f"least {_VOXELS:g} voxels thick, or its two sides cross when they are meshed. Resample the labels to "
+                "voxels of half the size, segment it thicker, or make it one with its neighbour by a list of labels",
+            )
 
 
 def _place_of(piece: Embedded, place: str) -> tuple[str, Any]:

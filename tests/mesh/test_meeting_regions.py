@@ -107,6 +107,29 @@ def test_a_hollow_region_that_leaves_the_body_ends_below_its_surface(given):
     assert walls.sum() > 20  # points of the cavity's wall, which nothing holds
 
 
+def test_a_skin_of_two_voxels_is_meshed_and_one_of_one_voxel_is_refused_with_the_way_out(tmp_path):
+    """As the skin, and as what is around another label."""
+    axes, steps = np.array([18.0, 15.0, 12.0]), 2.0
+    count = np.ceil(2 * axes / steps).astype(int) + 8
+    x = (np.moveaxis(np.indices(count), 0, -1) - (count - 1) / 2) * steps
+    affine = 1e-3 * np.column_stack([steps * np.eye(3), -(count - 1) / 2 * steps])
+
+    def sections(skin, label, other):
+        labels = (((x / axes) ** 2).sum(axis=-1) < 1) * 2
+        labels[((x / (axes - skin)) ** 2).sum(axis=-1) < 1] = 1
+        file = write(tmp_path / f"skin{skin}.nii", LabelMap(labels, affine))
+        body = {"shape": "image", "file": str(file), "label": label, "fixed": {"below": "-6 mm"}}
+        body["region"] = [{"name": "other", "label": other} | TISSUE]
+        return {"body": body, "probe": PROBE | {"at": ["0 mm", "0 mm"]}, "mesh": MESH, "material": TISSUE}
+
+    for label, other, told in ((1, 2, r"body\.region\[1\]\.label = 2: other"), (2, 1, r"body\.label = 2: tissue")):
+        with pytest.raises(StudyError, match=rf"{told} is 2\.\d+ mm thick, 1\.0 voxels.* voxels of half the size"):
+            study(**sections(2, label, other))
+    case = study(**sections(4, 1, 2)).case(())
+    parts = case.body.partition
+    np.testing.assert_allclose(volumes(mesh_arrays(case, ())), [parts.volume(0), parts.volume(1)], rtol=0.03)
+
+
 def test_places_on_a_border_are_told_before_the_run(given):
     """Those of a path together; a place beside the border, or far above it, is not among them."""
     sections = given(TUMOUR, LOBE)

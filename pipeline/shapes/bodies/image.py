@@ -133,6 +133,11 @@ class FromImage(Segmented, Scanned):
         return float(np.prod(self._spacing)) ** (1 / 3)
 
     @property
+    def finest_step(self) -> float:
+        """Smallest distance (m) of voxels."""
+        return float(self._spacing.min())
+
+    @property
     def smoothing_range(self) -> tuple[float, float] | None:
         """Two thirds and four thirds of the smoothing length: 1 and 2 voxels of the default; None without smoothing."""
         from pipeline.shapes.files.label_surface import default_smooth  # noqa: PLC0415
