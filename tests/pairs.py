@@ -233,7 +233,7 @@ FEATURES = (
     Feature("sticking sphere", "probe", _indenter(shape="sphere", radius="5 mm", friction="stick")),
     Feature("cone", "probe", _indenter(shape="cone", angle="70 deg", radius="8 mm", tip="1 mm")),
     Feature("paraboloid", "probe", _indenter(shape="paraboloid", radius="5 mm", shaft="5 mm")),
-    Feature("pyramid", "probe", _indenter(shape="pyramid", angle="70 deg", sides=3, tip="0.5 mm")),
+    Feature("pyramid", "probe", _indenter(shape="pyramid", angle="50 deg", sides=3, tip="0.5 mm")),
     Feature("rounded disc", "probe", _indenter(shape="disc", radius="4 mm", edge="1 mm")),
     Feature("wedge", "probe", _indenter(shape="wedge", angle="75 deg", length="8 mm", tip="1 mm")),
     Feature("cut", "probe", _probe(**_CUT)),
