@@ -118,6 +118,7 @@ def export(
     make = _flat if scope.is_flat else curved_model
     of_table = replace(solver, accuracy=_PRECISE_TABLE * accuracy)
     bare, error, places = make(scope, of_table, accuracy, largest, (*_BARS, precise), margin, ranks)
+    bare = replace(bare, tool=scope.tool)
     tools = range(len(TOOLS)) if len(bare.table.tensors) and not scope.law else (0,)
     halves = [checks - checks // 2, checks // 2]
     # Discs calibrate the linear part of a law; balls test the whole.

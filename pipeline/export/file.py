@@ -25,6 +25,7 @@ _DIMENSIONS: Mapping[str, tuple[str, ...]] = {
     "origin": ("component",),
     "axes": ("row", "component"),
     "bar": ("term",),
+    "tool": ("number",),
     **dict.fromkeys(("relaxation_share", "relaxation_time"), ("relaxing",)),
     **dict.fromkeys(("even", "reach", "sides", "poisson_range"), ("pair",)),
     "near": ("near_ratio", "near_node", "near_x"),

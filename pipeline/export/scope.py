@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from epsmesh_realtime.evaluator import MOST_RELAXING
+from epsmesh_realtime.query import Query
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.facetted import Facetted
 from pipeline.shapes.registry import PROBES
@@ -48,6 +49,14 @@ class Scope:
     def law(self) -> dict[str, Any]:
         """The keys of the law of large displacements at the face, {} if displacements are small."""
         return surface_tissue(self.case).keys_of_law
+
+    @property
+    def tool(self) -> tuple[float, ...]:
+        """The study's own tool, in the numbers of a model's file."""
+        probe = self.case.probe
+        sizes = {name: getattr(probe, name) for name in ("radius", "angle", "length", "width") if hasattr(probe, name)}
+        query = Query(probe.shape, self.case.frame.point, probe.depth, contact=probe.contact, **sizes)
+        return replace(query, along=getattr(probe, "direction", None)).tool_numbers
 
     @property
     def is_flat(self) -> bool:

@@ -1,6 +1,6 @@
 """A real-time model as a page: one HTML file that holds the model, what evaluates it, and what draws it."""
 
-from math import hypot
+from math import degrees, hypot
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,10 @@ EVALUATOR = _TEMPLATES / "evaluator.wasm"
 _MM = 1e3
 # Of the way to the nearest side or to the bottom: the radius that the page begins with, and the depths that it offers.
 _RADIUS, _RADII, _DEPTH, _DEPTHS = 0.12, (0.02, 0.4), 0.04, (-0.02, 0.15)
+# A size or a depth (m) that means none: measured studies have such a depth.
+_NO_SIZE = 1e-8
+# What the page says in place of a hint for Python.
+_OUTSIDE = "The place is outside the model's region: move the tool within the grey line."
 _YOUNG = (0.1, 10.0)
 _ANGLES = (20.0, 85.0)
 # A blade's length and width, least, most and at first, and its turn from x.
@@ -44,6 +48,7 @@ def render(surface: Surface, title: str) -> str:
         facts=_facts(surface),
         sliders=_sliders(surface),
         tools=_tools(surface),
+        tool=_first(surface),
     )
 
 
@@ -51,6 +56,12 @@ def _tools(surface: Surface) -> list[str]:
     """Return the tools that the model has tables for, as the page names them."""
     has_all = len(surface.model.table.tensors) > 0
     return ["disc", "sphere", "cone", *(("blade", "bonded disc") if has_all else ())]
+
+
+def _first(surface: Surface) -> str:
+    """Return the tool with which the page begins: the study's, if the model has it."""
+    tools, own = _tools(surface), surface.model.tool
+    return tools[int(own[0])] if own and own[0] < len(tools) else tools[0]
 
 
 def _facts(surface: Surface) -> list[str]:
@@ -65,13 +76,14 @@ def _facts(surface: Surface) -> list[str]:
     return [
         *at_once,
         f"Valid within the grey line: {region}. Tools move {along}, {friction}.",
+        "Only the outer surface is drawn; layers and inclusions act on the force and are not shown.",
         "Shaded: no answer for this tool at this depth.",
         "Drag on the body's face to move the tool, beside it to turn the body; scroll to zoom.",
     ]
 
 
 def _sliders(surface: Surface) -> list[dict[str, Any]]:
-    """Return what can be changed, in the units of the page."""
+    """Return what can be changed, in the units of the page: at first the study's tool, in the middle of the face."""
     model = surface.model
     size = _MM * min(*model.sides, model.thickness)
     x, y = (_MM * side for side in (model.sides if model.face.is_flat else model.table.reach))
@@ -88,7 +100,19 @@ def _sliders(surface: Surface) -> list[dict[str, Any]]:
         ("young", "E, kPa", _YOUNG[0] * model.young / 1e3, _YOUNG[1] * model.young / 1e3, model.young / 1e3),
         ("poisson", "ν", low, high, model.poisson),
     ]
-    return [dict(zip(("name", "label", "low", "high", "value"), row, strict=True)) for row in rows]
+    found: list[dict[str, Any]] = [
+        dict(zip(("name", "label", "low", "high", "value"), row, strict=True)) for row in rows
+    ]
+    own = zip(("radius", "angle", "length", "width", "depth"), model.tool[1:], strict=False)
+    sizes = {name: size * (degrees(1) if name == "angle" else _MM) for name, size in own if size > _NO_SIZE}
+    if model.tool:
+        sizes["turn"] = (degrees(model.tool[-1]) + 90) % 180 - 90
+    return [_beginning(slider, sizes.get(slider["name"], slider["value"])) for slider in found]
+
+
+def _beginning(slider: dict[str, Any], value: float) -> dict[str, Any]:
+    """Return a slider that begins at ``value``, and includes it."""
+    return slider | {"low": min(slider["low"], value), "high": max(slider["high"], value), "value": value}
 
 
 def _arrays(surface: Surface) -> dict[str, Any]:
@@ -109,5 +133,5 @@ def _told(surface: Surface) -> dict[str, Any]:
         "centre": (_MM * (low + high) / 2).tolist(),
         "radius": float(_MM * np.linalg.norm(high - low) / 2),
         "stops": palette.YLGNBU,
-        "sentences": SENTENCES,
+        "sentences": SENTENCES | {"outside": _OUTSIDE},
     }

@@ -7,6 +7,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.scene.model import PROBE
 from pipeline.shapes.contact import first_touch
+from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.view.fields import Fields
 
@@ -57,12 +58,12 @@ def _lines(probe: Probe, length: float) -> FloatArray:
     Those of a round tool or a pyramid go from its axis to its axis, by a shaft with the outline that the tool has at
     one height; those of a long one are sections, the first and last points.
     """
-    if probe.footprint.is_round:
+    if (probe.footprint if isinstance(probe, Indenter) else probe).is_round:
         angles, top = np.linspace(0, 2 * np.pi, _LINES), (0.0, 0.0, length)
         farthest = (_ROUND if probe.is_round else _ACROSS) * probe.circumradius
         rays = farthest * np.column_stack([np.cos(angles), np.sin(angles)])
-        ends = _at_height(probe, rays, min(length, float(probe.profile(rays).min())))
-        return np.array([[*_line(probe, np.zeros(2), end, length), top] for end in ends])
+        edge = _at_height(probe, rays, min(length, float(probe.profile(rays).min())))
+        return np.array([[*_line(probe, np.zeros(2), end, length), top] for end in edge])
     along, across = probe.outline().max(axis=0)
     sides = np.array([0.0, _ACROSS * across])
     starts = (np.array([x, 0.0]) for x in np.linspace(-along, along, _LINES))

@@ -25,6 +25,11 @@ All numbers that a query needs are doubles, in SI units, for a body with E = 1:
     largest                  largest contact radius, in units of the room: distance to the nearest side or ``thickness``
     bar                      (4,) b: error of c is (b0 + b2 (a/room)⁴)/room + b1 |h| <r²>; relative error of F, b3 more
 
+The study's own tool, with which a page begins, optional:
+
+    tool                     (7,) shape (0 disc, 1 sphere, 2 cone, 3 blade, 4 bonded disc), radius (m), half angle
+                             (rad), length, width, depth (m), a blade's turn from x (rad); 0: it has no such size
+
 Relaxation of all tissue, optional:
 
     relaxation_share         (relaxing,) shares of the modulus at once, of a Prony series,

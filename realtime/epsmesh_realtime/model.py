@@ -34,6 +34,7 @@ class Model:
     - ``pairs``: interaction of several tools; without it, the model answers for one tool at a time.
     - ``relaxation``: shares of the modulus at once, and their times (s). A query is answered for a sudden touch;
       for forces over time see :class:`epsmesh_realtime.history.History`.
+    - ``tool``: shape, sizes and depth of the study's own tool, as `epsmesh_realtime.file` has them; () if not known.
     - ``near``: a ball at large displacements on a half-space; without it, displacements are small.
     """
 
@@ -53,11 +54,13 @@ class Model:
     pairs: Pairs | None = None
     relaxation: tuple[tuple[float, float], ...] = ()
     near: Near | None = None
+    tool: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         x, y = (2e3 * size for size in self.table.reach)
         region = f"a region of {x:.3g} mm across" if self.table.is_round else f"a region of {x:.3g} × {y:.3g} mm"
-        tissue = f"{1e3 * self.thickness:.3g} mm of tissue, E = {self.young:.4g} Pa, ν = {self.poisson:.3g}"
+        deep = f"{1e3 * self.thickness:.3g} mm of the same tissue below"
+        tissue = f"{deep}, E = {self.young:.4g} Pa, ν = {self.poisson:.3g}"
         low, high = self.table.poisson
         large = ", at large displacements" if self.near else ""
         return f"Model of {region}, {tissue}{f' ({low:.3g} to {high:.3g})' if high > low else ''}{large}"
@@ -141,6 +144,7 @@ class Model:
             ("relaxation_share", "relaxation_time"), zip(*self.relaxation, strict=True), strict=False
         ):
             found[name] = terms
+        found |= {"tool": self.tool} if self.tool else {}
         return {name: np.asarray(value, dtype=float) for name, value in found.items()}
 
 
@@ -179,6 +183,7 @@ def loaded(data: bytes, evaluator: Evaluator) -> tuple[Model, dict[str, NDArray[
         pairs=Pairs.of(found),
         near=Near.of(found),
         relaxation=_relaxation(found),
+        tool=_tool(found),
         **{name: float(found[name]) for name in _NUMBERS if name in found},
     )
     vars(model)["evaluator"] = evaluator
@@ -191,6 +196,20 @@ def _relaxation(found: Mapping[str, NDArray[Any]]) -> tuple[tuple[float, float],
         found[f"relaxation_{kind}"].tolist() if "relaxation_share" in found else [] for kind in ("share", "time")
     )
     return tuple(zip(shares, times, strict=True))
+
+
+def _tool(found: Mapping[str, NDArray[Any]]) -> tuple[float, ...]:
+    """Return the study's tool in a file's arrays, () if there is none.
+
+    Raises:
+        ModelError: if it is damaged.
+    """
+    if "tool" not in found:
+        return ()
+    tool = found["tool"]
+    if tool.shape != (7,) or not np.isfinite(tool).all() or tool[0] not in range(5) or tool[1:6].min() < 0:
+        raise ModelError("tool has impossible numbers: the file is damaged")
+    return tuple(tool.tolist())
 
 
 def about(found: Mapping[str, NDArray[Any]]) -> dict[str, str]:

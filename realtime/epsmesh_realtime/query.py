@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import nan
+from math import atan2, isnan, nan
 from struct import Struct, error
 from typing import Any
 
@@ -77,6 +77,14 @@ class Query:
             return _PACKED.pack(*numbers)
         except error:
             raise TypeError(f"sizes, depth, E and ν of a query are numbers, in SI units: {self}") from None
+
+    @property
+    def tool_numbers(self) -> tuple[float, ...]:
+        """Shape as C numbers it, radius, angle, length, width, depth, and the turn of ``along`` from x; 0 for none."""
+        sizes = (self.radius, self.angle, self.length, self.width)
+        shape = _SHAPES.get((self.tool, self.contact), _UNKNOWN)
+        x, y, _ = self.along or (1.0, 0.0, 0.0)
+        return (shape, *(0.0 if isnan(size) else size for size in sizes), self.depth, atan2(y, x))
 
 
 def packed_each(query: Query, young: float, poisson: float) -> NDArray[Any]:

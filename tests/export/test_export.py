@@ -366,6 +366,7 @@ def test_a_layer_is_a_load_on_the_regular_part_of_the_skin():
 def test_an_inclusion_off_the_axis_of_a_cylinder_is_where_it_is():
     inside = TUMOUR | {"at": ["5 mm", "0 mm", "-12 mm"]}
     scope = scope_of(study(body=CYLINDER | {"inclusion": [inside]}))
+    assert scope.tool[1] == scope.case.probe.radius
     region = Region.of(scope.body, 0.6)
     assert (region.is_round, region.is_axial, region.even) == (True, False, (False, True))
     mesh, law = coarse_mesh(scope.case, region), MaterialLaw.of(*scope.tissues_at(0.45))

@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from epsmesh_realtime import ModelError, read_surface
+from epsmesh_realtime.query import Query
+from pipeline.export.file import write_model
 from pipeline.touch.page import render, write_touch_page
 from pipeline.touch.server import HOST, PageServer
 from tests.realtime.synthetic import random_surface, write_random, write_surface
@@ -242,6 +245,36 @@ def test_the_page_of_relaxing_tissue_says_that_it_shows_a_sudden_touch():
     assert "sudden touch" not in render(surface, "")
     model = replace(surface.model, relaxation=((0.4, 2.0),))
     assert "sudden touch" in render(replace(surface, model=model), "")
+
+
+@in_browser
+@pytest.mark.parametrize(
+    ("asked", "name"),
+    [
+        ({"tool": "sphere", "radius": 9e-3}, "sphere"),
+        ({"tool": "cone", "radius": 3e-3, "angle": 1.2}, "cone"),
+        ({"tool": "blade", "length": 5e-3, "width": 1e-3, "along": (0.0, 1.0, 0.0)}, "blade"),
+        ({"tool": "disc", "radius": 2e-3, "contact": "bonded"}, "bonded disc"),
+    ],
+)
+def test_the_page_begins_with_the_tool_of_the_study(browser, tmp_path, asked, name):
+    query = Query(at=(0.0, 0.0, 0.0), depth=7e-4, **asked)
+    made = random_surface()
+    model = replace(made.model, tool=query.tool_numbers)
+    write_model(tmp_path / "model.epsm", model, {}, {}, made.table)
+    surface = read_surface(tmp_path / "model.epsm")
+    browser.open(write_touch_page(surface, tmp_path / "page.html", ""))
+    drawn(browser)
+    assert browser.ask("document.querySelector('[name=tool]').value") == name
+    touch = surface.model.answer(query)
+    assert touch.status == "ok"
+    assert newtons(told(browser, "force")) == pytest.approx(touch.force[2], rel=6e-3)
+    assert "are not shown" in browser.ask("document.body.textContent")
+    change(browser, x=33)
+    assert "print" not in told(browser, "status")
+    write_model(tmp_path / "model.epsm", replace(model, tool=(9.0, *query.tool_numbers[1:])), {}, {}, made.table)
+    with pytest.raises(ModelError, match="tool has impossible numbers"):
+        read_surface(tmp_path / "model.epsm")
 
 
 @in_browser

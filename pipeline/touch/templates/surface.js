@@ -3,7 +3,7 @@
 // Edges near the tool are divided until they are shorter than this share of the contact's radius and of the way to its rim, and
 // until none crosses the rim; so many vertices are added at most. In units of the contact's radius: what is on the rim, and the
 // longest edge between two points of the rim that is divided on it.
-const SEEN = { FINE: 0.07, LEVELS: 7, ADDED: 30000, ON_RIM: 1e-3, ALONG: 0.8 };
+const SEEN = { FINE: 0.07, LEVELS: 9, ADDED: 30000, ON_RIM: 1e-3, ALONG: 0.8 };
 // Bisections of an edge for the point where it crosses the rim.
 const BISECTIONS = 12;
 
