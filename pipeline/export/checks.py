@@ -179,7 +179,7 @@ def margin(count: int) -> float:
 def narrowest(model: Model, checks: Sequence[Check]) -> tuple[float, float, float, float]:
     """Return the narrowest error bars of a model, on average, that cover all ``checks``, times a :func:`margin`.
 
-    The first three parts of ``model.bar`` keep their proportions. The fourth, which is the same for all tools, is at
+    The first three parts of ``model.bar`` get one factor. The fourth, which is the same for all tools, is at
     least the error that full solves may have in common, a share of their error bars.
     """
     bare = replace(model, bar=(*model.bar[:3], 0.0))

@@ -214,8 +214,8 @@ def extrapolate_found(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the limit of F / d (1, 1) of unilateral contact, and its bar.
 
-    F is lowered by a share of its bar; where one degree more raises it, F and its bar stay. At large displacements the
-    limit is known for balls only.
+    The middle of its known error is subtracted from F; where one degree more raises F, F and its bar stay. At large
+    displacements the limit is known for balls only.
     """
     if known.is_large:
         return _extrapolate_found_large(stiffness, decrements, bars, known)
