@@ -255,8 +255,13 @@ def _lacking(plan: Plan, opened: Opened, comm: MPI.Comm) -> Plan | None:
     """
 
     def get(keys: Collection[str]) -> dict[str, Record]:
-        found = opened.store.get(keys) if opened.store and not opened.is_fresh else {}
-        return comm.bcast({key: record for key, record in found.items() if record.is_ok})
+        found: dict[str, Record] = {}
+        if opened.store:
+            stored = {} if opened.is_fresh else opened.store.get(keys)
+            ended = fail_begun(opened.store, keys)
+            found = ended.failed | {key: record for key, record in stored.items() if record.is_ok}
+            opened.again = (opened.again | ended.again) - found.keys()
+        return comm.bcast(found)
 
     known = comm.bcast(opened.records)
     return complete(plan, opened.records if comm.rank == 0 else known, get)

@@ -11,11 +11,13 @@ from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
 from pipeline.report.read import read_file
-from pipeline.run.begun import Begun, Ended, done_beside, fail_begun, store_done
+from pipeline.run.begun import KILLED, Begun, Ended, done_beside, fail_begun, store_done
+from pipeline.run.execute import compute
 from pipeline.run.outbox import Outbox
 from pipeline.run.reading import open_to_read
 from pipeline.run.record import Record
 from pipeline.run.store import Store
+from pipeline.workflow import _lacking as lacking
 from pipeline.workflow import prepare
 from tests.cases import study
 from tests.commands import run_script as run
@@ -192,6 +194,30 @@ def test_a_file_that_its_process_removes_meanwhile_is_none(store: Store, monkeyp
     assert not fail_begun(store, ["a"]).failed
     (store.path.parent / f".{store.path.name}-done-here-1-2").write_text(Record("a", "ok").to_json())
     assert not [*done_beside(store.path)]
+
+
+def test_a_further_trial_that_ends_its_process_is_noticed(tmp_path: Path):
+    """Which depths are tried at a given force is not known before the first ones are on record."""
+    wanted = study(probe={"shape": "cone", "angle": "70 deg", "radius": "9 mm", "contact": "unilateral",
+                          "force": "5 mN", "depth": None})  # fmt: skip
+    plan, path = make_plan(wanted), tmp_path / "cases.sqlite"
+    records = compute(plan, MPI.COMM_SELF)
+    further = next(key for key in records if key not in plan.all_keys)
+    store = Store(path)
+    store.put_all([records[key] for key in plan.all_keys])
+    store.close()
+    begun = tmp_path / f".{path.name}-begun-here-1-2"
+    for times in (1, 2):
+        begun.write_text(json.dumps({"keys": [further], "why": KILLED}))
+        planned, opened = prepare(wanted, MPI.COMM_SELF, path)
+        assert begun.is_file()
+        following = lacking(planned, opened, MPI.COMM_SELF)
+        assert following is not None
+        assert not begun.is_file()
+        assert (further in opened.again) == (further in following.all_keys) == (times == 1)
+        assert (opened.records.get(further) is not None) == (times == 2)
+        opened.store.close()
+    assert opened.records[further].message == KILLED
 
 
 def test_a_damaged_file_blames_no_case(store: Store):
