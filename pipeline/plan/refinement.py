@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 from math import inf
 
 from pipeline.plan import estimate
@@ -16,6 +17,9 @@ LEAST: tuple[float, float] = (40_000, 200_000)
 # Tetrahedra of a mesh in units of the estimate, by refinements: once .71 to .86 on four scenes, twice .56 to .77 on
 # three of 0.9 to 10 million unknowns.
 _FEWER = (1.0, 0.8, 0.66)
+# Least thickness of a layer, in units of the area with its element size, for a refined mesh. The coarse elements are
+# larger than a layer; of .04 and less gmsh's first meshes were flat or failed, and the next ones did not resolve it.
+_FILM = 0.06
 _MANY = 200_000  # scenes of a large study
 
 
@@ -39,7 +43,8 @@ def refinements(case: Case) -> int:
 
     Points of a refined mesh are placed on surfaces that a formula gives. Bodies from files are therefore not refined,
     nor are curved bodies cut at ε, because two such surfaces meet there, nor slits. Nor are inclusions: some of their
-    elements would fold. Layered bodies are refined once: gmsh's elements would be too large for a layer.
+    elements would fold. Layered bodies are refined once: gmsh's elements would be too large for a layer. For a film
+    they are so at once: bodies with one are not refined.
     """
     return _refinements(_Scene(case.body, case.probe, case.mesh, case)) if case.mesh.degree > 1 else 0
 
@@ -56,5 +61,13 @@ def _refinements(scene: _Scene) -> int:
         return 0
     if case.column < inf and any(surface.is_curved for group in body.surfaces().values() for surface in group):
         return 0
+    if _thinnest(body, scene.probe) < _FILM:
+        return 0
     count = estimate.cells(case) * 0.5 ** len(mirror_planes(case))
     return sum(count >= least for least in (LEAST[:1] if body.regions else LEAST))
+
+
+def _thinnest(body: Body, probe: Probe) -> float:
+    """Return the least thickness of a layer, in units of the radius within which elements have its size."""
+    top, heights = body.heights[1], (body.heights[1], *body.interfaces)
+    return min(((high - low) / (probe.circumradius + top - low) for high, low in pairwise(heights)), default=inf)

@@ -117,6 +117,18 @@ def test_ranks_have_parts_of_equal_size_if_cells_of_one_stay_together():
 
 
 @pytest.mark.usefixtures("refine_all")
+def test_elements_of_a_film_are_as_many_as_estimated():
+    """Coarse elements of a refined mesh are larger than its thickness; some meshes of them had a quarter of these."""
+    film = SKIN | {"thickness": "10 um"}
+    disc = {"radius": "0.25 mm", "depth": "10 um", "at": ["1 mm", "0 mm"]}
+    mesh = {"epsilon": "full", "fine": "10 mm", "coarse": "10 mm", "rim": "0.1 mm", "growth": 0.7, "degree": 2}
+    case = case_of({"body": {"size": ["20 mm"] * 3, "layer": [film]}, "probe": disc, "mesh": mesh})
+    planes = mirror_planes(case)
+    assert len(planes) == 1
+    ratio = len(mesh_arrays(case, planes).cells) / refinement.cells(case) * 2 ** len(planes)
+    assert 0.5 < ratio < 2
+
+
 def test_refined_points_are_on_the_rim():
     fine = mesh_arrays(case_of({"probe": OFF}), ())
     radius = np.linalg.norm(fine.points[fine.rim] - [4e-3, 3e-3, 0], axis=1)
