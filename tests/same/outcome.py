@@ -88,7 +88,7 @@ def of_dataset(dataset: xr.Dataset, at: Mapping[str, int] = _WHOLE) -> Outcome:
             bars = dataset[bar].broadcast_like(variable).values if bar in dataset else np.full(numbers.shape, np.nan)
             values[str(name)] = Value(
                 numbers,
-                str(variable.attrs.get("units", "1")),
+                str(variable.attrs.get("units", "?")),
                 np.asarray(bars, dtype=float),
                 (*map(str, variable.dims),),
             )
