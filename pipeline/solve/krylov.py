@@ -12,8 +12,8 @@ from petsc4py import PETSc
 
 from pipeline.solve import SolveError
 
-# Number of dofs up to which Cholesky is faster than conjugate gradients, measured: docs/solvers.md. Degree 4 is that of error
-# bars.
+# Number of dofs up to which Cholesky is faster than conjugate gradients, measured: docs/solvers.md. Degree 4 is that of
+# error bars.
 DIRECT_LIMIT = {1: 5_000, 2: 1_500, 3: 1_500, 4: 1_500}
 
 _CG = {"ksp_type": "cg", "ksp_atol": 0.0, "ksp_initial_guess_nonzero": True}
