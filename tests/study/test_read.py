@@ -339,7 +339,7 @@ WORDS = {
     "c1 of a layer": ({"body": {"layer": [{"name": "skin", "c1": "3 kPa"}]}}, ["layer[1].c1", "4 (1 + poisson) C1"]),
     "permeability": ({"material": {"permeability": 1e-12}}, ["flow of fluid", "[[material.relaxation]]"]),
     "a cylinder for a punch": ({"probe": {"shape": "cylinder"}}, ['"cylinder"', 'shape = "disc"']),
-    "a pyramid": ({"probe": {"shape": "Berkovich"}}, ["70.3 deg"]),
+    "a pyramid": ({"probe": {"shape": "Berkovich"}}, ['shape = "pyramid"', "65.27 deg"]),
     "a sphere for a body": ({"body": {"shape": "sphere"}}, ['shape = "ellipsoid" with three equal `axes`']),
     "a half-space": ({"body": {"shape": "half-space"}}, ["20 contact radii"]),
     "a roller": ({"body": {"roller": "sides"}}, ["body.roller", "`fixed`", "not computed"]),
