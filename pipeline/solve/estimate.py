@@ -72,10 +72,10 @@ _FOUND_ENDED, _FOUND_ELSEWHERE = (0.43, 0.4), 1.25
 _FOUND_AGAIN, _FOUND_AT_EDGE = 2.0, 0.1
 # The same at large displacements, for the area's bar, by degree: docs/accuracy.md.
 AT_EDGE_LARGE = {2: 0.15, 3: 0.075}
-# The factor on the bar there, where the contact reaches the tool's own end: nodes at a sharp end slide off it, so that
+# The factor on the bar there, where the contact reaches a sharp end of the tool: nodes at the end slide off it, so that
 # F lacks a strip of an element, which one degree more sees in part. Neo-Hookean, a wedge of 75° at 1 mm, elements of
 # 0.6, 0.3 and 0.15 mm at its ends.
-AT_END_LARGE = 3.0
+AT_SHARP_END = 3.0
 # The limit of F there, for balls on plain bodies in degree 2: F_2 - (centre ± spread) (F_2 - F_3). The bar is at least
 # a share of the area's bar, which covers what the contact's edge adds by chance.
 _FOUND_LARGE, _FOUND_LARGE_AT_EDGE, _FOUND_LARGE_DEGREE = (1.08, 0.35), 0.12, 2

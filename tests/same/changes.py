@@ -370,7 +370,7 @@ def _turned(study: Study, turn: Callable[[list[Any]], list[Any]], sizes: Callabl
         probe["at"] = turn(probe["at"])
     if "axis" in probe:
         probe["axis"] = turn(probe["axis"])
-    if probe["shape"] in ("blade", "wedge", "ellipse"):
+    if probe["shape"] in ("blade", "wedge", "ellipse", "pyramid"):
         probe["direction"] = turn(probe.get("direction", [1, 0, 0]))
     if "gravity" in other.get("load", {}):
         other["load"]["gravity"] = turn(other["load"]["gravity"])
@@ -387,6 +387,8 @@ def _rotated_back(matrix: np.ndarray) -> Callable[[Outcome], Outcome]:
             along = value.dims.index("component")
             numbers = np.moveaxis(np.tensordot(matrix.T, value.numbers, (1, along)), 0, along)
             bars = np.moveaxis(np.tensordot(np.abs(matrix.T), np.nan_to_num(value.bars), (1, along)), 0, along)
+            unknown = np.moveaxis(np.tensordot(np.abs(matrix.T), np.isnan(value.bars), (1, along)), 0, along)
+            bars[unknown > 0] = np.nan
             return replace(value, numbers=numbers, bars=bars)
         if name == "torque":
             return _times(value, float(np.linalg.det(matrix)))

@@ -32,7 +32,7 @@ from pipeline.solve.contact.tool import Tool
 from pipeline.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
 from pipeline.solve.elements.fields import Column
 from pipeline.solve.ended import ended
-from pipeline.solve.estimate import AT_EDGE_LARGE, AT_END_LARGE, found_again_bar
+from pipeline.solve.estimate import AT_EDGE_LARGE, AT_SHARP_END, found_again_bar
 from pipeline.solve.movement import Loads, Movement
 from pipeline.solve.newton import LargeError
 from pipeline.solve.response import Contact, Response, reaction
@@ -151,8 +151,10 @@ class LargeContactSolution:
         return bool((self.touched.active & self.body.candidates.is_edge).any())
 
     @property
-    def is_beside_end(self) -> bool:
-        """Whether facets at the tool's own end are in contact: the nodes at the end itself may have slid off it."""
+    def is_at_sharp_end(self) -> bool:
+        """Whether facets at a sharp end of the tool are in contact: nodes at the end itself may have slid off."""
+        if not self.tool.is_sharp:
+            return False
         candidates = self.body.candidates
         at_end = np.zeros(len(candidates), dtype=bool)
         edge = np.flatnonzero(candidates.is_edge)
@@ -232,7 +234,7 @@ class LargeContactSolution:
         finer = self._found_again(movement.loads, stack)
         share, at_edge = 1 - finer.force / self.force, self._area().bar
         taken, bar = found_again_bar(share, at_edge, AT_EDGE_LARGE[self.body.elements.degree])
-        bar *= AT_END_LARGE if self.is_beside_end else 1.0
+        bar *= AT_SHARP_END if self.is_at_sharp_end else 1.0
         # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue
         # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
         of_area = nan if self.is_ended else at_edge + bar + abs(finer.whole_area / self.whole_area - 1)

@@ -23,7 +23,7 @@ class Tool:
     ends. Elsewhere contact must not reach that edge. ``first`` (m) is the smallest height, zero on the
     axis. ``friction`` is Coulomb's coefficient, infinite for tissue that sticks. ``distance`` is that of
     points (n, 3) to the probe pressed in by a depth (m) from the first touch, for contact at large displacements.
-    ``foot`` (m) are x and y of its axis.
+    ``foot`` (m) are x and y of its axis. ``is_sharp`` says that it ends at a sharp edge, off which tissue slides.
     """
 
     height: Callable[[FloatArray], FloatArray]
@@ -32,6 +32,7 @@ class Tool:
     friction: float = 0.0
     distance: Callable[[FloatArray, float], Distance] = _no_distance
     foot: tuple[float, float] = (0.0, 0.0)
+    is_sharp: bool = False
 
     def torque(self, points: FloatArray, forces: FloatArray) -> float:
         """Return the torque (N m) of the tissue on the tool about its advance, −z.
