@@ -4,13 +4,12 @@ import itertools
 import re
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.quantities import RESERVED
-from pipeline.shapes.bodies.image import FromImage
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.closed import Closed
 from pipeline.shapes.complex import OUTSIDE, TISSUE
@@ -26,6 +25,9 @@ from pipeline.study.howto import page_of
 from pipeline.study.loads import FREE
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Material, material_of
+
+if TYPE_CHECKING:
+    from pipeline.shapes.bodies.image import FromImage
 
 # Room around an embedded region, in units of half of its smallest thickness: elements there are no larger.
 GAP = 0.1
@@ -233,21 +235,24 @@ def _check_cavities(body: Body, places: Sequence[str], problems: Problems) -> No
 
 def _check_sheets(body: Body, problems: Problems) -> None:
     """Report labels of an image that are sheets or threads of about a voxel: their surfaces cannot be meshed."""
-    if not isinstance(body, FromImage) or (parts := body.partition) is None:
+    if body.shape != "image":
+        return
+    image = cast("FromImage", body)
+    if (parts := image.partition) is None:
         return
     for number in parts.regions.tolist():
-        key, found = "body.label", body.label
+        key, found = "body.label", image.label
         if number != TISSUE:
             piece = cast(Segment, body.regions[number - 1])
             key, found = _place_of(piece, body.places[number - 1])
         surface = shell_of(parts.surface(number), is_part=True)
         # A thick label with steps of voxels is thin at most points; a thread is thicker than volume over surface.
         thickness = 2 * max(surface.least, surface.volume / surface.triangles.area)
-        if surface.is_thin and thickness < _VOXELS * body.finest_step:
+        if surface.is_thin and thickness < _VOXELS * image.finest_step:
             problems.error(
                 key,
                 found,
-                f"{body.region_names[number]} is {in_mm(thickness)} thick, {thickness / body.finest_step:.1f} voxels, "
+                f"{body.region_names[number]} is {in_mm(thickness)} thick, {thickness / image.finest_step:.1f} voxels, "
                 f"and its surface {1e4 * surface.triangles.area:,.0f} cm²: a label so thin for its size must be at "
                 f"least {_VOXELS:g} voxels thick, or its two sides cross when they are meshed. Resample the labels to "
                 "voxels of half the size, segment it thicker, or make it one with its neighbour by a list of labels",

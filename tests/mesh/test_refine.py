@@ -129,6 +129,7 @@ def test_elements_of_a_film_are_as_many_as_estimated():
     assert 0.5 < ratio < 2
 
 
+@pytest.mark.usefixtures("refine_all")
 def test_refined_points_are_on_the_rim():
     fine = mesh_arrays(case_of({"probe": OFF}), ())
     radius = np.linalg.norm(fine.points[fine.rim] - [4e-3, 3e-3, 0], axis=1)
