@@ -144,7 +144,7 @@ def test_interrupted_parallel_run_writes_what_is_done_and_two_ranks_agree_with_o
         assert len(records.rows()) >= 2  # F_exact of scenes among them
     again = spawn("run", small, "--output", tmp_path, ranks=2)
     assert again.returncode == 0, again.stderr
-    assert again.stdout.count("wrote") == 1
+    assert again.stdout.count("small.nc") == 1  # of one rank; all may have been finished before the signal was heard
     one, two = (read_file(folder / "small.nc") for folder in (whole, tmp_path))
     assert (two["status"] == "ok").all()
     np.testing.assert_allclose(two["force"], one["force"], rtol=1e-8)
