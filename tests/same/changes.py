@@ -14,11 +14,11 @@ import numpy as np
 from tests.pairs import BASE, FEATURES, Study
 from tests.same.outcome import Outcome, Value
 from tests.same.quantities import in_other_units, number_of, scaled, times
+from tests.same.scenes import pieces
 
 _LAW_KEYS = ("law", "c2", "c3", "terms", "limit", "alpha", "fibres")
 _TISSUE_KEYS = ("young", "poisson", "density", "relaxation", *_LAW_KEYS)
 _FLAT = ("box", "cylinder")
-_SHELL = ("epsilon", "fine", "coarse", "rim")
 
 
 @dataclass(frozen=True)
@@ -248,7 +248,7 @@ def _neutral(study: Study, dice: random.Random) -> Pair | None:
         {"law": "veronda-westmann", "alpha": 1e-4},
     ]
     bare = copy.deepcopy(study)
-    for tissue in (bare["material"], *_pieces(bare)):
+    for tissue in (bare["material"], *pieces(bare)):
         for key in _LAW_KEYS:
             tissue.pop(key, None)
     one, two = dice.sample(neutral, 2)
@@ -260,7 +260,7 @@ def _small(study: Study, dice: random.Random) -> Pair | None:
     probe = study["probe"]
     if not _is_large(study) or study["material"]["law"] == "holzapfel" or "history" in probe or "insertion" in probe:
         return None
-    if probe.get("contact") == "unilateral" or "load" in study or _pieces(study):
+    if probe.get("contact") == "unilateral" or "load" in study or pieces(study):
         return None
     if study["mesh"].get("outside") == "linear":
         return None
@@ -282,7 +282,7 @@ def _no_friction(study: Study, dice: random.Random) -> Pair | None:
 
 @_change("relaxation that is too slow to matter")
 def _slow(study: Study, dice: random.Random) -> Pair | None:
-    if "history" not in study["probe"] or any("relaxation" in one for one in (study["material"], *_pieces(study))):
+    if "history" not in study["probe"] or any("relaxation" in one for one in (study["material"], *pieces(study))):
         return None
     slow = [{"share": 0.4, "time": "100000000 s"}]
     return Pair(study, _copy(study, material={"relaxation": slow}), one_mesh=False, allowed=1e-4, common=True,
@@ -291,13 +291,13 @@ def _slow(study: Study, dice: random.Random) -> Pair | None:
 
 @_change("relaxation that is over at once")
 def _fast(study: Study, dice: random.Random) -> Pair | None:
-    if "history" not in study["probe"] or any("relaxation" in one for one in (study["material"], *_pieces(study))):
+    if "history" not in study["probe"] or any("relaxation" in one for one in (study["material"], *pieces(study))):
         return None
     softer = _copy(study, material={"young": times(study["material"]["young"], 0.6)})
-    for number, piece in enumerate(_pieces(study)):
-        _pieces(softer)[number]["young"] = times(piece["young"], 0.6)
+    for number, piece in enumerate(pieces(study)):
+        pieces(softer)[number]["young"] = times(piece["young"], 0.6)
     fast = _copy(study, material={"relaxation": [{"share": 0.4, "time": "0.000001 s"}]})
-    for piece in _pieces(fast):
+    for piece in pieces(fast):
         piece["relaxation"] = [{"share": 0.4, "time": "0.000001 s"}]
     return Pair(softer, fast, one_mesh=False, allowed=1e-4, common=True,
                 related=_without("dissipated_energy", "force_elastic", "energy"))  # fmt: skip
@@ -311,10 +311,6 @@ def _weightless(study: Study, dice: random.Random) -> Pair | None:
     # Strains of loads and of the depth, one of which relaxes, have no sum.
     without = _without("max_strain") if "history" in study["probe"] else _without()
     return Pair(study, _copy(study, load=weight), one_mesh=False, allowed=1e-3, common=True, related=without)
-
-
-def _pieces(study: Study) -> list[dict[str, Any]]:
-    return [p for key in ("layer", "inclusion", "region") for p in study["body"].get(key, ()) if not p.get("hollow")]
 
 
 def _without(*names: str) -> Callable[[Outcome], Outcome]:
@@ -363,7 +359,7 @@ def _turned(study: Study, turn: Callable[[list[Any]], list[Any]], sizes: Callabl
             body[key] = sizes(body[key])
     for inclusion in body.get("inclusion", ()):
         inclusion["at"] = turn(inclusion["at"])
-    for tissue in (other["material"], *_pieces(other)):
+    for tissue in (other["material"], *pieces(other)):
         if "fibres" in tissue:
             tissue["fibres"]["direction"] = turn(tissue["fibres"]["direction"])
     if "at" in probe:
@@ -531,7 +527,7 @@ def _shared(study: Study, dice: random.Random) -> Pair | None:
     ]
     if "depth" not in before["probe"]:
         kinds.pop()
-    if own := _pieces(before):
+    if own := pieces(before):
         kinds += [lambda: own[0].update(young=times(own[0]["young"], 1.3)), lambda: own[0].update(poisson=0.33)]
     dice.choice(kinds)()
     return Pair(study, study, before=before)

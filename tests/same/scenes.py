@@ -99,5 +99,6 @@ def write_files(folder: Path) -> None:
 
 
 def pieces(study: Study) -> list[dict[str, Any]]:
-    """Return the tables of layers, inclusions and regions of a study with one body."""
-    return [piece for key in ("layer", "inclusion", "region") for piece in study["body"].get(key, ())]
+    """Return the tables of layers, inclusions and regions with tissue of a study with one body."""
+    tables = (piece for key in ("layer", "inclusion", "region") for piece in study["body"].get(key, ()))
+    return [piece for piece in tables if not piece.get("hollow")]
