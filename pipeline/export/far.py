@@ -4,9 +4,10 @@ Both far tables of a model derive from it. R (m/N for E = 1) is solved for force
 the region, or of a radius. Symmetry gives it for their images: reflections of a box, rotations of a round body.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from hashlib import sha256
 from itertools import product
 from math import pi
 
@@ -21,7 +22,7 @@ from pipeline.export.region import Region
 from pipeline.export.tabulate import extrema, ratios_of
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.far_field import PointForce
-from pipeline.solve.greens_function import OnBoundary, regular_on_boundary
+from pipeline.solve.greens_function import OnBoundary, each_on_boundary
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
@@ -65,20 +66,25 @@ class Pressed:
     doubt: float = 0.0
     ranks: Ranks = ALONE
 
+    @cached_property
+    def boundary(self) -> OnBoundary:
+        """The boundary without forces. All ranks have the same mesh, and so the same numbers on it."""
+        return OnBoundary.of(self.mesh)
+
     def solve(self, places: Sequence[Place], poisson: float) -> OnBoundary:
-        """Return R (m/N, E = 1) for a force at each place; collective."""
-        # All ranks have the same mesh, and so the same numbers on the boundary.
-        boundary: list[OnBoundary] = []
+        """Return R (m/N, E = 1) for a force at each place; collective. What earlier exports have solved is read."""
+        nodes = self.boundary.nodes
 
-        def solve(some: Sequence[Place]) -> list[FloatArray]:
+        def each(some: Sequence[Place]) -> Iterator[FloatArray]:
             forces = [self.force(place, poisson) for place in some]
-            boundary.append(regular_on_boundary(self.mesh, forces, self.law(poisson)))
-            scales = np.array([per_newton(force) for force in forces])
-            return list(scales[:, None, None] * boundary[0].values)
+            found = each_on_boundary(self.mesh, self.boundary, forces, self.law(poisson))
+            return (per_newton(force) * values for force, values in zip(forces, found, strict=True))
 
-        values = np.array(self.ranks.together(places, solve))
-        # The first rank always has some of the places.
-        return replace(self.ranks.on_first(lambda: boundary[0]), values=values)
+        # Meshes may differ from one export to the next.
+        mesh = sha256(nodes.tobytes() + self.boundary.triangles.tobytes()).hexdigest()
+        what = f"places solved for the surface, ν = {poisson:.3g}"
+        values = self.ranks.keeping(places, each, what, (mesh, self.region, poisson))
+        return replace(self.boundary, values=np.array(values))
 
 
 @dataclass(frozen=True, eq=False)

@@ -148,17 +148,30 @@ def compile_regular() -> None:
 class OnBoundary:
     """R on the boundary of a body, on quadratic triangles: ``nodes`` (n, 3) in m, ``triangles`` (m, 6) index them.
 
-    Corners are ordered around the outward normal; then come the mid nodes of the sides opposite to each. ``values``
-    (forces, n, 3), in m, are per unit of the field of each force.
+    Corners are ordered around the outward normal; then come the mid nodes of the sides opposite to each. ``among`` (n,)
+    are the numbers of the nodes in the body's space. ``values`` (forces, n, 3), in m, are per unit of the field of each
+    force.
     """
 
     nodes: FloatArray
     triangles: IntArray
+    among: IntArray
     values: FloatArray
 
+    @staticmethod
+    def of(body: BodyMesh) -> "OnBoundary":
+        """Return the boundary of a body, without forces."""
+        with Spaces(body) as spaces:
+            space = spaces.get(DEGREE, Conditions(unilateral=True)).space
+            places = np.asarray(space.tabulate_dof_coordinates())
+            used, triangles = np.unique(outer_triangles(compat.cell_dofs(space), places), return_inverse=True)
+        return OnBoundary(places[used], triangles.reshape(-1, 6), used, np.zeros((0, len(used), 3)))
 
-def regular_on_boundary(body: BodyMesh, forces: Sequence[PointForce], law: MaterialLaw | None = None) -> OnBoundary:
-    """Return R on the whole boundary for each of ``forces``, of one Poisson's ratio: see ``regular_parts``.
+
+def each_on_boundary(
+    body: BodyMesh, boundary: OnBoundary, forces: Sequence[PointForce], law: MaterialLaw | None = None
+) -> Iterator[FloatArray]:
+    """Yield R (n, 3) on the whole ``boundary`` for each of ``forces``, of one Poisson's ratio: see ``regular_parts``.
 
     On a curved boundary, with forces of type ``PlacedForce``, R grows logarithmically towards the force.
 
@@ -168,6 +181,5 @@ def regular_on_boundary(body: BodyMesh, forces: Sequence[PointForce], law: Mater
     with Spaces(body) as spaces:
         space = spaces.get(DEGREE, Conditions(unilateral=True))
         places = np.asarray(space.space.tabulate_dof_coordinates())
-        used, triangles = np.unique(outer_triangles(compat.cell_dofs(space.space), places), return_inverse=True)
-        values = [found.reshape(-1, 3)[used] for found in _solved(space, forces, places, law)]
-    return OnBoundary(places[used], triangles.reshape(-1, 6), np.array(values))
+        for values in _solved(space, forces, places, law):
+            yield values.reshape(-1, 3)[boundary.among]
