@@ -83,18 +83,6 @@ class Complex:
         """Whether several regions meet what is outside."""
         return len(np.unique(self.sides[self.sides[:, 1] == OUTSIDE, 0])) > 1
 
-    @cached_property
-    def border(self) -> tuple[FloatArray, IntArray]:
-        """Middles (k, 3), in m, of the edges of the body's surface at which two regions meet, and these (k, 2)."""
-        outer = self.sides[:, 1] == OUTSIDE
-        edges = np.sort(self.facets[outer][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        region = np.repeat(self.sides[outer, 0], 3)
-        order = np.lexsort((region, *edges.T))
-        edges, region = edges[order], region[order]
-        apart = (edges[1:] == edges[:-1]).all(axis=1) & (region[1:] != region[:-1])
-        pairs = np.column_stack([region[:-1], region[1:]])[apart]
-        return self.points[edges[:-1][apart]].mean(axis=1), pairs
-
     def surface(self, region: int) -> Triangles:
         """Return the surface of a region."""
         return self._surface(self.boundary(region))

@@ -8,10 +8,7 @@ from collections.abc import Sequence
 from math import prod
 from typing import cast
 
-import numpy as np
-
 from pipeline.shapes.body import Body
-from pipeline.shapes.facetted import Facetted
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.punch import LINEAR
@@ -69,7 +66,6 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for body, probe in placed:
         for check in (check_column, check_ball, check_gap, check_slit_in):
             problems.each(check, body=(body,), probe=(probe,), mesh=meshes)
-    _warn_of_borders(placed, way, problems)
     check_tools(placed, problems)
     check_features(sections, placed, problems)
     check_laws(bodies, materials, problems)
@@ -213,35 +209,6 @@ def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:
             f"{LINEAR:.0%}, linear elasticity is an extrapolation",
         )
     return True
-
-
-def _warn_of_borders(placed: Sequence[tuple[Body, Probe]], way: Axis | None, problems: Problems) -> None:
-    """Warn of places at which regions of a body meet below the footprint: their cases fail."""
-    by_body: dict[str, list[tuple[str, Probe]]] = {}
-    for body, probe in placed:
-        if why := _border_below(body, probe):
-            by_body.setdefault(body.name, []).append((why, probe))
-    for lost in by_body.values():
-        why, first = lost[0]
-        more = f" So do {len(lost) - 1} more of the {len(placed)} places." if len(lost) > 1 else ""
-        problems.warn(way.path if way else "probe.at", [in_mm(x) for x in first.at], f"{why}: this case fails.{more}")
-
-
-def _border_below(body: Body, probe: Probe) -> str:
-    """Return which regions meet below the footprint of a probe, and where; "" if there is one tissue."""
-    if not isinstance(body, Facetted) or (parts := body.partition) is None or not parts.has_divided_skin:
-        return ""
-    frame = probe.frame_on(body)
-    points, pairs = parts.border
-    local = frame.local(points)
-    # What is as far behind the face as the footprint is wide belongs to another side of the body.
-    below = (np.linalg.norm(local[:, :2], axis=1) < probe.circumradius) & (abs(local[:, 2]) < probe.circumradius)
-    if not below.any():
-        return ""
-    nearest = int(np.flatnonzero(below)[np.linalg.norm(local[below], axis=1).argmin()])
-    one, other = (body.region_names[number] for number in pairs[nearest])
-    at = ", ".join(f"{1e3 * x:.4g}" for x in points[nearest])
-    return f"{one} and {other} meet at the body's surface at ({at}) mm, below the footprint"
 
 
 def _has_place(probe: Probe, problems: Problems) -> bool:

@@ -1,13 +1,11 @@
 """Regions of an image that meet each other and the body's surface: meshes and forces of cases, and what is refused."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pipeline.export.scope import ExportError, scope_of
-from pipeline.mesh.generate import GeometryError
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.run import meshing
 from pipeline.shapes.files.labels import LabelMap
@@ -20,6 +18,7 @@ nibabel = pytest.importorskip("nibabel")
 PROBE = {"shape": "disc", "radius": "4 mm", "depth": "0.1 mm", "at": ["-4 mm", "4 mm", "20 mm"]}
 MESH = {"epsilon": "full", "fine": "12 mm", "coarse": "12 mm", "rim": "1.5 mm", "growth": 1.0}
 TISSUE = {"young": "10 kPa", "poisson": 0.4}
+ON_BORDER = ("18 mm", "3 mm", "17 mm")
 LOBE = {"name": "lobe", "label": 5} | TISSUE
 TUMOUR = {"name": "tumour", "label": 7} | TISSUE
 
@@ -46,6 +45,10 @@ def given(tmp_path_factory):
     return sections
 
 
+def faces(corners):
+    return map(tuple, corners[[(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)]].tolist())
+
+
 def volumes(mesh):
     corners = mesh.points[mesh.cells[:, :4]]
     return np.bincount(mesh.regions, np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6)
@@ -63,6 +66,75 @@ def test_regions_that_meet_are_meshed_with_their_volumes_below_a_tool_on_one_of_
         np.testing.assert_array_equal((mesh.regions == number)[clear], (depth > 0)[clear])
     below = np.unique(mesh.facets["probe"])
     assert {*mesh.regions[np.isin(mesh.cells, below).any(axis=1)].tolist()} == {2}
+
+
+@pytest.mark.parametrize(
+    "probe",
+    [
+        {},
+        {
+            "shape": "blade",
+            "length": "9 mm",
+            "width": "3 mm",
+            "direction": [0, 1, 0],
+            "at": ["19.57 mm", "3 mm", "17 mm"],
+        },
+    ],
+    ids=["disc", "along a blade's side"],
+)
+def test_elements_follow_a_border_below_the_footprint(given, probe):
+    """They have its tissues, on the true border; the footprint keeps its edge."""
+    sections = given(TUMOUR, LOBE, at=ON_BORDER)
+    sections["probe"] |= probe
+    if "shape" in probe:
+        del sections["probe"]["radius"]
+    case = study(**sections).case(())
+    parts, mesh = case.body.partition, mesh_arrays(case, ())
+    np.testing.assert_allclose(volumes(mesh), [parts.volume(region) for region in (0, 1, 2)], rtol=0.03)
+    facets = mesh.facets["probe"]
+    owner = {tuple(facet): cell for cell, corners in enumerate(np.sort(mesh.cells[:, :4])) for facet in faces(corners)}
+    region = mesh.regions[[owner[tuple(facet)] for facet in np.sort(facets).tolist()]]
+    centres = mesh.points[facets].mean(axis=1)
+    depth = -case.body.region[1].surface.distance(centres + 1e-5 * np.array(case.frame.axis))
+    clear = np.abs(depth) > 1e-4
+    assert {*region.tolist()} == {0, 2}
+    np.testing.assert_array_equal((region == 2)[clear], (depth > 0)[clear])
+    a, b, c = np.moveaxis(case.frame.local(mesh.points)[facets, :2], 1, 0)
+    area = abs(np.linalg.det(np.stack([b - a, c - a], axis=1))).sum() / 2
+    x, y = case.probe.outline().T
+    assert area == pytest.approx(abs(x[:-1] @ y[1:] - y[:-1] @ x[1:]) / 2, rel=0.03)
+
+
+def test_a_border_of_an_image_has_the_force_of_a_layer_that_the_kernel_draws(tmp_path):
+    """A disc on the side of a box, across the end of its upper layer."""
+    count, voxel = np.array([20, 20, 20]), 2.0
+    labels = np.zeros(count + 8, dtype=int)
+    labels[4:-4, 4:-4, 4:-4] = 1
+    labels[4:-4, 4:-4, 14:-4] = 2
+    affine = 1e-3 * np.column_stack([voxel * np.eye(3), [-27.0, -27.0, -47.0]])
+    image = {"shape": "image", "file": str(write(tmp_path / "box.nii", LabelMap(labels, affine))), "label": 1}
+    upper = TISSUE | {"name": "upper", "young": "100 kPa"}
+    box = {"shape": "box", "size": ["40 mm"] * 3, "layer": [upper | {"thickness": "20 mm"}]}
+    probe = PROBE | {"at": ["20 mm", "0 mm", "-20 mm"]}
+
+    def found(body):
+        body |= {"fixed": {"below": "-30 mm"}}
+        (record,) = solve(body=body, probe=probe, mesh=MESH | {"rim": "1 mm"}, material=TISSUE).values()
+        return record
+
+    drawn, meshed = found(box), found(image | {"region": [upper | {"label": 2}]})
+    assert meshed.force == pytest.approx(drawn.force, rel=0.02)
+    assert max(drawn.force_error, meshed.force_error) < 0.1
+
+
+def test_a_map_across_a_border_has_the_force_of_every_place(given):
+    """It grows from that of the softer tissue to that of the stiffer one."""
+    sections = given(TUMOUR, LOBE | {"young": "40 kPa"})
+    del sections["probe"]["at"]
+    sections["probe"]["path"] = {"points": [[f"{x} mm", "3 mm", "17 mm"] for x in (12, 18, 27)]}
+    soft, across, stiff = (record.force for record in solve(**sections).values())
+    assert soft < across < stiff
+    assert 2 < stiff / soft < 4
 
 
 def test_parts_of_one_material_have_the_force_of_the_whole(given, monkeypatch):
@@ -130,21 +202,7 @@ def test_a_skin_of_two_voxels_is_meshed_and_one_of_one_voxel_is_refused_with_the
     np.testing.assert_allclose(volumes(mesh_arrays(case, ())), [parts.volume(0), parts.volume(1)], rtol=0.03)
 
 
-def test_places_on_a_border_are_told_before_the_run(given):
-    """Those of a path together; a place beside the border, or far above it, is not among them."""
-    sections = given(TUMOUR, LOBE)
-    del sections["probe"]["at"]
-    sections["probe"]["path"] = {"points": [[f"{x} mm", "3 mm", "17 mm"] for x in (0, 17, 19, 28)]}
-    (warning,) = (said for said in study(**sections).warnings if "meet" in said)
-    assert re.search(
-        r"tissue and lobe meet at the body's surface at \(.*\) mm, below the footprint: this case", warning
-    )
-    assert "So do 1 more of the 4 places" in warning
-
-
 def test_what_cannot_be_is_refused_by_name_and_place(given):
-    with pytest.raises(GeometryError, match=r"tissue and lobe meet at the body's surface at \(2\d.*move the"):
-        mesh_arrays(study(**given(TUMOUR, LOBE, at=("18 mm", "3 mm", "17 mm"))).case(()), ())
     disc = {"probe": PROBE | {"contact": "frictionless", "at": ["-4 mm", "4 mm"]}}
     with pytest.raises(ExportError, match=r"body\.region meets the surface"):
         scope_of(study(**given(TUMOUR, LOBE) | disc))

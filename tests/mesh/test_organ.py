@@ -324,7 +324,8 @@ def test_a_footprint_next_to_a_fold_is_set_in_with_a_narrower_collar(tmp_path):
     def lift(places):
         return case.body.lift(case.frame, places)[0]
 
-    contact = set_in(far_surface(case.body).sheet, case.frame, case.probe, sizes_of(case), lift)
+    far = far_surface(case.body)
+    contact = set_in(far.sheet, far.faces, case.frame, case.probe, sizes_of(case), lift)
     edges_of(contact.sheet.facets)
     rim = case.frame.local(contact.sheet.points[contact.rim])
     np.testing.assert_allclose(np.hypot(*rim[:, :2].T), 1.5e-3, rtol=1e-9)

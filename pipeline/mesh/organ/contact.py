@@ -3,23 +3,29 @@
 The points of the footprint's edge are then on its true curve, at the distance of the elements there.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import gmsh
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import GeometryError, MeshError, model_options
 from pipeline.mesh.model_arrays import corners_of, numbered_points
-from pipeline.mesh.organ.sheet import FIXED, PROBE, WALL, Sheet, compact, edges_of
+from pipeline.mesh.organ.borders import Bordered, are_within, borders_within, cut_at_rim, divided_to
+from pipeline.mesh.organ.faces import Faces
+from pipeline.mesh.organ.field import Field
+from pipeline.mesh.organ.sheet import FIXED, FREE, PROBE, WALL, Sheet, compact, edges_of, groups_of
 from pipeline.mesh.reason import reason
 from pipeline.mesh.size import Sizes, set_size_field
+from pipeline.shapes.complex import OUTSIDE
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
-from pipeline.shapes.rays import facing
-from pipeline.shapes.triangles import half_edges
+from pipeline.shapes.rays import facing, pierce
+from pipeline.shapes.triangles import edge_keys, half_edges
 
 Lift = Callable[[FloatArray], FloatArray]
 # Radius of the remeshed patch, in units of the footprint's, if facets are small; smaller ones are tried where a fold
@@ -77,16 +83,14 @@ def _legs(outline: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
     return [(outline[k], outline[k + 1]) for k in range(len(outline) - 1)]
 
 
-def set_in(
-    sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift, *, names: Sequence[str] = ("tissue",)
-) -> Contact:
+def set_in(sheet: Sheet, faces: Faces, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -> Contact:
     """Return the sheet with the footprint's surroundings meshed to ``sizes``, and its edge as edges of the mesh.
 
-    ``lift`` projects points (n, 2) of the probe's plane along its axis onto the true surface. ``names`` are those of
-    the body's regions, by number.
+    So are the borders of regions there. ``faces`` are the body's true ones. ``lift`` projects points (n, 2) of the
+    probe's plane along its axis onto them.
 
     Raises:
-        GeometryError: if a part of the footprint has no tissue below it, or two regions.
+        GeometryError: if a part of the footprint has no tissue below it, or a border of regions runs along its edge.
         FoldedError: if facets around it reach over a fold.
     """
     rim = rim_points(probe, sizes)
@@ -94,41 +98,32 @@ def set_in(
     lifted, followed = lift(rim), lift(edge)
     if not (np.isfinite(lifted).all() and np.isfinite(followed).all()):
         raise GeometryError("a part of the footprint's edge has no connected tissue below it")
-    local, skin = frame.local(sheet.points), sheet.skin
-    for collar in _COLLARS:
-        patch = _patch(skin, local, collar * probe.circumradius + sizes.rim)
-        loops = _loops(skin.facets[patch])
-        if not _lines_cross(local[:, :2], loops, rim) and len(np.unique(skin.sides[patch], axis=0)) == 1:
+    local, radii = frame.local(sheet.points), [collar * probe.circumradius + sizes.rim for collar in _COLLARS]
+    around = borders_within(sheet, _patch(sheet, local, radii[0]))
+    sheet = divided_to(sheet, around, faces, Field(sizes, frame, followed).at)
+    local = frame.local(sheet.points)
+    is_corner = np.zeros(len(rim), dtype=bool) if probe.is_curved else np.isin(rim, probe.outline()).all(axis=1)
+    for radius in radii:
+        patch = _patch(sheet, local, radius)
+        bordered = cut_at_rim(sheet, patch, local[:, :2], rim, is_corner, probe.to_edge, lift)
+        loops = _loops(sheet.facets[patch])
+        if not _lines_cross(bordered, loops):
             break
     else:
-        if len(np.unique(skin.sides[patch], axis=0)) > 1:
-            raise _over_two_regions(skin, patch, frame, names)
         raise FoldedError(f"{_FOLDED}; for a rough surface, set `smooth` to the length of its bumps")
-    if (skin.kind[patch] == FIXED).any():
+    if (sheet.kind[patch] == FIXED).any():
         raise GeometryError("the footprint is on, or next to, the fixed part of the body")
-    plane = _mesh_plane(local[:, :2], loops, rim, probe, sizes)
-    return _joined(sheet, patch, plane, lift, lifted, followed)
-
-
-def _over_two_regions(skin: Sheet, patch: IntArray, frame: Frame, names: Sequence[str]) -> GeometryError:
-    """Return the error for a contact at a border between regions, with the nearest place of that."""
-    edges, sides = skin.border_of_regions()
-    near = np.isin(edges, skin.facets[patch]).any(axis=1)
-    middles = skin.points[edges[near]].mean(axis=1)
-    nearest = np.linalg.norm(middles - np.array(frame.point), axis=1).argmin()
-    (x, y, z), (one, other) = 1e3 * middles[nearest], sorted(sides[near][nearest])
-    return GeometryError(
-        f"{names[one]} and {names[other]} meet at the body's surface at ({x:.4g}, {y:.4g}, {z:.4g}) mm, below the "
-        "footprint or next to it: move the probe, or make it smaller"
-    )
+    return _joined(bordered, _mesh_plane(bordered, loops, probe, sizes), lift, followed)
 
 
 def _patch(sheet: Sheet, local: FloatArray, radius: float) -> IntArray:
     """Return the facets that meet the disc, enlarged until no point of the patch's boundary is used twice."""
-    reachable = facing(local, sheet.facets, 4 * radius)
+    (outer,) = np.nonzero(sheet.kind != WALL)
+    skin = sheet.facets[outer]
+    reachable = outer[facing(local, skin, 4 * radius)]
     corners = local[sheet.facets[reachable]][:, :, :2]
     chosen = reachable[_distance_to_origin(corners) <= radius]
-    chosen = chosen[np.isin(chosen, facing(local, sheet.facets, radius))]
+    chosen = chosen[np.isin(chosen, outer[facing(local, skin, radius)])]
     if not len(chosen):
         raise GeometryError("the probe's axis does not meet the surface")
     for _ in range(20):
@@ -144,10 +139,12 @@ def _patch(sheet: Sheet, local: FloatArray, radius: float) -> IntArray:
     raise FoldedError(_FOLDED)
 
 
-def _lines_cross(local: FloatArray, loops: list[list[int]], rim: FloatArray) -> bool:
-    """Return whether boundary lines of the patch, and the rim, cross in the plane: gmsh would end the process."""
-    closed = [local[loop] for loop in loops] + [rim]
-    return cross(np.vstack(closed), np.vstack([np.roll(line, -1, axis=0) for line in closed]))
+def _lines_cross(bordered: Bordered, loops: list[list[int]]) -> bool:
+    """Return whether lines of the patch, of borders, and the rim cross in the plane: gmsh would end the process."""
+    local, rim = bordered.local, bordered.rim
+    lines = [(local[loop], local[np.roll(loop, -1)]) for loop in loops]
+    lines += [(rim, np.roll(rim, -1, axis=0)), tuple(local[ends] for ends in bordered.borders.T)]
+    return cross(*map(np.vstack, zip(*lines, strict=True)))
 
 
 def _distance_to_origin(corners: FloatArray) -> FloatArray:
@@ -190,28 +187,36 @@ class _Plane:
 
     points: FloatArray
     facets: IntArray
-    inside: np.ndarray
-    outer: IntArray  # points of the mesh on the loops
-    outer_of: IntArray  # points of the sheet that they are
+    inside: BoolArray
+    given: IntArray  # points of the mesh on the loops and borders
+    given_of: IntArray  # points of the sheet that they are
     rim: IntArray
 
 
-def _mesh_plane(local: FloatArray, loops: list[list[int]], rim: FloatArray, probe: Probe, sizes: Sizes) -> _Plane:
-    """Mesh the plane inside ``loops`` of points, with the rim's edges in it."""
-    scale = probe.circumradius / 10
+def _mesh_plane(bordered: Bordered, loops: list[list[int]], probe: Probe, sizes: Sizes) -> _Plane:
+    """Mesh the plane inside ``loops`` of points, with the edges of the rim and of borders in it."""
+    scale, local = probe.circumradius / 10, bordered.local
     with gmsh_session():
         model_options()
         geo, mesh = gmsh.model.geo, gmsh.model.mesh
-        curves, outer = [], []
+        tag_of: dict[int, int] = {}
+        curves = []
         for loop in loops:
-            tags = [geo.addPoint(*(local[i] / scale), 0) for i in loop]
-            outer += list(zip(tags, loop, strict=True))
-            curves.append(_closed(tags))
-        rim_tags = [geo.addPoint(*p, 0) for p in (rim / scale).tolist()]
+            tag_of |= {point: geo.addPoint(*(local[point] / scale), 0) for point in loop}
+            curves.append(_closed([tag_of[point] for point in loop]))
+        rim_tags = [geo.addPoint(*p, 0) for p in (bordered.rim / scale).tolist()]
         around = _closed(rim_tags)
+        tag_of |= {point: tag for point, tag in zip(bordered.on_rim.tolist(), rim_tags, strict=True) if point >= 0}
+        for point in np.unique(bordered.borders).tolist():
+            if point not in tag_of:
+                tag_of[point] = geo.addPoint(*(local[point] / scale), 0)
         geo.addPlaneSurface([*curves, around], 1)
         geo.addPlaneSurface([around], 2)
+        lines = [geo.addLine(tag_of[a], tag_of[b]) for a, b in bordered.borders.tolist()]
         geo.synchronize()
+        is_inner = are_within(bordered.rim, local[bordered.borders].mean(axis=1))
+        for face, chosen in ((1, ~is_inner), (2, is_inner)):
+            mesh.embed(1, [line for line, is_chosen in zip(lines, chosen, strict=True) if is_chosen], 2, face)
         for _, curve in gmsh.model.getEntities(1):
             mesh.setTransfiniteCurve(curve, 2)
         set_size_field(sizes, probe, Frame((0.0, 0.0, 0.0)), scale)
@@ -223,18 +228,15 @@ def _mesh_plane(local: FloatArray, loops: list[list[int]], rim: FloatArray, prob
         points = points[:, :2] * scale
         parts = [position[corners_of(2, [face])] for face in (1, 2)]
 
-        def node(point: int) -> int:
-            return int(position[mesh.getNodes(0, point)[0][0]])
+        def nodes(tags: Iterable[int]) -> IntArray:
+            return np.array([position[mesh.getNodes(0, tag)[0][0]] for tag in tags])
 
         facets = np.vstack(parts)
         a, b, c = (points[facets[:, k]] for k in range(3))
         area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
         facets = np.where((area < 0)[:, None], facets[:, [0, 2, 1]], facets)
         inside = np.arange(len(facets)) >= len(parts[0])
-        return _Plane(
-            points, facets, inside, np.array([node(tag) for tag, _ in outer]), np.array([i for _, i in outer]),
-            np.array([node(tag) for tag in rim_tags]),
-        )  # fmt: skip
+        return _Plane(points, facets, inside, nodes(tag_of.values()), np.array(list(tag_of)), nodes(rim_tags))
 
 
 def _closed(tags: list[int]) -> int:
@@ -243,43 +245,58 @@ def _closed(tags: list[int]) -> int:
     return int(geo.addCurveLoop(lines))
 
 
-def _joined(
-    sheet: Sheet, patch: IntArray, plane: _Plane, lift: Lift, lifted: FloatArray, followed: FloatArray
-) -> Contact:
+def _joined(bordered: Bordered, plane: _Plane, lift: Lift, followed: FloatArray) -> Contact:
     """Replace a patch of the sheet's surface by the lifted mesh of the plane."""
-    skin = sheet.skin
-    inner = sheet.kind == WALL
+    sheet = bordered.sheet
     number = np.full(len(plane.points), -1, dtype=np.int64)
-    number[plane.outer] = plane.outer_of
+    number[plane.given] = plane.given_of
     (new,) = np.nonzero(number < 0)
     number[new] = len(sheet.points) + np.arange(len(new))
-    points = np.full((len(new), 3), np.nan)
-    on_rim = np.full(len(plane.points), -1, dtype=np.int64)
-    on_rim[plane.rim] = np.arange(len(plane.rim))
-    is_rim = on_rim[new] >= 0
-    points[is_rim] = lifted[on_rim[new[is_rim]]]
-    points[~is_rim] = lift(plane.points[new[~is_rim]])
+    flat = plane.points.copy()
+    flat[plane.rim] = bordered.rim
+    points = lift(flat[new])
     if not np.isfinite(points).all():
         raise GeometryError("a part of the surface around the footprint is hidden along the probe's axis")
-    rest = np.ones(len(skin.facets), dtype=bool)
-    before = skin.group[patch[0]]
-    group = np.where(plane.inside, before - skin.kind[patch[0]] + PROBE, before)
-    rest[patch] = False
+    rest = np.setdiff1d(np.arange(len(sheet.facets)), bordered.patch)
+    group = groups_of(np.where(plane.inside, PROBE, FREE), _sides(bordered, plane))
     whole = Sheet(
         np.vstack([sheet.points, points]),
-        np.vstack([skin.facets[rest], number[plane.facets], sheet.facets[inner]]),
-        np.concatenate([skin.group[rest], group, sheet.group[inner]]),
-        _outside(skin, patch),
+        np.vstack([sheet.facets[rest], number[plane.facets]]),
+        np.concatenate([sheet.group[rest], group]),
+        _outside(sheet, bordered.patch),
     )
     result, renumbered = compact(whole)
     edges_of(result.skin.facets)
     return Contact(result, renumbered[number[plane.rim]], followed)
 
 
+def _sides(bordered: Bordered, plane: _Plane) -> IntArray:
+    """Return the regions (m, 2) behind and before the facets of the plane; borders separate them."""
+    sides, count = bordered.sheet.sides[bordered.patch], len(plane.points)
+    if not len(bordered.borders):
+        return np.tile(sides[:1], (len(plane.facets), 1))
+    position = np.full(len(bordered.local), -1)
+    position[plane.given_of] = plane.given
+    keys = edge_keys(plane.facets, count)
+    lines = position[bordered.borders]
+    order = np.argsort(keys, kind="stable")
+    twins = (np.diff(keys[order]) == 0) & ~np.isin(keys[order[1:]], lines.min(axis=1) * count + lines.max(axis=1))
+    one, other = order[:-1][twins] // 3, order[1:][twins] // 3
+    joined = coo_array((np.ones(len(one)), (one, other)), shape=(len(plane.facets),) * 2)
+    pieces, piece = connected_components(joined, directed=False)
+    level = np.column_stack([bordered.local, np.zeros(len(bordered.local))])
+    below, _ = pierce(level, bordered.sheet.facets[bordered.patch], plane.points[plane.facets].mean(axis=1))
+    region = np.zeros((pieces, sides[:, 0].max() + 1))
+    seen = below >= 0
+    np.add.at(region, (piece[seen], sides[below[seen], 0]), 1)
+    return np.column_stack([region.argmax(axis=1)[piece], np.full(len(piece), OUTSIDE)])
+
+
 def _outside(sheet: Sheet, patch: IntArray) -> IntArray:
     """Sharp edges that are not within the patch."""
-    edges, sides = edges_of(sheet.facets)
-    within = np.isin(sides, patch).all(axis=1)
+    (outer,) = np.nonzero(sheet.kind != WALL)
+    edges, sides = edges_of(sheet.facets[outer])
+    within = np.isin(outer[sides], patch).all(axis=1)
     base = len(sheet.points)
     gone = edges[within] @ np.array([base, 1])
     sharp = np.sort(sheet.sharp, axis=1)

@@ -98,7 +98,7 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     def lift(points: FloatArray) -> FloatArray:
         return scene.body.lift(scene.frame, points)[0]
 
-    contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift, names=scene.body.region_names)
+    contact = set_in(far.sheet, far.faces, scene.frame, scene.footprint, sizes, lift)
     field = Field(sizes, scene.frame, contact.edge, embedded_sizes(scene.body, sizes.growth, scene.frame.point))
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
     sheet = untangled(sheet, np.unique(sheet.facets[sheet.kind == PROBE]))
@@ -173,7 +173,8 @@ class _Truth:
         """Return the sheet on the true surface; its ``rim`` points (k) move to ``true_rim`` (k, 3)."""
         points = sheet.points.copy()
         points[rim] = true_rim
-        inner = np.setdiff1d(np.unique(sheet.facets[sheet.kind == PROBE]), rim)
+        on_border = np.concatenate([rim, sheet.junctions.ravel()])
+        inner = np.setdiff1d(np.unique(sheet.facets[sheet.kind == PROBE]), on_border)
         lifted = self.lift(self.scene.frame.local(points[inner])[:, :2])
         seen = np.isfinite(lifted).all(axis=1)
         own = np.setdiff1d(self.far.own_points(sheet), np.concatenate([rim, inner]))
