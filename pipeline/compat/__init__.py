@@ -23,6 +23,7 @@ from pipeline.compat.elements import (
     element,
     equidistant_nodes,
     mixed_element,
+    quadrature_element,
     reference_element,
     vtk_order,
 )
@@ -63,6 +64,7 @@ __all__ = [
     "mixed_element",
     "original_cells",
     "partition",
+    "quadrature_element",
     "reference_element",
     "renumbered_space",
     "triangle_nodes",

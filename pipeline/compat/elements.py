@@ -20,6 +20,15 @@ def element(mesh: Any, family: str, degree: int, shape: tuple[int, ...] = ()) ->
     return ufl.VectorElement(family, cell, degree, dim=shape[0]) if shape else ufl.FiniteElement(family, cell, degree)
 
 
+def quadrature_element(mesh: Any, degree: int, size: int) -> Any:
+    """Return the element of vectors of a ``size`` at the quadrature points of a ``degree`` in cells of ``mesh``."""
+    cell = mesh.ufl_cell()
+    if hasattr(ufl, "VectorElement"):
+        return ufl.VectorElement("Quadrature", cell, degree, dim=size, quad_scheme="default")
+    name = cell.cellname() if callable(cell.cellname) else cell.cellname
+    return basix.ufl.quadrature_element(name, value_shape=(size,), degree=degree, scheme="default")
+
+
 def mixed_element(parts: list[Any]) -> Any:
     """Return the element that has ``parts`` side by side."""
     return ufl.MixedElement(parts) if hasattr(ufl, "MixedElement") else basix.ufl.mixed_element(parts)

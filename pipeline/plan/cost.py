@@ -44,6 +44,8 @@ _MERIDIAN, _MERIDIAN_BYTES = 0.27, 3.8e8
 _FOUND, _TRIALS = "meridian contact", 1.7
 # At large displacements, load steps and Newton iterations on a few meshes.
 _STEPS, _ITERATIONS = "meridian large", 9.0
+# With some 40 time steps besides.
+_IN_TIME, _COURSE_OF_MERIDIAN = "meridian time steps", 45.0
 # Share of first meshes whose error bar exceeds the accuracy: 5 of 60 scenes, 9 of 48 slicing blades.
 _MISSED, _MISSED_BY_SEVERAL = 0.08, 0.19
 # Exponent of 1 - 2ν: growth of the iterations towards incompressibility.
@@ -162,6 +164,8 @@ def kind_of(solve: Solve) -> str:
     case = solve.case
     if solve.axisymmetric:
         found = _FOUND if case.probe.is_unilateral else "meridian"
+        if case.is_stepped:
+            return _IN_TIME
         return _STEPS if case.has_load_steps else found
     words = [case.formulation, str(case.mesh.degree)]
     words += [str(case.movements)] if case.movements > 1 else []
@@ -234,7 +238,11 @@ def _poisson(case: Case) -> float:
 @lru_cache
 def _prior(stage: str, kind: str) -> _Numbers:
     if kind.startswith("meridian"):
-        return log(_MERIDIAN * {_FOUND: _TRIALS, _STEPS: _ITERATIONS}.get(kind, 1.0)), 0.0, 0.0
+        return (
+            log(_MERIDIAN * {_FOUND: _TRIALS, _STEPS: _ITERATIONS, _IN_TIME: _COURSE_OF_MERIDIAN}.get(kind, 1.0)),
+            0.0,
+            0.0,
+        )
     element, degree, *words = kind.split()
     if stage == "mesh":
         seconds, power = _MESH

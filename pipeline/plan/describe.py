@@ -182,7 +182,8 @@ def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
 def _steps(plan: Plan, solve: Solve, step: MeshStep | None) -> list[str]:
     if solve.axisymmetric:
         if solve.case.has_load_steps:
-            return ["meridian: load steps in two dimensions, on finer and finer meshes until the error bar is small"]
+            path = ["meridian: load steps in two dimensions, on finer and finer meshes until the error bar is small"]
+            return [*path, "time steps on the last of these meshes"] if solve.case.is_stepped else path
         if solve.case.probe.is_unilateral:
             return ["meridian: a few meshes and direct solves in two dimensions, until the contact radius is found"]
         return ["meridian: mesh, assembly and direct solve in two dimensions"]

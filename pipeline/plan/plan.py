@@ -14,9 +14,10 @@ from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import NO_RECORD, EndPlans, Plan, Struck
 from pipeline.study.capabilities.obstacles import obstacle
+from pipeline.study.capabilities.refusals import STEPS_IN_SPACE
 from pipeline.study.case import Case
 from pipeline.study.ends import ends_of
-from pipeline.study.problems import StudyError
+from pipeline.study.problems import Problem, StudyError
 from pipeline.study.schema import Mesh, Solving
 from pipeline.study.sweep import Study
 
@@ -69,7 +70,8 @@ def make_plan(
 
     Raises:
         ValueError: if ``without`` has an unknown name.
-        StudyError: if the study leaves to its measured curves what cases need.
+        StudyError: if the study leaves to its measured curves what cases need, or asks for an accuracy of time steps in
+            three dimensions.
     """
     if study.lacking:
         raise StudyError(study.file, study.lacking)
@@ -82,6 +84,8 @@ def make_plan(
             if name not in left_out:
                 plan = reduction(plan)
                 plan = replace(plan, used=plan.used | {name})
+    if any(solve.goal is not None and solve.case.is_stepped and not solve.axisymmetric for solve in plan.solves):
+        raise StudyError(study.file, [Problem("probe.history", None, STEPS_IN_SPACE)])
     plan = _seeking(plan) if study.seeks_depths else ask_for_exact(plan)
     plan = take(first_attempts(plan), shard) if shard is not None else ask_for_ends(plan, without)
     return first_attempts(leave_out_stored(plan, stored, without))

@@ -52,7 +52,7 @@ def _has_slit(case: Case) -> bool:
 
 
 def _may_end_early(case: Case) -> bool:
-    return case.has_load_steps or case.is_stepped or case.probe.force is not None
+    return case.has_load_steps or case.probe.force is not None
 
 
 _COSTS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total", "time_spread")

@@ -26,9 +26,9 @@ class Attempts:
             return record
         # A meridian has chosen among its own meshes.
         has_next = bool(solve.later) and not solve.axisymmetric
-        if record.is_ok and record.force_error > solve.goal and has_next:
+        if record.is_ok and record.proven > solve.goal and has_next:
             self._earlier.setdefault(solve.key, []).append(record)
-            self._again[solve.key] = solve.again(record.force_error)
+            self._again[solve.key] = solve.again(record.proven)
             return None
         return _concluded(solve, record, self._earlier.pop(solve.key, []))
 
@@ -84,15 +84,15 @@ def _concluded(solve: Solve, last: Record, earlier: list[Record]) -> Record:
     if not known:
         unmet = f"the accuracy {_percent(solve.goal)} is not reached: {last.message}"
         return replace(last, message=unmet) if last.status == "partial" else last
-    best = min(known, key=lambda record: record.force_error)
+    best = min(known, key=lambda record: record.proven)
     # The time of several meshes must not enter the cost model.
     record = replace(add_times(best, [r for r in known if r is not best]), kind="")
-    if best.force_error <= solve.goal:
+    if best.proven <= solve.goal:
         return record
-    if solve.is_reference and best.force_error <= _WORST_BAR:
+    if solve.is_reference and best.proven <= _WORST_BAR:
         return record
     why = last.message or "this is the finest mesh tried"
-    bar, goal = _percent(best.force_error), _percent(solve.goal)
+    bar, goal = _percent(best.proven), _percent(solve.goal)
     return failed(record, f"error bar {bar} exceeds the accuracy {goal}: {why}")
 
 

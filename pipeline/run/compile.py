@@ -68,9 +68,10 @@ def _forms(solve: Solve) -> _Forms:
     if solve.axisymmetric:
         half_plane = body.half_plane()
         kind = "elliptic" if half_plane and half_plane.is_curved else "axisymmetric"
-        if solve.case.material.is_large:
+        if solve.case.material.is_large or solve.case.is_stepped:
             degree = DEGREE_OF_STEPS if solve.case.probe.friction else LARGE_DEGREE
-            return _Forms(kind, degree, tuple(sorted({str(tissue.law) for tissue in solve.case.tissues})))
+            laws = tuple(sorted({str(tissue.law or "linear") for tissue in solve.case.tissues}))
+            return _Forms(kind, degree, laws, of_steps=solve.case.is_stepped)
         lowest = DEGREE_OF_STEPS - 1 if solve.case.probe.friction else TRIAL_DEGREE
         return _Forms(kind, lowest if solve.case.probe.is_unilateral else 0)
     has_slit = solve.case.probe.slit is not None
@@ -88,8 +89,8 @@ def _compile(forms: _Forms) -> None:
     element, degree, of_regions = forms.element, forms.degree, forms.of_regions
     if element in ("axisymmetric", "elliptic"):
         curved = element == "elliptic"
-        if forms.laws != ("linear",):
-            compile_axisymmetric(degree, curved=curved, laws=forms.laws)
+        if forms.of_steps or forms.laws != ("linear",):
+            compile_axisymmetric(degree, curved=curved, laws=forms.laws, relaxes=forms.of_steps)
             return
         compile_axisymmetric(curved=curved, lowest=degree)
         return

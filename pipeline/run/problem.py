@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import lru_cache
+from math import inf
 
 import numpy as np
 
@@ -88,7 +89,7 @@ def meridian_problem(case: Case) -> Problem:
     if case.probe.is_unilateral and case.has_load_steps:
         how = {} if case.mesh.accuracy is None else {"accuracy": case.mesh.accuracy / 2}
         return LargeMeridianContact(meridian_of(case), round_tool_of(case), **how)
-    if case.material.is_large:
+    if case.has_load_steps:
         return LargeMeridian(meridian_of(case), conditions_of(case))
     if case.probe.is_unilateral:
         return MeridianContact(meridian_of(case), round_tool_of(case))
@@ -205,15 +206,23 @@ def law_of(case: Case, *, in_body: bool = False) -> MaterialLaw:
     return MaterialLaw(found)
 
 
-def course_of(case: Case) -> Course | None:
-    """Return the movement of ``case`` over time, as shares of that to its depth; None if it needs no time steps."""
+def course_of(case: Case, goal: float | None = None) -> Course | None:
+    """Return the movement of ``case`` over time, as shares of that to its depth; None if it needs no time steps.
+
+    With a ``goal``, the largest force is wanted to this accuracy.
+    """
     history = case.probe.history
     if history is None or not case.is_stepped:
         return None
-    motion, times = history.motion(case.probe.depth), history.times()
-    shares = motion.at(times) / case.probe.depth
+    motion, times, depth = history.motion(case.probe.depth), history.times(), case.probe.depth
     breaks = np.flatnonzero(np.isin(times, [canonical(time) for time in motion.times]))
-    return Course(tuple(times.tolist()), tuple(shares.tolist()), frozenset(breaks.tolist()))
+    return Course(
+        tuple(times.tolist()),
+        tuple((motion.at(times) / depth).tolist()),
+        frozenset(breaks.tolist()),
+        share_at=lambda times: motion.at(times) / depth,
+        accuracy=inf if goal is None else goal,
+    )
 
 
 def _parameters(tissue: Tissue, turn: FloatArray | None) -> Parameters:
@@ -226,17 +235,24 @@ def _parameters(tissue: Tissue, turn: FloatArray | None) -> Parameters:
 
 
 def solve_problem(
-    case: Case, problem: Problem, *, estimate: bool, meshed: Case | None = None, keep: bool = False
+    case: Case,
+    problem: Problem,
+    *,
+    estimate: bool,
+    meshed: Case | None = None,
+    keep: bool = False,
+    goal: float | None = None,
 ) -> Solution:
     """Solve a case; a small system is solved directly if iterations do not converge. Collective.
 
-    ``meshed`` is the case of the mesh, if it differs: see ``movement_of``. ``keep``: see :class:`Request`.
+    ``meshed`` is the case of the mesh, if it differs: see ``movement_of``. ``keep``: see :class:`Request`. ``goal`` is
+    the accuracy for which time steps are chosen.
 
     Raises:
         SolveError: if this fails, too, or if the solution is impossible.
     """
     law, movement = law_of(case), movement_of(case, meshed)
-    asked = Request(law, movement, case.solve.method, case.solve.energy_tolerance, estimate, course_of(case))
+    asked = Request(law, movement, case.solve.method, case.solve.energy_tolerance, estimate, course_of(case, goal))
     asked = replace(asked, keep=keep or bool(case.outputs))
     try:
         solution = problem.answer(asked)

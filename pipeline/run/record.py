@@ -131,6 +131,13 @@ class Record:
         return self.status == OK and isfinite(self.force)
 
     @property
+    def proven(self) -> float:
+        """The relative error bar that an accuracy limits: of F or, over time, of the largest force with its steps."""
+        if not self.course:
+            return self.force_error
+        return self.force_error + max(self.course["step_error"]) / max(map(abs, self.course["force"]))
+
+    @property
     def max_strain(self) -> float:
         """Largest principal strain, by magnitude, of a cell away from the probe's edge."""
         return self.largest.get("max_strain", nan)

@@ -230,7 +230,7 @@ class StepRunner:
 
         def compute() -> Record | LargeError:
             try:
-                return record_of(solve, solve_problem(solve.case, problem, estimate=True))
+                return record_of(solve, solve_problem(solve.case, problem, estimate=True, goal=solve.goal))
             except LargeError as error:
                 return error
 

@@ -91,6 +91,11 @@ def cellwise_space(mesh: Any, shape: tuple[int, ...]) -> Any:
     return space(mesh, compat.element(mesh, "DG", 0, shape))
 
 
+def quadrature_space(mesh: Any, degree: int, size: int) -> Any:
+    """Return the space of vectors of a ``size`` at the quadrature points of a ``degree``; collective."""
+    return space(mesh, compat.quadrature_element(mesh, degree, size))
+
+
 def quadrature_degree(degree: int) -> int:
     """Return the degree of quadrature on curved cells of a space of degree p.
 

@@ -174,12 +174,18 @@ class HyperelasticBody:
         return self._tangent.stresses()
 
     def force_of(self, stress: list[FloatArray], state: PETSc.Vec, direction: FloatArray) -> float:
-        """Return the work (J) that a change of the prestress by ``stress`` does in a ``direction`` (owned dofs)."""
-        forces = Imposed(self._space, self._tangent, stress).forces(state.array_r[: self._space.owned])
-        return self._unit * float(self._space.comm.allreduce(float(forces @ direction), op=MPI.SUM))
+        """Return the work (J) that a change of the prestress by ``stress`` does in a ``direction``, a state."""
+        owned = self._space.owned
+        forces = Imposed(self._space, self._tangent, stress).forces(state.array_r[:owned])
+        return self._unit * float(self._space.comm.allreduce(float(forces @ direction[:owned]), op=MPI.SUM))
 
     @property
-    def cells(self) -> TangentCells:
+    def comm(self) -> MPI.Comm:
+        """The ranks that share the body."""
+        return self._space.comm
+
+    @property
+    def points(self) -> TangentCells:
         """The cells, laid out for values at quadrature points."""
         return self._tangent.cells
 

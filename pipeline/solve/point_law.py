@@ -23,6 +23,14 @@ SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _VOLUME = 1 / 6
 
 
+def symmetric(components: Any, share: int = 1) -> Any:
+    """Return the tensor with ``components`` of ``SYMMETRIC``, those off the diagonal divided by ``share``."""
+    rows: list[list[Any]] = [[0.0] * 3 for _ in range(3)]
+    for number, (row, column) in enumerate(SYMMETRIC):
+        rows[row][column] = rows[column][row] = components[number] / (1 if row == column else share)
+    return ufl.as_tensor(rows)
+
+
 @dataclass(frozen=True)
 class PointKernel:
     """Compiled values at a point: the ``kernel``, its ``constants``, and where it reads F and p (-1: it does not)."""
@@ -96,10 +104,7 @@ class PointLaw:
         """Return the symmetric tensor whose product with another one gives its components of ``SYMMETRIC``."""
         domain = self._mesh.ufl_domain()
         test = ufl.TestFunction(ufl.FunctionSpace(domain, compat.element(self._mesh, "DG", 0, (len(SYMMETRIC),))))
-        rows: list[list[Any]] = [[0.0] * 3 for _ in range(3)]
-        for number, (row, column) in enumerate(SYMMETRIC):
-            rows[row][column] = rows[column][row] = test[number] / (1 if row == column else 2)
-        return ufl.as_tensor(rows)
+        return symmetric(test, 2)
 
     @cached_property
     def _moduli(self) -> tuple[Any, Kernel]:

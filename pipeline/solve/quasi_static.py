@@ -35,7 +35,7 @@ from pipeline.solve.prescribed import PrescribedMotion, respond
 from pipeline.solve.response import Contact, LoadResponse, Response, shares
 from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Spaces
-from pipeline.solve.time_steps import Pressed, TimeSteps
+from pipeline.solve.time_steps import Pressed, TimeSteps, follow
 from pipeline.stages import recorded, stage
 
 
@@ -148,10 +148,14 @@ class QuasiStaticProblem(Problem):
             LargeError: if the time steps do not reach its end.
         """
         assert asked.course is not None
-        pressed = self.constraint.in_time(asked, found, stack)
-        steps = TimeSteps(self.elements, asked.law, pressed, found.movement.amounts[0], stack)
-        history = steps.follow(asked.course)
-        return replace(solution, history=history, iterations=solution.iterations + steps.iterations)
+        self.elements.set_law(asked.law)
+
+        def begin() -> TimeSteps:
+            pressed = self.constraint.in_time(asked, found, stack)
+            return TimeSteps(asked.law, pressed, found.movement.amounts[0], stack, mirrored=self._body.mirrored)
+
+        history, iterations = follow(begin, asked.course)
+        return replace(solution, history=history, iterations=solution.iterations + iterations)
 
     @stage("error bar")
     def _estimated(self, solution: Solution, found: Equilibrium, asked: Request) -> Solution:

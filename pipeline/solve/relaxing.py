@@ -17,12 +17,12 @@ the work to both sums is the error.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.elements.tangent import Prestress
-from pipeline.solve.kernels.tangent import TangentCells
 from pipeline.solve.point_law import SYMMETRIC
 from pipeline.viscoelastic import Terms, heat_of, kept_of
 
@@ -40,19 +40,29 @@ class _Lag:
     deformation: FloatArray
 
 
+class Points(Protocol):
+    """The quadrature points of a body, by part: values are (batches, quadrature, size, lanes)."""
+
+    def weights(self) -> list[FloatArray]:
+        """Return their volumes, (batches, quadrature, lanes) by part; 0 of padding."""
+
+    def by_region(self, values: Sequence[float]) -> list[FloatArray]:
+        """Return the value of each point's region, by part, to be broadcast to the shape of volumes."""
+
+
 class HistoryVariables:
     """History variables of a body whose regions have Prony ``terms``; stresses in the unit of the law.
 
     ``heat`` and ``stored`` are the energies (J in that unit) that this rank's terms have dissipated, and store.
     """
 
-    def __init__(self, cells: TangentCells, terms: Sequence[Terms]):
+    def __init__(self, points: Points, terms: Sequence[Terms]):
         """Begin at rest; ``terms`` are those of each region."""
         count = max(map(len, terms))
         # A region with fewer terms has some without a share.
         table = [[*each, *[(0.0, 1.0)] * (count - len(each))] for each in terms]
         self._table = np.array(table).reshape(len(terms), count, 2)
-        self._cells, self._weights = cells, cells.weights()
+        self._points, self._weights = points, points.weights()
         self._shapes = [weights.shape for weights in self._weights]
         self._volumes = np.concatenate([weights.ravel() for weights in self._weights])
         self._shares, self._times = ([self._at_points(self._table[:, i, k]) for i in range(count)] for k in range(2))
@@ -109,7 +119,7 @@ class HistoryVariables:
 
     def _at_points(self, values: FloatArray) -> FloatArray:
         """Return values of regions at the points."""
-        found = self._cells.by_region(values.tolist())
+        found = self._points.by_region(values.tolist())
         return np.concatenate([np.broadcast_to(v, s).ravel() for v, s in zip(found, self._shapes, strict=True)])
 
     def _flat(self, parts: list[FloatArray]) -> FloatArray:

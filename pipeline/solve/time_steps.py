@@ -8,28 +8,33 @@ what that changes of the force, about four times the error.
 """
 
 from abc import ABC, abstractmethod
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.balance import sums
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.elements.base import Elements, Linearised
+from pipeline.solve.elements.tangent import Prestress
 from pipeline.solve.ended import ended
 from pipeline.solve.history import Course, History, between
 from pipeline.solve.movement import Movement
 from pipeline.solve.newton import HyperelasticBody, LargeError
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.relaxing import HistoryVariables
+from pipeline.solve.relaxing import HistoryVariables, Points
 from pipeline.solve.response import whole_force
 from pipeline.stages import stage
 
 # Largest step as a share of the movement, and the smallest part of a step.
 _LONGEST, _SMALLEST = 1 / 3, 1 / 64
+# How often all steps are halved for an accuracy.
+_MOST_REFINEMENTS = 3
 # Of the difference between steps and double steps, a third is the error of the steps; the bar is twice that.
 _OF_DIFFERENCE = 2 / 3
 
@@ -46,19 +51,52 @@ class _Place:
     has_moved: bool = False
 
 
+class Body(Protocol):
+    """A body whose energy is that of its law, changed by a prestress. Methods are collective on ``comm``.
+
+    ``unit`` (J) is that of stress times the volumes of the ``points``; ``iterations`` counts linear solves.
+    """
+
+    iterations: int
+
+    @property
+    def comm(self) -> MPI.Comm: ...  # noqa: D102
+    @property
+    def unit(self) -> float: ...  # noqa: D102
+    @property
+    def points(self) -> Points: ...  # noqa: D102
+
+    def state(self) -> AbstractContextManager[PETSc.Vec]:
+        """Lend a zero state."""
+
+    def impose(self, prestress: Prestress | None, factors: tuple[float, ...] = ()) -> None:
+        """Change the energy from now on; None leaves only ``factors``, by region."""
+
+    def stresses(self, state: PETSc.Vec) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Return stress (of the unchanged energy, in the law's unit) and strain at the points."""
+
+    def force_of(self, stress: list[FloatArray], state: PETSc.Vec, direction: FloatArray) -> float:
+        """Return the work (J) that a change of the prestress by ``stress`` does in a ``direction``."""
+
+    def energy(self, state: PETSc.Vec) -> float:
+        """Return the energy (J)."""
+
+
 class Pressed(ABC):
     """A relaxing ``body`` and what presses it, at the equilibrium at a share of the movement. Methods are collective.
 
     ``force`` (3), N, is that of the tool on the modelled part, ``rate`` (J) the work per share, and ``area`` (m²) the
-    contact of the whole body, NaN unless it ``is_found``.
+    contact of the whole body, NaN unless it ``is_found``. ``rough`` is the relative error of the force by the distance
+    of nodes at the edge of contact, where that of the mesh does not have it.
     """
 
     is_found: ClassVar[bool]
 
-    body: HyperelasticBody
+    body: Body
     force: FloatArray
     rate: float
     area: float = np.nan
+    rough: float = 0.0
 
     @abstractmethod
     def equilibrate(self, state: PETSc.Vec, share: float) -> None:
@@ -74,13 +112,14 @@ class Pressed(ABC):
 
     @abstractmethod
     def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
-        """Return the displacement (owned dofs) per metre of the tool in which stresses do the work of the force."""
+        """Return the displacement, a state, per metre of the tool in which stresses do the work of the force."""
 
 
 class PressedFootprint(Pressed):
     """A body whose footprint has a prescribed ``movement``."""
 
     is_found = False
+    body: HyperelasticBody
 
     def __init__(
         self, elements: Elements, law: MaterialLaw, linearised: Linearised, movement: Movement, stack: ExitStack
@@ -113,17 +152,48 @@ class PressedFootprint(Pressed):
 
     def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
         """Return the displacement per metre, as a secant."""
-        return np.asarray(state.array[: self._space.owned] / (share * self._amount))
+        return np.asarray(state.array_r / (share * self._amount))
+
+
+def follow(begin: Callable[[], "TimeSteps"], course: Course) -> tuple[History, int]:
+    """Return the history of a ``course``, in steps that are halved for its accuracy, and the iterations of all.
+
+    ``begin`` returns a body at rest.
+
+    Raises:
+        LargeError: see :meth:`TimeSteps.follow`.
+    """
+    iterations = 0
+    for refinements in range(_MOST_REFINEMENTS + 1):
+        steps = begin()
+        found = steps.follow(course)
+        iterations += steps.iterations
+        if found.bar <= course.accuracy or refinements == _MOST_REFINEMENTS:
+            break
+        course = course.refined()
+    return found, iterations
 
 
 class TimeSteps:
     """Time steps of a body of a ``law`` whose regions may relax, to a ``depth`` (m). Methods are collective."""
 
-    def __init__(self, elements: Elements, law: MaterialLaw, pressed: Pressed, depth: float, stack: ExitStack):
-        """Set up; what is made is freed with the ``stack``."""
-        self._elements, self._law, self._depth = elements, law, depth
+    def __init__(
+        self,
+        law: MaterialLaw,
+        pressed: Pressed,
+        depth: float,
+        stack: ExitStack,
+        *,
+        mirrored: Sequence[int] = (),
+        has_own_mesh: bool = False,
+    ):
+        """Set up; what is made is freed with the ``stack``.
+
+        The body is ``mirrored`` at planes normal to these axes. ``has_own_mesh``: the study does not choose the mesh.
+        """
+        self._law, self._depth, self._mirrored, self._has_own_mesh = law, depth, mirrored, has_own_mesh
         self._place, self._pressed, self._body = _Place(), pressed, pressed.body
-        self._variables = HistoryVariables(self._body.cells, [each.relaxation for each in law.parameters])
+        self._variables = HistoryVariables(self._body.points, [each.relaxation for each in law.parameters])
         self._state, self._before = (stack.enter_context(self._body.state()) for _ in range(2))
 
     @property
@@ -138,9 +208,8 @@ class TimeSteps:
         Raises:
             LargeError: if Newton's method does not converge; it has the depth and the force that were reached.
         """
-        self._elements.set_law(self._law)
         halves, errors = course.halves(), dict[int, float]()
-        forces, heat, imbalance, areas = [], [], [], []
+        forces, heat, imbalance, areas, rough = [], [], [], [], []
         for number, (time, share) in enumerate(zip(course.times, course.shares, strict=True)):
             self._reach(time, share, course)
             if number in halves:
@@ -150,11 +219,12 @@ class TimeSteps:
             heat.append(dissipated)
             imbalance.append(self._place.work - stored - dissipated)
             areas.append(self._pressed.area)
-        whole = 2.0 ** len(self._elements.body.mirrored)
+            rough.append(self._pressed.rough * abs(forces[-1][2]))
+        whole = 2.0 ** len(self._mirrored)
         return History(
             times=np.array(course.times),
             forces=np.array(forces),
-            bars=_OF_DIFFERENCE * whole * between(errors, len(forces)),
+            bars=_OF_DIFFERENCE * whole * between(errors, len(forces)) + np.maximum.accumulate(rough),
             dissipated=whole * np.array(heat),
             imbalance=whole * np.array(imbalance),
             areas=np.array(areas),
@@ -222,7 +292,7 @@ class TimeSteps:
 
     def _force(self) -> FloatArray:
         """Return the force (N) of the tissue on the probe, of the whole body."""
-        return -whole_force(self._pressed.force, self._elements.body.mirrored)
+        return -whole_force(self._pressed.force, self._mirrored)
 
     def _energies(self) -> tuple[float, float]:
         """Return what is dissipated and what is stored (J) of the modelled part."""
@@ -231,11 +301,19 @@ class TimeSteps:
         self._body.impose(None, self._variables.rest)
         elastic = self._body.energy(self._state)
         own = np.array([self._variables.heat, self._variables.stored])
-        heat, stored = self._body.unit * global_sum(self._elements.body.comm, own)
+        heat, stored = self._body.unit * global_sum(self._body.comm, own)
         return float(heat), elastic + float(stored)
 
     def _stopped(self, course: Course, why: LargeError) -> LargeError:
         """Return the error of steps that end before the end of the course."""
         place, (*_, force) = self._place, self._force()
         reached, times = (place.share * self._depth, float(force)), (place.time, course.times[-1])
-        return ended(why, self._law, reached, self._depth, is_found=self._pressed.is_found, times=times)
+        return ended(
+            why,
+            self._law,
+            reached,
+            self._depth,
+            is_found=self._pressed.is_found,
+            times=times,
+            has_own_mesh=self._has_own_mesh,
+        )

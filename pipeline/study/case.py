@@ -288,8 +288,8 @@ class Case:
 
     @property
     def has_load_steps(self) -> bool:
-        """Whether its law or friction makes a load path of steps necessary, which the meridian follows, too."""
-        return self.material.is_large or self.probe.friction > 0
+        """Whether its law, friction or history makes steps necessary, which the meridian follows, too."""
+        return self.material.is_large or self.probe.friction > 0 or self.is_stepped
 
     @property
     def is_factorised(self) -> bool:

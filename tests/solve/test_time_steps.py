@@ -44,9 +44,11 @@ def followed(motion, *terms: Terms, steps: int = 4, **changes) -> tuple[History,
         of_regions = terms if len(terms) > 1 else terms * len(law.parameters)
         each = zip(law.parameters, of_regions, strict=True)
         law = MaterialLaw(tuple(replace(one, relaxation=own) for one, own in each))
+        elements.set_law(law)
         linear = elements.linearised(law, stack, direct=True)
         pressed = PressedFootprint(elements, law, linear, movement, stack)
-        found = TimeSteps(elements, law, pressed, movement.amounts[0], stack).follow(course_of(motion, steps))
+        course = course_of(motion, steps)
+        found = TimeSteps(law, pressed, movement.amounts[0], stack, mirrored=mesh.mirrored).follow(course)
         return found, static.reaction[2], static.energy
 
 

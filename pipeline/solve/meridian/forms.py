@@ -5,6 +5,7 @@ In mixed elements
 units of the μ of region 0. Each region has its own mesh and space: displacements are continuous, pressures jump.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from pipeline.mesh.meridian import JOINT
 from pipeline.solve import SolveError
 from pipeline.solve.meridian.region import Region
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.point_law import SYMMETRIC
 
 # Two places are equal within this share of the larger coordinate (rounding).
 _SAME_PLACE = 1e-11
@@ -34,8 +36,10 @@ class MeridianForms:
             SolveError: if the meshes of two regions do not match.
         """
         unit = law.parameters[0].lame_mu
+        relaxes, self._numbers = any(each.relaxation for each in law.parameters), tuple(meshes)
         parts = [
-            Region(*mesh, degree, law.parameters[region], unit, is_plane=is_plane) for region, mesh in meshes.items()
+            Region(*mesh, degree, law.parameters[region], unit, is_plane=is_plane, relaxes=relaxes)
+            for region, mesh in meshes.items()
         ]
         self.is_definite = not any(part.is_mixed for part in parts)
         self._parts: list[tuple[Region, IntArray]] = []  # with the number of each dof
@@ -88,6 +92,33 @@ class MeridianForms:
     def energy(self, solution: FloatArray) -> float:
         """Return the energy (μ a, per radian) of a ``solution``, NaN if tissue is inside out."""
         return sum(part.energy(solution[number]) for part, number in self._parts)
+
+    def impose(self, factors: Sequence[float], stress: Sequence[FloatArray] | None) -> None:
+        """Change the energy of relaxing tissue: ``factors`` of regions, and ``stress`` as of :meth:`stresses`, or 0."""
+        for number, ((part, _), factor) in enumerate(zip(self._parts, self.by_region(factors), strict=True)):
+            size = len(SYMMETRIC), len(part.volumes)
+            part.impose(factor.item(), np.zeros(size) if stress is None else stress[number][0, 0])
+
+    def stresses(self, solution: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Return stress and strain of the laws alone, by region (1, 1, 6, points)."""
+        found = [part.stresses(solution[number]) for part, number in self._parts]
+        stress, strain = zip(*found, strict=True)
+        return [each[None, None] for each in stress], [each[None, None] for each in strain]
+
+    def forces_of(self, stress: Sequence[FloatArray], solution: FloatArray) -> FloatArray:
+        """Return what a change of the imposed ``stress`` changes of the residual at a ``solution``."""
+        total = np.zeros(self.dofs)
+        for (part, number), change in zip(self._parts, stress, strict=True):
+            total[number] += part.forces_of(change[0, 0], solution[number])
+        return total
+
+    def weights(self) -> list[FloatArray]:
+        """Return the volumes (per radian) of the quadrature points, by region (1, 1, points)."""
+        return [part.volumes[None, None] for part, _ in self._parts]
+
+    def by_region(self, values: Sequence[float]) -> list[FloatArray]:
+        """Return the value of each region that has cells, (1, 1, 1)."""
+        return [np.full((1, 1, 1), values[number]) for number in self._numbers]
 
     def interpolate(self, coarse: "MeridianForms", solution: FloatArray) -> FloatArray:
         """Return the ``solution`` of elements of a lower degree on the same meshes, in these elements."""

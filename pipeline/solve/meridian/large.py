@@ -14,6 +14,7 @@ from math import pi
 from typing import Any
 
 import numpy as np
+from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.meridian import Grading, MeridianArrays
@@ -22,10 +23,12 @@ from pipeline.solve.balance import check_balance
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.ended import ended
 from pipeline.solve.load_steps import check_path
+from pipeline.solve.meridian.in_time import RelaxingHalfPlane
 from pipeline.solve.meridian.problem import Answer, MeridianSolver, best_of, error_bar
 from pipeline.solve.meridian.system import HalfPlane, System, max_strain, meshes_of
 from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.time_steps import Pressed
 from pipeline.stages import stage
 
 DEGREE = 4
@@ -119,6 +122,37 @@ class LargeSystem(System):
         raise LargeError("tissue is turned inside out")
 
 
+class PressedSystem(Pressed):
+    """A ``system`` of relaxing tissue whose probe moves to a ``depth`` (units of the mesh, ``unit``, m)."""
+
+    is_found = False
+
+    def __init__(self, system: LargeSystem, law: MaterialLaw, depth: float, unit: float):
+        self._system, self._depth, self._unit = system, depth, unit
+        self.body = RelaxingHalfPlane.of(system.forms, law, unit)
+        self.force, self.rate = np.zeros(3), 0.0
+
+    def equilibrate(self, state: PETSc.Vec, share: float) -> None:
+        """Find the equilibrium at a share."""
+        system, before = self._system, self._system.iterations
+        if not np.isfinite(system.forms.energy(state.array_r)):
+            raise LargeError("tissue is turned inside out")
+        try:
+            state.array[:] = system.equilibrate(state.array_r.copy(), share * self._depth)
+        finally:
+            self.body.iterations += system.iterations - before
+        work = self.body.unit * float(system.forms.residual(state.array_r)[system.probe].sum())
+        self.force, self.rate = np.array([0.0, 0.0, work / self._unit]), -work * self._depth
+
+    def guess(self, state: PETSc.Vec) -> None:
+        """Return nothing: Newton's first step is the guess by the tangent."""
+        return
+
+    def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
+        """Return the displacement per metre, as a secant."""
+        return np.asarray(state.array_r / (share * self._depth * self._unit))
+
+
 class LargeSolver(MeridianSolver):
     """The meridian of a body of a law of large displacements; meshes are tried in the order of ``gradings``."""
 
@@ -194,6 +228,7 @@ class LargeMeridian(LargeSolver):
             cells=len(arrays.cells),
             iterations=coarse.iterations + fine.iterations,
             energy=energy * arrays.unit**2,
+            in_time=lambda: PressedSystem(fine, law, deep, arrays.unit),
         )
 
 

@@ -12,7 +12,7 @@ Lengths are in units of the contact radius of the mesh, stresses in units of μ 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
 
@@ -21,6 +21,9 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
+from pipeline.solve.contact.deformed import ContactSolution, PlacedTool
+from pipeline.solve.contact.in_time import PressedTissue
+from pipeline.solve.meridian.in_time import RelaxingHalfPlane
 from pipeline.solve.meridian.large import LargeSolver, stopped
 from pipeline.solve.meridian.problem import Answer
 from pipeline.solve.meridian.punch import Punches, RoundTool
@@ -107,6 +110,7 @@ class LargeMeridianContact(LargeSolver):
             friction_error=of_friction / arrays.unit**2 / deep + error * fine.friction / deep,
             energy=fine.energy * arrays.unit**2,
             touch=fine,
+            in_time=lambda: PressedTouch(replace(fine, touched=None), deep),
         )
 
     def _from(
@@ -146,6 +150,32 @@ class LargeMeridianContact(LargeSolver):
             except LargeError:  # its own path tells how far it comes
                 fine = fine.pressed(depth)
         return fine, bars + _BETWEEN_DEGREES * np.abs(coarse.results - fine.results)
+
+
+class PressedTouch(PressedTissue):
+    """Relaxing tissue below a round tool, ``at_rest``, that is pressed in to a ``depth`` (units of the mesh)."""
+
+    def __init__(self, at_rest: MeridianTouch, depth: float):
+        tissue = at_rest.tissue
+        tissue.state = np.zeros_like(tissue.state)
+        self.body = RelaxingHalfPlane.of(tissue.system.forms, at_rest.law, at_rest.unit)
+        self._touch, self._depth = at_rest, depth
+        super().__init__(tissue, tissue.places, self.body.unit)
+
+    def _placed(self, share: float) -> PlacedTool:
+        return replace(self._touch.placed(share * self._depth), depth=self._depth)
+
+    def _check(self, touched: ContactSolution) -> None:
+        self._touch.check_outside(touched)
+
+    def _measure(self, touched: ContactSolution, share: float) -> None:
+        found, is_touched = replace(self._touch, touched=touched), bool(touched.active.any())
+        self.body.iterations = self._touch.tissue.iterations
+        of_force = self.body.unit / self._touch.unit
+        self.force = np.array([0.0, 0.0, of_force * float(touched.forces[:, 1].sum())])
+        self.rate = -float(self.force[2]) * self._depth * self._touch.unit
+        self.area = found.area * self._touch.unit**2 if is_touched else 0.0
+        self.rough = found.resolution**2 if is_touched else 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -6,6 +6,7 @@ force is the reaction, times 2π. Meshes are refined until the error bar is smal
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import product
 from math import isnan, nan, pi
@@ -19,10 +20,13 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.laws import LAWS
 from pipeline.solve.meridian.forms import MeridianForms
 from pipeline.solve.meridian.system import HalfPlane, Pressed, System, Unbalanced, max_strain, meshes_of
-from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.response import Contact, reaction
 from pipeline.solve.solution import Problem, Request, Solution
+from pipeline.solve.time_steps import Pressed as InTime
+from pipeline.solve.time_steps import TimeSteps, follow
 from pipeline.stages import recorded, stage
+from pipeline.viscoelastic import Terms
 
 DEGREE = 5
 # Meshes, tried in this order until the error bar is below the required accuracy.
@@ -37,7 +41,8 @@ class Answer:
 
     ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²) with a relative bar,
     friction the part of it that slides and the sum of tangential forces over d, in units of μ a, with bars in the same
-    units. The strain energy, in units of μ a times m², is half of F d if it is not given.
+    units. The strain energy, in units of μ a times m², is half of F d if it is not given. ``in_time`` returns the same
+    body at rest, of a law with relaxation.
     """
 
     stiffness: float
@@ -56,6 +61,7 @@ class Answer:
     friction: float = nan
     friction_error: float = nan
     energy: float | None = None
+    in_time: Callable[[], InTime] | None = None
 
     def contact(self, scale: float) -> Contact:
         """Return the contact, with the tangential forces times ``scale``; by symmetry they have no torque."""
@@ -108,8 +114,13 @@ class MeridianSolver(Problem):
             if not 0 <= tissue.poisson <= 0.5:
                 raise SolveError(f"Poisson's ratio is {tissue.poisson:g}, must be between 0 and 0.5")
         (depth,) = movement.amounts
-        with recorded() as times:
+        history, iterations = None, 0
+        with recorded() as times, ExitStack() as stack:
             found = self._answer(law, depth)
+            if asked.course is not None and (at_rest := found.in_time) is not None:
+                history, iterations = follow(
+                    lambda: TimeSteps(law, at_rest(), depth, stack, has_own_mesh=True), asked.course.left(found.error)
+                )
         scale = law.lame_mu[0] * found.unit
         stiffness, on_probe = np.array([[scale * found.stiffness]]), np.array([[0.0, 0.0, scale * found.on_probe]])
         return Solution(
@@ -117,8 +128,9 @@ class MeridianSolver(Problem):
             largest={"max_strain": found.max_strain},
             dofs=found.dofs,
             cells=found.cells,
-            iterations=found.iterations,
+            iterations=found.iterations + iterations,
             times=times,
+            history=history,
             bars=found.error * stiffness,
             contact=None if isnan(found.area) else found.contact(scale * depth),
             stored=None if found.energy is None else scale * found.energy,
@@ -232,15 +244,22 @@ class MeridianProblem(MeridianSolver):
 
 
 def compile_axisymmetric(
-    degree: int = DEGREE, *, curved: bool = False, lowest: int = 0, laws: Sequence[str] = ("linear",)
+    degree: int = DEGREE,
+    *,
+    curved: bool = False,
+    lowest: int = 0,
+    laws: Sequence[str] = ("linear",),
+    relaxes: bool = False,
 ) -> None:
     """Compile every form of a meridian with these laws, on this process; call it within ``compiling()``.
 
     If ``lowest`` is given, degrees from there on are compiled.
     """
+    terms: Terms = ((0.5, 1.0),) if relaxes else ()
     example: HalfPlane = EllipticMeridian(2.0, 2.0, 1.0, 0.0) if curved else Meridian(2.0, 1.0, 1.0)
     mesh = meridian_mesh(example.mesh(Grading(1.0)))
     for law, poisson in product(laws, (0.0, 0.5)):
         further = dict.fromkeys(LAWS[law].parameters, 1.0)
         for p in range(lowest or degree - 1, degree + 1):
-            MeridianForms({0: mesh}, p, MaterialLaw.of_moduli(1.0, poisson, law, **further))
+            tissue = Parameters.of_moduli(1.0, poisson, law, further)
+            MeridianForms({0: mesh}, p, MaterialLaw((replace(tissue, relaxation=terms),)))

@@ -3,6 +3,8 @@
 The energy of a law is integrated over r dr dz. A linear law has the axisymmetric strain of
 :mod:`pipeline.solve.physics`; others have the deformation gradient (r, θ, z) with the hoop stretch 1 + u_r/r. In plane
 strain the energy is that of a unit of thickness.
+
+Tissue that relaxes has the energy A ψ + H : E of :mod:`pipeline.solve.relaxing`, with H at the quadrature points.
 """
 
 from dataclasses import replace
@@ -17,7 +19,7 @@ from dolfinx import fem
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.mesh.meridian import mesh_order
-from pipeline.solve.compiled import cellwise_space, form, taylor_hood_space, vector_space
+from pipeline.solve.compiled import cellwise_space, form, quadrature_space, taylor_hood_space, vector_space
 from pipeline.solve.laws import LAWS
 from pipeline.solve.laws.law import Energy
 from pipeline.solve.meridian.transfer import Pieces
@@ -31,6 +33,7 @@ from pipeline.solve.physics import (
     pressurised,
     small_strain,
 )
+from pipeline.solve.point_law import SYMMETRIC, symmetric
 
 # A larger Poisson's ratio than in three dimensions (Mesh.MIXED_FROM, 0.45): elements of degree 5 lock later than those
 # of degree 2. On three scenes displacement elements differ from mixed ones by 5e-9 to 1e-8 at ν = 0.45 and by 2e-8 at
@@ -57,8 +60,12 @@ class Region:
         unit: float,
         *,
         is_plane: bool = False,
+        relaxes: bool = False,
     ):
-        """Compile the forms: of a half plane (r, z), or of plane strain if it ``is_plane``."""
+        """Compile the forms: of a half plane (r, z), or of plane strain if it ``is_plane``.
+
+        Tissue that ``relaxes`` has A and H.
+        """
         self._mesh, self._facets, self._is_plane = mesh, facets, is_plane
         self._material, self._unit, self._degree = material, unit, degree
         self.is_linear = material.law == "linear"
@@ -74,16 +81,31 @@ class Region:
             self._u, self._p = ufl.split(self._solution)
         # Only u_r v_r/r is no polynomial on straight cells; the other integrands have degree 2p at most.
         exact = 2 * degree + mesh_order(mesh)
-        self._dx = ufl.dx(metadata={"quadrature_degree": exact if self.is_linear else exact + _MORE})
-        self._density = self._linear() if self.is_linear else self._hyperelastic()
-        first = self._density.derivative(self._solution, ufl.TestFunction(self._space))
-        second = first.derivative(self._solution, ufl.TrialFunction(self._space))
-        self._action, self._stiffness = (form(each.value * self._weight * self._dx) for each in (first, second))
-        _ = self._strains, self._areas, self.is_linear or self._energies  # all forms are compiled now
+        quadrature = exact if self.is_linear else exact + _MORE
+        self._dx = ufl.dx(metadata={"quadrature_degree": quadrature})
+        self._history = _History(mesh, quadrature) if relaxes else None
+        self._density = self._linear(self._strain) if self.is_linear else self._hyperelastic(self._gradient)
+        directions = ufl.TestFunction(self._space), ufl.TrialFunction(self._space)
+        self._action, self._stiffness = (form(self._derivative(*directions[:order])) for order in (1, 2))
+        # All forms are compiled now.
+        _ = self._strains, self._areas, (self.is_linear and not relaxes) or self._energies, relaxes and self._at_points
 
-    def _linear(self) -> Energy:
+    def _derivative(self, *directions: Any) -> Any:
+        """Return the derivative of the energy along ``directions``."""
+        energy, history = self._density, self._history
+        for direction in directions:
+            energy = energy.derivative(self._solution, direction)
+        value = energy.value
+        if history is not None:
+            work = ufl.inner(history.tensor, self._green)
+            for direction in directions:
+                work = ufl.derivative(work, self._solution, direction)
+            value = history.factor * value + work
+        return value * self._weight * self._dx
+
+    def _linear(self, strain: Any) -> Energy:
         material, unit, mesh = self._material, self._unit, self._mesh
-        strain, mu = self._strain, fem.Constant(mesh, material.lame_mu / unit)
+        mu = fem.Constant(mesh, material.lame_mu / unit)
         if self.is_mixed:
             compliance = fem.Constant(mesh, unit / material.lame_lambda)
             energy = pressurised(strain, 0, mu, self._p, compliance)
@@ -91,13 +113,12 @@ class Region:
             energy = small_strain(strain, fem.Constant(mesh, material.ratio * material.lame_mu / unit), mu)
         return Energy(((energy, None),), {})
 
-    def _hyperelastic(self) -> Energy:
+    def _hyperelastic(self, gradient: Any) -> Energy:
         material, mesh = self._material, self._mesh
         share, (split,) = material.lame_mu / self._unit, [SplitLaw.of(MaterialLaw((material,)))]
         volume = split.elastic.parameters[0].lame_lambda if self.is_mixed else material.ratio
         of = {name: fem.Constant(mesh, value) for name, value in material.further}
         of |= {"lame_mu": fem.Constant(mesh, share), "lame_lambda": fem.Constant(mesh, volume * share)}
-        gradient = self._gradient
         if not self.is_mixed:
             return LAWS[material.law].density(gradient, of)
         pressure, compliance = ufl.variable(self._p), fem.Constant(mesh, split.compliance[0] / share)
@@ -116,6 +137,12 @@ class Region:
             if self._is_plane
             else axisymmetric_strain(self._u, self._r)
         )
+
+    @property
+    def _green(self) -> Any:
+        """Green's strain, of linear laws ε."""
+        gradient = self._gradient
+        return self._strain if self.is_linear else (gradient.T * gradient - ufl.Identity(3)) / 2
 
     def on(self, name: str) -> tuple[IntArray, FloatArray]:
         """Return the dofs (n, 2) of u_r and u_z on a group of facets, and their coordinates (n, 2)."""
@@ -161,13 +188,62 @@ class Region:
         converges then to F wrong by 0.2 to 0.4 %. Both have a sign of their own in a logarithm. In plane
         strain J is the area's change; at a crack's tip, where F is singular, polynomials fold beside these points.
         """
-        forms = [form(self._density.value * self._weight * self._dx)]
+        forms = [form(self._derivative())]
         if not (self.is_linear or self._is_plane):
             gradient, zero = self._gradient, fem.Constant(self._mesh, 0.0)
             inside = ufl.dx(metadata={"quadrature_degree": _INSIDE})
             area = gradient[0, 0] * gradient[2, 2] - gradient[0, 2] * gradient[2, 0]
             forms.append(form(zero * (ufl.ln(area) + ufl.ln(gradient[1, 1])) * inside))
         return forms
+
+    def impose(self, factor: float, stress: FloatArray) -> None:
+        """Set A and H, (6, points), of tissue that relaxes."""
+        assert self._history is not None
+        self._history.factor.value = factor
+        self._history.stress.x.array[:] = stress.T.ravel()
+
+    def stresses(self, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return stress and strain of the law alone, (6, points): see :class:`pipeline.solve.point_law.PointLaw`."""
+        self._solution.x.array[:] = solution
+        stress, strain = (
+            np.asarray(fem.assemble_vector(each).array).reshape(-1, len(SYMMETRIC)).T / self.volumes
+            for each in self._at_points[:2]
+        )
+        return stress, strain
+
+    def forces_of(self, stress: FloatArray, solution: FloatArray) -> FloatArray:
+        """Return the residual at a ``solution`` of H alone, (6, points)."""
+        assert self._history is not None
+        factor, imposed = (
+            float(self._history.factor.value),
+            self._history.stress.x.array.reshape(-1, len(SYMMETRIC)).T.copy(),
+        )
+        self.impose(0.0, stress)
+        found = self.residual(solution)
+        self.impose(factor, imposed)
+        return found
+
+    @cached_property
+    def volumes(self) -> FloatArray:
+        """The share of each quadrature point in r dr dz."""
+        return np.array(fem.assemble_vector(self._at_points[2]).array[:: len(SYMMETRIC)])
+
+    @cached_property
+    def _at_points(self) -> tuple[Any, Any, Any]:
+        """Forms of stress and strain at the quadrature points, times their volumes, and of these."""
+        assert self._history is not None
+        test = ufl.TestFunction(self._history.stress.function_space)
+        if self.is_linear:
+            strain = ufl.variable(self._strain)
+            stress = ufl.diff(self._linear(strain).value, strain)
+        else:
+            gradient = ufl.variable(self._gradient)
+            stress = ufl.inv(gradient) * ufl.diff(self._hyperelastic(gradient).value, gradient)
+        values = [ufl.inner(each, symmetric(test, 2)) for each in (stress, self._green)]
+        of_stress, of_strain, volumes = (
+            form(each * self._weight * self._dx) for each in (*values, sum(test[n] for n in range(len(SYMMETRIC))))
+        )
+        return of_stress, of_strain, volumes
 
     def interpolate(self, coarse: "Region", solution: FloatArray) -> FloatArray:
         """Return the ``solution`` of elements of a lower degree on the same mesh, in these elements."""
@@ -232,3 +308,16 @@ class Region:
     def _areas(self) -> Any:
         test = ufl.TestFunction(cellwise_space(self._mesh, ()))
         return form(test * self._dx) if mesh_order(self._mesh) > 1 else None
+
+
+class _History:
+    """What the energy of relaxing tissue has besides ψ: its ``factor`` A, and the ``stress`` H at quadrature points."""
+
+    def __init__(self, mesh: Any, quadrature: int):
+        self.factor = fem.Constant(mesh, 1.0)
+        self.stress = fem.Function(quadrature_space(mesh, quadrature, len(SYMMETRIC)))
+
+    @property
+    def tensor(self) -> Any:
+        """H as a tensor."""
+        return symmetric(self.stress)

@@ -75,14 +75,14 @@ class MeridianTouch:
         Raises:
             LargeError: if the path ends before; ``reached`` are the depth and the force there.
         """
-        return self._at_end(lambda path, there: press(self.tissue, self._placed, path, there), depth)
+        return self._at_end(lambda path, there: press(self.tissue, self.placed, path, there), depth)
 
     def along(self, depths: Sequence[float]) -> Iterator["MeridianTouch"]:
         """Yield the contact without friction at rising ``depths`` (m) of one load path, as far as it goes."""
         path = ContactPath(Stage(0.0, np.zeros_like(self.tissue.state)))
         for depth in depths:
             try:
-                press(self.tissue, self._placed, path, depth / self.unit)
+                press(self.tissue, self.placed, path, depth / self.unit)
             except LargeError:
                 return
             yield replace(self, touched=path.last.touched)
@@ -95,7 +95,7 @@ class MeridianTouch:
         """
         friction = self._friction(depth / self.unit)
         return self._at_end(
-            lambda path, there: press_with_friction(self.tissue, self._placed, path, there, friction, steps), depth
+            lambda path, there: press_with_friction(self.tissue, self.placed, path, there, friction, steps), depth
         )
 
     def _at_end(self, follow: Callable[[ContactPath, float], int], depth: float) -> "MeridianTouch":
@@ -131,11 +131,11 @@ class MeridianTouch:
     def _found_from(self, other: "MeridianTouch", depth: float) -> "MeridianTouch":
         if not self.tissue.is_sound:
             raise LargeError("tissue is turned inside out")
-        tool = self._placed(depth / self.unit)
+        tool = self.placed(depth / self.unit)
         active = first_set(self.tissue, tool, self.tissue.places[:, 0] * self.unit < other.edge * other.unit)
         return replace(self, touched=solve_contact(self.tissue, tool, active))
 
-    def _placed(self, depth: float) -> PlacedTool:
+    def placed(self, depth: float) -> PlacedTool:
         """Return the tool at a ``depth`` (units of the mesh)."""
         on_support = self.tissue.fixed.all(axis=1)
 
@@ -281,9 +281,17 @@ class MeridianTouch:
             SolveError: if forces do not balance, the work is not the change of the energy, or the support is touched.
         """
         tissue, touched = self.tissue, self._contact
-        if np.any(touched.gap[tissue.fixed.all(axis=1)] < 0):
-            raise SolveError("the probe reaches the fixed part of the body: no displacement satisfies both")
+        self.check_outside(touched)
         check_balance(self.balance)
         work = 2 * pi * float((touched.forces * (tissue.positions() - tissue.places)).sum())
         more, less = (2 * pi * tissue.system.forms.energy((1 + change) * tissue.state) for change in (_SMALL, -_SMALL))
         check_work(work, (more, less), _SMALL, LargeError, _ROUNDING * self.volume)
+
+    def check_outside(self, touched: ContactSolution) -> None:
+        """Check that the tool does not reach the support.
+
+        Raises:
+            SolveError: if it does.
+        """
+        if np.any(touched.gap[self.tissue.fixed.all(axis=1)] < 0):
+            raise SolveError("the probe reaches the fixed part of the body: no displacement satisfies both")

@@ -133,6 +133,15 @@ def needs_time_steps(scene: Scene) -> bool:
     return scene.probe.history is not None and (_is_large(scene) or len(_relaxations(scene)) > 1)
 
 
+def _is_off_axis(scene: Scene) -> bool:
+    return scene.body.half_plane() is None or any(scene.probe.at)
+
+
+def _is_in_space(scene: Scene) -> bool:
+    """Return whether a scene is certainly no axisymmetric one; of others, the plan knows."""
+    return _is_off_axis(scene) or not scene.probe.is_round or scene.mesh.model == "3d"
+
+
 FEATURES: dict[str, Feature] = {
     "layers": Feature("body.layer", lambda s: isinstance(s.body, Layered) and bool(s.body.layer)),
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
@@ -144,6 +153,9 @@ FEATURES: dict[str, Feature] = {
         "probe.history", lambda s: any(_relaxations(s)) and s.probe.history is None, ("body", "material")
     ),
     "time steps": Feature("probe.history", needs_time_steps, ("body", "material")),
+    "time steps in three dimensions": Feature(
+        "probe.history", lambda s: needs_time_steps(s) and _is_in_space(s), ("body", "material", "mesh")
+    ),
     "fibres": Feature("material.law", lambda s: any(t.has_fibres for t in (s.material, *s.body.regions)), ("body",)),
     # Of regions, those of layers that fill the body included, the study's check of laws reports it.
     "ν < 0.2": Feature(
@@ -183,7 +195,7 @@ FEATURES: dict[str, Feature] = {
     "needle that cuts": Feature("probe.toughness", lambda s: s.probe.crack is not None),
     "linear law": Feature("material.law", lambda s: not _is_large(s), ("body",)),
     "model in three dimensions": Feature("mesh.model", lambda s: s.mesh.model == "3d"),
-    "no round scene": Feature("probe.at", lambda s: s.body.half_plane() is None or any(s.probe.at), PLACE, list),
+    "no round scene": Feature("probe.at", _is_off_axis, PLACE, list),
     "six motions": Feature("probe.motion", lambda s: s.probe.motion == "all"),
     "range of depths": Feature(
         "probe.depth_range",

@@ -9,7 +9,6 @@ _PRESSED_ONLY = "real-time models are only for tools that press straight down"
 # Of each way that may be shorter, the features with which it is not taken, each with the reason.
 OBSTACLES: dict[str, dict[str, str]] = {
     "meridian": {
-        "time steps": "time steps are computed in three dimensions",
         "fibres": "fibres have a direction, and are not axisymmetric",
         "linear outside": "the boundary of the linear part is a sphere, and no line of the mesh of the meridian",
         "six motions": "most of the six motions are not axisymmetric",
@@ -19,7 +18,6 @@ OBSTACLES: dict[str, dict[str, str]] = {
     },
     # Taken if no case of the study is in the way: what is compared is computed alike.
     "meridian, in a comparison": {
-        "time steps": "all cases of the comparison are solved in three dimensions",
         "linear outside": "all cases of the comparison are solved in three dimensions",
         "half ball": "all cases of the comparison are solved in three dimensions",
     },

@@ -30,6 +30,10 @@ _PRESSES = f"the far field is known only for a tool that presses: {_COARSE}"
 _HOLDS = 'a tool that slides along the tissue has no lateral stiffness: use contact = "bonded"'
 _STATIC = "omit [probe.history] and relaxation"
 _IN_STEPS = "with this law or relaxation the force over time is computed in time steps"
+STEPS_IN_SPACE = (
+    f"{_IN_STEPS}, which meshes for an accuracy cover only where the scene is solved in two dimensions: give sizes, or "
+    "use a round tool on the axis of a round body"
+)
 _NO_LOADS = "omit [load], and pressure in hollow regions"
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
 _OF_LAW = "with a law of large displacements"
@@ -198,7 +202,7 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal("time steps", "six motions", f'{_IN_STEPS}, of one movement: use motion = "press"'),
     Refusal("time steps", "loads", f"{_IN_STEPS}, and the tissue has crept under the loads before: {_NO_LOADS}"),
-    Refusal("time steps", "accuracy", f"{_IN_STEPS}, which meshes for an accuracy do not cover: give sizes"),
+    Refusal("time steps in three dimensions", "accuracy", STEPS_IN_SPACE),
     Refusal("time steps", "half ball", f"{_IN_STEPS}, and the far field has none: {_COARSE}"),
     # Large strains.
     Refusal(
