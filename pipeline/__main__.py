@@ -17,13 +17,19 @@ def main() -> None:
         signal.signal(signal.SIGINT, _leave)
 
     try:
+        from pipeline import interrupts  # noqa: PLC0415
         from pipeline.cli import main as run  # noqa: PLC0415 (takes time to load)
         from pipeline.launcher import prepare_libraries  # noqa: PLC0415
 
         prepare_libraries()
         if listens:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-        run()
+            interrupts.listen()
+        try:
+            run()
+        finally:
+            if listens:
+                signal.signal(signal.SIGINT, _leave)
+                interrupts.forget()
     except ModuleNotFoundError as missing:
         from pipeline.libraries import sentence_on  # noqa: PLC0415
 
@@ -32,7 +38,6 @@ def main() -> None:
         print(sentence, file=sys.stderr)
         sys.exit(BAD_INPUT)
     except KeyboardInterrupt:
-        signal.signal(signal.SIGINT, _leave)
         sys.exit(INTERRUPTED)
 
 

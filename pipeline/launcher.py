@@ -6,6 +6,8 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+from pipeline import interrupts
+
 # Open MPI 4 and 5 (PMIx), MPICH and Slurm's PMI, Intel's. Slurm's own SLURM_PROCID is no sign of MPI: each process of
 # `srun --mpi=none` is a run of its own.
 _RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
@@ -43,6 +45,8 @@ def is_first_rank() -> bool:
 
 def is_interrupt(error: BaseException) -> bool:
     """Tell whether it is Ctrl-C that an import, or a library, has made another exception of."""
+    if interrupts.is_raised():
+        return True
     cause = error.__cause__ or error.__context__
     return cause is not None and (isinstance(cause, KeyboardInterrupt) or is_interrupt(cause))
 
