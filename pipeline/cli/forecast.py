@@ -1,4 +1,4 @@
-"""What `epsmesh plan` tells of the forces that `epsmesh identify` and `sensitivity` need."""
+"""What `epsmesh plan` tells of the forces that `epsmesh identify` and `sensitivity` need, and of an export."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -39,6 +39,27 @@ def told(found: dict[str, Any]) -> str:
         least = f"{counted(found['least'], 'solve')}, {format_seconds(found['least_seconds'])}"
         text = f"{least}, if the sides of the body are far away; if not, {text}"
     return f"  {found['command']}, forces of {found['of']}: {text}; less what is stored"
+
+
+def of_export(study: "Study", cost: "CostModel") -> dict[str, Any]:
+    """Return about what `epsmesh export` costs, without options; or the reason, ``refused``, why there is no model."""
+    from pipeline.export.forecast import Export
+    from pipeline.export.scope import ExportError, scope_of
+
+    try:
+        return vars(Export(scope_of(study), cost=cost).forecast())
+    except ExportError as reason:
+        return {"refused": str(reason).removeprefix(f"{study.file}: ")}
+
+
+def told_of_export(found: dict[str, Any], ranks: int) -> str:
+    """Write it as a line."""
+    from pipeline.export.forecast import Forecast
+
+    if reason := found.get("refused"):
+        return f"  export: no real-time model: {reason}"
+    warned = f"; {found['warning']}" if found["warning"] else ""
+    return f"  export, as a real-time model: {Forecast(**found).told(ranks)}{warned}"
 
 
 def _domains(study: "Study") -> "Iterator[tuple[str, str, Domain]]":

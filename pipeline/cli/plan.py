@@ -8,7 +8,7 @@ import typer
 from pipeline.cli.cases import find_case
 from pipeline.cli.console import is_json_wanted, say, warning
 from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, as_data, fail, of_study, print_faults, refusing
-from pipeline.cli.forecast import forecasts, told
+from pipeline.cli.forecast import forecasts, of_export, told, told_of_export
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     File,
@@ -68,7 +68,7 @@ def plan(
 ) -> None:
     """Check a study, and show the work to do, the work skipped, and the reasons.
 
-    It estimates time and memory. For one case it shows the steps, the source of its force, what it shares with other
+    It estimates time and memory, also of an export. For one case it shows the steps, the source of its force, what it shares with other
     cases, and the cost of changes. Exit status 1: no case fits into memory; 2: the study has errors; all are listed.
 
     Example: epsmesh plan studies/figure3.toml
@@ -101,6 +101,7 @@ def plan(
     found |= {"memory_available": room, "too_large": sum(step["memory"] > most for step in found["steps"])}
     found["besides"] = _besides(made, records, ranks)
     found["forecasts"] = _forecasts(study, made.cost)
+    found["export"] = of_export(study, made.cost)
     _show(study, found, quiet=quiet, verbose=verbose)
     # Where all cases are too large, that of F_exact may still be solved: for nothing.
     asked = [step for step in found["steps"] if not step["exact"]] or found["steps"]
@@ -221,6 +222,7 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool) 
         print(f"  besides: up to {most}, {seconds} {on}: which are needed is found on the way")
     for forecast in found["forecasts"]:
         print(told(forecast))
+    print(told_of_export(found["export"], found["ranks"]))
 
 
 def _list_steps(steps: list[dict[str, Any]], most: int | None) -> None:

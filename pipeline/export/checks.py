@@ -10,12 +10,11 @@ from scipy.optimize import linprog
 
 from epsmesh_realtime.model import Model
 from pipeline.arrays import FloatArray
+from pipeline.export.forecast import DEPTH, SIZES
 from pipeline.export.full import Full, Solver, Tool
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.stages import stage
 
-# Half sizes of the tools, in units of the largest allowed one at the place; depth in units of the half size.
-SIZES, _DEPTH = (0.1, 0.99), 0.02
 # Least factor on the parts of a bar that grow with the tool: few touches are of the largest.
 _LEAST_SHAPE = 0.25
 # Error that full solves have in common, as a share of their error bars: on facets, meshes of the table and of the
@@ -107,7 +106,7 @@ def random_touch(model: Model, rng: np.random.Generator, kind: int) -> Check:
     smallest, largest = np.log(SIZES)
     size = model.largest * model.room(x, y) * float(np.exp(rng.uniform(smallest, largest)))
     low, high = model.table.poisson
-    poisson, depth = float(rng.uniform(low, high)), _DEPTH * size
+    poisson, depth = float(rng.uniform(low, high)), DEPTH * size
     tool = Tool("disc", size, contact="bonded" if TOOLS[kind] == "bonded" else "frictionless")
     if TOOLS[kind] == "blade":
         slenderness, angle = float(np.exp(rng.uniform(*np.log(_SLENDER)))), rng.uniform(0, 2 * np.pi)

@@ -3,31 +3,25 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import pi
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from pipeline.arrays import FloatArray
 from pipeline.export.ranks import ALONE, Ranks
-from pipeline.export.region import Region
+from pipeline.export.region import Region, coarse_case
 from pipeline.export.scope import Scope
 from pipeline.export.side_force import SideForce
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.mesh.of_case import mesh_arrays
-from pipeline.shapes.probes.blade import Blade
-from pipeline.shapes.probes.disc import Disc
 from pipeline.solve.far_field import PointForce
 from pipeline.solve.greens_function import regular_parts
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 from pipeline.study.case import Case
-from pipeline.study.schema import Mesh
 
-# Number of elements from the region's edge to the sides, through the thickness, or down to other tissue; growth.
-_NEAR, _THROUGH, _TO_TISSUE, _GROWTH = 2.5, 4, 2, 0.4
 # A mid node this far from the middle, in units of its edge's length, is a quarter point.
 _ASIDE = 0.2
 # Point forces at a place: one along the normal, two along the face.
@@ -43,17 +37,8 @@ def coarse_mesh(case: Case, region: Region, ranks: Ranks = ALONE) -> BodyMesh:
     Raises:
         MeshError: if the body cannot be meshed.
     """
-    through = _TO_TISSUE if case.body.regions else _THROUGH
-    near, far = region.margin / _NEAR, region.thickness / through
-    near = min(near, far) if case.body.regions else near
-    size: dict[str, Any] = {"depth": region.margin, "at": (0.0, 0.0), "axis": None}
-    if region.is_round:
-        probe: Any = Disc.model_construct(shape="disc", radius=region.reach[0], **size)
-    else:
-        length, width = 2 * region.reach[0], 2 * region.reach[1]
-        probe = Blade.model_construct(shape="blade", length=length, width=width, **size)
-    mesh = Mesh.model_construct(epsilon=region.margin, fine=near, coarse=max(near, far), rim=near, growth=_GROWTH)
-    arrays = ranks.on_first(lambda: mesh_arrays(replace(case, probe=probe, mesh=mesh), ()))
+    meshed = coarse_case(case, region)
+    arrays = ranks.on_first(lambda: mesh_arrays(meshed, ()))
     return distribute(MPI.COMM_SELF, _without_quarter_points(arrays))
 
 

@@ -9,24 +9,19 @@ from epsmesh_realtime.evaluator import Evaluator
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Face, Table
 from pipeline.arrays import FloatArray
+from pipeline.export.forecast import DEPTH, LARGER, RADII, SIZES_CURVED, discs_at
 from pipeline.export.full import Solver, Tool
 from pipeline.export.ranks import ALONE, Ranks
-from pipeline.export.region import Region
+from pipeline.export.region import Region, curved_region, is_free
 from pipeline.export.scope import ExportError, Scope
-from pipeline.export.tabulate import Places, counts, ratios_of, tabulate
-from pipeline.run.remaining import format_seconds
+from pipeline.export.tabulate import Places, ratios_of, tabulate
 from pipeline.shapes.contact import mean_curvature, paraboloid
 from pipeline.shapes.frame import PlaceError, Vector
 
-# Radii of the two discs, in units of the study's; the larger one is close to the model's largest contact.
-RADII, _LARGER = (0.6, 1.5), 1.03
-# Half size of the region: of a body without axes, in units of the disc's radius, the largest one with a face;
-# of an ellipsoid in its semi-axes.
-_REACHES, _OF_AXES = (3.0, 2.25, 1.5), 0.4
-# Intervals of the tables; depth over radius; fixed-point steps for h, whose square has little weight.
-_SIZES, _DEPTH, _STEPS = (2, 4), 0.02, 50
-# c depends most on the smaller disc, whose solve is so much more accurate.
-_FINER = 2 / 3
+# Half size of the region of a body without axes, in units of the disc's radius: the largest one with a face.
+_REACHES = (3.0, 2.25, 1.5)
+# Fixed-point steps for h, whose square has little weight.
+_STEPS = 50
 # Largest error of the table for c at new nodes, as a share of the accuracy.
 _SHARE = 0.5
 # The face: points along each direction, and the number of polynomials fitted to them (facets are smoothed).
@@ -55,19 +50,10 @@ def curved_model(
         RuntimeError: if a full solve failed.
     """
     radius = scope.case.probe.circumradius
-    room = _LARGER * RADII[1] * radius / largest
+    room = LARGER * RADII[1] * radius / largest
     middle = scope.case.probe.at[:2]
     region, face, off, bend_error = _region_and_face(scope, room, middle)
     ratios = ratios_of(scope.poissons).tolist()
-    least, most = counts(region, _SIZES, sparse=not region.is_round)
-    one = sum(
-        replace(solver, accuracy=share * solver.accuracy).seconds(
-            tool, middle, [_DEPTH * tool.radius], ratios if len(ratios) > 1 else None
-        )
-        for share, tool in _discs(radius)
-    )
-    first, last = (format_seconds(number * one / ranks.comm.size) for number in (least, most))
-    ranks.note(f"{least} to {most} places are to be solved in about {first} to {last}")
     known: dict[tuple[float, float], FloatArray] = {}
     smooth = Table.none(region.reach, is_round=region.is_axial, even=region.even).with_arrays(face.numbers())
 
@@ -80,7 +66,7 @@ def curved_model(
         known.update(zip(unknown, ranks.in_turn(unknown, regular, "places solved"), strict=True))
         return np.array([known[place][ratios.index(poisson)] for place in places])
 
-    table, error = tabulate(region, scope.poissons, found, _SHARE * accuracy, _SIZES, sparse=not region.is_round)
+    table, error = tabulate(region, scope.poissons, found, _SHARE * accuracy, SIZES_CURVED, sparse=not region.is_round)
     table = replace(table, leans=False)
     model = Model(
         table,
@@ -113,36 +99,9 @@ def _region_and_face(scope: Scope, room: float, middle: tuple[float, ...]) -> tu
         try:
             return region, *_face(scope, region, middle)
         except ExportError:
-            if not smaller or not _is_free(scope):
+            if not smaller or not is_free(scope):
                 raise
             share, *smaller = smaller
-
-
-def _is_free(scope: Scope) -> bool:
-    """Return whether the region has the size of the tool, not that of the body."""
-    return not scope.body.half_sides or any(scope.case.probe.at[:2]) or bool(scope.body.embedded)
-
-
-def curved_region(scope: Scope, room: float, half: float) -> Region:
-    """Return the region of a curved body round the study's place; ``room`` (m) is the distance to its boundary.
-
-    ``half`` (m) is its half size, unless the body's symmetry gives one.
-    """
-    is_round, reach, even = False, (half, half), (False, False)
-    if not _is_free(scope):
-        assert scope.body.half_sides is not None
-        is_round, even = scope.body.is_round, (True, True)
-        reach = (_OF_AXES * scope.body.half_sides[0], _OF_AXES * scope.body.half_sides[1])
-    return Region(reach, (reach[0] + 2 * room, reach[1] + 2 * room), room, is_round, even, is_axial=is_round)
-
-
-def _discs(radius: float) -> list[tuple[float, Tool]]:
-    """Return the discs of a place by the study's ``radius``, each with its accuracy as a share of the solver's."""
-    bonded = Tool("disc", radius, contact="bonded", motion="all")
-    return [
-        *((share, Tool("disc", size * radius)) for size, share in zip(RADII, (_FINER, 1.0), strict=True)),
-        (1.0, bonded),
-    ]
 
 
 def _regular(
@@ -153,14 +112,14 @@ def _regular(
     c and h satisfy d/F = 1/(2aE*) + c + a²h/3 - 2E*h²a⁵/45 for both radii. A₁ and A_xy are 0: second derivatives of R
     do not exist at a force on a curved face. R is the compliance of a bonded disc beyond that on a half-space.
     """
-    *discs, _ = _discs(radius)
+    *discs, _ = discs_at(radius)
     radii, rests = [tool.radius for _, tool in discs], []
     planes = 1 / (1 - np.square(ratios))
     several = ratios if len(ratios) > 1 else None  # the study's own materials, or all ratios on one mesh
     for share, tool in discs:
         a = tool.radius
-        fulls = replace(solver, accuracy=share * solver.accuracy).press_all(tool, at, [_DEPTH * a], several)
-        rests.append(scope.young * _DEPTH * a / np.array([full.force for full in fulls]) - 0.5 / (planes * a))
+        fulls = replace(solver, accuracy=share * solver.accuracy).press_all(tool, at, [DEPTH * a], several)
+        rests.append(scope.young * DEPTH * a / np.array([full.force for full in fulls]) - 0.5 / (planes * a))
     (a, b), h = radii, np.zeros(len(ratios))
     for _ in range(_STEPS):
         bent = [rest + 2 / 45 * planes * h**2 * r**5 for rest, r in zip(rests, radii, strict=True)]
@@ -179,7 +138,7 @@ def _bonded(
     the model's smooth face: a tilt against facets would add a share of its own compliances to R.
     """
     x, y, z = normal
-    tool, depth = Tool("disc", radius, contact="bonded", motion="all", axis=(-x, -y, -z)), _DEPTH * radius
+    tool, depth = Tool("disc", radius, contact="bonded", motion="all", axis=(-x, -y, -z)), DEPTH * radius
     turn = upright(normal)
     found = []
     for ratio, full in zip(

@@ -13,29 +13,22 @@ from pipeline.export.compliance import coarse_mesh, each_compliance, law_of
 from pipeline.export.curved import curved_model
 from pipeline.export.far import far_fields
 from pipeline.export.file import write_model
-from pipeline.export.full import Solver, Tool
+from pipeline.export.forecast import LARGEST, Export, too_large
+from pipeline.export.full import Solver
 from pipeline.export.near import near_field, with_near
 from pipeline.export.pairs import tabulate_pairs
 from pipeline.export.ranks import ALONE, Ranks
-from pipeline.export.region import Region
+from pipeline.export.region import MARGIN, Region
 from pipeline.export.scope import ExportError, Scope
 from pipeline.export.surface import tabulate_surface
 from pipeline.export.surface_body import surface_body
-from pipeline.export.tabulate import Places, counts, ratios_of, tabulate
-from pipeline.printable import counted
-from pipeline.run.remaining import format_seconds
+from pipeline.export.tabulate import Places, tabulate
 from pipeline.shapes.body import Layered
 
-# Margin beside the sides, in units of half the width or the thickness, whichever is smaller. Largest contact, in units
-# of the distance to the nearest side or the bottom.
-MARGIN, LARGEST = 0.15, 0.4
-# Shares of the accuracy: the table's error in c for the largest disc; full solves of a flat body, of a curved body, and
-# of the two discs for a curved body's table. Error bars before calibration: of c, of h, and of the contact size to the
-# fourth power.
-_SHARE, _PRECISE, _PRECISE_CURVED, _PRECISE_TABLE, _BARS = 0.4, 0.05, 0.5, 1.0, (1e-3, 0.03, 0.1)
+# Share of the accuracy: the table's error in c for the largest disc. Error bars before calibration: of c, of h, and of
+# the contact size to the fourth power.
+_SHARE, _BARS = 0.4, (1e-3, 0.03, 0.1)
 _SEEDS = (1, 2)
-# Depth over radius of a touch whose time is estimated.
-_TOUCH = 0.02
 _UNSEEN = "at large displacements there is only a force"
 # Largest distance of a query from a flat face, in units of the thickness.
 _OFF = 1e-6
@@ -109,15 +102,12 @@ def export(
         ExportError: if no region of the body remains.
         MeshError, SolveError, RuntimeError: if a mesh, a Green's function or a full solve fails.
     """
-    precise = _PRECISE * accuracy if scope.is_flat else _PRECISE_CURVED * accuracy
-    solver = Solver(scope.sections, scope.file, scope.young, precise, kept=ranks.kept)
-    size, ratios = scope.case.expected.circumradius, None if scope.poissons[0] == scope.poissons[1] else [scope.poisson]
-    one = solver.seconds(Tool("disc", size), scope.case.probe.at[:2], [_TOUCH * size], ratios)
-    seconds = format_seconds(checks * one / ranks.comm.size)
-    ranks.note(f"{counted(checks, 'full solve')} for the error bar will take about {seconds}")
+    planned = Export(scope, accuracy, checks, margin, largest, ranks.kept)
+    solver = planned.solver
+    ranks.note(f"the export needs {planned.forecast().told(ranks.comm.size)}, less what is kept")
     make = _flat if scope.is_flat else curved_model
-    of_table = replace(solver, accuracy=_PRECISE_TABLE * accuracy)
-    bare, error, places = make(scope, of_table, accuracy, largest, (*_BARS, precise), margin, ranks)
+    of_table = planned.solver_of_table
+    bare, error, places = make(scope, of_table, accuracy, largest, (*_BARS, solver.accuracy), margin, ranks)
     bare = replace(bare, tool=scope.tool)
     tools = range(len(TOOLS)) if len(bare.table.tensors) and not scope.law else (0,)
     halves = [checks - checks // 2, checks // 2]
@@ -130,7 +120,7 @@ def export(
     model = replace(bare, bar=narrowest(replace(bare, bar=(*_BARS, 0.0)), plain))
     fitted, judged = ([with_bar(model, check) for check in half] for half in (fitted, judged))
     if scope.law:
-        nonlinear = replace(solver, accuracy=accuracy, law=scope.law)
+        nonlinear = planned.solver_of_law
         near = near_field(scope, nonlinear, ranks)
         model, fitted, judged = with_near(model, near, nonlinear, halves, ranks)
         return Exported(model, fitted, judged, error, places, None, _UNSEEN if surface else "")
@@ -162,10 +152,6 @@ def _flat(
         raise ExportError("the body leaves no region: make it wider")
     if told := too_large(scope, largest * region.room(0.0, 0.0)):
         ranks.note(f"warning: {told}")
-    (least, most), of = counts(region), counted(len(ratios_of(scope.poissons)), "value")
-    ranks.note(
-        f"{least} to {most} places are to be solved for each of {of} of ν; the first ones tell how long it takes"
-    )
     ranks.note("meshing the body")
     mesh = coarse_mesh(scope.case, region, ranks=ranks)
     solved: list[tuple[float, float]] = []
@@ -193,17 +179,6 @@ def _flat(
         relaxation=scope.relaxation,
     )
     return model, error, len(solved)
-
-
-def too_large(scope: Scope, most: float) -> str:
-    """Return why a model with contact radii up to ``most`` (m) refuses the study's own tool everywhere, "" if not."""
-    size = scope.case.expected.circumradius
-    if size <= most:
-        return ""
-    return (
-        f"the model will refuse the study's own tool: its contact radius is {1e3 * size:.3g} mm, and a model of this "
-        f"body answers up to {1e3 * most:.3g} mm: give a wider and thicker body, or a smaller tool"
-    )
 
 
 def write(exported: Exported, path: Path, scope: Scope, study: Path, version: str) -> None:

@@ -5,12 +5,10 @@ from dataclasses import dataclass, field
 from math import degrees, isfinite, nan
 from typing import Any
 
-from mpi4py import MPI
-
 from pipeline.arrays import FloatArray, np
 from pipeline.export.kept import NONE, Kept
+from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, make_plan
-from pipeline.run.execute import compute
 from pipeline.shapes.tissue import KEYS_OF_LAWS
 from pipeline.study.read import parse
 
@@ -80,6 +78,7 @@ class Solver:
     """Full solves on the body of a study with these ``sections``, to a relative ``accuracy``.
 
     ``law`` are the keys of the law of large displacements, none for linear elasticity. What is solved is ``kept``.
+    ``cost`` estimates times.
     """
 
     sections: Mapping[str, Any]
@@ -88,6 +87,7 @@ class Solver:
     accuracy: float
     law: Mapping[str, Any] = field(default_factory=dict)
     kept: Kept = field(default=NONE, repr=False, compare=False)
+    cost: CostModel = field(default_factory=CostModel, repr=False, compare=False)
 
     def press(self, tool: Tool, at: tuple[float, ...], depth: float, poisson: float | None) -> Full:
         """Return the force of a tool at x and y, or x, y and z (m), at a ``depth`` (m).
@@ -117,12 +117,12 @@ class Solver:
             return fulls
         return [Full.of(numbers) for numbers in found]
 
-    def seconds(
+    def cost_of(
         self, tool: Tool, at: tuple[float, ...], depths: Sequence[float], poissons: Sequence[float] | None = None
-    ) -> float:
-        """Return about how long :meth:`press_all` takes (s)."""
+    ) -> tuple[int, float]:
+        """Return about how many solves :meth:`press_all` needs, and how long they take (s)."""
         plan = self._plan(tool, at, depths, poissons)
-        return sum(plan.cost.step(step).seconds for step in plan.meshes)
+        return len(plan.solves), sum(self.cost.step(step).seconds for step in plan.meshes)
 
     def _plan(
         self, tool: Tool, at: tuple[float, ...], depths: Sequence[float], poissons: Sequence[float] | None
@@ -138,6 +138,10 @@ class Solver:
 
 
 def _solved(plan: Plan, what: str) -> list[Full]:
+    from mpi4py import MPI  # noqa: PLC0415 (`epsmesh plan` asks for times alone)
+
+    from pipeline.run.execute import compute  # noqa: PLC0415
+
     records = compute(plan, MPI.COMM_SELF)
     found = [records[key] for key in plan.keys]
     for record in found:

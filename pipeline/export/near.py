@@ -15,20 +15,19 @@ import numpy as np
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Near
 from pipeline.arrays import FloatArray
-from pipeline.export.checks import BALL, SIZES, Check, check_touches, margin, on_face, random_place, with_bar
+from pipeline.export.checks import BALL, Check, check_touches, margin, on_face, random_place, with_bar
+from pipeline.export.forecast import BALL as RADIUS
+from pipeline.export.forecast import DEPTHS, DISC, RATIOS, SHALLOW, SIZES, half_space
 from pipeline.export.full import Full, Solver, Tool
 from pipeline.export.ranks import Ranks
 from pipeline.export.scope import ExportError, Scope
 from pipeline.export.tabulate import ratios_of
 from pipeline.stages import stage
 
-# Radius of the ball (m); radius and depth of the linear disc that measures the cylinder's compliance; size of the
-# cylinder in radii of the ball.
-_RADIUS, _DISC, _SHALLOW, _SIZE = 1e-3, 4e-3, 1e-5, 100.0
-# Depths in radii of the ball, of which the last may have no equilibrium; accuracy of the solves.
-_DEPTHS, _FEWEST, _ACCURACY = (0.05, 0.15, 0.3, 0.5, 0.75, 1.0), 4, 1e-3
-# Number of nodes over ν, and terms in x beyond the first, which is known.
-_RATIOS, _TERMS = 4, 4
+# Fewest depths with an equilibrium.
+_FEWEST = 4
+# Terms in x beyond the first, which is known.
+_TERMS = 4
 # F is about in proportion to the depth to this power.
 _POWER = 1.5
 # Depths of the checks, in radii of the ball, and the factor to the next depth if one has no answer.
@@ -48,29 +47,27 @@ def near_field(scope: Scope, solver: Solver, ranks: Ranks) -> Near:
         ExportError: if too few depths have an equilibrium.
         RuntimeError: if a linear solve fails.
     """
-    ratios = ratios_of(scope.poissons, _RATIOS)
-    size = f"{1e3 * _SIZE * _RADIUS:g} mm"
-    body = {"shape": "cylinder", "radius": size, "height": size, "fixed": "bottom"}
-    large = replace(solver, sections={"body": body}, accuracy=_ACCURACY)
+    ratios = ratios_of(scope.poissons, RATIOS)
+    large = half_space(solver)
     small = replace(large, law={})
 
     def solve(one: tuple[float, float]) -> list[Full]:
         ratio, share = one
         if share == 0.0:
-            return [small.press(Tool("disc", _DISC), (0.0, 0.0), _SHALLOW, ratio)]
+            return [small.press(Tool("disc", DISC), (0.0, 0.0), SHALLOW, ratio)]
         try:
-            return [large.press(Tool("sphere", _RADIUS, contact="unilateral"), (0.0, 0.0), share * _RADIUS, ratio)]
+            return [large.press(Tool("sphere", RADIUS, contact="unilateral"), (0.0, 0.0), share * RADIUS, ratio)]
         except RuntimeError:
             return []
 
-    asked = [(float(ratio), share) for ratio in ratios for share in (0.0, *_DEPTHS)]
+    asked = [(float(ratio), share) for ratio in ratios for share in (0.0, *DEPTHS)]
     found = iter(ranks.in_turn(asked, solve, "half-spaces solved"))
-    rows = [[next(found) for _ in (0.0, *_DEPTHS)] for _ in ratios]
+    rows = [[next(found) for _ in (0.0, *DEPTHS)] for _ in ratios]
     count = min([*map(bool, row), False].index(False) for row in rows) - 1
     if count < _FEWEST:
         raise ExportError(
-            f'material.law = "{solver.law["law"]}": a half-space has no equilibrium {_DEPTHS[count]:g} radii of a ball '
-            f"deep; a real-time model needs {_DEPTHS[_FEWEST - 1]:g}"
+            f'material.law = "{solver.law["law"]}": a half-space has no equilibrium {DEPTHS[count]:g} radii of a ball '
+            f"deep; a real-time model needs {DEPTHS[_FEWEST - 1]:g}"
         )
     solved = [[full for one in row[: count + 1] for full in one] for row in rows]
     curves = [_curve(row, ratio, scope.young) for row, ratio in zip(solved, ratios, strict=True)]
@@ -93,12 +90,12 @@ def _curve(solved: Sequence[Full], ratio: float, young: float) -> tuple[FloatArr
     """Return x (n,), and depth and contact radius (2, n) in units of Hertz's, from the solves of disc and balls."""
     disc, *balls = solved
     plane = 1 / (1 - ratio**2)
-    ends = young * _SHALLOW / disc.force - 0.5 / (_DISC * plane)  # 1/m, for E = 1
+    ends = young * SHALLOW / disc.force - 0.5 / (DISC * plane)  # 1/m, for E = 1
     force, radius = np.array([(ball.force / young, ball.radius) for ball in balls]).T
-    depth = np.array(_DEPTHS[: len(force)]) * _RADIUS - ends * force
-    x = np.cbrt(force / (plane * _RADIUS**2))
-    hertz = 0.75 ** (1 / 3) * x * _RADIUS
-    return x, np.array([depth * _RADIUS / hertz**2, radius / hertz])
+    depth = np.array(DEPTHS[: len(force)]) * RADIUS - ends * force
+    x = np.cbrt(force / (plane * RADIUS**2))
+    hertz = 0.75 ** (1 / 3) * x * RADIUS
+    return x, np.array([depth * RADIUS / hertz**2, radius / hertz])
 
 
 def _fitted(x: FloatArray, values: FloatArray, most: float) -> tuple[FloatArray, float]:

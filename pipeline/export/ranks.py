@@ -89,7 +89,8 @@ class Ranks:
 
     def _tell(self, what: str, done: int, count: int, start: float) -> None:
         """Tell how many items are done, and how long the others take at the pace since the ``start`` (s)."""
-        left = (time.monotonic() - start) / done * (count - done) if done else 0.0
+        # The first item's time has the set-up.
+        left = (time.monotonic() - start) / done * (count - done) if done > self.comm.size else 0.0
         self.note(
             f"{what}: {min(done, count)} of {count}" + (f", about {format_seconds(left)} left" if left > 0 else "")
         )

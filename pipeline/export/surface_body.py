@@ -1,6 +1,5 @@
 """The meshed body of a model, with the point forces for which its deforming surface is tabulated."""
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -8,21 +7,16 @@ from mpi4py import MPI
 
 from epsmesh_realtime.model import Model
 from pipeline.export.compliance import coarse_mesh, law_of
-from pipeline.export.curved import curved_region
 from pipeline.export.far import Pressed
 from pipeline.export.placed_force import PlacedForce
 from pipeline.export.ranks import ALONE, Ranks
-from pipeline.export.region import Region
+from pipeline.export.region import Region, curved_region, surface_case
 from pipeline.export.scope import ExportError, Scope
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.shapes.body import Layered
 from pipeline.solve.far_field import PointForce
-from pipeline.study.schema import Mesh
 
-# Element sizes of a curved body: in the region, in units of the study's radius; elsewhere, in units of the cube root of
-# the volume. Radius of the small elements, in units of half the region; growth.
-_IN_REGION, _ELSEWHERE, _AROUND, _GROWTH = 0.9, 0.095, 1.2, 0.4
 # Distances from a force, in units of the study's radius, within which its loads are omitted, and R is not tested.
 _BLUNT, _NEXT = 0.1, 0.5
 # A node is on a flat face if its distance, in units of the thickness, is at most this.
@@ -63,7 +57,7 @@ def _curved(scope: Scope, model: Model, ranks: Ranks) -> Pressed:
         first, second, third = ((float(a), float(b), float(c)) for a, b, c in spot.turn)
         return PlacedForce(poisson, (x, y, z), region.room(*place), (first, second, third), _BLUNT * radius)
 
-    mesh = _mesh(scope, region, radius, ranks)
+    mesh = _mesh(scope, region, ranks)
     points = np.asarray(mesh.mesh.geometry.x)
     corners = [(x * region.reach[0], y * region.reach[1]) for x in (-0.7, 0.0, 0.7) for y in (-0.7, 0.0, 0.7)]
     if max(on_face(place, scope.poisson).above(points) for place in corners) > _STRAIGHT_ABOVE:
@@ -71,9 +65,5 @@ def _curved(scope: Scope, model: Model, ranks: Ranks) -> Pressed:
     return Pressed(mesh, region, on_face, partial(law_of, scope), _NEXT * radius, model.off, _DOUBT, ranks)
 
 
-def _mesh(scope: Scope, region: Region, radius: float, ranks: Ranks) -> BodyMesh:
-    """Return a mesh that is fine in the region, for loads that grow towards a force, and for display."""
-    around, fine = _AROUND * max(region.reach), _IN_REGION * radius
-    coarse = max(fine, _ELSEWHERE * scope.body.volume ** (1 / 3))
-    mesh = Mesh.model_construct(epsilon=around, fine=fine, coarse=coarse, rim=fine, growth=_GROWTH)
-    return distribute(MPI.COMM_SELF, ranks.on_first(lambda: mesh_arrays(replace(scope.case, mesh=mesh), ())))
+def _mesh(scope: Scope, region: Region, ranks: Ranks) -> BodyMesh:
+    return distribute(MPI.COMM_SELF, ranks.on_first(lambda: mesh_arrays(surface_case(scope.case, region), ())))

@@ -1,5 +1,6 @@
 """Tables that know a smooth body, studies that no model is made of, and one body by full solves."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import pi
@@ -14,7 +15,7 @@ from epsmesh_realtime.table import Table
 from pipeline.export.checks import check_touches, margin, narrowest, random_touches, with_bar, with_full
 from pipeline.export.compliance import coarse_mesh, compliances
 from pipeline.export.curved import curved_model, upright
-from pipeline.export.export import too_large
+from pipeline.export.forecast import Export, too_large
 from pipeline.export.full import Full, Solver, Tool
 from pipeline.export.ranks import Ranks
 from pipeline.export.region import Region
@@ -23,8 +24,10 @@ from pipeline.export.tabulate import tabulate
 from pipeline.solve.physics import MaterialLaw
 from pipeline.study.read import parse
 from pipeline.verify.compare import solve
+from tests.commands import epsmesh
 from tests.organs import sphere, write_stl
 from tests.realtime.synthetic import of_place, random_model
+from tests.studies import small_text
 
 DISC = {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "frictionless"}
 BALL = {"shape": "sphere", "radius": "6 mm", "depth": "0.1 mm", "contact": "unilateral"}
@@ -173,6 +176,37 @@ def test_the_range_of_poissons_ratio_holds_that_of_the_study():
 def test_a_model_that_refuses_its_own_tool_is_told_before(radius, word):
     told = too_large(scope_of(study(probe=DISC | {"radius": radius})), 8e-3)
     assert (bool(told), word in told) == (bool(word), True)
+
+
+@pytest.mark.parametrize("body", [CYLINDER, BOX, BOX | {"inclusion": [TUMOUR]}, DOME])
+def test_what_an_export_costs_is_told_before(body):
+    """Of places, as many as a table may have; more for more checks, and for a law, whose checks need load steps."""
+    scope = scope_of(study(body=body))
+    scope = replace(scope, sections={"body": body, "material": SOFT})
+    few, many = (Export(scope, checks=checks).forecast() for checks in (4, 24))
+    ratios = 3 if scope.poissons[0] < scope.poissons[1] else 1
+    assert 4 + 9 * ratios <= few.least <= few.most <= 4 + (2 * 289 + 110) * ratios
+    assert (many.least, many.most) == (few.least + 20, few.most + 20)
+    assert 0 < few.least_seconds <= few.most_seconds < many.most_seconds
+    assert few.told().startswith(f"about {few.least} ")
+    if body == BOX:
+        law = SOFT | {"law": "neo-hookean"}
+        large = replace(scope_of(study(body=BOX, material=law, probe=BALL)), sections={"body": BOX, "material": law})
+        assert Export(large).forecast().least_seconds > 2 * many.least_seconds
+
+
+def test_a_plan_tells_what_an_export_costs_or_why_there_is_none(tmp_path):
+    for friction, told in ((0.0, "real-time model: about "), (0.2, "no real-time model: probe.friction")):
+        ball = BALL | ({"friction": friction} if friction else {})
+        file = tmp_path / f"{friction}.toml"
+        file.write_text(small_text(body=CYLINDER, probe=ball, material=SOFT))
+        found = epsmesh("plan", file)
+        assert told in found.stdout.replace("\n", " ")
+        data = json.loads(epsmesh("plan", file, "--json").stdout)["export"]
+        assert ("refused" in data) == (friction > 0) and ("most_seconds" in data) == (friction == 0)
+    small = SOFT | {"poisson": 0.4}
+    file.write_text(small_text(body=CYLINDER, probe=DISC | {"radius": "9 mm"}, material=small))
+    assert "the model will refuse the study's own tool" in epsmesh("plan", file).stdout
 
 
 def test_a_study_that_relaxes_makes_a_model_that_does_and_is_solved_as_it_is_at_once():

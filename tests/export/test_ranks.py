@@ -103,7 +103,7 @@ def test_an_export_that_was_killed_goes_on_from_there(monkeypatch, tmp_path, bod
     again = made(1000)
     assert before < len(kept) == len({*kept}) > 9
     assert all("surface" in work for work in kept[before:])
-    assert any("full solves for the error bar will take about" in line for line in told)
+    assert any("the export needs about" in line and " solves, " in line for line in told)
     assert any("left" in line for line in told)
     assert max(abs(check.error) for check in again.judged) < 0.02
     for one in keepers:
