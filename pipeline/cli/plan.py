@@ -68,8 +68,9 @@ def plan(
 ) -> None:
     """Check a study, and show the work to do, the work skipped, and the reasons.
 
-    It estimates time and memory, also of an export. For one case it shows the steps, the source of its force, what it shares with other
-    cases, and the cost of changes. Exit status 1: no case fits into memory; 2: the study has errors; all are listed.
+    It estimates time and memory, and the cost of an export. For one case it shows the steps, the source of its force,
+    what it shares with other cases, and the cost of changes. Exit status 1: no case fits into memory; 2: the study has
+    errors; all are listed.
 
     Example: epsmesh plan studies/figure3.toml
 

@@ -20,7 +20,6 @@ from pipeline.arrays import FloatArray
 from pipeline.export.scope import Scope
 from pipeline.locks import hold, is_held
 from pipeline.plan.key import PHYSICS_VERSION
-from pipeline.run.provenance import git_commit
 
 
 class Kept:
@@ -32,6 +31,8 @@ class Kept:
         self._base, self._found = "", dict[str, FloatArray]()
         if model is None or scope is None:
             return
+        from pipeline.run.provenance import git_commit  # noqa: PLC0415 (it loads the solver libraries)
+
         what = (
             __version__,
             git_commit(),

@@ -7,8 +7,6 @@ import numpy as np
 
 from pipeline.export.scope import Scope
 from pipeline.shapes.body import Layered
-from pipeline.shapes.probes.blade import Blade
-from pipeline.shapes.probes.disc import Disc
 from pipeline.study.case import Case
 from pipeline.study.schema import Mesh
 
@@ -71,6 +69,9 @@ class Region:
 
 def coarse_case(case: Case, region: Region) -> Case:
     """Return a case of a flat body with a mesh for all places of a region."""
+    from pipeline.shapes.probes.blade import Blade  # noqa: PLC0415 (a plan loads the shapes that it names alone)
+    from pipeline.shapes.probes.disc import Disc  # noqa: PLC0415
+
     through = _TO_TISSUE if case.body.regions else _THROUGH
     near, far = region.margin / _NEAR, region.thickness / through
     near = min(near, far) if case.body.regions else near

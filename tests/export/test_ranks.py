@@ -73,7 +73,11 @@ def test_an_export_that_was_killed_goes_on_from_there(monkeypatch, tmp_path, bod
     """
     if WORLD.comm.size > 1:
         pytest.skip("of one rank")
-    few = {tabulate: {"_SIZES": (2, 4), "_POISSONS": 1}, curved: {"_SIZES": (1, 2)}, far: {"_SIZE": 2, "_HELD_OUT": 1}}
+    few = {
+        tabulate: {"_SIZES": (2, 4), "_POISSONS": 1},
+        curved: {"SIZES_CURVED": (1, 2)},
+        far: {"_SIZE": 2, "_HELD_OUT": 1},
+    }
     for module, name, value in ((module, *one) for module, names in few.items() for one in names.items()):
         monkeypatch.setattr(module, name, value)
     scope = replace(scope_of(study(body=body)), sections={"body": body, "material": SOFT}, poissons=(0.45, 0.45))
