@@ -21,6 +21,7 @@ from pipeline.mesh.slit import open_slit
 from pipeline.mesh.smooth import smoothed
 from pipeline.plan.refinement import is_refined, refinements
 from pipeline.plan.symmetry import mirror_planes
+from pipeline.plan.thin import cause
 from pipeline.scene.model import Scene
 from pipeline.shapes.half_plane import HalfEllipse, Rectangle
 from pipeline.shapes.scanned import Scanned
@@ -53,7 +54,12 @@ def unrefined_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" =
     """Return the mesh of a case as its generator makes it: see :func:`mesh_arrays`."""
     start = perf_counter()
     scene, sizes = _scene(case, is_coarse=False)
-    arrays = _meshed(scene, sizes, kept)
+    try:
+        arrays = _meshed(scene, sizes, kept)
+    except MeshError as error:
+        if thin := cause(case):
+            raise type(error)(f"{error}. {thin}") from error
+        raise
     arrays = open_slit(arrays, scene) if scene.has_inner_slit else arrays
     arrays = arrays if scene.straight else curve(arrays, scene)
     arrays = _with_linear(arrays, case) if case.is_linear_beyond else arrays

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray
+from pipeline.plan.estimate import FLATTEST, IN_LAYER
 from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Vector
@@ -19,9 +20,6 @@ from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.regions import Embedded
 from pipeline.shapes.shell import Shell
 
-# Element size in a layer below the probe in units of its thickness. With elements of degree 2, F is then within .4 % of
-# its value for half this size (docs/accuracy.md), and the error bar accounts for the rest.
-_IN_LAYER = 0.5
 # Elements on a surface of triangles have sizes in steps of this factor, each with the points of its own part.
 _STEP = 1.3
 # Sampling points on an embedded region, for the point nearest to anything else.
@@ -36,7 +34,7 @@ _LONGER = 2
 
 def longest_at_rim(body: Body) -> float:
     """Return the largest element size (m) along the probe's edge above a thin layer; infinite without one."""
-    return _LONGER * _IN_LAYER * (body.heights[1] - body.interfaces[0]) if body.interfaces else inf
+    return _LONGER * IN_LAYER * (body.heights[1] - body.interfaces[0]) if body.interfaces else inf
 
 
 class LocalSizes(Protocol):
@@ -52,14 +50,17 @@ class LocalSizes(Protocol):
         """
 
 
-def region_sizes(scene: Scene, growth: float) -> tuple[LocalSizes, ...]:
-    """Return the element sizes of the regions of a body, which grow by ``growth`` per unit of distance."""
+def region_sizes(scene: Scene, growth: float, largest: float = inf) -> tuple[LocalSizes, ...]:
+    """Return the element sizes of the regions of a body, which grow by ``growth`` per unit of distance.
+
+    No element exceeds the ``largest`` size (m) anyway.
+    """
     body, contact = scene.body, scene.frame.point
     low, high = body.heights
     # The part below the last interface is treated as a layer, too.
     heights = (high, *body.interfaces, low) if body.interfaces else ()
     layers = [
-        LayerSizes(bottom, top, contact, scene.probe.circumradius + high - bottom, growth)
+        LayerSizes(bottom, top, contact, scene.probe.circumradius + high - bottom, growth, largest)
         for top, bottom in pairwise(heights)
     ]
     return (*layers, *embedded_sizes(body, growth, contact))
@@ -67,26 +68,38 @@ def region_sizes(scene: Scene, growth: float) -> tuple[LocalSizes, ...]:
 
 @dataclass(frozen=True)
 class LayerSizes:
-    """Element sizes (m) in a layer between two heights, within a distance ``reach`` of the ``contact``; all in m."""
+    """Element sizes (m) in a layer between two heights, within a distance ``reach`` of the ``contact``; all in m.
+
+    Farther away they grow, but not until elements are flat. ``largest`` is the size that no element exceeds anyway.
+    """
 
     bottom: float
     top: float
     contact: Vector
     reach: float
     growth: float
+    largest: float = inf
+
+    @property
+    def thickness(self) -> float:
+        """Thickness (m) of the layer."""
+        return self.top - self.bottom
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the size (m) at points (n, 3)."""
         off = np.maximum(np.maximum(self.bottom - points[:, 2], points[:, 2] - self.top), 0.0)
         away = np.maximum(np.linalg.norm(points - np.array(self.contact), axis=1) - self.reach, 0.0)
-        return np.asarray(_IN_LAYER * (self.top - self.bottom) + self.growth * (off + away))
+        size = np.minimum(IN_LAYER * self.thickness + self.growth * away, FLATTEST * self.thickness)
+        return np.asarray(size + self.growth * off)
 
     def terms(self, unit: float, kernel: Any) -> Iterator[str]:
         """Yield the same as text for gmsh."""
         bottom, top = unit * self.bottom, unit * self.top
         away = f"Max({_distance(self.contact, unit)}-({unit * self.reach:.12g}),0)"
         off = f"Max(Max({bottom:.12g}-z,z-({top:.12g})),0)"
-        yield f"{_IN_LAYER * (top - bottom):.12g}+{self.growth:.12g}*({off}+{away})"
+        yield f"{IN_LAYER * (top - bottom):.12g}+{self.growth:.12g}*({off}+{away})"
+        if FLATTEST * self.thickness < self.largest:
+            yield f"{FLATTEST * (top - bottom):.12g}+{self.growth:.12g}*{off}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,9 +36,16 @@ _BYTES_PER_CELL = 1000
 # tetrahedra per unit of a surface's curvature, for elements of unit size whose facets deviate least.
 _OF_BEND, _ON_BOUNDARY, _FOLLOW = 0.5, 1.4, 30.0
 _TRIANGLE = 0.43
-# Element size in a layer, in its thickness (mesh/regions.py); factor on the number of elements of regions, because
-# element faces follow the interfaces.
-_IN_LAYER, _MEETING = 0.5, 1.75
+# Element size in a layer below the probe in units of its thickness. With elements of degree 2, F is then within .4 % of
+# its value for half this size (docs/accuracy.md), and the error bar accounts for the rest.
+IN_LAYER = 0.5
+# Largest element size in a layer, in its thickness. In a film of 10 µm on a box of 20 mm, elements as long as 700
+# thicknesses (no limit), 20 and 8 take 163, 39 and 25 iterations at ν = .3, and .45 fails without a limit, which takes
+# 82 with 40 and 64 with 20. Without a limit F is 4 % too large, with 20 .2 %.
+FLATTEST = 20.0
+# Factor on the number of elements of regions, because element faces follow the interfaces; tetrahedra per triangle of a
+# film.
+_MEETING, _IN_FILM = 1.75, 3
 
 
 def cells(case: Case) -> float:
@@ -53,7 +60,7 @@ def cells(case: Case) -> float:
     if not probe.is_flat:  # small elements down to the depth of the tool, and beside it
         _, depth = probe.depths
         total += area * depth / rim**3 + length * depth / (growth * rim**2)
-    total += _of_bend(case) + _of_regions(case)
+    total += _of_bend(case) + _MEETING * sum(_of_regions(case))
     epsilon = min(mesh.epsilon, (3 * body.volume / (2 * pi)) ** (1 / 3))
     if case.is_full or mesh.epsilon == inf:
         return (total + body.volume / mesh.fine**3) / _TETRAHEDRON
@@ -85,24 +92,45 @@ def _of_bend(case: Case) -> float:
     return body.volume / far**3 + _TETRAHEDRON * (_ON_BOUNDARY * triangles + follow)
 
 
-def _of_regions(case: Case) -> float:
-    """Return the number of elements (as cubes of their size) for layers and inclusions."""
+def cells_of_regions(case: Case) -> list[float]:
+    """Return the estimated number of tetrahedra that each layer and region of a body asks for, in their order."""
+    return [_MEETING * share / _TETRAHEDRON for share in _of_regions(case)]
+
+
+def _of_regions(case: Case) -> list[float]:
+    """Return the number of elements (as cubes of their size) of each layer and region, but for :data:`_MEETING`."""
     body, growth = case.body, case.mesh.growth
-    # Both sides of an embedded region's surface: ∫ 1 / (size + growth s)³ ds.
-    total = 0.0
-    for piece in body.embedded:
-        _, sizes, areas = piece.surface.sizes(case.frame.point)
-        total += float((areas / (growth * sizes**2)).sum())
-    top = body.heights[1]
-    high = top
+    found, high = [], body.heights[1]
     for low in body.interfaces:
-        size, radius = _IN_LAYER * (high - low), case.probe.circumradius + top - low
-        if size < case.mesh.fine:
-            within = pi * radius**2 * (high - low) / size**3
-            beside, below = (ring / (2 * growth * size**2) for ring in (2 * pi * radius * (high - low), pi * radius**2))
-            total += within + beside + below
+        found.append(_of_layer(case, high, low) + _of_film(case, FLATTEST * (high - low)))
         high = low
-    return _MEETING * total
+    found += [0.0] * (len(body.regions) - len(body.embedded) - len(found))  # the last of layers that fill the body
+    for piece in body.embedded:
+        # Both sides of its surface: ∫ 1 / (size + growth s)³ ds.
+        _, sizes, areas = piece.surface.sizes(case.frame.point)
+        found.append(float((areas / (growth * sizes**2)).sum()))
+    return found
+
+
+def _of_layer(case: Case, high: float, low: float) -> float:
+    """Return the same of a layer between two heights (m), near the tool."""
+    size, radius = IN_LAYER * (high - low), case.probe.circumradius + case.body.heights[1] - low
+    if size >= case.mesh.fine:
+        return 0.0
+    within = pi * radius**2 * (high - low) / size**3
+    rings = 2 * pi * radius * (high - low) + pi * radius**2  # beside and below
+    return within + rings / (2 * case.mesh.growth * size**2)
+
+
+def _of_film(case: Case, size: float) -> float:
+    """Return the same of a layer and what is below it, far from the tool, where its largest ``size`` (m) counts."""
+    if size >= (case.mesh.fine if case.is_full else case.mesh.coarse):
+        return 0.0
+    area = case.body.volume / (case.body.heights[1] - case.body.heights[0])
+    if case.is_truncated:
+        area = min(area, pi * case.mesh.epsilon**2)
+    flat = _IN_FILM * _TETRAHEDRON / (_MEETING * _TRIANGLE)
+    return area / size**2 * (flat + 1 / (2 * case.mesh.growth))
 
 
 def dofs(count: float, degree: int) -> float:

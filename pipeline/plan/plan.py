@@ -12,6 +12,7 @@ from pipeline.plan.reductions import REDUCTIONS, strike_stored
 from pipeline.plan.shard import Shard, take
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import is_round, model_planes
+from pipeline.plan.thin import refuse_thin
 from pipeline.plan.work import NO_RECORD, EndPlans, Plan, Struck
 from pipeline.study.capabilities.obstacles import obstacle
 from pipeline.study.capabilities.refusals import STEPS_IN_SPACE
@@ -70,8 +71,8 @@ def make_plan(
 
     Raises:
         ValueError: if ``without`` has an unknown name.
-        StudyError: if the study leaves to its measured curves what cases need, or asks for an accuracy of time steps in
-            three dimensions.
+        StudyError: if the study leaves to its measured curves what cases need, asks for an accuracy of time steps in
+            three dimensions, or has a layer or region too thin to be meshed.
     """
     if study.lacking:
         raise StudyError(study.file, study.lacking)
@@ -88,7 +89,9 @@ def make_plan(
         raise StudyError(study.file, [Problem("probe.history", None, STEPS_IN_SPACE)])
     plan = _seeking(plan) if study.seeks_depths else ask_for_exact(plan)
     plan = take(first_attempts(plan), shard) if shard is not None else ask_for_ends(plan, without)
-    return first_attempts(leave_out_stored(plan, stored, without))
+    plan = first_attempts(leave_out_stored(plan, stored, without))
+    refuse_thin(plan.solves, study.file)
+    return plan
 
 
 def _seeking(plan: Plan) -> Plan:

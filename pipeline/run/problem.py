@@ -10,6 +10,7 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.of_case import meridian_of
 from pipeline.plan import estimate
 from pipeline.plan.symmetry import mirror_planes, movement_planes
+from pipeline.plan.thin import cause
 from pipeline.run.far_field import far_field_of, far_field_seconds
 from pipeline.run.loads import loads_of
 from pipeline.run.room import MEMORY_SHARE
@@ -270,14 +271,15 @@ def solve_problem(
     return solution
 
 
-def check_memory(available: float, needed: float, what: str) -> None:
+def check_memory(available: float, needed: float, what: str, case: Case | None = None) -> None:
     """Fail the case if it needs more memory than what is ``available`` (bytes).
 
     Raises:
-        CaseFailure: if so.
+        CaseFailure: if so, with the layer or region that makes most of the mesh of ``case``.
     """
     if message := lacks_memory(available, needed, what):
-        raise CaseFailure(f"{message}: use larger elements, or a smaller epsilon")
+        thin = f". {found}" if case is not None and (found := cause(case)) else ""
+        raise CaseFailure(f"{message}: use larger elements, or a smaller epsilon{thin}")
 
 
 def lacks_memory(available: float, needed: float, what: str) -> str:

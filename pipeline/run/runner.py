@@ -243,7 +243,9 @@ class StepRunner:
         """Return the distributed mesh of a solve; collective. Timing studies do not use the cache."""
         case = solve.meshed_case
         self._progress.note(f"{MESHING}{solve.label}")
-        check_memory(self._free.available(), estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
+        check_memory(
+            self._free.available(), estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case", case
+        )
         return mesh_case(case, solve.mirrors, self._comm, None if case.solve.timing else self._cache)
 
     def _condenses(self, step: OperatorStep, mesh: BodyMesh) -> bool:

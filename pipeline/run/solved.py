@@ -151,7 +151,9 @@ def _attempt(solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, n
 def modelled_arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -> MeshArrays | None:
     """Return, on rank 0, the mesh of the part of the body that is modelled; of a half ball, where a run makes it."""
     case = solve.meshed_case
-    check_memory(FreeMemory(comm).available(), estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
+    check_memory(
+        FreeMemory(comm).available(), estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case", case
+    )
     note("meshing")
     return on_first_rank(comm, lambda: cached_arrays(case, solve.mirrors, cache))
 

@@ -39,6 +39,11 @@ class Facetted(Body):
         return None
 
     @property
+    def finest_step(self) -> float | None:
+        """Smallest distance (m) of the voxels that its surface is made from; None without voxels."""
+        return None
+
+    @property
     def meeting(self) -> tuple[Embedded, ...]:
         """The regions of its partition."""
         numbers = () if self.partition is None else self.partition.regions.tolist()

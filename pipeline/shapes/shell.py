@@ -20,6 +20,9 @@ _THIN_PART = 0.4
 _ROUNDS = 30
 # A ball ends at points of which its centre sees the first one under a larger angle (cosine); nearer ones are noise.
 _APART, _SAME = 0.5, 1e-6
+# Half of the thickness, in units of volume over area, is 1 of a sheet and 3 of a ball: no shape has more, but for
+# rounding.
+_MOST_OF_SHEET = 3.4
 # A surface is thin if its area is so many squares of its thickness: a sheet 10, a thread 60 times as long as thick.
 _SHEET = 200.0
 # Fractions of a low-discrepancy sequence in two dimensions (M. Roberts, 2018).
@@ -107,7 +110,10 @@ class Shell(Closed):
             goes_on = shorter & (angle < _APART)
             shrinks = shrinks[goes_on]
             radius[shrinks] = smaller[goes_on]
-        return points, np.maximum(radius, np.quantile(radius, self._thin))
+        half = np.maximum(radius, np.quantile(radius, self._thin))
+        sheet = self.volume / self.triangles.area
+        # A sheet thinner than the distance between the points: no ball meets its other side.
+        return points, np.full_like(half, sheet) if half.min() > _MOST_OF_SHEET * sheet else half
 
     @cached_property
     def _normals(self) -> FloatArray:

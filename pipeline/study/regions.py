@@ -4,7 +4,7 @@ import itertools
 import re
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -25,9 +25,6 @@ from pipeline.study.howto import page_of
 from pipeline.study.loads import FREE
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Material, material_of
-
-if TYPE_CHECKING:
-    from pipeline.shapes.bodies.image import FromImage
 
 # Room around an embedded region, in units of half of its smallest thickness: elements there are no larger.
 GAP = 0.1
@@ -177,7 +174,7 @@ def _check_room(body: Body, problems: Problems) -> None:
     for piece, place in pieces:
         if piece in meeting:
             continue
-        surface, (key, found) = piece.surface, _place_of(piece, place)
+        surface, (key, found) = piece.surface, place_of(piece, place)
         gap, why = GAP * surface.least, f"a tenth of {surface.LEAST}"
         if (room := body.room(surface)) < gap:
             problems.error(
@@ -204,7 +201,7 @@ def _check_room(body: Body, problems: Problems) -> None:
         gap = GAP * thinner.least
         room, where = _apart(one.surface, other.surface)
         if room < gap:
-            key, found = _place_of(other, place)
+            key, found = place_of(other, place)
             problems.error(
                 key,
                 found,
@@ -226,7 +223,7 @@ def _check_cavities(body: Body, places: Sequence[str], problems: Problems) -> No
             what = "the body's surface" if other == OUTSIDE else hollow[other].name
             at = _point(parts.points[parts.facets[walls][0]].mean(axis=0))
             problems.error(
-                *_place_of(piece, places[number - 1]),
+                *place_of(piece, places[number - 1]),
                 f"{piece.name} is hollow and meets {what} at {at}: it must be inside tissue. End it three "
                 "voxels below the surface, or give it `young` and `poisson` of its filling, and omit `hollow`",
             )
@@ -235,31 +232,28 @@ def _check_cavities(body: Body, places: Sequence[str], problems: Problems) -> No
 
 def _check_sheets(body: Body, problems: Problems) -> None:
     """Report labels of an image that are sheets or threads of about a voxel: their surfaces cannot be meshed."""
-    if body.shape != "image":
-        return
-    image = cast("FromImage", body)
-    if (parts := image.partition) is None:
+    if not isinstance(body, Facetted) or (parts := body.partition) is None or (step := body.finest_step) is None:
         return
     for number in parts.regions.tolist():
-        key, found = "body.label", image.label
+        key, found = "body.label", getattr(body, "label", None)
         if number != TISSUE:
             piece = cast(Segment, body.regions[number - 1])
-            key, found = _place_of(piece, body.places[number - 1])
+            key, found = place_of(piece, body.places[number - 1])
         surface = shell_of(parts.surface(number), is_part=True)
         # A thick label with steps of voxels is thin at most points; a thread is thicker than volume over surface.
         thickness = 2 * max(surface.least, surface.volume / surface.triangles.area)
-        if surface.is_thin and thickness < _VOXELS * image.finest_step:
+        if surface.is_thin and thickness < _VOXELS * step:
             problems.error(
                 key,
                 found,
-                f"{body.region_names[number]} is {in_mm(thickness)} thick, {thickness / image.finest_step:.1f} voxels, "
+                f"{body.region_names[number]} is {in_mm(thickness)} thick, {thickness / step:.1f} voxels, "
                 f"and its surface {1e4 * surface.triangles.area:,.0f} cm²: a label so thin for its size must be at "
                 f"least {_VOXELS:g} voxels thick, or its two sides cross when they are meshed. Resample the labels to "
                 "voxels of half the size, segment it thicker, or make it one with its neighbour by a list of labels",
             )
 
 
-def _place_of(piece: Embedded, place: str) -> tuple[str, Any]:
+def place_of(piece: Embedded, place: str) -> tuple[str, Any]:
     """Return the key that places an embedded region, and its value as messages quote it."""
     if isinstance(piece, Inclusion):
         return f"body.{place}.at", [in_mm(x) for x in piece.at]
