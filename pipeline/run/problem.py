@@ -124,7 +124,7 @@ def tool_of(case: Case) -> Tool:
         probe.friction,
         distance,
         frame.point[:2],
-        getattr(probe, "edge", None) == 0.0,
+        probe.ends_sharply,
     )
 
 

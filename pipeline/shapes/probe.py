@@ -243,6 +243,11 @@ class Probe(Footprint):
         """
 
     @property
+    def ends_sharply(self) -> bool:
+        """Whether it ends at a sharp edge, off which tissue slides at large displacements."""
+        return False
+
+    @property
     @abstractmethod
     def has_singular_edge(self) -> bool:
         """Whether the displacement goes like r^½ at the footprint's edge, which is then the edge of contact."""

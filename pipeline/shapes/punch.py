@@ -23,6 +23,7 @@ class Punch(Probe):
 
     is_flat: ClassVar[bool] = True
     has_singular_edge: ClassVar[bool] = True
+    ends_sharply: ClassVar[bool] = True
     # Zero (m): contact is expected to end at the edge of the face.
     rim_offset: ClassVar[float] = 0.0
 

@@ -11,7 +11,7 @@ from pipeline.shapes.parabola import Parabola
 from pipeline.shapes.rounded import Rounded, quarter_turn
 from pipeline.study.problems import StudyError
 from pipeline.verify import known
-from tests.cases import study
+from tests.cases import probe, study
 
 SPHERE = {"shape": "sphere", "radius": "3 mm", "depth": "0.1 mm", "contact": "unilateral"}
 CONE = {"shape": "cone", "angle": "80 deg", "radius": "3 mm", "depth": "0.1 mm", "contact": "unilateral"}
@@ -220,3 +220,19 @@ def test_a_tilted_tool_whose_contact_leaves_the_searched_region_is_refused_when_
     study(probe=tool | axis[taken])
     with pytest.raises(StudyError, match=f"inclined by {refused}° to the surface"):
         study(probe=tool | axis[refused])
+
+
+@pytest.mark.parametrize(
+    ("keys", "sharp"),
+    [
+        ({"shape": "disc", "radius": "3 mm"}, True),
+        ({"shape": "disc", "radius": "3 mm", "edge": "1 mm", "contact": "unilateral"}, False),
+        ({"shape": "ellipse", "axes": ["3 mm", "2 mm"]}, True),
+        ({"shape": "wedge", "angle": "70 deg", "length": "3 mm"}, True),
+        ({"shape": "wedge", "angle": "70 deg", "length": "3 mm", "tip": "1 mm", "edge": "1 mm"}, False),
+        ({"shape": "sphere", "radius": "3 mm"}, False),
+    ],
+)
+def test_tools_say_whether_they_end_at_a_sharp_edge(keys, sharp):
+    """Tissue slides off it at large displacements, for which bars are wider; an ellipse counted as rounded."""
+    assert probe(depth="0.1 mm", **keys).ends_sharply is sharp

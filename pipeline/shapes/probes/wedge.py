@@ -53,6 +53,11 @@ class Wedge(Indenter):
         return self.touching(self.candidate_width)
 
     @property
+    def ends_sharply(self) -> bool:
+        """Whether its edge is not rounded around both ends."""
+        return not self.edge
+
+    @property
     def half_length(self) -> float:
         """Half the length of the edge (m)."""
         return self.length / 2
