@@ -71,6 +71,15 @@ def test_a_flat_punch_that_sticks_is_the_bonded_one():
     assert 0 < rubs.slip_area < rubs.contact_area
 
 
+def test_friction_of_a_flat_punch_settles_where_directions_of_slip_change_slowly():
+    """They contract by half in an iteration: halving steps nevertheless, again and again, ended short of the law."""
+    body = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"]}
+    mesh = {"epsilon": "10 mm", "fine": "3.8 mm", "coarse": "8 mm", "rim": "1 mm", "growth": 0.8}
+    disc = DISC | {"radius": "4 mm", "depth": "0.37 mm"}
+    smooth, rubs, sticks = (record(friction, disc, mesh, 0.49, body=body) for friction in (0.0, 0.3, "stick"))
+    assert smooth.force < rubs.force < sticks.force
+
+
 def test_tractions_obey_coulomb():
     (case,) = study(body=BODY, probe=SPHERE | {"friction": 0.2}, mesh=MESH).cases()
     with Spaces(mesh_case(case, ("x", "y"), MPI.COMM_SELF)) as spaces:

@@ -23,6 +23,9 @@ _TINY = 1e-300
 _MOST_SIMPLIFIED = 0.1
 # Changes of a node's state after which it is simplified.
 _CHANGES = 3
+# Steps of iterations are halved where the change of the directions of slip is not smaller than the one before by this
+# share of the step: an iteration that contracts by more than this does so in any part of a step.
+_CONTRACTS = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +141,23 @@ class Simplified:
     def sliding(self, slide: Slide, active: BoolArray) -> Slide:
         """Return ``slide`` with these nodes sliding, if they are ``active``."""
         return replace(slide, sliding=(slide.sliding | self.nodes) & active)
+
+
+class Damping:
+    """Shorter changes of the directions of slip, from some iteration on, while these swing to and fro."""
+
+    def __init__(self, begins: int):
+        """Begin after ``begins`` iterations."""
+        self._begins, self._share, self._swing = begins, 1.0, inf
+
+    def towards(self, before: Slide, after: Slide, iteration: int) -> Slide:
+        """Return the next state: ``after``, with its directions some of the way from those ``before``."""
+        both = before.sliding & after.sliding
+        swing = float(np.linalg.norm((after.directions - before.directions)[both]))
+        if iteration > self._begins and swing > (1 - _CONTRACTS * self._share) * self._swing:
+            self._share /= 2
+        self._swing = swing
+        return before.towards(after, self._share)
 
 
 def most_simplified(depth: float, deepest: float) -> float:

@@ -18,12 +18,12 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.contact.active_set import SLACK, ContactError
-from pipeline.solve.contact.coulomb import Neighbours, Simplified, Slide, largest_friction, most_simplified
+from pipeline.solve.contact.coulomb import Damping, Neighbours, Simplified, Slide, largest_friction, most_simplified
 
 # Steps of a load path, and further ones before the first.
 STEPS, _BEFORE = 16, (0.25, 0.5, 0.75)
 _MOST_ITERATIONS = 60
-# Iterations after which changes of the direction of slip are halved, again and again.
+# Iterations after which changes of the direction of slip are damped.
 _SWINGING = 12
 # Tolerance on the friction of sliding nodes, in units of the mean normal reaction.
 _CLOSE = 1e-7
@@ -147,7 +147,7 @@ def _settled(
         Unsettled: if states repeat, or too much of the force is on nodes that are simplified.
     """
     step, simple = replace(guess, iterations=0), Simplified.none(len(surface))
-    seen, single = set[bytes](), False
+    seen, single, damping = set[bytes](), False, Damping(_SWINGING)
     for iteration in range(1, _MOST_ITERATIONS + 1):
         law = simple.law(friction.coefficient)
         step = replace(step, slide=simple.sliding(step.slide, step.active), iterations=iteration)
@@ -167,7 +167,7 @@ def _settled(
         if moves.any() or turns.any():
             seen.add(state)
         simple = simple.counting(moves, turns) if single else simple
-        step = replace(after, slide=step.slide.towards(after.slide, 0.5 ** (iteration // _SWINGING)))
+        step = replace(after, slide=damping.towards(step.slide, after.slide, iteration))
     raise Unsettled("contact with friction does not settle: use smaller elements below the probe, or less friction")
 
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.contact.constraint import Constraint
-from pipeline.solve.contact.coulomb import Neighbours, Simplified, Slide, largest_friction
+from pipeline.solve.contact.coulomb import Damping, Neighbours, Simplified, Slide, largest_friction
 
-# Iterations from which a change of the directions of slip is halved if it is not this much smaller than the one before.
-_SWINGING, _CONTRACTS = 4, 0.7
+# Iterations from which changes of the directions of slip are damped.
+_SWINGING = 4
 # Share of the force below which friction is no part of it.
 _NO_PART = 1e-6
 
@@ -46,7 +46,7 @@ class FrictionIteration:
     def __init__(self, friction_step: FrictionStep):
         self._with, self.slide, self.normal = friction_step, friction_step.slide, friction_step.normal
         self._simple = Simplified.none(len(friction_step.normal))
-        self._share, self._swing = 1.0, np.inf
+        self._damping = Damping(_SWINGING)
         self._seen, self._single = set[bytes](), False
         self.is_same = False
 
@@ -67,16 +67,7 @@ class FrictionIteration:
             self._seen.add(state)
         self._simple = self._simple.counting(moves, turns) if self._single else self._simple
         self.is_same = not turns.any()
-        self.slide = self._towards(after, iteration)
-
-    def _towards(self, after: Slide, iteration: int) -> Slide:
-        """Return the next state, with smaller changes of directions where these swing to and fro."""
-        both = self.slide.sliding & after.sliding
-        swing = float(np.linalg.norm((after.directions - self.slide.directions)[both]))
-        if iteration > _SWINGING and swing > _CONTRACTS * self._swing:
-            self._share /= 2
-        self._swing = swing
-        return self.slide.towards(after, self._share)
+        self.slide = self._damping.towards(self.slide, after, iteration)
 
     def is_sound(self, active: BoolArray) -> bool:
         """Return whether nodes whose state was simplified carry little of the force, or friction no part of it."""

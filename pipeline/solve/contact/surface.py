@@ -136,7 +136,8 @@ class Candidates:
         """Sides (m) of squares with the area of each node, (n); planes of symmetry are accounted for."""
         shares = np.outer(self.areas, self.shape.weights * self.shape.facets_per_node).ravel()
         count = np.bincount(self.facets.ravel(), minlength=len(self))
-        return np.asarray(np.sqrt(np.bincount(self.facets.ravel(), shares, len(self)) / count))
+        # Shares of degree 4 are negative in the middle of edges.
+        return np.asarray(np.sqrt(np.maximum(np.bincount(self.facets.ravel(), shares, len(self)), 0.0) / count))
 
     def from_regions(self, values: Sequence[float]) -> FloatArray:
         """Return ``values`` by region as values of the nodes (n), from the tissue below their facets."""
