@@ -1,7 +1,8 @@
 """From arrays on one process to a distributed dolfinx mesh with named boundary facets."""
 
 from dataclasses import dataclass
-from math import nan
+from functools import cached_property
+from math import inf, nan
 from typing import Any
 
 import dolfinx
@@ -44,6 +45,14 @@ class BodyMesh:
     def comm(self) -> MPI.Comm:
         """Communicator of the mesh."""
         return self.mesh.comm
+
+    @cached_property
+    def mean_size(self) -> float:
+        """Size of elements (m), the cube root of their mean volume, as if the mesh filled its bounding box."""
+        points = self.mesh.geometry.x
+        ends = np.concatenate([points.max(axis=0, initial=-inf), (-points).max(axis=0, initial=-inf)])
+        self.comm.Allreduce(MPI.IN_PLACE, ends, MPI.MAX)
+        return float(np.cbrt(np.prod(ends[:3] + ends[3:]) / self.cells))
 
 
 @stage("dolfinx mesh")

@@ -32,6 +32,8 @@ from pipeline.stages import stage
 LEFT, _MOST = 1e-9, 25
 # The same for load steps before the last: the work of F has fewer digits.
 ON_THE_WAY = 1e-4
+# A residual has stalled if an iteration leaves this share of it; then rounding of gradients by this may be all of it.
+_STALLS, _ROUNDED = 0.5, float(np.finfo(float).eps) / 2
 # Tolerances of linear solves: the first one and the least, and the share of the gain that is needed to the end.
 _ROUGH, _FINE, _SPARE = 1e-1, 1e-4, 0.1
 # Most halvings of a step that turns tissue inside out.
@@ -246,11 +248,26 @@ class HyperelasticBody:
                 norm, is_there = residual.norm(), not self._space.comm.allreduce(bool(todo.any()), op=MPI.LOR)
                 if is_there and norm <= left * scale:
                     return iteration
+                if is_there and norm > _STALLS * before and norm <= self._rounding(state):
+                    return iteration  # loads, or a depth, next to nothing
                 ksp.setTolerances(rtol=forcing(norm / before, left * scale / norm) if is_there else _ROUGH)
                 before = norm if is_there else inf
                 self._newton_step(ksp, state, residual, todo, step, is_there=is_there)
                 stored = self._advance(state, stored, residual, step, there, is_there=is_there)
         raise LargeError(f"no equilibrium after {_MOST} iterations")
+
+    def _rounding(self, state: PETSc.Vec) -> float:
+        """Return the residual (in units of the law) that rounding of the displacement's gradient may leave; collective.
+
+        Beside 1, a gradient has the error ε, which is that of nodes displaced by ε times the element size.
+        """
+        with self.state() as noise, self.state() as forces:
+            displaced = self._space.owned
+            noise.array[:displaced] = _ROUNDED * self._elements.body.mean_size * np.cos(np.arange(displaced))
+            self.assemble(state)
+            self.tangent.mult(noise, forces)
+            forces.array[self._held] = 0.0
+            return float(forces.norm())
 
     def _newton_step(
         self,

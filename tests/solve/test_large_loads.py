@@ -70,6 +70,13 @@ def test_small_loads_are_linear_superposition():
     assert found[1.0].load_force_error == pytest.approx(linear.load_force_error, rel=0.05)
 
 
+def test_loads_next_to_nothing_are_none():
+    """Rounding of the strain-free tissue is all of the residual, and no instability."""
+    alone, loaded = one(), one(load=gravity(1e-6))
+    assert loaded.force == pytest.approx(alone.force, rel=1e-7)
+    assert loaded.sag == pytest.approx(1e-6 * one(load=gravity(1.0), material=TISSUE | {"law": "linear"}).sag, rel=1e-3)
+
+
 def test_a_shallow_depth_under_loads_is_that_of_linear_tissue():
     probe, load = {"depth": "0.015 mm"}, gravity(2.0)
     assert one(probe=probe, load=load).force == pytest.approx(
