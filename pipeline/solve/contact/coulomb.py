@@ -142,6 +142,11 @@ class Simplified:
         """Return ``slide`` with these nodes sliding, if they are ``active``."""
         return replace(slide, sliding=(slide.sliding | self.nodes) & active)
 
+    def steady(self, before: Slide, after: Slide) -> Slide:
+        """Return the state ``after``, in which these nodes slide as ``before``: next to sticking, they reverse."""
+        kept = self.nodes & before.sliding
+        return replace(after, trial=np.where(kept[:, None], before.trial, after.trial))
+
 
 class Damping:
     """Shorter changes of the directions of slip, from some iteration on, while these swing to and fro."""

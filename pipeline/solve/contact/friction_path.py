@@ -167,6 +167,7 @@ def _settled(
         if moves.any() or turns.any():
             seen.add(state)
         simple = simple.counting(moves, turns) if single else simple
+        after = replace(after, slide=simple.steady(step.slide, after.slide))
         step = replace(after, slide=damping.towards(step.slide, after.slide, iteration))
     raise Unsettled("contact with friction does not settle: use smaller elements below the probe, or less friction")
 

@@ -67,7 +67,7 @@ class FrictionIteration:
             self._seen.add(state)
         self._simple = self._simple.counting(moves, turns) if self._single else self._simple
         self.is_same = not turns.any()
-        self.slide = self._damping.towards(self.slide, after, iteration)
+        self.slide = self._damping.towards(self.slide, self._simple.steady(self.slide, after), iteration)
 
     def is_sound(self, active: BoolArray) -> bool:
         """Return whether nodes whose state was simplified carry little of the force, or friction no part of it."""
