@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from tests.same.campaign import Row, report, run_scene
+from tests.same.files import write_files
 from tests.same.judge import judge
 from tests.same.outcome import Outcome, Value
 from tests.same.quantities import in_other_units, number_of, scaled
-from tests.same.scenes import draw, write_files
+from tests.same.scenes import draw
 
 # Of the scenes, those that run by day: layers, an inclusion with a history, a ball beside the axis, an ellipse.
 _BY_DAY = (1, 6, 19, 22)

@@ -1,4 +1,4 @@
-"""Ways to run a study: in this process, or by the command line, on two ranks, in two parts, or killed and run again."""
+"""Ways to run a study: in this process, by the command line or Python, on two ranks, in two parts, or killed."""
 
 import os
 import random
@@ -40,8 +40,12 @@ def _command(path: Path, *more: str, ranks: bool = False) -> list[str]:
 
 
 def _run(path: Path, *more: str, ranks: bool = False) -> None:
+    _start(_command(path, *more, ranks=ranks), path)
+
+
+def _start(command: list[str], path: Path) -> None:
     subprocess.run(
-        _command(path, *more, ranks=ranks), cwd=path.parent, env=os.environ | _ENVIRONMENT, stdin=subprocess.DEVNULL,
+        command, cwd=path.parent, env=os.environ | _ENVIRONMENT, stdin=subprocess.DEVNULL,
         capture_output=True, timeout=_LIMIT, check=False,
     )  # fmt: skip
 
@@ -68,8 +72,27 @@ def _killed(path: Path, dice: random.Random) -> None:
     _run(path)
 
 
+def _by_command(path: Path, _dice: random.Random) -> None:
+    _run(path)
+
+
+def _by_python(path: Path, _dice: random.Random) -> None:
+    program = "import sys, pipeline; pipeline.read(sys.argv[1]).run()"
+    _start([sys.executable, "-c", program, path.name], path)
+
+
+def _merged(path: Path, _dice: random.Random) -> None:
+    """Two shards, whose stores are merged; nothing else is run."""
+    for shard in ("2/2", "1/2"):
+        _run(path, "--shard", shard)
+    _start([sys.executable, "-m", "pipeline", "status", path.name, "--merge"], path)
+
+
 _WAYS: dict[str, Callable[[Path, random.Random], None]] = {
     "two ranks": _two_ranks,
     "two shards": _two_shards,
     "killed": _killed,
+    "command": _by_command,
+    "python": _by_python,
+    "merged": _merged,
 }
