@@ -29,7 +29,7 @@ from tests.same.files import write_files
 from tests.same.judge import judge
 from tests.same.outcome import Outcome, solve
 from tests.same.pair import CHANGES, Pair
-from tests.same.scenes import draw
+from tests.same.scenes import draw, seconds
 from tests.same.ways import by_command
 
 # Changes that are tried of each scene; those of the command line take seconds, and are drawn less often.
@@ -44,6 +44,7 @@ _LONG = {
 }
 _KEPT = ("differs", "one failed")
 _LIMIT = 900  # seconds that a scene may take
+_FINE_LIMIT = 5.0  # seconds that a study of a pair of fine scenes may take, as planned
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,11 @@ class Row:
     seconds: float = 0.0
 
 
-def run_scene(seed: int, folder: Path, kept: Path | None = None, only: Collection[str] = ()) -> list[Row]:
+def run_scene(
+    seed: int, folder: Path, kept: Path | None = None, only: Collection[str] = (), *, fine: bool = False
+) -> list[Row]:
     """Run one scene with the changes that are drawn for it; what differs is written to ``kept`` as two studies."""
-    study, features = draw(seed, folder)
+    study, features = draw(seed, folder, fine=fine)
     dice = random.Random(f"changes {seed}")
     names = [name for name in CHANGES if dice.randrange(_LONG.get(name, 1)) == 0]
     chosen = [name for name in dice.sample(names, len(names)) if not only or name in only]
@@ -82,13 +85,18 @@ def run_scene(seed: int, folder: Path, kept: Path | None = None, only: Collectio
         except Exception:
             rows.append(Row(seed, features, name, "differs", traceback.format_exc(limit=-2), math.inf))
             continue
-        if pair is None:
+        if pair is None or (fine and _seconds(pair, folder) > _FINE_LIMIT):
             continue
         row, other = _compare(Row(seed, features, name, "none"), pair, folder, change_dice, known)
         rows.append(Row(**asdict(row) | {"seconds": time.process_time() - start}))
         if row.result in _KEPT and kept is not None:
             keep(row, pair.first, other, kept)
     return rows
+
+
+def _seconds(pair: Pair, folder: Path) -> float:
+    studies = (pair.first, pair.first if callable(pair.second) else pair.second)
+    return max(seconds(study, folder) for study in studies)
 
 
 def _compare(row: Row, pair: Pair, folder: Path, dice: random.Random, known: dict[str, Outcome]) -> tuple[Row, Study]:
@@ -160,8 +168,8 @@ def report(rows: Sequence[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _in_process(seed: int, folder: str, kept: str, only: Collection[str]) -> list[Row]:
-    return run_scene(seed, Path(folder), Path(kept), only)
+def _in_process(seed: int, folder: str, kept: str, only: Collection[str], fine: bool) -> list[Row]:
+    return run_scene(seed, Path(folder), Path(kept), only, fine=fine)
 
 
 def main() -> int:
@@ -169,6 +177,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", default="0:20", help="FIRST:END of the scenes' seeds")
     parser.add_argument("--change", action="append", default=[], help="this change only; may be repeated")
+    parser.add_argument("--fine", action="store_true", help="scenes of smaller elements, mostly on the meridian")
     parser.add_argument("--output", type=Path, default=Path("results"))
     arguments = parser.parse_args()
     arguments.output.mkdir(exist_ok=True)
@@ -184,7 +193,9 @@ def main() -> int:
                 continue
             try:
                 kept = str(arguments.output / "same")
-                found = pool.submit(_in_process, seed, folder, kept, arguments.change).result(timeout=_LIMIT)
+                found = pool.submit(_in_process, seed, folder, kept, arguments.change, arguments.fine).result(
+                    timeout=_LIMIT
+                )
             except (BrokenProcessPool, Late) as error:
                 found = [Row(seed, (), "any", "differs", f"the process ended: {error!r}", math.inf)]
                 for process in list(getattr(pool, "_processes", {}).values()):

@@ -3,6 +3,7 @@
 import copy
 import random
 from collections.abc import Iterator
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_mapping
 from tests.pairs import BASE, FEATURES, Feature, Study, write_bodies
+from tests.same.quantities import times
 
 # What takes many times the time of the others, each drawn once in this many scenes that have it.
 _SLOW = {
@@ -31,23 +33,45 @@ _NO_SCENES = {"swept E", "path", "model 3d"}
 _FEATURES = (1, 2, 2, 3, 3, 4)
 # Longest time (s) that a scene may take, as planned: one in four may take longer.
 _SHORT, _LONG = 0.3, 2.0
+# Elements of fine scenes are smaller by these factors; so are error bars, and smaller differences are seen.
+_FINER = {"fine": 1 / 3, "coarse": 0.5, "rim": 0.2}
+# Share of fine scenes in a box that are in a cylinder instead, where round tools have a meridian.
+_ROUND = 0.7
 
 
-def draw(seed: int, folder: Path) -> tuple[Study, tuple[str, ...]]:
+def draw(seed: int, folder: Path, *, fine: bool = False) -> tuple[Study, tuple[str, ...]]:
     """Return the study of a seed, and the names of its features; the same seed gives the same study.
 
-    ``folder`` has the files of :func:`write_files`. What the study's checks refuse is drawn again.
+    ``folder`` has the files of :func:`write_files`. What the study's checks refuse is drawn again. ``fine`` scenes have
+    small elements, and many of them a meridian.
     """
     dice = random.Random(f"same {seed}")
     longest = dice.choice((_SHORT, _SHORT, _SHORT, _LONG))
     for features, study in _drawn(dice):
-        try:
-            plan = make_plan(read_mapping(study, "same", folder))
-        except StudyError:
-            continue
-        if summary(plan)["seconds"] <= longest:
+        if fine:
+            _refine(study, dice)
+        if seconds(study, folder) <= longest:
             return study, tuple(feature.name for feature in features)
     raise AssertionError("the drawing does not end")
+
+
+def _refine(study: Study, dice: random.Random) -> None:
+    """Make elements of the study smaller, and some boxes round."""
+    mesh = study["mesh"]
+    mesh.update({key: times(mesh[key], factor) for key, factor in _FINER.items() if key in mesh})
+    if "accuracy" in mesh:
+        mesh["accuracy"] = "1 %"
+    if study["body"]["shape"] == "box" and dice.random() < _ROUND:
+        del study["body"]["size"]
+        study["body"].update(shape="cylinder", radius="20 mm", height="20 mm")
+
+
+def seconds(study: Study, folder: Path) -> float:
+    """Return how long a study takes (s), as planned; infinite if it is refused."""
+    try:
+        return float(summary(make_plan(read_mapping(study, "same", folder)))["seconds"])
+    except StudyError:
+        return inf
 
 
 def _drawn(dice: random.Random) -> Iterator[tuple[tuple[Feature, ...], Study]]:
