@@ -23,8 +23,8 @@ _TINY = 1e-300
 _MOST_SIMPLIFIED = 0.1
 # Changes of a node's state after which it is simplified.
 _CHANGES = 3
-# Steps of iterations are halved where the change of the directions of slip is not smaller than the one before by this
-# share of the step: an iteration that contracts by more than this does so in any part of a step.
+# Steps of iterations are halved where directions of slip turn back by a change that is not smaller than the one before
+# by this share of the step: an iteration that contracts by more than this does so in any part of a step.
 _CONTRACTS = 0.3
 
 
@@ -153,15 +153,16 @@ class Damping:
 
     def __init__(self, begins: int):
         """Begin after ``begins`` iterations."""
-        self._begins, self._share, self._swing = begins, 1.0, inf
+        self._begins, self._share, self._before = begins, 1.0, np.zeros(0)
 
     def towards(self, before: Slide, after: Slide, iteration: int) -> Slide:
         """Return the next state: ``after``, with its directions some of the way from those ``before``."""
         both = before.sliding & after.sliding
-        swing = float(np.linalg.norm((after.directions - before.directions)[both]))
-        if iteration > self._begins and swing > (1 - _CONTRACTS * self._share) * self._swing:
-            self._share /= 2
-        self._swing = swing
+        change = np.where(both[:, None], after.directions - before.directions, 0.0).ravel()
+        if iteration > self._begins and change @ self._before < 0:
+            contracts = np.linalg.norm(change) < (1 - _CONTRACTS * self._share) * np.linalg.norm(self._before)
+            self._share *= 1.0 if contracts else 0.5
+        self._before = change
         return before.towards(after, self._share)
 
 
