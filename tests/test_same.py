@@ -10,8 +10,8 @@ from tests.same.outcome import Outcome, Value
 from tests.same.quantities import in_other_units, number_of, scaled
 from tests.same.scenes import draw
 
-# Of the scenes, those that run by day: layers, an inclusion with a history, a ball beside the axis, an ellipse.
-_BY_DAY = (1, 6, 19, 22)
+# Of the scenes, those that run by day: an inclusion with a history, a ball beside the axis, an ellipse.
+_BY_DAY = (6, 19, 22)
 
 
 @pytest.fixture(scope="module")

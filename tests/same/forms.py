@@ -195,11 +195,10 @@ def _full(study: Study, dice: random.Random) -> Pair | None:
 
 @change("a list of one value")
 def _one(study: Study, dice: random.Random) -> Pair:
-    other = copy.deepcopy(study)
+    other, at = copy.deepcopy(study), {}
     for section, key in (("material", "young"), ("material", "poisson"), ("probe", "depth"), ("mesh", "epsilon")):
         if key in other[section] and not ("history" in study["probe"] and key == "depth"):
-            other[section][key] = [other[section][key]]
-    at = dict.fromkeys(("young", "poisson", "depth", "epsilon"), 0)
+            other[section][key], at[key] = [other[section][key]], 0
     return Pair(study, other, at=at)
 
 
