@@ -213,6 +213,8 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool) 
     if found["steps"]:
         print(f"  estimate: {cost}")
         ground = f"{counted(found['fitted_to'], 'case')} on record" if found["fitted_to"] else "no case on record yet"
+        if (slower := found["machine"]) != 1:
+            ground += f"; work of a kind without any gets {slower:.2g} times its usual time, as other work took"
         print(
             f"    ({ground}; a step's time is typically right within a factor of {found['factor']:.1f}, "
             "on an idle machine)"

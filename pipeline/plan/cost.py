@@ -42,8 +42,11 @@ _MESHED = {"curved": 2.5, "folded": 18.0}
 _MERIDIAN, _MERIDIAN_BYTES = 0.27, 3.8e8
 # A meridian with contact to find takes _TRIALS times as long.
 _FOUND, _TRIALS = "meridian contact", 1.7
-# At large displacements, load steps and Newton iterations on a few meshes.
-_STEPS, _ITERATIONS = "meridian large", 9.0
+# With load steps on a few meshes: Newton iterations at large displacements, or friction, with or without these.
+_STEPS, _ITERATIONS = "meridian large", 4.0
+_RUBBING, _RUBS = "meridian friction", 8.5
+# Friction on a linear body: a factorisation, a condensation to the surface, and load steps there.
+_FRICTION = (16.0, 1.35)
 # With some 40 time steps besides.
 _IN_TIME, _COURSE_OF_MERIDIAN = "meridian time steps", 45.0
 # Share of first meshes whose error bar exceeds the accuracy: 5 of 60 scenes, 9 of 48 slicing blades.
@@ -85,22 +88,30 @@ class StepEstimate:
 
 @dataclass(frozen=True)
 class CostModel:
-    """The fitted laws, the number of observations, and the typical factor of their error."""
+    """The fitted laws, the number of observations, and the typical factor of their error.
+
+    ``machine`` is the factor from the prior to the times of kinds of work without a law, as others took here.
+    """
 
     laws: Mapping[tuple[str, str], _Numbers] = field(default_factory=dict)
     count: int = 0
     error: float = _PRIOR_ERROR
+    machine: float = 1.0
+
+    def unknown(self, solves: Iterable[Solve]) -> list[Solve]:
+        """Return the ``solves`` of kinds without stored times."""
+        return [solve for solve in solves if ("solve", kind_of(solve)) not in self.laws]
 
     def error_for(self, solves: Iterable[Solve]) -> float:
         """Return the typical factor of the error for ``solves``; kinds without stored times have that of the prior."""
-        unknown = [solve for solve in solves if ("solve", kind_of(solve)) not in self.laws]
+        unknown = self.unknown(solves)
         large = any(solve.case.material.is_large for solve in unknown)
         return max(self.error, *((_PRIOR_ERROR_LARGE if large else _PRIOR_ERROR,) if unknown else ()), 1.0)
 
     def seconds(self, stage: str, kind: str, cells: float, poisson: float) -> float:
         """Return the seconds on one rank of a stage."""
         law = self.laws.get((stage, kind)) or _prior(stage, kind)
-        rest = _beyond(stage, kind, cells)
+        rest = _beyond(stage, kind, cells) + (0.0 if ("solve", kind) in self.laws else log(self.machine))
         return exp(rest + sum(a * b for a, b in zip(law, _row(cells, poisson), strict=True)))
 
     def step(self, step: MeshStep) -> StepEstimate:
@@ -158,18 +169,20 @@ def _memory(solve: Solve) -> float:
 def kind_of(solve: Solve) -> str:
     """Return the kind of a solve in the cost model.
 
-    It names element, degree, several movements, found contact, several materials, time steps, and a curved or folded
-    body.
+    It names element, degree, several movements, found contact, friction, several materials, time steps, and a curved
+    or folded body.
     """
     case = solve.case
     if solve.axisymmetric:
         found = _FOUND if case.probe.is_unilateral else "meridian"
         if case.is_stepped:
             return _IN_TIME
-        return _STEPS if case.has_load_steps else found
+        stepped = _RUBBING if case.probe.friction else _STEPS
+        return stepped if case.has_load_steps else found
     words = [case.formulation, str(case.mesh.degree)]
     words += [str(case.movements)] if case.movements > 1 else []
     words += ["found"] if case.probe.is_unilateral else []
+    words += ["friction"] if case.probe.friction else []
     words += ["regions"] if case.body.regions else []
     words += ["steps"] if case.is_stepped else []
     if not isinstance(case.body, Layered):
@@ -204,7 +217,17 @@ def fit(observations: Iterable[Observation]) -> CostModel:
         laws[stage, kind], residuals = _ridge(_prior(stage, kind), found)
         if stage == "solve":
             wrong += residuals
-    return CostModel(laws, count, exp(median(wrong))) if wrong else CostModel(laws, count)
+    return CostModel(laws, count, exp(median(wrong)) if wrong else _PRIOR_ERROR, _machine(groups))
+
+
+def _machine(groups: Mapping[tuple[str, str], list[tuple[_Numbers, float]]]) -> float:
+    """Return the median, over kinds of work, of measured times over those of the prior; of a few kinds, nearer to 1."""
+    slower = [
+        median(value - sum(a * b for a, b in zip(_prior(stage, kind), row, strict=True)) for row, value in found)
+        for (stage, kind), found in groups.items()
+        if stage == "solve"
+    ]
+    return exp(median(slower) * len(slower) / (len(slower) + _WEIGHT[0])) if slower else 1.0
 
 
 def _ridge(prior: _Numbers, found: list[tuple[_Numbers, float]]) -> tuple[_Numbers, list[float]]:
@@ -238,11 +261,8 @@ def _poisson(case: Case) -> float:
 @lru_cache
 def _prior(stage: str, kind: str) -> _Numbers:
     if kind.startswith("meridian"):
-        return (
-            log(_MERIDIAN * {_FOUND: _TRIALS, _STEPS: _ITERATIONS, _IN_TIME: _COURSE_OF_MERIDIAN}.get(kind, 1.0)),
-            0.0,
-            0.0,
-        )
+        times = {_FOUND: _TRIALS, _STEPS: _ITERATIONS, _RUBBING: _RUBS, _IN_TIME: _COURSE_OF_MERIDIAN}
+        return log(_MERIDIAN * times.get(kind, 1.0)), 0.0, 0.0
     element, degree, *words = kind.split()
     if stage == "mesh":
         seconds, power = _MESH
@@ -252,10 +272,11 @@ def _prior(stage: str, kind: str) -> _Numbers:
         seconds *= _COURSE_LARGE if stage == "solve" and "steps" in words else 1.0
         is_mixed = element.endswith("-mixed")
         return log(seconds * (_MIXED_LARGE if is_mixed else 1.0)), power, 0.0 if is_mixed else _LOCKING
-    seconds, power = (_SOLVE if stage == "solve" else _BAR)[int(degree)]
+    rubs = stage == "solve" and "friction" in words
+    seconds, power = _FRICTION if rubs else (_SOLVE if stage == "solve" else _BAR)[int(degree)]
     movements = next((int(word) for word in words if word.isdigit()), 1)
-    seconds *= (1 + _MOVEMENT * (movements - 1)) * (_MIXED if element == "mixed" else 1.0)
+    seconds *= (1 + _MOVEMENT * (movements - 1)) * (_MIXED if element == "mixed" and not rubs else 1.0)
     seconds *= _LAYERED if "regions" in words else 1.0
-    seconds *= _SEARCH if stage == "solve" and "found" in words else 1.0
+    seconds *= _SEARCH if stage == "solve" and "found" in words and not rubs else 1.0
     seconds *= _COURSE if stage == "solve" and "steps" in words else 1.0
-    return log(seconds), power, 0.0 if element == "mixed" else _LOCKING
+    return log(seconds), power, 0.0 if element == "mixed" or rubs else _LOCKING

@@ -64,6 +64,7 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
         "ranks": ranks,
         "fitted_to": plan.cost.count,
         "factor": plan.cost.error_for(plan.solves),
+        "machine": plan.cost.machine if plan.cost.unknown(plan.solves) else 1.0,
         "steps": steps,
     }
 

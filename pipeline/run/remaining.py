@@ -44,7 +44,8 @@ class Remaining:
     """Time left of a run, from the times at which its solves finish, on any number of ranks.
 
     The estimates of each kind of work are multiplied by the ratio of measured to expected time. While few times are
-    measured, this ratio is drawn towards that of the whole run, and that one towards 1. ``clock`` returns seconds.
+    measured, this ratio is drawn towards that of the whole run, and that one towards 1. The first solve of a kind does
+    not count: it loads and compiles what it needs, and makes a mesh for others. ``clock`` returns seconds.
     """
 
     def __init__(self, expected: Mapping[str, Expected], clock: Callable[[], float] = time.monotonic):
@@ -76,9 +77,10 @@ class Remaining:
             self._finished += counts
             for step in (None, expected.step):
                 self._to_come[step][expected.kind] -= expected.seconds
+            is_first = expected.kind not in self._measured
             for sums, seconds in ((self._measured, now - self._last), (self._estimated, expected.seconds)):
                 if counts:
-                    sums[expected.kind] = _MEMORY * sums.get(expected.kind, 0.0) + seconds
+                    sums[expected.kind] = 0.0 if is_first else _MEMORY * sums[expected.kind] + seconds
         self._last = now
 
     def step_of(self, label: str) -> int | None:

@@ -89,6 +89,43 @@ def test_estimates_follow_what_the_store_knows(factor, tmp_path):
     assert json.loads(shown.stdout)["seconds"] == pytest.approx(told["seconds"])
 
 
+@pytest.mark.parametrize("factor", [10.0, 0.1])
+def test_kinds_of_work_that_are_on_no_record_take_as_much_longer_as_the_others_do_here(factor):
+    """With a single kind on record less so, since the estimate of that kind may be wrong by itself."""
+
+    def found(kinds):
+        seen = [(kind, 10 ** (3 + 0.1 * n)) for kind in kinds for n in range(20)]
+        prior = CostModel().seconds
+        return fit([Observation(kind, n, 0.3, {"solve": factor * prior("solve", kind, n, 0.3)}) for kind, n in seen])
+
+    one, several = (
+        found(kinds).seconds("solve", "meridian", 1.0, 0.0) for kinds in ([KIND], [KIND, "mixed 2", "mixed 3"])
+    )
+    alone = CostModel().seconds("solve", "meridian", 1.0, 0.0)
+    assert 1 < one / alone < several / alone < factor or 1 > one / alone > several / alone > factor
+    assert several / alone == pytest.approx(factor, rel=0.5)
+    assert CostModel().machine == 1.0
+
+
+@pytest.mark.parametrize(
+    ("body", "law", "least", "most"),
+    [("box", "linear", 3, 9), ("cylinder", "linear", 4, 10), ("cylinder", "neo-hookean", 1.5, 3)],
+)
+def test_friction_takes_longer_than_contact_without_it(body, law, least, most):
+    """As measured, on small meshes: a factorisation and a condensation in 3D, load steps of two degrees in 2D."""
+    sizes = {"box": {"size": ["40 mm", "40 mm", "20 mm"]}, "cylinder": {"radius": "20 mm", "height": "20 mm"}}
+
+    def seconds(friction):
+        probe = {"shape": "sphere", "radius": "4 mm", "depth": "0.4 mm", "contact": "unilateral", "friction": friction}
+        chosen = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
+        scene = study(
+            body={"shape": body, **sizes[body]}, material={"law": law}, probe=probe, mesh={"accuracy": "5 %", **chosen}
+        )
+        return sum(CostModel().step(step).seconds for step in first_attempts(declare(scene)).meshes)
+
+    assert least < seconds(0.3) / seconds(0.0) < most
+
+
 def test_meshes_that_may_have_to_follow_are_counted():
     """Of an accuracy asked for, the later meshes count with the share of the cases that come to them."""
     chosen = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))

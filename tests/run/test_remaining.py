@@ -36,6 +36,16 @@ def test_begins_with_the_estimates_and_follows_what_is_measured():
     assert 0 < left.seconds(step=2) < 3
 
 
+def test_a_first_solve_that_compiles_says_nothing_of_the_others():
+    clock = Clock()
+    left = Remaining(run_of(40), clock)
+    for i in range(3):
+        clock.now += 1 if i else 30
+        left.done(f"solve {i}")
+    assert left.is_known
+    assert left.seconds() == pytest.approx(37, rel=0.05)
+
+
 def test_kinds_of_work_have_factors_of_their_own():
     clock = Clock()
     left = Remaining(run_of(10, ("slow", "fast")), clock)
