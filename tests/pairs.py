@@ -126,15 +126,21 @@ def _inclusion(study: Study) -> None:
     study["body"]["inclusion"] = [inclusion | {"young": "50 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}]
 
 
+def _labels(study: Study) -> None:
+    """Two tissues that meet below the tool: one is a quarter of the box."""
+    study["body"] = {"shape": "image", "file": "labels.nrrd", "label": 1, "fixed": dict(_HELD)}
+    quarter = {"name": "quarter", "label": 2, "young": "30 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}
+    study["body"]["region"] = [quarter]
+
+
 def _region(study: Study) -> None:
     region = {"name": "cyst", "file": "ball.stl", "unit": "mm", "young": "2 kPa", "poisson": 0.3}
-    study["body"]["region"] = [region | {"density": "1000 kg/m^3"}]
+    study["body"].setdefault("region", []).append(region | {"density": "1000 kg/m^3"})
 
 
 def _hollow(study: Study) -> None:
-    study["body"]["region"] = [
-        {"name": "cyst", "file": "ball.stl", "unit": "mm", "hollow": True, "pressure": "0.5 kPa"}
-    ]
+    cyst = {"name": "cyst", "file": "ball.stl", "unit": "mm", "hollow": True, "pressure": "0.5 kPa"}
+    study["body"].setdefault("region", []).append(cyst)
 
 
 def _layers(study: Study) -> None:
@@ -214,6 +220,7 @@ FEATURES = (
     Feature("cad", "body", _body(shape="cad", file="box.brep", unit="mm", fixed=_HELD)),
     Feature("surface", "body", _body(shape="surface", file="box.stl", unit="mm", fixed=_HELD)),
     Feature("image", "body", _body(shape="image", file="box.nrrd", label=1, fixed=_HELD)),
+    Feature("border", "body", _labels),
     Feature("layers", "layers", _layers),
     Feature("inclusion", "inclusion", _inclusion),
     Feature("region", "region", _region),
@@ -305,7 +312,10 @@ def write_bodies(folder: Path) -> None:
         "space directions": np.diag([2.0, 2.0, 2.0]),
         "space units": ["mm"] * 3,
     }
-    nrrd.write(str(folder / "box.nrrd"), label, header | {"space origin": np.array([-23.0, -23.0, -23.0])})
+    header["space origin"] = np.array([-23.0, -23.0, -23.0])
+    nrrd.write(str(folder / "box.nrrd"), label, header)
+    label[:12, 12:] *= 2
+    nrrd.write(str(folder / "labels.nrrd"), label, header)
     # In a process of its own: in this one the mesher may have begun.
     subprocess.run([sys.executable, "-c", _DRAW, str(folder / "box.brep")], check=True, capture_output=True)
 
