@@ -102,6 +102,12 @@ def write(path: Path, heads: tuple[str, ...], columns: np.ndarray, factors: tupl
     path.write_text("\n".join([",".join(heads), *rows]) + "\n", encoding="utf-8")
 
 
+def write_punch(path: Path, young: float, seed: int) -> None:
+    """Write the curve of a flat punch of 2 mm on a wide layer of 10 mm, of ``young`` (Pa)."""
+    found = pressed(body((young, 0.4, 10e-3)), disc(2e-3), 0.2e-3, Machine(0.5e-3, 1e-3, count=150), seed)
+    write(path, ("depth (mm)", "force (mN)"), found, (1e3, 1e3))
+
+
 def main(folder: Path) -> None:
     """Write all curves into a folder."""
     folder.mkdir(parents=True, exist_ok=True)

@@ -148,8 +148,8 @@ def _layers(study: Study) -> None:
     study["body"]["layer"] = [skin]
 
 
-def _pieces(study: Study) -> list[Study]:
-    """Return the tables of the body's regions."""
+def pieces(study: Study) -> list[Study]:
+    """Return the tables of layers, inclusions and regions with tissue of a study with one body."""
     return [
         piece
         for key in ("layer", "inclusion", "region")
@@ -160,7 +160,7 @@ def _pieces(study: Study) -> list[Study]:
 
 def _poisson(value: float) -> Callable[[Study], None]:
     def change(study: Study) -> None:
-        for tissue in (study["material"], *_pieces(study)):
+        for tissue in (study["material"], *pieces(study)):
             tissue["poisson"] = value
 
     return change
@@ -191,9 +191,9 @@ def _relaxation(study: Study) -> None:
 def _relaxing_regions(study: Study) -> None:
     """Tissue of which each region relaxes in its own way."""
     _relaxation(study)
-    if not _pieces(study):
+    if not pieces(study):
         _inclusion(study)
-    for piece in _pieces(study):
+    for piece in pieces(study):
         piece["relaxation"] = [{"share": 0.3, "time": "1 s"}]
 
 

@@ -181,16 +181,11 @@ def _rank_of(process: psutil.Process) -> str:
 
 
 def _write_curves(folder: Path) -> None:
-    from pipeline.layered.body import RIGID, LayeredBody
-    from pipeline.layered.compliance import Layer
-    from scripts.make_curves import Machine, disc, pressed, write
+    from scripts.make_curves import write_punch
 
     folder.mkdir()
-    machine = Machine(0.5e-3, 1e-3, count=150)
     for number in range(40):
-        tissue = LayeredBody((Layer(20e3 + 500.0 * number, 0.4, 10e-3),), RIGID)
-        curve = pressed(tissue, disc(2e-3), 0.2e-3, machine, number)
-        write(folder / f"gel_{number}.csv", ("depth (mm)", "force (mN)"), curve, (1e3, 1e3))
+        write_punch(folder / f"gel_{number}.csv", 20e3 + 500.0 * number, number)
 
 
 def main(arguments: list[str]) -> int:

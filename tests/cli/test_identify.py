@@ -9,10 +9,8 @@ import xarray as xr
 
 import pipeline
 from pipeline.identify.estimate import identify
-from pipeline.layered.body import RIGID, LayeredBody
-from pipeline.layered.compliance import Layer
 from pipeline.study.problems import StudyError
-from scripts.make_curves import TRUTH, Machine, disc, main, pressed, write
+from scripts.make_curves import TRUTH, main, write, write_punch
 from tests.commands import run_script
 
 YOUNG = 20e3
@@ -37,20 +35,13 @@ may_hide = {may_hide}
 """
 
 
-def curve(path, young=YOUNG, seed=1):
-    """Write the curve of a flat punch on a wide layer."""
-    tissue = LayeredBody((Layer(young, 0.4, 10e-3),), RIGID)
-    machine = Machine(0.5e-3, 1e-3, count=150)
-    write(path, ("depth (mm)", "force (mN)"), pressed(tissue, disc(2e-3), 0.2e-3, machine, seed), (1e3, 1e3))
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Return a folder with a study of one curve, one of three, and one of none."""
     folder = tmp_path_factory.mktemp("identify")
     (folder / "curves").mkdir()
     for number, young in enumerate((20e3, 25e3, 30e3), start=8):
-        curve(folder / "curves" / f"gel_{number}.csv", young, seed=number)
+        write_punch(folder / "curves" / f"gel_{number}.csv", young, seed=number)
     (folder / "punch.toml").write_text(STUDY.format(file="curves/gel_8.csv", may_hide='["layer", "base"]'))
     (folder / "three.toml").write_text(STUDY.format(file="curves/*.csv", may_hide="[]"))
     (folder / "none.toml").write_text(STUDY.format(file="curves/nothing.csv", may_hide="[]"))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.pairs import BASE, FEATURES, Study
+from tests.pairs import BASE, FEATURES, Study, pieces
 from tests.same.outcome import Outcome, Value
 from tests.same.pair import (
     FLAT,
@@ -27,7 +27,6 @@ from tests.same.pair import (
     without,
 )
 from tests.same.quantities import in_other_units, number_of, scaled, times
-from tests.same.scenes import pieces
 
 # ---- how numbers and keys are written -----------------------------------------------------------------------
 

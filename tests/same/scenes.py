@@ -5,7 +5,6 @@ import random
 from collections.abc import Iterator
 from math import inf
 from pathlib import Path
-from typing import Any
 
 import nrrd
 import numpy as np
@@ -14,7 +13,7 @@ from pipeline.plan.describe import summary
 from pipeline.plan.plan import make_plan
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_mapping
-from tests.pairs import BASE, FEATURES, Feature, Study, write_bodies
+from tests.pairs import BASE, FEATURES, Feature, Study, pieces, write_bodies
 from tests.same.quantities import times
 
 # What takes many times the time of the others, each drawn once in this many scenes that have it.
@@ -120,9 +119,3 @@ def write_files(folder: Path) -> None:
     axes = {"space directions": np.eye(3), "space origin": np.array([x[0], y[0], z[0]])}
     header = {"space": "left-posterior-superior", "space units": ["mm"] * 3}
     nrrd.write(str(folder / "lump.nrrd"), label, header | axes)
-
-
-def pieces(study: Study) -> list[dict[str, Any]]:
-    """Return the tables of layers, inclusions and regions with tissue of a study with one body."""
-    tables = (piece for key in ("layer", "inclusion", "region") for piece in study["body"].get(key, ()))
-    return [piece for piece in tables if not piece.get("hollow")]
