@@ -132,6 +132,11 @@ class Fibres(Section):
         return self.k1 == 0 or self.dispersion > 1 / 3 - _ALIGNED
 
 
+def name_in_term(own: str, number: int, key: str) -> str:
+    """Return the name of a key of a table of a list, the ``number``-th from 0, which may have its ``own`` name."""
+    return f"{own}_{key}" if own else f"{key}_{number + 1}"
+
+
 class Tissue(Section):
     """Elasticity: small-strain moduli, and a law."""
 

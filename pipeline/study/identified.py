@@ -5,9 +5,10 @@ to the end of the study's text, as the table ``[identified]``: the text is then 
 file, and another result is another study.
 """
 
+import copy
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.section import Words
-from pipeline.shapes.tissue import NUMBERS_OF_LAWS
+from pipeline.shapes.tissue import NUMBERS_OF_LAWS, name_in_term
 from pipeline.study.problems import Problems, StudyError, tuples
 from pipeline.study.text import toml_of
 from pipeline.study.toml import to_toml
@@ -117,7 +118,7 @@ def _sound(table: Any, problems: Problems) -> Identified:
 def _filled(raw: dict[str, Any], material: dict[str, Any], found: Identified, problems: Problems) -> dict[str, Any]:
     """Return the study with the values found; what it gives beside them is reported, but for those of layers."""
     own = {key: value for key, value in material.items() if key != "from"}
-    new = _material(found.values)
+    new = _material(found.values) | _tables(found.values, found.known)
     for key in own.keys() & new.keys():
         problems.error(f"material.{key}", own[key], "excludes `from`, which has it: leave one of them out")
     for key in own.keys() & found.known.keys():
@@ -147,6 +148,29 @@ def _material(values: Mapping[str, float]) -> dict[str, Any]:
         elif name in _KEYS:
             found[name] = _written(name, value)
     return found | ({"relaxation": [terms[number] for number in sorted(terms)]} if terms else {})
+
+
+def _tables(values: Mapping[str, float], known: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of [material], fibres and terms, with the values found in place of those ``known``."""
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        if place := _place(name, known):
+            key, number = place[:2]
+            table = found.setdefault(key, copy.deepcopy(known[key]))
+            (table if number is None else table[number])[place[2]] = value
+    return found
+
+
+def _place(name: str, material: Mapping[str, Any]) -> tuple[str, int | None, str] | None:
+    """Return key, number of the table from 0, and key in it, of a number of a table of [material], by its name."""
+    fibres, terms = material.get("fibres"), material.get("terms")
+    if isinstance(fibres, Mapping) and name in fibres:
+        return "fibres", None, name
+    for number, term in enumerate(terms if isinstance(terms, Sequence) else ()):
+        for key in term:
+            if key != "name" and name == name_in_term(str(term.get("name", "")), number, key):
+                return "terms", number, key
+    return None
 
 
 def _body(body: Any, values: Mapping[str, float], all_have: Mapping[str, Any]) -> Any:
@@ -239,9 +263,12 @@ def _table(path: str, dataset: "xr.Dataset") -> dict[str, Any]:
         raise _UnusableError(f"{what}give a value in the study of the identification, or add a curve that tells it")
     ends = {end: own.get(f"{end}_hidden", own[end]) for end in ("low", "high")}
     ends = {end: values.where(values.notnull(), own[end]) for end, values in ends.items()}
-    if unknown := [name for name in tissue if name.rpartition("_")[2] not in _KEYS and not _is_relaxation(name)]:
-        raise _UnusableError(f"{', '.join(unknown)} cannot be passed on: write the values into [material]")
     material = toml_of(str(dataset.attrs.get("study", "")), path).get("material", {})
+    passed_on = {name for name in tissue if name.rpartition("_")[2] in _KEYS or _place(name, material)}
+    if unknown := [name for name in tissue if name not in passed_on and not _is_relaxation(name)]:
+        raise _UnusableError(
+            f"{', '.join(unknown)} cannot be passed on: write the values into the table of the layer or region"
+        )
     own_keys = (*tissue, "young", "from", *(("relaxation",) if any(map(_is_relaxation, tissue)) else ()))
     known = {key: value for key, value in material.items() if key not in own_keys}
     return {

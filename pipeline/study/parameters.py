@@ -9,7 +9,7 @@ from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.probe import MOST_FRICTION, Probe
 from pipeline.shapes.regions import Embedded
 from pipeline.shapes.section import Section
-from pipeline.shapes.tissue import Fibres, Term, Tissue
+from pipeline.shapes.tissue import Fibres, Term, Tissue, name_in_term
 from pipeline.study.schema import Material
 from pipeline.study.swept import Place
 
@@ -96,7 +96,7 @@ def _of_law(prefix: str, place: Place, tissue: Tissue) -> Iterator[Parameter]:
 
 def _of_term(prefix: str, own: str, number: int, key: str) -> str:
     """Return the name of a key of a table of a list, which may have its ``own`` name."""
-    return f"{prefix}{own}_{key}" if own else f"{prefix}{key}_{number + 1}"
+    return prefix + name_in_term(own, number, key)
 
 
 def _numbers(section: Section, place: Place, name: Callable[[str], str]) -> Iterator[Parameter]:

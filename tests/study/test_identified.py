@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from pipeline.identify.dataset import joined, write
+from pipeline.identify.parts import Unknown
 from pipeline.plan.plan import make_plan
 from pipeline.report.identified import material
 from pipeline.report.uncertainty import tissue
 from pipeline.study.identified import NOTHING
 from pipeline.study.problems import StudyError
 from pipeline.study.read import read_mapping, read_text
+from tests import identifications
 from tests.cases import raw
 from tests.identifications import VALUES, identification
 from tests.report.synthetic import dataset
@@ -130,6 +132,44 @@ def test_relaxation_is_read_into_its_terms(tmp_path):
     history = {"ramp": "1 s", "hold": "10 s"}
     (term,) = next(using(tmp_path, probe={"history": history}).cases()).material.relaxation
     assert (term.share, term.time) == (0.4, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("law", "names", "key", "expected"),
+    [
+        ("fibres = {direction = [1, 0, 0], k1 = 0.5, k2 = 2.0}", ("k1", "k2"), "fibres", {"k1": 0.3, "k2": 3.0}),
+        ("terms = [{share = 0.7, alpha = 2.0}, {alpha = 9.0}]", ("share_1", "alpha_2"), "terms", [0.6, 2.0, 0.4, 8.0]),
+        ('terms = [{name = "stiff", alpha = 2.0}]', ("stiff_alpha",), "terms", [1.0, 5.0]),
+    ],
+)
+def test_fibres_and_terms_of_a_law_are_passed_on(tmp_path, monkeypatch, law, names, key, expected):
+    """They are in tables of [material]: of these, what was known stays."""
+    values = {"k1": 0.3, "k2": 3.0, "share_1": 0.6, "alpha_2": 8.0, "stiff_alpha": 5.0}
+    unknowns = tuple(Unknown(name, 0.0, 30.0, "1") for name in names)
+    monkeypatch.setattr(identifications, "UNKNOWNS", (*identifications.UNKNOWNS, *unknowns))
+    for name in names:
+        found = values[name]
+        monkeypatch.setitem(identifications.VALUES, name, (found, 0.9 * found, 1.1 * found, 0.8 * found, 1.2 * found))
+    kind = "holzapfel" if key == "fibres" else "ogden"
+    write_one(tmp_path, names=("young", *names), study=f'[material]\npoisson = 0.45\nlaw = "{kind}"\n{law}\n')
+    study = using(tmp_path)
+    (case,) = study.cases()
+    assert case.material.young == 12e3
+    if key == "fibres":
+        fibres = case.material.fibres
+        assert {"k1": fibres.k1, "k2": fibres.k2} == expected and fibres.direction == (1.0, 0.0, 0.0)
+    else:
+        flat = [number for term in range(len(case.material.terms)) for number in _term(case, term + 1)]
+        assert flat == pytest.approx(expected)
+    assert read_text(study.text, study.file) == study
+    ends = {solve.end_of for solve in make_plan(study).solves} - {""}
+    assert ends >= set(names)
+
+
+def _term(case, number):
+    """Return share and exponent of a term, as the solver has them."""
+    further = case.material.further
+    return further[f"share{number}"], further[f"alpha{number}"]
 
 
 def test_layers_that_fill_the_body_have_the_relaxation_that_was_found(tmp_path):
