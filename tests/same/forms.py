@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tests.pairs import Study
+from tests.pairs import Study, pieces
 from tests.same.pair import FLAT, Pair, change, copied, has, is_large, without
 from tests.same.quantities import number_of, times
-from tests.same.scenes import pieces
 
 _LONG = ("blade", "wedge", "ellipse")  # tools with two ends that are the same
 _DIRECTED = (*_LONG, "pyramid")
