@@ -1,6 +1,6 @@
 """Kill commands whose cases take seconds, at random moments: ``python -m benchmarks.faults.slow [MOMENTS] [--seed N]``.
 
-Commands are a run on 1, 2 and 4 ranks, paths of a needle and of a scalpel, an export, and an identification of a folder
+Commands are a run on 1, 2 and 4 ranks, paths of a needle and of a scalpel, exports, and an identification of a folder
 of curves. SIGKILL goes to all processes, or to one of the ranks. All that any rank has finished must then be on disk:
 only cases in hand are lost. With ``--ended`` each command is then run to its end, from what was kept.
 """
@@ -58,7 +58,10 @@ file = "curves/*.csv"
 [identify]
 young = ["1 kPa", "1 MPa"]
 """
-_EXPORT = small_text(mesh={"epsilon": None, "fine": None, "coarse": None, "rim": None, "accuracy": "1 %"})
+_ASKED = {"epsilon": None, "fine": None, "coarse": None, "rim": None, "accuracy": "1 %"}
+_EXPORT = small_text(mesh=_ASKED)
+_BALL = {"shape": "sphere", "radius": "6 mm", "depth": "0.6 mm", "contact": "unilateral"}
+_LAW = small_text(mesh=_ASKED, material={"poisson": 0.4, "law": "neo-hookean"}, probe=_BALL)
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,8 @@ def commands() -> list[Command]:
     return [
         *(Command("run", "cases", _RUN, ranks) for ranks in (1, 2, 4)),
         *paths,
-        *(Command("export", "export", export, ranks) for ranks in (1, 2)),
+        *(Command("export", "export", export, ranks) for ranks in (1, 2, 4)),
+        Command("export", "law", _LAW),
         Command("identify", "folder", _CURVES, 2),
     ]
 
@@ -108,7 +112,7 @@ class Slow(Scene):
         """The command line."""
         place = ["--output", str(self.folder / "results")]
         if self.command.name == "export":
-            place = ["--output", str(self.model), "--no-surface", "--checks", "8", "--accuracy", "2%"]
+            place = ["--output", str(self.model), "--checks", "8", "--accuracy", "2%"]
         return [self.command.name, str(self.file), *place]
 
     @property
