@@ -32,7 +32,7 @@ from pipeline.solve.contact.tool import Tool
 from pipeline.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
 from pipeline.solve.elements.fields import Column
 from pipeline.solve.ended import ended
-from pipeline.solve.estimate import AT_EDGE_LARGE, AT_SHARP_END, found_again_bar
+from pipeline.solve.estimate import AT_EDGE_LARGE, found_again_bar
 from pipeline.solve.movement import Loads, Movement
 from pipeline.solve.newton import LargeError
 from pipeline.solve.response import Contact, Response, reaction
@@ -151,18 +151,6 @@ class LargeContactSolution:
         return bool((self.touched.active & self.body.candidates.is_edge).any())
 
     @property
-    def is_at_sharp_end(self) -> bool:
-        """Whether facets at a sharp end of the tool are in contact: nodes at the end itself may have slid off."""
-        if not self.tool.is_sharp:
-            return False
-        candidates = self.body.candidates
-        at_end = np.zeros(len(candidates), dtype=bool)
-        edge = np.flatnonzero(candidates.is_edge)
-        at_end[edge] = self.tool.ends_at(candidates.points[edge])
-        facets = candidates.facets
-        return bool((at_end[facets].any(axis=1) & self.touched.active[facets].any(axis=1)).any())
-
-    @property
     def whole_area(self) -> float:
         """The contact area (m²) of the whole body, normal to the axis."""
         return float(2.0 ** len(self.body.elements.body.mirrored) * self._area().value)
@@ -233,8 +221,8 @@ class LargeContactSolution:
         """
         finer = self._found_again(movement.loads, stack)
         share, at_edge = 1 - finer.force / self.force, self._area().bar
-        taken, bar = found_again_bar(share, at_edge, AT_EDGE_LARGE[self.body.elements.degree])
-        bar *= AT_SHARP_END if self.is_at_sharp_end else 1.0
+        least = AT_EDGE_LARGE[self.body.elements.degree]
+        taken, bar = found_again_bar(share, at_edge, least, at_end=self._at_sharp_end())
         # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue
         # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
         of_area = nan if self.is_ended else at_edge + bar + abs(finer.whole_area / self.whole_area - 1)
@@ -294,6 +282,17 @@ class LargeContactSolution:
         press(body, tool_at, path, self.depth)
         assert path.last.touched is not None
         return path.last.touched
+
+    def _at_sharp_end(self) -> float:
+        """Return the share of the facets in contact that are at a sharp end of the tool, off which nodes slide."""
+        if not self.tool.is_sharp:
+            return 0.0
+        candidates, edge = self.body.candidates, np.flatnonzero(self.body.candidates.is_edge)
+        at_end = np.zeros(len(candidates), dtype=bool)
+        at_end[edge] = self.tool.ends_at(candidates.points[edge])
+        touching = self.touched.active[candidates.facets].any(axis=1)
+        areas = candidates.areas * touching
+        return float(areas[at_end[candidates.facets].any(axis=1)].sum() / areas.sum())
 
     def _area(self) -> Area:
         moved = replace(self.body.candidates, points=self.body.positions())
