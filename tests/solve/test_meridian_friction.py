@@ -69,6 +69,7 @@ def test_sticking_tools_have_their_closed_forms(tool, power):
     sticks = pressed(tool, depth, LAWS[0], inf, WIDE)
     assert sticks.reaction[2] / smooth.reaction[2] == pytest.approx(known.stick_ratio(0.3, power), rel=sticks.bar)
     assert sticks.bar < 0.01
+    assert sticks.contact.slip_area == 0
 
 
 def test_a_disc_that_sticks_is_bonded():

@@ -38,6 +38,8 @@ _BETWEEN_DEGREES, _BETWEEN_MESHES = 2.0, 1.0
 # The same for each result in units of those of F: F itself, friction, the contact area and the part that slides; and
 # the area in units of the distance of nodes at the edge. F is stationary with respect to the area, which errs by more.
 _OF_RESULTS, _OF_EDGE = np.array([1.0, 1.5, 0.5, 1.0]), 0.3
+# Largest change of the friction, as a share of it, that enters its bar.
+_MOST = 0.9
 # With friction: load steps of each mesh, whose bar is rarely below a tenth of a per cent, the accuracy that is tried,
 # and a degree whose error is well below that of the steps.
 _STEPS = {Grading(0.1, 1.0, 4.0): 8, Grading(0.02, 0.7, 4.0): 16}
@@ -90,6 +92,8 @@ class LargeMeridianContact(LargeSolver):
         deep, force, balance = depth / arrays.unit, fine.force, fine.balance
         of_force, of_friction, of_area, of_slip = (_OF_RESULTS * bars).tolist()
         error, area = of_force / fine.results[0] + fine.resolution**2 + 3 * balance, fine.area * arrays.unit**2
+        # Too few steps make friction too large, which then errs by more than by its share of itself.
+        of_friction /= 1 - min(of_friction / max(fine.results[1], of_friction), _MOST) if of_friction else 1.0
         # Sliding may begin between the last two nodes. Tissue that sticks by definition does not slide.
         of_slip += fine.slip_resolution * arrays.unit**2 + fine.resolution * area
         return _Found(

@@ -9,7 +9,7 @@ Lengths are in units of the mesh, stresses in units of μ of region 0.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import nan, pi
+from math import inf, nan, pi
 
 import numpy as np
 
@@ -249,9 +249,11 @@ class MeridianTouch:
 
     @property
     def slip_area(self) -> float:
-        """The part of the contact area that slides, NaN without friction."""
+        """The part of the contact area that slides, NaN without friction; where tissue sticks by definition, none."""
         touched = self._contact
-        return nan if touched.slide is None else touched.slide.share(self.areas, touched.active) * self.area
+        if touched.slide is None:
+            return nan
+        return touched.slide.share(self.areas, touched.active) * self.area if self.tool.friction < inf else 0.0
 
     @property
     def slip_resolution(self) -> float:
@@ -271,8 +273,7 @@ class MeridianTouch:
     @property
     def friction(self) -> float:
         """The sum of the sizes of the tangential forces."""
-        squares = (self._contact.forces**2).sum(axis=1) - self._contact.pressed**2
-        return 2 * pi * float(np.sqrt(np.maximum(squares, 0.0)).sum())
+        return 2 * pi * float(np.abs(self._contact.tangential).sum())
 
     def check(self) -> None:
         """Check balance and work, and that contact ends on the surface.
