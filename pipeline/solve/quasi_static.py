@@ -256,4 +256,8 @@ def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:
 
 
 def _with_bars(contact: Contact, finer: HierarchicalEstimate) -> Contact:
-    return replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)
+    found = replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)
+    if contact.rubbing is None or finer.relative is None:
+        return found
+    of_slip, of_force = contact.rubbing.bars(contact.area, float(finer.relative[0]), finer.area_bar)
+    return replace(found, slip_area_bar=of_slip, friction_force_bar=of_force)

@@ -63,6 +63,18 @@ def test_more_friction_needs_more_force_and_slides_less():
     assert found[2].energy < found[2].force * 0.1e-3 / 2
 
 
+@pytest.mark.parametrize("of_law", ["linear", "large"])
+def test_the_area_that_slides_and_the_friction_have_bars_that_hold_another_mesh(of_law):
+    solved, friction, rim = (record, 0.2, "0.45 mm") if of_law == "linear" else (large, 0.3, "0.5 mm")
+    found, coarse = solved(friction), solved(friction, mesh={"rim": rim})
+    for name in ("slip_area", "friction_force"):
+        (value, bar), (other, its_bar) = ((getattr(r, name), getattr(r, f"{name}_error")) for r in (found, coarse))
+        assert 0 < bar < 0.5 * (found.contact_area if name == "slip_area" else value)
+        assert abs(value - other) < bar + its_bar
+    sticks = solved("stick")
+    assert sticks.slip_area == sticks.slip_area_error == 0 < sticks.friction_force_error < 0.5 * sticks.friction_force
+
+
 def test_a_flat_punch_that_sticks_is_the_bonded_one():
     bonded, smooth = (record(probe=DISC | {"contact": contact}) for contact in ("bonded", "frictionless"))
     sticks, rubs = record("stick", DISC), record(0.3, DISC)
@@ -156,10 +168,10 @@ LARGE = {"body": {"shape": "cylinder", "radius": "20 mm", "height": "15 mm"}}
 NEO_HOOKEAN = {"law": "neo-hookean", "poisson": 0.3}
 
 
-def large(friction):
+def large(friction, mesh=None):
     """Return the record of a ball on neo-Hookean tissue, solved once for all tests."""
-    mesh = {"fine": "6 mm", "coarse": "6 mm", "rim": "0.35 mm", "growth": 0.7}
-    key = "large", friction
+    mesh = {"fine": "6 mm", "coarse": "6 mm", "rim": "0.35 mm", "growth": 0.7} | (mesh or {})
+    key = "large", friction, mesh["rim"]
     if key not in KNOWN:
         (KNOWN[key],) = solve(**LARGE, probe=SPHERE | {"friction": friction}, mesh=mesh, material=NEO_HOOKEAN).values()
         assert KNOWN[key].status == "ok", KNOWN[key].message

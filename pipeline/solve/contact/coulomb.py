@@ -11,10 +11,13 @@ corners slide where most of their neighbours do, in the mean direction of these.
 
 from dataclasses import dataclass, replace
 from math import inf
+from typing import Protocol
 
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
+from pipeline.solve.contact.surface import Candidates
+from pipeline.solve.response import Rubbing
 
 # Nodes change between sticking and sliding beyond this share of the largest friction.
 _SLACK = 1e-6
@@ -78,6 +81,15 @@ class Slide:
         """Return the sliding part of the area of ``active`` nodes (n), whose own areas are ``weights`` (n)."""
         return float(weights[active & self.sliding].sum()) / float(weights[active].sum())
 
+    def unsure(self, facets: IntArray, areas: FloatArray, active: BoolArray) -> float:
+        """Return the area of the ``facets`` (m, k) in which sliding begins or ends, at least that of one.
+
+        ``areas`` (m) are theirs. Beside the edge of contact tissue slides wherever friction is finite.
+        """
+        sticks, touches = (active & ~self.sliding)[facets], active[facets].any(axis=1)
+        mixed = sticks.any(axis=1) & ~sticks.all(axis=1)
+        return float(max(areas[mixed].sum(), areas[touches].mean()))
+
     def turning(self, most: FloatArray) -> FloatArray:
         """Return (n, t, t), the change of the unit vector with the trial traction, times ``most`` (n), the friction."""
         along = self.directions
@@ -107,6 +119,38 @@ class Slide:
             sliding = np.where(changes & (np.cumsum(changes) > 1), self.sliding, sliding)
         sliding = neighbours.majority(sliding, active) & active
         return Slide(sliding, neighbours.mean(trial, sliding))
+
+
+class Touching(Protocol):
+    """Contact with friction at n nodes."""
+
+    @property
+    def active(self) -> BoolArray:
+        """Nodes in contact (n)."""
+
+    @property
+    def slide(self) -> Slide | None:
+        """How they slide."""
+
+    @property
+    def tangential(self) -> FloatArray:
+        """Sizes of the tangential forces (n), N, with the sign of the normal reaction."""
+
+
+def rubbing_of(candidates: Candidates, coefficient: float, fine: Touching, coarse: Touching) -> Rubbing:
+    """Return the friction on ``candidates``, and its change to that of half as many load steps, ``coarse``.
+
+    At an infinite ``coefficient`` tissue slides nowhere, by definition.
+    """
+    force, change = float(fine.tangential.sum()), abs(float(fine.tangential.sum() - coarse.tangential.sum()))
+    if coefficient == inf:
+        return Rubbing(0.0, force, 0.0, change, 0.0)
+    assert fine.slide is not None
+    assert coarse.slide is not None
+    share = fine.slide.share(candidates.weights, fine.active)
+    other = coarse.slide.share(candidates.weights, coarse.active)
+    unsure = fine.slide.unsure(candidates.facets, candidates.areas, fine.active)
+    return Rubbing(share, force, abs(share - other), change, unsure)
 
 
 @dataclass(frozen=True, eq=False)

@@ -103,6 +103,12 @@ class ContactSolution:
     pressed: FloatArray
     slide: Slide | None = None
 
+    @property
+    def tangential(self) -> FloatArray:
+        """Sizes (n) of the tangential forces (N), with the sign of the normal part."""
+        squares = (self.forces**2).sum(axis=1) - self.pressed**2
+        return np.asarray(np.sign(self.pressed) * np.sqrt(np.maximum(squares, 0.0)))
+
 
 class Residual(NamedTuple):
     """Norms (N) of the residual inside the body, and at the nodes that the tool may touch."""

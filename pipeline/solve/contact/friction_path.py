@@ -75,6 +75,11 @@ class Step:
         return float(self.reactions[self.active, 0].sum())
 
     @property
+    def tangential(self) -> FloatArray:
+        """Sizes (n) of the tangential forces (N), with the sign of the normal reaction."""
+        return np.asarray(np.sign(self.reactions[:, 0]) * np.linalg.norm(self.reactions[:, 1:], axis=1))
+
+    @property
     def energy(self) -> float:
         """Strain energy (J) of the modelled part."""
         return float(np.einsum("nc,nc->", self.moved, self.reactions)) / 2

@@ -17,7 +17,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import SLACK, Obstacle
-from pipeline.solve.contact.coulomb import Neighbours, Slide
+from pipeline.solve.contact.coulomb import Neighbours, Slide, rubbing_of
 from pipeline.solve.contact.elements import State, Unknowns
 from pipeline.solve.contact.found import FoundContact
 from pipeline.solve.contact.friction_path import STEPS, CondensedSurface, Step, press
@@ -116,13 +116,13 @@ class SurfaceBody:
 class FrictionalContact(FoundContact):
     """Contact with the friction of a ``tool``, beside the frictionless one that was ``found``.
 
-    ``pressed`` is its equilibrium, nodes in the order of the candidates; ``path_bar`` the change of the force from half
-    as many load steps, relative. ``smooth`` and ``frictional`` are the unknowns without and with friction.
+    ``pressed`` is its equilibrium, nodes in the order of the candidates, and ``coarse`` that from half as many load
+    steps. ``smooth`` and ``frictional`` are the unknowns without and with friction.
     """
 
     tool: Tool
     pressed: Step
-    path_bar: float
+    coarse: Step
     smooth: Unknowns
     frictional: Unknowns
 
@@ -139,11 +139,9 @@ class FrictionalContact(FoundContact):
     def summary(self, sag: float) -> Contact:
         """Return the area of the whole contact, and the part of it that slides."""
         candidates, step = self.obstacle.candidates, self.pressed
-        across = step.reactions[:, 1:]
-        sizes = np.sign(step.reactions[:, 0]) * np.linalg.norm(across, axis=1)
-        torque = self.tool.torque(candidates.points, across)
-        share = step.slide.share(candidates.weights, step.active)
-        return super().summary(sag).with_friction(share, sizes, torque, self._plug.body.mirrored)
+        torque = self.tool.torque(candidates.points, step.reactions[:, 1:])
+        rubbing = rubbing_of(candidates, self.tool.friction, step, self.coarse)
+        return super().summary(sag).with_friction(rubbing, torque, self._plug.body.mirrored)
 
     def response(self, column: Column, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d, with its components across the axis."""
@@ -165,7 +163,8 @@ class FrictionalContact(FoundContact):
         self._plug.put(columns[0], self.smooth, depth)
         found = super().hierarchical_estimate(columns, movement, stack, keep=keep)
         self._plug.put(columns[0], self.frictional, depth)
-        return with_friction(found, self.path_bar, added=self.force / super().force - 1)
+        path_bar = abs(self.coarse.force / self.force - 1)
+        return with_friction(found, path_bar, added=self.force / super().force - 1)
 
     def _touching(self) -> tuple[BoolArray, State]:
         step = self.pressed
@@ -208,13 +207,12 @@ def add_friction(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: Exi
         if not through.any():
             break
         touched = touched | through
-    path_bar = abs(coarse.force / pressed.force - 1)
     known = {name: getattr(contact, name) for name in ("sweep", "obstacle", "found", "loaded", "obstacle_above")}
     return FrictionalContact(
         **known,
         tool=tool,
         pressed=replace(pressed, moved=moved),
-        path_bar=path_bar,
+        coarse=coarse,
         smooth=smooth,
         frictional=frictional,
     )

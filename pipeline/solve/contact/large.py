@@ -165,17 +165,9 @@ class LargeContactSolution:
         return Equilibrium(self, columns, movement, iterations, self.response(movement), contact=self.summary())
 
     def summary(self) -> Contact:
-        """Return the area of the whole contact, with friction the part that slides, with loads their effects."""
-        touched, body, whole = self.touched, self.body, 2.0 ** len(self.body.elements.body.mirrored)
-        loaded = whole * self.sagged.stored
-        contact = Contact(self.whole_area, sag=self.sagged.sag, load_energy=loaded, is_ended=self.is_ended)
-        if touched.slide is None:
-            return contact
-        places, share = body.positions(), touched.slide.share(body.candidates.weights, touched.active)
-        across = touched.forces - touched.pressed[:, None] * self.placed.distance(places, self.depth).normal
-        sizes = np.sign(touched.pressed) * np.linalg.norm(across, axis=1)
-        torque = self.tool.torque(places, touched.forces)
-        return contact.with_friction(share, sizes, torque, body.elements.body.mirrored)
+        """Return the area of the whole contact, with loads their effects."""
+        loaded = 2.0 ** len(self.body.elements.body.mirrored) * self.sagged.stored
+        return Contact(self.whole_area, sag=self.sagged.sag, load_energy=loaded, is_ended=self.is_ended)
 
     def check(self) -> None:
         """Check the work, and that contact ends within the candidates.

@@ -13,7 +13,8 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.contact.contact_steps import ContactPath, Friction, Stage, press_with_friction
-from pipeline.solve.contact.coulomb import Neighbours
+from pipeline.solve.contact.coulomb import Neighbours, rubbing_of
+from pipeline.solve.contact.deformed import ContactSolution
 from pipeline.solve.contact.frictional import with_friction
 from pipeline.solve.contact.large import LargeContact, LargeContactSolution, placed_tool, stopped
 from pipeline.solve.contact.tissue import DeformedBody
@@ -22,6 +23,7 @@ from pipeline.solve.elements.fields import Column
 from pipeline.solve.movement import Movement
 from pipeline.solve.newton import LargeError
 from pipeline.solve.physics import of_regions
+from pipeline.solve.response import Contact
 from pipeline.solve.solution import Request
 
 
@@ -56,9 +58,8 @@ class LargeFrictionalContact(LargeContact):
             touched.append(path.last.touched)
         body.state = path.last.state
         coarse, fine = touched
-        path_bar = abs(float(coarse.forces[:, 2].sum() / fine.forces[:, 2].sum()) - 1)
         found = LargeFrictionalSolution(
-            self._surface, body, self._tool, fine, depth, smooth.sagged, smooth.corrections, smooth, state, path_bar
+            self._surface, body, self._tool, fine, depth, smooth.sagged, smooth.corrections, smooth, state, coarse
         )
         return found.equilibrium(asked.movement, iterations, stack)
 
@@ -81,12 +82,18 @@ def friction_of(body: DeformedBody, coefficient: float, depth: float) -> Frictio
 class LargeFrictionalSolution(LargeContactSolution):
     """Contact with friction, beside the frictionless one, ``smooth``, with its state.
 
-    ``path_bar`` is the change of the force from half as many load steps, relative.
+    ``coarse`` is the contact from half as many load steps.
     """
 
     smooth: LargeContactSolution
     smooth_state: FloatArray
-    path_bar: float
+    coarse: ContactSolution
+
+    def summary(self) -> Contact:
+        """Return the area of the whole contact, the part that slides, and the friction."""
+        rubbing = rubbing_of(self.body.candidates, self.tool.friction, self.touched, self.coarse)
+        torque = self.tool.torque(self.body.positions(), self.touched.forces)
+        return super().summary().with_friction(rubbing, torque, self.body.elements.body.mirrored)
 
     def hierarchical_estimate(
         self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
@@ -100,4 +107,5 @@ class LargeFrictionalSolution(LargeContactSolution):
         self.body.state = self.smooth_state
         found, frictionless = self.smooth.hierarchical_estimate(columns, movement, stack, keep=keep), self.smooth.force
         self.body.state = state
-        return with_friction(found, self.path_bar, added=self.force / frictionless - 1)
+        path_bar = abs(float(self.coarse.forces[:, 2].sum() / self.touched.forces[:, 2].sum()) - 1)
+        return with_friction(found, path_bar, added=self.force / frictionless - 1)
