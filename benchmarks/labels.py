@@ -1,8 +1,8 @@
 """Meshes of random organs with two or three labels that meet: ``python -m benchmarks.labels [--count 150] [--seed 1]``.
 
 Each is a rough ellipsoid of random proportions, divided by random fields; a disc is on a random place. The table has
-the share that was meshed, that refused because the disc is on a border between labels, all other messages, and the
-times of processors (s) from the file to the mesh.
+the share that was meshed, that refused because a border between labels runs along the disc's edge, all other messages,
+and the times of processors (s) from the file to the mesh.
 """
 
 from argparse import ArgumentParser
