@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from tests.pairs import Study, pieces
-from tests.same.pair import FLAT, Pair, change, copied, has, is_large, without
+from tests.same.outcome import Value
+from tests.same.pair import FLAT, Pair, change, copied, has, is_large, with_values, without
 from tests.same.quantities import number_of, times
 
 _LONG = ("blade", "wedge", "ellipse")  # tools with two ends that are the same
@@ -187,9 +188,12 @@ def _full(study: Study, dice: random.Random) -> Pair | None:
     if "epsilon" not in mesh or mesh.get("outside") != "coarse":
         return None
     # F_max is that of the study's own case of `full`.
-    without_max = without("force_max", "force_ratio")
     return Pair(copied(study, mesh={"epsilon": "1 m"}), copied(study, mesh={"epsilon": "full"}), common=True,
-                related=without_max)  # fmt: skip
+                related=lambda two: with_values(two, _not_of_full))  # fmt: skip
+
+
+def _not_of_full(name: str, value: Value) -> Value | None:
+    return None if name.endswith(("_ratio", "_max")) else value
 
 
 @change("a list of one value")
