@@ -197,6 +197,16 @@ def _relaxing_regions(study: Study) -> None:
         piece["relaxation"] = [{"share": 0.3, "time": "1 s"}]
 
 
+def _relaxing_round_scene(study: Study) -> None:
+    """A large law that relaxes; what is left of the base study is round, to be solved on the meridian."""
+    if study["body"] == BASE["body"]:
+        study["body"] = {"shape": "cylinder", "radius": "22 mm", "height": "20 mm", "fixed": "bottom"}
+    if study["mesh"].items() >= {"epsilon": "8 mm", "outside": "coarse"}.items():
+        study["mesh"]["epsilon"] = "full"
+    study["material"].setdefault("law", "neo-hookean")
+    _relaxation(study)
+
+
 def _accuracy(study: Study) -> None:
     mesh = study["mesh"]
     kept = ("epsilon",) if mesh["outside"] != "coarse" else ()
@@ -254,6 +264,7 @@ FEATURES = (
     Feature("history", "history", _history),
     Feature("relaxation", "relaxation", _relaxation),
     Feature("relaxing regions", "relaxation", _relaxing_regions),
+    Feature("relaxing round scene", "relaxation", _relaxing_round_scene),
     Feature("gravity", "gravity", _update("load", gravity=["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"])),
     Feature("traction", "traction", _traction),
     Feature("free", "outside", _update("mesh", outside="free")),

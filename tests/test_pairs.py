@@ -10,13 +10,22 @@ from tests.pairs import Result, name_of, pairs, run, write_bodies
 
 _EVERY = {name_of(pair): pair for pair in pairs()}
 # F_exact and time steps take seconds, and remeshing a surface one: `make pairs` runs those, too.
-_SLOW = {"F_exact", "surface", "image", "border", "accuracy", "relaxing regions"}
+_SLOW = {"F_exact", "surface", "image", "border", "accuracy", "relaxing regions", "relaxing round scene"}
 _QUICK = [name for name, pair in _EVERY.items() if not _SLOW & {feature.name for feature in pair}]
 _SAMPLE = random.Random(32).sample(_QUICK, 40)
 
 
 # Features that make no other case of a study, or none of one with a tool that finds its contact anyway.
-_SAME_CASE = {"history", "relaxation", "relaxing regions", "F_exact", "model 3d", "swept E", "unilateral"}
+_SAME_CASE = {
+    "history",
+    "relaxation",
+    "relaxing regions",
+    "relaxing round scene",
+    "F_exact",
+    "model 3d",
+    "swept E",
+    "unilateral",
+}
 
 
 @pytest.fixture(scope="module")
