@@ -30,7 +30,7 @@ from pipeline.study.case import Case
 from pipeline.study.output import OWN, WHOLE, Output
 
 # Least change, in units of the mean pointwise change over the region.
-POINTWISE = {"at": 1.0, "max": 0.5, "mean": 0.1, "quantile": 0.1}
+POINTWISE = {"at": 1.0, "max": 0.5, "mean": 0.1, "quantile": 0.3}
 # The highest degree for which the whole case is solved again in one degree more.
 _HIGHEST = 2
 
