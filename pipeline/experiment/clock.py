@@ -1,4 +1,4 @@
-"""Clock times in columns of files, such as 12:21:07.250 or 2025-10-30 12:21:07."""
+"""Clock times in columns of files, such as 12:21:07.250, 2025-10-30 12:21:07 or 10/30/2025 12:21:07 PM."""
 
 import re
 
@@ -7,10 +7,14 @@ import pandas as pd
 
 from pipeline.arrays import FloatArray
 
+_DATE = (
+    r"(?:(?P<year>\d{4})[-/](?P<month>\d{1,2})[-/](?P<day>\d{1,2})"
+    r"|(?P<first>\d{1,2})(?P<sign>[./])(?P<second>\d{1,2})[./](?P<last>\d{4}))"
+)
+_ONLY_DATE = re.compile(_DATE)
 _CLOCK = re.compile(
-    r"(?:(?P<year>\d{4})[-/](?P<month>\d{1,2})[-/](?P<day>\d{1,2})[T ]"
-    r"|(?P<first>\d{1,2})(?P<sign>[./])(?P<second>\d{1,2})[./](?P<last>\d{4}) )?"
-    r"(?P<hours>\d{1,2}):(?P<minutes>\d{2}):(?P<seconds>\d{2}(?:[.,]\d+)?)"
+    rf"(?:{_DATE}[T ])?(?P<hours>\d{{1,2}}):(?P<minutes>\d{{2}}):(?P<seconds>\d{{2}}(?:[.,]\d+)?)"
+    r"(?: ?(?P<half>[AaPp])[Mm])?(?: ?(?:Z|(?P<zone>[+-])(?P<ahead>\d{2}):?(?P<more>\d{2})))?"
 )
 _DAY = 86400.0
 
@@ -18,6 +22,11 @@ _DAY = 86400.0
 def is_clock(text: str) -> bool:
     """Tell a clock time, with or without a date."""
     return _CLOCK.fullmatch(text) is not None
+
+
+def is_date(text: str) -> bool:
+    """Tell a date without a clock time."""
+    return _ONLY_DATE.fullmatch(text) is not None
 
 
 def seconds(column: "pd.Series[str]") -> FloatArray:
@@ -28,6 +37,10 @@ def seconds(column: "pd.Series[str]") -> FloatArray:
     found = column.str.extract(_CLOCK)
     parts = found[["hours", "minutes", "seconds"]].apply(lambda part: part.str.replace(",", ".", regex=False))
     since = parts.astype(float).to_numpy() @ np.array([3600.0, 60.0, 1.0])
+    half = found["half"].str.lower().to_numpy()
+    since = since - _DAY / 2 * ((half == "a") | (half == "p")) * (since >= _DAY / 2) + _DAY / 2 * (half == "p")
+    ahead = found[["ahead", "more"]].astype(float).fillna(0.0).to_numpy() @ np.array([3600.0, 60.0])
+    since = since - np.where(found["zone"] == "-", -ahead, ahead)
     if found[["day", "first"]].notna().any(axis=None):
         return np.asarray(since + _DAY * _days(found))
     known = np.flatnonzero(~np.isnan(since))

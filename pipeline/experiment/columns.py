@@ -196,6 +196,9 @@ def _if_bent(table: Table) -> str:
 def _time(table: Table, taken: set[int], reading: Reading, told: list[str]) -> int | None:
     """Return the only column that is called time, or has a unit of time; None if there is none, or several."""
     free = [n for n in range(len(table.headers)) if n not in taken and _has_values(table, n)]
+    for number, (line, text) in table.strange.items():
+        if is_called(table.headers[number].name, "time"):
+            told.append(f'column `{_title(table, number)}` has text, "{text}" in line {line}, and is not read as time')
     found = [n for n in free if is_called(table.headers[n].name, "time")]
     found = found or [n for n in free if is_unit_of(table.headers[n].unit, "s")]
     for number in [n for n in found if not _unit(table, n, reading, "time")]:

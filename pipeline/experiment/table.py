@@ -11,7 +11,7 @@ import pandas as pd
 from pandas.api.types import is_bool_dtype, is_numeric_dtype
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.experiment.clock import is_clock, seconds
+from pipeline.experiment.clock import is_clock, is_date, seconds
 from pipeline.experiment.header import Header, is_comment
 from pipeline.experiment.headings import has_headers, headers_of
 from pipeline.experiment.layout import MISSING, Layout, find_layout
@@ -111,11 +111,13 @@ def _begin(lines: Sequence[str], layout: Layout) -> int | None:
 
 
 def _is_data(layout: Layout, line: str) -> bool:
-    """Tell a row of numbers; where a column has text, one of numbers for the most part."""
+    """Tell a row of numbers, dates and clock times; where a column has text, one of them for the most part."""
     fields = layout.fields(line)
     if len(fields) != layout.width:
         return False
-    return layout.is_row(fields) or sum(map(layout.is_number, fields)) > max(1, layout.width / 2)
+    numbers = sum(map(layout.is_number, fields))
+    times = sum(is_clock(field) or is_date(field) for field in fields)
+    return layout.is_row(fields) or (numbers > 1 and numbers + times > layout.width / 2)
 
 
 def _rows(lines: Sequence[str], begin: int, layout: Layout) -> tuple[list[int], list[int]]:
@@ -160,12 +162,14 @@ def _values(
     found = np.empty(frame.shape)
     strange: dict[int, tuple[int, str]] = {}
     clocks: set[int] = set()
+    dates = [text for text in (frame[number].map(str).str.strip() for number in frame) if is_date(text.iloc[0])]
     for number in range(layout.width):
         column = frame[number]
         if not is_numeric_dtype(column) or is_bool_dtype(column):
             text = column.map(str).str.strip()
             if is_clock(text.iloc[0]):
-                found[:, number] = seconds(text)
+                is_apart = len(dates) == 1 and is_clock(f"{dates[0].iloc[0]} {text.iloc[0]}")
+                found[:, number] = seconds(dates[0] + " " + text if is_apart else text)
                 clocks.add(number)
                 continue
             plain = text.str.replace(",", ".", regex=False) if layout.decimal == "," else text

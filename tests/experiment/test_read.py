@@ -355,13 +355,16 @@ def test_exports_of_testing_machines(tmp_path, machine):
         ("%d.%m.%Y %H:%M:%S,%f", "2025-02-28 23:00:00", 4500),  # 25 hours
         ("%m/%d/%Y %H:%M:%S.%f", "2025-10-11 20:00:00", 4500),
         ("%d/%m/%Y %H:%M:%S.%f", "2025-10-11 20:00:00", 4500),
+        ("%m/%d/%Y %I:%M:%S.%f %p", "2025-10-11 11:59:50", 4500),
+        ("%Y-%m-%dT%H:%M:%S.%f+02:00", "2025-10-31 10:00:00", 9000),
+        ("%d.%m.%Y;%H:%M:%S.%f", "2025-02-28 23:00:00", 4500),  # date and time in two columns
     ],
 )
 def test_clock_times_over_midnight(tmp_path, form, begin, longer):
     def clock(lines):
         rows = [line.split(",") for line in lines[1:]]
         times = [datetime.fromisoformat(begin) + timedelta(seconds=longer * float(row[0])) for row in rows]
-        head = lines[0].replace("time (s)", "Time").replace(",", ";")
+        head = "Date;" * (";" in form) + lines[0].replace("time (s)", "Time").replace(",", ";")
         return [head, *(";".join([t.strftime(form), *row[1:]]) for t, row in zip(times, rows, strict=True))]
 
     curve = read(write(tmp_path / "a.csv", IN_MM, change=clock))
