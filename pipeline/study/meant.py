@@ -89,8 +89,26 @@ OTHER_SHAPES = {
         **dict.fromkeys(("step", "iges", "brep"), 'a solid of a CAD file is shape = "cad"'),
     },
 }
-# Values that are not computed, wherever they are.
-OTHER_VALUES = dict.fromkeys(("roller", "rollers", "sliding", "symmetry"), f"; {_ROLLER}")
+_SLIDES = '; tissue that slides along a known footprint is contact = "frictionless"'
+_STICKS = '; tissue that sticks to a known footprint is contact = "bonded"'
+_TOUCHES = '; tissue that may leave the tool is contact = "unilateral"'
+# Other names of values, by key.
+OTHER_VALUES = {
+    "fixed": dict.fromkeys(("roller", "rollers", "sliding", "symmetry"), f"; {_ROLLER}"),
+    "contact": {
+        **dict.fromkeys(("sliding", "slip", "smooth", "lubricated"), _SLIDES),
+        **dict.fromkeys(("tied", "glued", "stick", "sticking", "no-slip", "rough", "adhesive"), _STICKS),
+        **dict.fromkeys(("hard", "one-sided", "separation", "signorini", "friction", "frictional"), _TOUCHES),
+    },
+}
+# Other names of sections.
+OTHER_SECTIONS = {
+    **dict.fromkeys(("indenter", "tool", "punch", "needle", "blade"), "the tool is [probe]"),
+    **dict.fromkeys(("tissue", "law", "tissues"), "what tissue is made of is [material]"),
+    **dict.fromkeys(("geometry", "domain", "sample", "specimen", "organ"), "the tissue's shape is [body]"),
+    **dict.fromkeys(("gravity", "pressure", "boundary"), "gravity and tractions are in [load]"),
+    **dict.fromkeys(("solver", "solution"), "how it is solved is in [solve]"),
+}
 
 
 def other_name(section: str, key: str) -> str:

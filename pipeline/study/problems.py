@@ -178,7 +178,7 @@ class Problems:
         else:
             told = other_name(where, key) if item["type"] == "extra_forbidden" else ""
             told = told or allowed({**item, "loc": place}, model)
-            hint = OTHER_VALUES.get(found.casefold(), "") if isinstance(found, str) else ""
+            hint = OTHER_VALUES.get(key, {}).get(found.casefold(), "") if isinstance(found, str) else ""
             self.error(f"{where}.{key}".rstrip("."), found, told + hint)
 
     def _add(self, problems: list[Problem], problem: Problem) -> None:

@@ -18,6 +18,7 @@ from pipeline.study.identification import Identification, check_shared, read_ide
 from pipeline.study.identified import with_identified
 from pipeline.study.insertion_stages import has_insertion, with_steps
 from pipeline.study.loads import Load
+from pipeline.study.meant import OTHER_SECTIONS
 from pipeline.study.measured import MESH, OF_MEASUREMENTS, borrowed, completed, of_measurement
 from pipeline.study.measurement import Measurement
 from pipeline.study.output import Output, check_outputs, read_outputs
@@ -276,6 +277,8 @@ def _check_top(raw: dict[str, Any], problems: Problems) -> None:
 
 def _meant(key: str) -> str:
     """Return a suggestion for an unknown section: a section, or an array of tables within one."""
+    if key.casefold() in OTHER_SECTIONS:
+        return OTHER_SECTIONS[key.casefold()]
     pieces = {piece: section for section, inner in NESTED.items() for piece in inner}
     if close := difflib.get_close_matches(key, pieces, n=1, cutoff=0.6):
         return f"it is part of another section: write [[{pieces[close[0]]}.{close[0]}]]"

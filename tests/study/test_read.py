@@ -344,6 +344,11 @@ WORDS = {
     "a half-space": ({"body": {"shape": "half-space"}}, ["20 contact radii"]),
     "a roller": ({"body": {"roller": "sides"}}, ["body.roller", "`fixed`", "not computed"]),
     "a roller as a support": ({"body": {"fixed": "roller"}}, ["body.fixed", "'bottom'", "a roller", "not computed"]),
+    "contact that slides": (
+        {"probe": {"contact": "sliding"}},
+        ["probe.contact", "along a known footprint", '"frictionless"'],
+    ),
+    "a tool of its own": ({"indenter": {}}, ["indenter", "the tool is [probe]"]),
 }
 
 
