@@ -20,10 +20,10 @@ from pipeline.cli.words import (
     check_kind,
     check_machine,
     check_output,
-    check_store,
     read_all,
+    store_to_write,
 )
-from pipeline.files import STORE_NAME, result_files
+from pipeline.files import result_files
 from pipeline.launcher import is_first_rank
 from pipeline.printable import counted, printable, printable_lines
 from pipeline.run.remaining import format_seconds
@@ -70,17 +70,14 @@ def identify(
         _describe(curves, [file for file in files if file not in curves])
         return
     studies = read_all(files, have_cases=False)
-    if store:
-        check_store(store)
-    path = store or output / STORE_NAME
+    path = store_to_write(store, output)
     if design:
-        check_output(path)
         check_machine()
         rank(studies, path, _HOWTO, quiet=quiet or is_json_wanted())
     without = [Fault(f"{s.file}: has no [[measurement]]", s.file, howto=_HOWTO) for s in studies if not s.measurements]
     if without:
         fail(*without)
-    check_output(path, *(file for study in studies for file in result_files(output, study.name)))
+    check_output(*(file for study in studies for file in result_files(output, study.name)))
     for study in studies:
         check_kind(output / f"{study.name}.nc", identified=True)
     check_machine()

@@ -30,8 +30,8 @@ from pipeline.cli.words import (
     check_names,
     check_output,
     check_shard,
-    check_store,
     read_all,
+    store_to_write,
     warn,
 )
 from pipeline.files import STORE_NAME, result_files
@@ -85,11 +85,10 @@ def run(
     Example: epsmesh run studies/figure3.toml --shard 3/8
     """
     studies, left_out = read_all(files), check_names(without)
-    if store:
-        check_store(store)
     part = check_shard(shard, studies)
     # If the default mesh cache cannot be written, meshes are not cached, and the run continues.
-    check_output(store or output / STORE_NAME, folder=None if meshes == DEFAULT_MESHES else meshes)
+    store_to_write(store, output)
+    check_output(folder=None if meshes == DEFAULT_MESHES else meshes)
     for study in () if part else studies:
         check_output(*result_files(output, study.name))
     _check_measured(studies, output)

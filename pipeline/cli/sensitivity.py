@@ -15,11 +15,11 @@ from pipeline.cli.words import (
     StoreFile,
     check_machine,
     check_output,
-    check_store,
     read_all,
+    store_to_write,
     warn,
 )
-from pipeline.files import STORE_NAME, result_files
+from pipeline.files import result_files
 from pipeline.launcher import is_first_rank
 
 if TYPE_CHECKING:
@@ -47,11 +47,9 @@ def sensitivity(
     Example: epsmesh sensitivity studies/sensitivity.toml
     """
     (study,) = read_all([file])
-    if store:
-        check_store(store)
-    path, name = store or output / STORE_NAME, study.name + _ENDING
+    path, name = store_to_write(store, output), study.name + _ENDING
     files = result_files(output, name)
-    check_output(path, *files)
+    check_output(*files)
     check_machine()
     if is_first_rank():
         warn(study)

@@ -9,7 +9,7 @@ import typer
 
 from pipeline.cli.console import error, is_json_wanted, say
 from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, of_results, refusing
-from pipeline.cli.words import CLUSTER, check_names, check_output, check_store, read_all
+from pipeline.cli.words import CLUSTER, check_names, check_output, read_all, store_to_write
 from pipeline.files import result_files
 from pipeline.printable import counted
 from pipeline.states import FAILURES
@@ -32,8 +32,8 @@ def merge_shards(
 
     (study,) = read_all([file])
     paths = _stores(study, stores, output)
-    check_store(target)
-    check_output(target, *result_files(output, study.name))
+    store_to_write(target, output)
+    check_output(*result_files(output, study.name))
     plan = make_plan(study, without=check_names(without))
     sources, records, further = _merged(paths, target, plan)
     problems = [problem for source in sources for problem in source.problems]

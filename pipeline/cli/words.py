@@ -143,19 +143,32 @@ def check_store(path: Path) -> None:
             fail(of_option("--store", path, "is not a case store"))
 
 
-def check_output(*files: Path, folder: Path | None = None) -> None:
-    """Exit, before any computation, if one of the files, or a file in ``folder``, cannot be written."""
+def store_to_write(store: Path | None, output: Path) -> Path:
+    """Return the given case store, else that of a folder; exit, before any computation, if it cannot be written."""
+    if store is None:
+        check_output(output / STORE_NAME)
+        return output / STORE_NAME
+    check_store(store)
+    check_output(store, option="--store FILE")
+    return store
+
+
+def check_output(*files: Path, folder: Path | None = None, option: str = "--output FOLDER") -> None:
+    """Exit, before any computation, if one of the files, or a file in ``folder``, cannot be written.
+
+    ``option`` gives the files another place.
+    """
     for file in files:
         if why := why_not_writable(file):
-            fail(Fault(or_elsewhere(why), file=str(file)))
+            fail(Fault(or_elsewhere(why, option), file=str(file)))
     if folder and (why := _why_no_files(folder)):
         fail(Fault(or_elsewhere(why), file=str(folder)))
 
 
-def or_elsewhere(why: str) -> str:
-    """Return why a file cannot be written, and that another folder can be given, if this one is read-only."""
+def or_elsewhere(why: str, option: str = "--output FOLDER") -> str:
+    """Return why a file cannot be written, and the ``option`` for another place, if this one is read-only."""
     is_closed = why.endswith(tuple(map(os.strerror, (errno.EACCES, errno.EPERM, errno.EROFS))))
-    return f"{why}; `--output FOLDER` writes elsewhere" if is_closed else why
+    return f"{why}; `{option}` writes elsewhere" if is_closed else why
 
 
 def check_kind(file: Path, *, identified: bool) -> None:

@@ -10,7 +10,9 @@ import sqlite3
 import subprocess
 
 import pytest
+import typer
 
+from pipeline.cli import words
 from pipeline.cli.words import or_elsewhere
 from pipeline.study.named import EXAMPLES
 from tests.commands import ENVIRONMENT, command, talk
@@ -224,3 +226,11 @@ def test_a_closed_folder_names_the_option_for_another(number):
     """Another folder on a full disk would be of no use."""
     why = f"out/small.nc: cannot be written: {os.strerror(number)}"
     assert ("`--output FOLDER` writes elsewhere" in or_elsewhere(why)) == (number != errno.ENOSPC)
+
+
+def test_a_case_store_that_cannot_be_written_names_its_own_option(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(words, "why_not_writable", lambda path: f"{path}: {os.strerror(errno.EROFS)}")
+    for store, option in ((tmp_path / "a.sqlite", "--store FILE"), (None, "--output FOLDER")):
+        with pytest.raises(typer.Exit):
+            words.store_to_write(store, tmp_path)
+        assert f"`{option}` writes elsewhere" in capsys.readouterr().err
