@@ -27,10 +27,11 @@ REACH = 0.5
 """Contact is this much before the first depth at most, in recorded depths, of a curve that begins in air or near it."""
 
 # What is known of a tilt beforehand: its standard deviation, as a share of the mean slope in contact, and its range in
-# standard deviations. Force microscopes and testing machines have some per cent.
-_TILT, _TILTS = 0.03, 8.0
-# A curve has air from so many rows before contact on, and this share of the depth in contact.
-_AIR_ROWS, _AIR = 10, 0.05
+# standard deviations. Force microscopes and testing machines have some per cent; at constant speed a drift adds to it.
+_TILT, _TILTS = 0.05, 5.0
+# A curve has air from so many rows before contact on. Little air tells little of a tilt: it is then what was known
+# beforehand. A level baseline, which a curve without air has, would give a bar that is far too small.
+_AIR_ROWS = 2
 # A force is small below this share of the largest.
 _SMALL = 0.05
 # Step of finite differences, as a share of an unknown's range, and of the largest depth.
@@ -153,7 +154,7 @@ class Model:
     def has_air(self, number: int, values: Values) -> bool:
         """Return whether curve ``number`` has a part before contact, from which its tilt is seen."""
         depth = self.measured[number].curve.depth - values[self.own("contact_point", number)]
-        return bool(np.sum(depth < 0) >= _AIR_ROWS and -depth.min() >= _AIR * depth.max())
+        return bool(np.sum(depth < 0) >= _AIR_ROWS)
 
     def with_unknowns(self, unknowns: Sequence[Unknown]) -> "Model":
         """Return the model with further shared unknowns after its own, such as those of a hidden layer."""

@@ -40,6 +40,10 @@ def test_a_baseline_tilts_where_there_is_air_and_is_level_by_assumption_elsewher
     level = identify([replace(tilted, may_tilt=False)], [YOUNG])
     assert "tilt" not in [unknown.name for unknown in level.unknowns]
     assert not level.fits or level.high[0] < 2e4 or level.low[0] > 2e4
+    # Little air tells little of the tilt: the bar is that of what is known beforehand.
+    short = identify([measured(OfYoung(Punch()), values, error, 2e-4, 0.03, tilt=0.04)], [YOUNG])
+    assert short.low[0] <= 2e4 <= short.high[0]
+    assert not any("taken for level" in sentence for sentence in short.told)
     deep = identify([measured(Ball(), values, error, 2e-4, 0.0)], [YOUNG])
     assert any("taken for level" in sentence for sentence in deep.told)
     assert not any("taken for level" in sentence for sentence in found.told)
