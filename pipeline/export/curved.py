@@ -9,7 +9,7 @@ from epsmesh_realtime.evaluator import Evaluator
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Face, Table
 from pipeline.arrays import FloatArray
-from pipeline.export.forecast import DEPTH, LARGER, RADII, SIZES_CURVED, discs_at
+from pipeline.export.forecast import DEPTH, LARGER, RADII, REACHES, SIZES_CURVED, discs_at
 from pipeline.export.full import Solver, Tool
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region, curved_region, is_free
@@ -18,8 +18,6 @@ from pipeline.export.tabulate import Places, ratios_of, tabulate
 from pipeline.shapes.contact import mean_curvature, paraboloid
 from pipeline.shapes.frame import PlaceError, Vector
 
-# Half size of the region of a body without axes, in units of the disc's radius: the largest one with a face.
-_REACHES = (3.0, 2.25, 1.5)
 # Fixed-point steps for h, whose square has little weight.
 _STEPS = 50
 # Largest error of the table for c at new nodes, as a share of the accuracy.
@@ -93,7 +91,7 @@ def _region_and_face(scope: Scope, room: float, middle: tuple[float, ...]) -> tu
     Raises:
         ExportError: if even the smallest has none.
     """
-    share, *smaller = _REACHES
+    share, *smaller = REACHES
     while True:
         region = curved_region(scope, room, share * scope.case.probe.circumradius)
         try:

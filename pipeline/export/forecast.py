@@ -13,6 +13,7 @@ from pipeline.plan.cost import CostModel
 from pipeline.printable import counted
 from pipeline.run.remaining import format_seconds
 from pipeline.shapes.body import Layered
+from pipeline.study.problems import StudyError
 
 # Largest contact, in units of the distance to the nearest side or the bottom; number of full solves; accuracy.
 LARGEST, CHECKS, ACCURACY = 0.4, 24, 0.01
@@ -23,6 +24,8 @@ SIZES = (0.1, 0.99)
 # Discs of a curved body's table: radii, in units of the study's, the larger one close to the model's largest contact;
 # accuracy, as a share of the solver's: c depends most on the smaller disc. Intervals of the table; depth over radius.
 RADII, FINER, LARGER, SIZES_CURVED, DEPTH = (0.6, 1.5), 2 / 3, 1.03, (2, 4), 0.02
+# Half size of the region of a body without axes, in units of the disc's radius: the largest one with a face.
+REACHES = (3.0, 2.25, 1.5)
 # A law's half-spaces: number of ν; radius of the ball (m); radius and depth (m) of the linear disc that measures the
 # cylinder's compliance; size of the cylinder, and depths, in radii of the ball, of which the last may have no
 # equilibrium; accuracy of the solves.
@@ -62,6 +65,8 @@ class Forecast:
 
     def told(self, ranks: int = 1) -> str:
         """Write it in words, with times on several ranks."""
+        if not self.most:
+            return "solves whose number is not known before"
         times = (format_seconds(seconds / ranks) for seconds in (self.least_seconds, self.most_seconds))
         least = f"{self.least} to " if self.least < self.most else ""
         return f"about {least}{counted(self.most, 'solve')}, {' to '.join(dict.fromkeys(times))}"
@@ -110,10 +115,16 @@ class Export:
         body, radius = self.scope.body, self.scope.case.probe.circumradius
         if isinstance(body, Layered):
             return Region.of(body, self.margin)
-        return curved_region(self.scope, self.room, radius)
+        return curved_region(self.scope, self.room, REACHES[0] * radius)
 
     def forecast(self) -> Forecast:
-        """Return about what it costs."""
+        """Return about what it costs; nothing if a typical touch cannot be planned, as where a face ends."""
+        try:
+            return self._forecast()
+        except StudyError:
+            return Forecast()
+
+    def _forecast(self) -> Forecast:
         region, scope = self.region, self.scope
         ratios = len(ratios_of(scope.poissons))
         if scope.is_flat:
