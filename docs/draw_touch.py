@@ -1,4 +1,4 @@
-"""The pictures of the page of a real-time model: ``python docs/draw_touch.py NAME MODEL``, with Chromium.
+"""The pictures of the page of a real-time model: ``python -m docs.draw_touch NAME MODEL``, with Chromium.
 
 ``MODEL`` is what ``epsmesh export`` gives: for ``touch`` of a box of 80 × 60 × 40 mm; for ``touch_curved`` of an
 ellipsoid of 40 × 40 × 25 mm held below -6 mm, E = 10 kPa; for ``touch_organ`` of meshes/liver.stl held below -20 mm, a
