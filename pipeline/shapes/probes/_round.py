@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from math import pi
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from pipeline.shapes.insertion import Needle
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes.disc import Disc
 from pipeline.shapes.revolved import Revolved
+from pipeline.units import Length
 
 # Rings of a tip.
 _RINGS = 1000
@@ -98,3 +100,22 @@ class RoundIndenter(InRing, Needle):
     def ends_at(self, points: FloatArray) -> BoolArray:
         """Return true if the footprint is as large as the tool."""
         return np.full(len(points), self.footprint.half_width >= (1 - ON_EDGE) * self.limit)
+
+
+class HertzTip(RoundIndenter):
+    """An indenter that is H. Hertz's paraboloid at small depths, of its ``radius`` (m) of curvature at the apex."""
+
+    # 3/2: of a paraboloid at any depth, of a ball while contact is small compared with it.
+    force_exponent: ClassVar[float | None] = 1.5
+
+    radius: Length
+
+    @property
+    def mean_square(self) -> float:
+        """8/15 of the square of the contact radius (m²): 2/5, times 4/3."""
+        return 8 / 15 * self.contact_width**2
+
+    @property
+    def hertz_radius(self) -> float:
+        """The radius of curvature at the apex (m)."""
+        return self.radius

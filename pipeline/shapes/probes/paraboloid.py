@@ -1,20 +1,18 @@
 """A paraboloid."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.distance import Distance, revolved
 from pipeline.shapes.parabola import Parabola, ParabolicContour
-from pipeline.shapes.probes._round import RoundIndenter
+from pipeline.shapes.probes._round import HertzTip
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.units import Length
 
 
-class Paraboloid(RoundIndenter):
+class Paraboloid(HertzTip):
     """A paraboloid on a shaft, as H. Hertz has it: the model of a worn tip of a force microscope."""
 
-    # 3/2 (I. N. Sneddon), at any depth.
-    force_exponent: ClassVar[float | None] = 1.5
     EXPECTED_ERROR = 1.1
 
     shape: Literal["paraboloid"]
@@ -30,16 +28,6 @@ class Paraboloid(RoundIndenter):
     def kinks(self) -> tuple[float, ...]:
         """None: it is smooth up to the shaft."""
         return ()
-
-    @property
-    def mean_square(self) -> float:
-        """8/15 of the square of the contact radius (m²): 2/5, times 4/3."""
-        return 8 / 15 * self.contact_width**2
-
-    @property
-    def hertz_radius(self) -> float:
-        """The radius of curvature at the apex (m)."""
-        return self.radius
 
     @property
     def limit(self) -> float:

@@ -1,19 +1,17 @@
 """A sphere."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
-from pipeline.shapes.probes._round import RoundIndenter
+from pipeline.shapes.probes._round import HertzTip
 from pipeline.shapes.rounded import Rounded
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.units import Length
 
 
-class Sphere(RoundIndenter):
+class Sphere(HertzTip):
     """A ball, such as the tip of a palpating probe; inserted, it is the end of a needle with a shaft of its radius."""
 
     REALTIME = ("unilateral",)
-    # 3/2 (H. Hertz), while contact is small compared with the ball.
-    force_exponent: ClassVar[float | None] = 1.5
     EXPECTED_ERROR = 1.0
 
     shape: Literal["sphere"]
@@ -23,16 +21,6 @@ class Sphere(RoundIndenter):
     def section(self) -> Rounded:
         """A circle, without a flank."""
         return Rounded(0.0, self.radius)
-
-    @property
-    def mean_square(self) -> float:
-        """8/15 of the square of the contact radius (m²): 2/5, times 4/3."""
-        return 8 / 15 * self.contact_width**2
-
-    @property
-    def hertz_radius(self) -> float:
-        """The radius (m)."""
-        return self.radius
 
     @property
     def limit(self) -> float:
