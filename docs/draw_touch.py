@@ -1,8 +1,8 @@
 """The pictures of the page of a real-time model: ``python -m docs.draw_touch NAME MODEL``, with Chromium.
 
 ``MODEL`` is what ``epsmesh export`` gives: for ``touch`` of a box of 80 × 60 × 40 mm; for ``touch_curved`` of an
-ellipsoid of 40 × 40 × 25 mm held below -6 mm, E = 10 kPa; for ``touch_organ`` of meshes/liver.stl held below -20 mm, a
-disc of 4 mm at -25 mm, E = 5 kPa; ν = 0.45.
+ellipsoid of 40 × 40 × 25 mm held below -6 mm, a disc of 3 mm, E = 10 kPa; for ``touch_organ`` of meshes/liver.stl held
+below -20 mm, a disc of 4 mm at -25 mm, E = 5 kPa; ν = 0.45.
 """
 
 import json
@@ -20,7 +20,7 @@ FIGURES = Path(__file__).parent / "figures"
 ASKED = MappingProxyType(
     {
         "touch": {"tool": "sphere", "x": 22, "y": -12, "radius": 7, "depth": 2.2},
-        "touch_curved": {"tool": "sphere", "x": 6, "y": -7, "radius": 6, "depth": 2},
+        "touch_curved": {"tool": "sphere", "x": 6, "y": -7, "radius": 4.5, "depth": 1.5},
         "touch_organ": {"tool": "sphere", "x": 7.8, "y": -7.5, "radius": 6, "depth": 1.5},
     }
 )
