@@ -275,7 +275,7 @@ def _prior(stage: str, kind: str) -> _Numbers:
     rubs = stage == "solve" and "friction" in words
     seconds, power = _FRICTION if rubs else (_SOLVE if stage == "solve" else _BAR)[int(degree)]
     movements = next((int(word) for word in words if word.isdigit()), 1)
-    seconds *= (1 + _MOVEMENT * (movements - 1)) * (_MIXED if element == "mixed" and not rubs else 1.0)
+    seconds *= (1 + _MOVEMENT * (movements - 1)) * (_MIXED if element == "mixed" else 1.0)
     seconds *= _LAYERED if "regions" in words else 1.0
     seconds *= _SEARCH if stage == "solve" and "found" in words and not rubs else 1.0
     seconds *= _COURSE if stage == "solve" and "steps" in words else 1.0
