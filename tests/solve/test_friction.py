@@ -183,6 +183,12 @@ def test_at_large_displacements_little_friction_is_none():
     assert large(1e-9).slip_area == pytest.approx(large(1e-9).contact_area)
 
 
+@pytest.mark.parametrize("rim", ["0.42 mm", "0.5 mm"])
+def test_little_friction_settles_at_large_displacements(rim):
+    forces = [large(friction, {"rim": rim}).force for friction in (0.0, 0.1, 0.3)]
+    assert forces[0] < forces[1] < forces[2]
+
+
 def test_at_small_depth_the_law_does_not_matter():
     """What friction adds is that at small displacements, up to the ratio of contact radius and ball, which is 0.1."""
     for friction in (0.3, "stick"):

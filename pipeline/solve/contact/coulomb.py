@@ -26,8 +26,7 @@ _TINY = 1e-300
 _MOST_SIMPLIFIED = 0.1
 # Changes of a node's state after which it is simplified.
 _CHANGES = 3
-# Steps of iterations are halved where directions of slip turn back by a change that is not smaller than the one before
-# by this share of the step: an iteration that contracts by more than this does so in any part of a step.
+# Steps of iterations are halved where a change of directions of slip is not smaller than the one before by this share.
 _CONTRACTS = 0.3
 
 
@@ -193,18 +192,24 @@ class Simplified:
 
 
 class Damping:
-    """Shorter changes of the directions of slip, from some iteration on, while these swing to and fro."""
+    """Shorter changes of the directions of slip, from some iteration on, where these do not settle.
 
-    def __init__(self, begins: int):
+    ``swings``: only changes that turn back are, and a change in a part of a step need only contract by this part. That
+    is for iterations of friction alone, which may creep in one direction. Where the tissue changes in each iteration,
+    too, as at large displacements, directions wander in any way, and every change that does not contract is damped.
+    """
+
+    def __init__(self, begins: int, *, swings: bool):
         """Begin after ``begins`` iterations."""
-        self._begins, self._share, self._before = begins, 1.0, np.zeros(0)
+        self._begins, self._swings, self._share, self._before = begins, swings, 1.0, np.zeros(0)
 
     def towards(self, before: Slide, after: Slide, iteration: int) -> Slide:
         """Return the next state: ``after``, with its directions some of the way from those ``before``."""
         both = before.sliding & after.sliding
         change = np.where(both[:, None], after.directions - before.directions, 0.0).ravel()
-        if iteration > self._begins and change @ self._before < 0:
-            contracts = np.linalg.norm(change) < (1 - _CONTRACTS * self._share) * np.linalg.norm(self._before)
+        if iteration > self._begins and (change @ self._before < 0 or not self._swings):
+            least = 1 - _CONTRACTS * (self._share if self._swings else 1.0)
+            contracts = np.linalg.norm(change) <= least * np.linalg.norm(self._before)
             self._share *= 1.0 if contracts else 0.5
         self._before = change
         return before.towards(after, self._share)

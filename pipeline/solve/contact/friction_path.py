@@ -152,7 +152,7 @@ def _settled(
         Unsettled: if states repeat, or too much of the force is on nodes that are simplified.
     """
     step, simple = replace(guess, iterations=0), Simplified.none(len(surface))
-    seen, single, damping = set[bytes](), False, Damping(_SWINGING)
+    seen, single, damping = set[bytes](), False, Damping(_SWINGING, swings=True)
     for iteration in range(1, _MOST_ITERATIONS + 1):
         law = simple.law(friction.coefficient)
         step = replace(step, slide=simple.sliding(step.slide, step.active), iterations=iteration)

@@ -46,7 +46,7 @@ class FrictionIteration:
     def __init__(self, friction_step: FrictionStep):
         self._with, self.slide, self.normal = friction_step, friction_step.slide, friction_step.normal
         self._simple = Simplified.none(len(friction_step.normal))
-        self._damping = Damping(_SWINGING)
+        self._damping = Damping(_SWINGING, swings=False)
         self._seen, self._single = set[bytes](), False
         self.is_same = False
 
