@@ -17,12 +17,12 @@ from mpi4py import MPI
 from benchmarks.families import FAMILIES, Dice, Thrown
 from benchmarks.machine import machine
 from benchmarks.tables import markdown, options, write
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.run.record import Record
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
-from pipeline.verify.sections import Section
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.run.record import Record
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
+from epsmesh.verify.sections import Section
 
 ASKED = (2e-2, 1e-2, 5e-3, 3e-3, 1e-3)
 SEED, COUNT = 5101, 5

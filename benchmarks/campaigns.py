@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
-from pipeline import workflow
+from epsmesh import workflow
 
 T = TypeVar("T")
 _INTERRUPTED = 130

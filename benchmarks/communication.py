@@ -29,15 +29,15 @@ from benchmarks.one_run import stages_by
 from benchmarks.processor import ask
 from benchmarks.scenes import LARGE
 from benchmarks.tables import markdown, options, write
-from pipeline import stages
-from pipeline.run.meshing import mesh_case
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.linear_solver import LinearSolver
-from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
-from pipeline.study.read import parse
+from epsmesh import stages
+from epsmesh.run.meshing import mesh_case
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.linear_solver import LinearSolver
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
+from epsmesh.study.read import parse
 
 _TOLERANCE = 1e-8
 # Rim, in units of the elements, and growth of a mesh whose elements are nearly as large everywhere.

@@ -18,18 +18,18 @@ from mpi4py import MPI
 from benchmarks.processor import by_turns, median_seconds
 from benchmarks.scenes import graded, study
 from benchmarks.tables import options, write
-from pipeline.mesh.distribute import BodyMesh
-from pipeline.plan.plan import make_plan
-from pipeline.plan.symmetry import model_planes
-from pipeline.run.execute import compute
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, movement_of, problem_of
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.solution import Solution
-from pipeline.solve.spaces import Spaces
-from pipeline.study.case import Case
-from pipeline.study.read import parse
+from epsmesh.mesh.distribute import BodyMesh
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.symmetry import model_planes
+from epsmesh.run.execute import compute
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import law_of, movement_of, problem_of
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.solution import Solution
+from epsmesh.solve.spaces import Spaces
+from epsmesh.study.case import Case
+from epsmesh.study.read import parse
 
 _REPEATS = 3
 _BODY = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm", "fixed": "bottom"}

@@ -18,13 +18,13 @@ from mpi4py import MPI
 from benchmarks.campaigns import each, ended_soon, finite
 from benchmarks.families import FAMILIES
 from benchmarks.tables import options
-from pipeline.plan.plan import make_plan
-from pipeline.plan.recipe import half_width_of
-from pipeline.run.execute import compute
-from pipeline.run.record import Record
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
-from pipeline.verify.sections import Section
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.recipe import half_width_of
+from epsmesh.run.execute import compute
+from epsmesh.run.record import Record
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
+from epsmesh.verify.sections import Section
 
 SEED, COUNT = 2026, 160
 # A mesh is naive if its elements at the probe's edge are larger than this, in units of the half width of contact.

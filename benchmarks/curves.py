@@ -15,12 +15,12 @@ from typing import Any
 
 import xarray as xr
 
-from pipeline.files import write_whole
-from pipeline.identify.run import identification
-from pipeline.report.identified import bar, engineering, mesh_share, written
-from pipeline.report.words import percent
-from pipeline.study.identified import FITS
-from pipeline.study.read import read_mapping
+from epsmesh.files import write_whole
+from epsmesh.identify.run import identification
+from epsmesh.report.identified import bar, engineering, mesh_share, written
+from epsmesh.report.words import percent
+from epsmesh.study.identified import FITS
+from epsmesh.study.read import read_mapping
 
 _HEADS = ("curve", "scene", "E", "as declared", "may hide", "largest parts", "share of the mesh", "authors")
 _COLUMNS = {"depth": "Z_Position(mm)", "force": "Corrected_Force(N)", "time": "Timestamp(s)"}

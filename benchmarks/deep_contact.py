@@ -23,18 +23,18 @@ from benchmarks.campaigns import ended_soon
 from benchmarks.deep_scenes import FAMILIES, RADIUS, SETS, Scene, thrown
 from benchmarks.families import Dice, mm
 from benchmarks.tables import options
-from pipeline.plan.symmetry import mirror_planes
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, movement_of, tool_of
-from pipeline.solve import SolveError
-from pipeline.solve.conditions import WITHOUT_FOOTPRINT
-from pipeline.solve.contact.large_friction import LargeFrictionalContact
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.solution import Solution
-from pipeline.solve.spaces import Spaces
-from pipeline.study.case import Case
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh.plan.symmetry import mirror_planes
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import law_of, movement_of, tool_of
+from epsmesh.solve import SolveError
+from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
+from epsmesh.solve.contact.large_friction import LargeFrictionalContact
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.solution import Solution
+from epsmesh.solve.spaces import Spaces
+from epsmesh.study.case import Case
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 
 SEED, COUNT = 11, 60
 # Elements of the finer mesh, relative to those of the case, and their largest size, without and with friction.

@@ -25,11 +25,11 @@ import numpy as np
 from benchmarks.realtime import model_of
 from benchmarks.tables import markdown
 from benchmarks.touches import groups_of, keep
+from epsmesh.arrays import FloatArray
+from epsmesh.export.checks import Check, solved
+from epsmesh.export.full import Solver, Tool
+from epsmesh.report.figures.style import COLOURS
 from epsmesh_realtime.model import Model
-from pipeline.arrays import FloatArray
-from pipeline.export.checks import Check, solved
-from pipeline.export.full import Solver, Tool
-from pipeline.report.figures.style import COLOURS
 
 _FOLDER, _SOURCES = Path("results/realtime"), Path(__file__).parents[1] / "realtime"
 _CHECKS, _SEED = 12, 7

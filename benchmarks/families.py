@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from pipeline.arrays import FloatArray
-from pipeline.shapes.rounded import Rounded
-from pipeline.verify.sections import Section
-from pipeline.verify.star import directions, star_file
+from epsmesh.arrays import FloatArray
+from epsmesh.shapes.rounded import Rounded
+from epsmesh.verify.sections import Section
+from epsmesh.verify.star import directions, star_file
 
 Range = tuple[float, float]
 Thrown = tuple[Section, Section]

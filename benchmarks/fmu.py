@@ -14,7 +14,7 @@ import numpy as np
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
-import pipeline
+import epsmesh
 
 _STEP, _SECONDS = 1e-3, 60.0
 # Of the way to the nearest side or to the bottom: the ball's radius, and its largest depth.
@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument("model", type=Path)
     parser.add_argument("unit", type=Path)
     asked = parser.parse_args()
-    model = pipeline.realtime.read(asked.model)
+    model = epsmesh.realtime.read(asked.model)
     problems = validate_fmu(str(asked.unit))
     room = min(*model.sides, model.thickness)
     time = _STEP * np.arange(round(_SECONDS / _STEP))

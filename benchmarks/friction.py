@@ -15,18 +15,18 @@ from scipy.sparse.linalg import splu
 
 from benchmarks.campaigns import ended_soon
 from benchmarks.tables import markdown
-from pipeline.mesh.meridian import AXIS, Grading, Meridian
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.run.record import Record
-from pipeline.scene.model import FIXED, PROBE
-from pipeline.shapes.rounded import Rounded
-from pipeline.solve.contact.coulomb import Neighbours
-from pipeline.solve.contact.friction_path import CondensedSurface, press
-from pipeline.solve.meridian.forms import MeridianForms
-from pipeline.solve.meridian.system import meshes_of
-from pipeline.solve.physics import MaterialLaw, Parameters
-from pipeline.study.read import parse
+from epsmesh.mesh.meridian import AXIS, Grading, Meridian
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.run.record import Record
+from epsmesh.scene.model import FIXED, PROBE
+from epsmesh.shapes.rounded import Rounded
+from epsmesh.solve.contact.coulomb import Neighbours
+from epsmesh.solve.contact.friction_path import CondensedSurface, press
+from epsmesh.solve.meridian.forms import MeridianForms
+from epsmesh.solve.meridian.system import meshes_of
+from epsmesh.solve.physics import MaterialLaw, Parameters
+from epsmesh.study.read import parse
 
 Scene = dict[str, Any]
 FRICTIONS = (0.05, 0.1, 0.2, 0.4, 0.8, inf)

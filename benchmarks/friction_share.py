@@ -10,9 +10,9 @@ from typing import Any
 from mpi4py import MPI
 
 from benchmarks.tables import markdown
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.study.read import parse
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.study.read import parse
 
 _RADIUS = 5.0  # mm
 _BODY = {"shape": "cylinder", "radius": "50 mm", "height": "40 mm", "fixed": "bottom"}

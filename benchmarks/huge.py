@@ -13,10 +13,10 @@ from typing import Any
 from benchmarks.processor import run
 from benchmarks.scenes import BOX, DISC, graded, study
 from benchmarks.tables import Table, options
-from pipeline.plan.cost import CostModel, Observation, StepEstimate, fit
-from pipeline.plan.plan import make_plan
-from pipeline.run.record import Record
-from pipeline.study.read import parse
+from epsmesh.plan.cost import CostModel, Observation, StepEstimate, fit
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.record import Record
+from epsmesh.study.read import parse
 
 # Poisson's ratio by element; element size (mm) by millions of unknowns. Meshes from 40,000 tetrahedra on are refined,
 # from 200,000 on twice.

@@ -22,26 +22,26 @@ from mpi4py import MPI
 
 from benchmarks.campaigns import ended_soon
 from benchmarks.tables import Table, options
-from pipeline.arrays import FloatArray
-from pipeline.experiment.curve import Curve
-from pipeline.identify.estimate import identify
-from pipeline.identify.fit import prior
-from pipeline.identify.forward import stored_in
-from pipeline.identify.may_hide import KINDS, hidden_parts
-from pipeline.identify.model import Model
-from pipeline.identify.parts import Estimate, Forward, Measured, Unknown
-from pipeline.identify.start import start
-from pipeline.identify.tools import tip_of_probe
-from pipeline.layered.body import RIGID, LayeredBody
-from pipeline.layered.compliance import Layer
-from pipeline.layered.contact import Profile
-from pipeline.shapes.probe import Probe
-from pipeline.study.read import parse
-from pipeline.study.sweep import Study
-from pipeline.surrogate.build import build
-from pipeline.surrogate.cases import domain_of
-from pipeline.surrogate.derived import ON_MERIDIAN
-from pipeline.surrogate.wide import profile_of
+from epsmesh.arrays import FloatArray
+from epsmesh.experiment.curve import Curve
+from epsmesh.identify.estimate import identify
+from epsmesh.identify.fit import prior
+from epsmesh.identify.forward import stored_in
+from epsmesh.identify.may_hide import KINDS, hidden_parts
+from epsmesh.identify.model import Model
+from epsmesh.identify.parts import Estimate, Forward, Measured, Unknown
+from epsmesh.identify.start import start
+from epsmesh.identify.tools import tip_of_probe
+from epsmesh.layered.body import RIGID, LayeredBody
+from epsmesh.layered.compliance import Layer
+from epsmesh.layered.contact import Profile
+from epsmesh.shapes.probe import Probe
+from epsmesh.study.read import parse
+from epsmesh.study.sweep import Study
+from epsmesh.surrogate.build import build
+from epsmesh.surrogate.cases import domain_of
+from epsmesh.surrogate.derived import ON_MERIDIAN
+from epsmesh.surrogate.wide import profile_of
 
 SEED, COUNT = 20260, 300
 WORN = "worn ball"

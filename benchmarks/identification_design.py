@@ -16,20 +16,20 @@ from typing import Any
 import numpy as np
 
 from benchmarks.tables import Table, options
-from pipeline.identify.candidates import Trial, candidates, case_of
-from pipeline.identify.design import USUAL, Designer
-from pipeline.identify.estimate import identify
-from pipeline.identify.may_hide import hidden_parts
-from pipeline.identify.parts import Forward, Measured
-from pipeline.identify.relaxing import relaxed
-from pipeline.identify.tools import tip_of_probe
-from pipeline.study.read import parse
-from pipeline.study.sweep import Study
-from pipeline.study.toml import to_toml
-from pipeline.surrogate.build import build
-from pipeline.surrogate.cases import SurrogateError, domain_of
-from pipeline.surrogate.derived import parameters
-from pipeline.surrogate.wide import layered_body, profile_of, solve_wide
+from epsmesh.identify.candidates import Trial, candidates, case_of
+from epsmesh.identify.design import USUAL, Designer
+from epsmesh.identify.estimate import identify
+from epsmesh.identify.may_hide import hidden_parts
+from epsmesh.identify.parts import Forward, Measured
+from epsmesh.identify.relaxing import relaxed
+from epsmesh.identify.tools import tip_of_probe
+from epsmesh.study.read import parse
+from epsmesh.study.sweep import Study
+from epsmesh.study.toml import to_toml
+from epsmesh.surrogate.build import build
+from epsmesh.surrogate.cases import SurrogateError, domain_of
+from epsmesh.surrogate.derived import parameters
+from epsmesh.surrogate.wide import layered_body, profile_of, solve_wide
 
 COUNT, SEED = 12, 90210
 _LEAST, _MOST, _HELD = 0.6, 1.7, 0.8

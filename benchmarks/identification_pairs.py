@@ -16,17 +16,17 @@ from statistics import median
 import numpy as np
 
 from benchmarks.tables import Table, options
-from pipeline.arrays import FloatArray
-from pipeline.experiment.curve import Curve
-from pipeline.identify.estimate import identify
-from pipeline.identify.model import Model
-from pipeline.identify.noise import Noise, whiten
-from pipeline.identify.parts import Estimate, Forward, Measured, Unknown, Values
-from pipeline.study.read import parse
-from pipeline.surrogate.build import build
-from pipeline.surrogate.cases import domain_of
-from pipeline.surrogate.derived import ON_MERIDIAN
-from pipeline.surrogate.wide import solve_wide
+from epsmesh.arrays import FloatArray
+from epsmesh.experiment.curve import Curve
+from epsmesh.identify.estimate import identify
+from epsmesh.identify.model import Model
+from epsmesh.identify.noise import Noise, whiten
+from epsmesh.identify.parts import Estimate, Forward, Measured, Unknown, Values
+from epsmesh.study.read import parse
+from epsmesh.surrogate.build import build
+from epsmesh.surrogate.cases import domain_of
+from epsmesh.surrogate.derived import ON_MERIDIAN
+from epsmesh.surrogate.wide import solve_wide
 
 COUNT, SEED = 40, 20270
 # Limits: bar over bound, and half width of the layer's modulus.

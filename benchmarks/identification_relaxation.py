@@ -29,10 +29,10 @@ from benchmarks.identification import (
     tools,
 )
 from benchmarks.tables import Table, options
-from pipeline.arrays import FloatArray
-from pipeline.experiment.curve import Curve
-from pipeline.identify.estimate import identify
-from pipeline.identify.parts import Estimate, Measured, Unknown
+from epsmesh.arrays import FloatArray
+from epsmesh.experiment.curve import Curve
+from epsmesh.identify.estimate import identify
+from epsmesh.identify.parts import Estimate, Measured, Unknown
 
 SEED, COUNT = 20280, 60
 HOLD, STEPS = 20.0, 4000

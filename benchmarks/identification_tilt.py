@@ -15,10 +15,10 @@ import numpy as np
 
 from benchmarks.identification import CORRELATIONS, HELD, noise
 from benchmarks.tables import Table, options
-from pipeline.arrays import FloatArray
-from pipeline.experiment.curve import Curve
-from pipeline.identify.estimate import identify
-from pipeline.identify.parts import Estimate, Measured, Unknown, Values
+from epsmesh.arrays import FloatArray
+from epsmesh.experiment.curve import Curve
+from epsmesh.identify.estimate import identify
+from epsmesh.identify.parts import Estimate, Measured, Unknown, Values
 
 COUNT, SEED, DEEPEST = 200, 20290, 2e-4
 # Air before contact, as shares of the depth in contact.

@@ -16,9 +16,9 @@ from scipy import ndimage
 
 from benchmarks.processor import processor_seconds
 from benchmarks.tables import markdown
-from pipeline.arrays import FloatArray, IntArray
-from pipeline.mesh.of_case import mesh_arrays
-from pipeline.study.read import parse
+from epsmesh.arrays import FloatArray, IntArray
+from epsmesh.mesh.of_case import mesh_arrays
+from epsmesh.study.read import parse
 
 # Semi-axes of the bodies in voxels, sizes of voxels in mm, and lengths of the fields' waves in voxels.
 _AXES, _VOXELS, _WAVES = (6.0, 10.0), (1.0, 3.0), (3.0, 5.0)

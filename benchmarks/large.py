@@ -80,9 +80,9 @@ def _meshed(tool: str, size: str) -> tuple[Any, Any]:
     """Return the case of a tool, and a quarter of it, meshed."""
     from mpi4py import MPI
 
-    from pipeline.plan.plan import make_plan
-    from pipeline.run.meshing import mesh_case
-    from pipeline.study.read import parse
+    from epsmesh.plan.plan import make_plan
+    from epsmesh.run.meshing import mesh_case
+    from epsmesh.study.read import parse
 
     fine, rim = SIZES[tool][size]
     mesh = graded(f"{fine} mm", "6 mm", f"{rim} mm", 0.4, degree=2, model="3d")
@@ -94,12 +94,12 @@ def _meshed(tool: str, size: str) -> tuple[Any, Any]:
 
 def _solved(case: Any, body: Any, element: str, law: str, depths: list[float], *, estimate: bool) -> int:
     """Solve for ``depths`` (m) on one load path, all set-up included; return the number of unknowns."""
-    from pipeline.run.problem import tool_of
-    from pipeline.solve.conditions import WITHOUT_FOOTPRINT, Conditions
-    from pipeline.solve.movement import Movement
-    from pipeline.solve.physics import MaterialLaw
-    from pipeline.solve.quasi_static import QuasiStaticProblem
-    from pipeline.solve.spaces import Spaces
+    from epsmesh.run.problem import tool_of
+    from epsmesh.solve.conditions import WITHOUT_FOOTPRINT, Conditions
+    from epsmesh.solve.movement import Movement
+    from epsmesh.solve.physics import MaterialLaw
+    from epsmesh.solve.quasi_static import QuasiStaticProblem
+    from epsmesh.solve.spaces import Spaces
 
     material = MaterialLaw.of_moduli(10e3, POISSON[element], law)
     is_found = case.probe.contact == "unilateral"

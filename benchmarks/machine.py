@@ -13,7 +13,7 @@ def machine() -> dict[str, Any]:
     """Return processor, cores, memory, load, date and versions."""
     import psutil
 
-    from pipeline import compat
+    from epsmesh import compat
 
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()

@@ -30,8 +30,8 @@ import psutil
 from benchmarks.machine import MPI_ENVIRONMENT
 from benchmarks.scenes import many_small
 from benchmarks.tables import markdown, options, write
-from pipeline.run.registry import RUNNING, runs
-from pipeline.study.toml import to_toml
+from epsmesh.run.registry import RUNNING, runs
+from epsmesh.study.toml import to_toml
 from tests.cluster.slurm import HERE, JOBS, ROOT, Cluster, started
 from tests.compare import all_done, assert_same_bits
 
@@ -49,7 +49,7 @@ _LOOK, _TELL = 0.2, 20.0
 _PATIENCE = 1200.0
 # The command of a job: it notes the processor time of the program, also of one that was killed.
 COMMAND = """#!/bin/bash
-{python} -m pipeline "$@"
+{python} -m epsmesh "$@"
 status=$?
 times >"{folder}/$SLURM_JOB_ID-$SLURM_RESTART_COUNT-$$"
 exit $status
@@ -243,7 +243,7 @@ def _run(*words: object, at: Path = ROOT) -> Used:
     """
     start = time.monotonic()
     process = subprocess.Popen(
-        [sys.executable, "-m", "pipeline", *map(str, words)],
+        [sys.executable, "-m", "epsmesh", *map(str, words)],
         cwd=at,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,

@@ -58,7 +58,7 @@ def main(arguments: list[str]) -> int:
     options = _options(arguments)
     draw = random.Random(options.seed)
     rooms = options.room or ROOMS
-    files = [file for room in rooms for file in sorted((ROOT / "pipeline" / room).rglob("*.py"))]
+    files = [file for room in rooms for file in sorted((ROOT / "pipeline" / "epsmesh" / room).rglob("*.py"))]
     mutants = [mutant for file in files for mutant in _mutants(file)]
     chosen = draw.sample(mutants, min(options.count, len(mutants)))
     rows = []
@@ -75,7 +75,7 @@ def main(arguments: list[str]) -> int:
         for mutant in chosen:
             place = tree / mutant.file.relative_to(ROOT)
             place.write_text(mutant.text)
-            verdict = _run(tree, mutant.file.relative_to(ROOT / "pipeline").parts[0])
+            verdict = _run(tree, mutant.file.relative_to(ROOT / "pipeline" / "epsmesh").parts[0])
             shutil.copy(mutant.file, place)
             rows.append((f"{mutant.file.relative_to(ROOT)}:{mutant.line}", mutant.changed, verdict or "SURVIVES"))
             print(*rows[-1], sep="  ", flush=True)
@@ -98,7 +98,7 @@ def _options(arguments: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mutants", description=(__doc__ or "").split("\n\n")[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=20)
-    parser.add_argument("--room", action="append", choices=ROOMS, help="only this folder of pipeline/")
+    parser.add_argument("--room", action="append", choices=ROOMS, help="only this folder of pipeline/epsmesh/")
     return parser.parse_args(arguments)
 
 

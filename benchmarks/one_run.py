@@ -2,7 +2,7 @@
 
     python benchmarks/one_run.py STUDY [OPTIONS]        both are JSON: a study, and arguments of ``measure``
 
-It imports only ``pipeline``, from any checkout, so that two versions can be compared on one machine at one time.
+It imports only ``epsmesh``, from any checkout, so that two versions can be compared on one machine at one time.
 Start-up, compilation and imports at the first solve are not counted.
 """
 
@@ -19,12 +19,12 @@ from typing import Any
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from pipeline import stages
-from pipeline.plan import estimate
-from pipeline.plan.plan import make_plan
-from pipeline.run.compile import prepare
-from pipeline.run.execute import compute
-from pipeline.study.read import parse
+from epsmesh import stages
+from epsmesh.plan import estimate
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.compile import prepare
+from epsmesh.run.execute import compute
+from epsmesh.study.read import parse
 
 WARM = {
     "body": {"shape": "box", "size": ["30 mm", "30 mm", "15 mm"], "fixed": "bottom"},

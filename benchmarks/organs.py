@@ -25,17 +25,17 @@ from benchmarks.machine import MPI_ENVIRONMENT
 from benchmarks.one_run import stages_by
 from benchmarks.processor import MPIRUN, processor_seconds
 from benchmarks.tables import markdown
-from pipeline import stages
-from pipeline.plan.plan import make_plan
-from pipeline.run.compile import prepare
-from pipeline.run.execute import execute
-from pipeline.run.mesh_cache import MeshCache
-from pipeline.run.progress import MESHING, Progress
-from pipeline.run.record import Record
-from pipeline.shapes.files.stl import parse as read_stl
-from pipeline.shapes.files.stl import written
-from pipeline.study.read import parse
-from pipeline.study.toml import to_toml
+from epsmesh import stages
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.compile import prepare
+from epsmesh.run.execute import execute
+from epsmesh.run.mesh_cache import MeshCache
+from epsmesh.run.progress import MESHING, Progress
+from epsmesh.run.record import Record
+from epsmesh.shapes.files.stl import parse as read_stl
+from epsmesh.shapes.files.stl import written
+from epsmesh.study.read import parse
+from epsmesh.study.toml import to_toml
 
 MESHES = Path(__file__).parents[1] / "meshes"
 LIVER = {"shape": "surface", "file": "liver.stl", "unit": "mm", "fixed": {"below": "-20 mm"}}
@@ -169,7 +169,7 @@ def command(*arguments: str, folder: Path) -> float:
     surroundings = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(MESHES.parent)}
     if "--check" in arguments:  # the cache of checked files must be empty
         surroundings["EPSMESH_CACHE"] = str(folder / "cache")
-    whole = [sys.executable, "-m", "pipeline", *arguments]
+    whole = [sys.executable, "-m", "epsmesh", *arguments]
     subprocess.run(whole, check=True, stdout=subprocess.DEVNULL, cwd=folder, env=surroundings)
     return processor_seconds() - start
 
@@ -207,7 +207,7 @@ def on_ranks(tool: str, probe: dict[str, Any], folder: Path) -> dict[str, Any]:
     paths = os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(MESHES.parent)}
     for ranks, name in ((1, "one rank"), (2, "two")):
         where = ("--output", f"results-{tool}-{ranks}", "--meshes", f"meshes-{tool}-{ranks}")
-        command = [*MPIRUN, str(ranks), sys.executable, "-m", "mpi4py", "-m", "pipeline", "run", "map.toml", *where]
+        command = [*MPIRUN, str(ranks), sys.executable, "-m", "mpi4py", "-m", "epsmesh", "run", "map.toml", *where]
         start = time.perf_counter()
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=folder, env=paths)
         row[name] = time.perf_counter() - start

@@ -22,7 +22,7 @@ from benchmarks.machine import MPI_ENVIRONMENT
 from benchmarks.processor import MPIRUN, ROOT, processor_seconds, run
 from benchmarks.scenes import BOX, DISC, study
 from benchmarks.tables import Table, options
-from pipeline.study.toml import to_toml
+from epsmesh.study.toml import to_toml
 
 PLACES, HELD_OUT, SEED = 100, 8, 39
 _BODY = BOX | {"size": ["80 mm", "80 mm", "20 mm"]}
@@ -119,7 +119,7 @@ def on_map(name: str) -> dict[str, Any]:
         file = Path(folder) / "map.toml"
         file.write_text(to_toml(scene, name))
         paths = os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-        words = [*MPIRUN, "2", sys.executable, "-m", "mpi4py", "-m", "pipeline", "run", str(file), "--output", folder]
+        words = [*MPIRUN, "2", sys.executable, "-m", "mpi4py", "-m", "epsmesh", "run", str(file), "--output", folder]
         start, before = time.perf_counter(), processor_seconds()
         subprocess.run([*words, "-q"], check=True, env=paths, cwd=folder)
         elapsed, spent = time.perf_counter() - start, processor_seconds() - before

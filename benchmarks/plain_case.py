@@ -17,11 +17,11 @@ from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline import compat
-from pipeline.mesh.size import Sizes, set_size_field
-from pipeline.scene.model import FIXED, PROBE, Scene, build
-from pipeline.solve.compiled import form, vector_space
-from pipeline.study.case import Case
+from epsmesh import compat
+from epsmesh.mesh.size import Sizes, set_size_field
+from epsmesh.scene.model import FIXED, PROBE, Scene, build
+from epsmesh.solve.compiled import form, vector_space
+from epsmesh.study.case import Case
 
 _CG = {"ksp_type": "cg", "ksp_rtol": 1e-8}
 _GAMG = {"pc_type": "gamg", "pc_gamg_threshold": 0.01, "mg_levels_ksp_type": "chebyshev"}

@@ -28,11 +28,11 @@ from benchmarks.machine import machine
 from benchmarks.plain_case import MOST_DIRECT, SOLVERS, Solved, solve
 from benchmarks.processor import ROOT, processor_seconds
 from benchmarks.tables import markdown, options, write
-from pipeline.arrays import FloatArray
-from pipeline.plan import estimate
-from pipeline.study.case import Case
-from pipeline.study.read import read_study
-from pipeline.study.sweep import Study
+from epsmesh.arrays import FloatArray
+from epsmesh.plan import estimate
+from epsmesh.study.case import Case
+from epsmesh.study.read import read_study
+from epsmesh.study.sweep import Study
 
 # Study that compiles all forms of a run, in seconds.
 _WARM_UP = ROOT / "studies" / "quick.toml"
@@ -81,7 +81,7 @@ def run_program(study: Study, folder: Path, *, exact: bool = True, parts: int = 
 
 
 def _epsmesh(command: str, file: Path, *words: str) -> None:
-    whole = [sys.executable, "-m", "pipeline", command, str(file), "--output", str(file.parent), *words]
+    whole = [sys.executable, "-m", "epsmesh", command, str(file), "--output", str(file.parent), *words]
     path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH", "")) if part)
     done = subprocess.run(whole, env=os.environ | {"PYTHONPATH": path}, check=False)
     if done.returncode > 1:

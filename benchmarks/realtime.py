@@ -23,16 +23,16 @@ import numpy as np
 
 from benchmarks.tables import markdown
 from benchmarks.touches import NAMES, add_groups, flat_kinds, groups_of
+from epsmesh.arrays import FloatArray
+from epsmesh.export.checks import TOOLS, Check, with_bar
+from epsmesh.export.disc import Disc
+from epsmesh.export.export import export, write
+from epsmesh.export.full import Solver
+from epsmesh.export.scope import Scope, scope_of
+from epsmesh.export.tabulate import shares
+from epsmesh.study.read import read_study
 from epsmesh_realtime import read
 from epsmesh_realtime.model import Model
-from pipeline.arrays import FloatArray
-from pipeline.export.checks import TOOLS, Check, with_bar
-from pipeline.export.disc import Disc
-from pipeline.export.export import export, write
-from pipeline.export.full import Solver
-from pipeline.export.scope import Scope, scope_of
-from pipeline.export.tabulate import shares
-from pipeline.study.read import read_study
 
 _FOLDER = Path("results/realtime")
 # Accuracy of models; accuracies of the full solves for flat tools, for those on organs, and for others; number of

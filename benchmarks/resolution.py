@@ -18,15 +18,15 @@ import matplotlib as mpl
 import nibabel
 import numpy as np
 
-from pipeline.api import RunnableStudy
-from pipeline.arrays import FloatArray, IntArray
-from pipeline.report.figures import STYLE, save
-from pipeline.report.figures.style import WIDTH, finish, look, new_figure
-from pipeline.shapes.files.label_surface import march
-from pipeline.shapes.files.shells import largest_shell
-from pipeline.shapes.triangles import enclosed
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh.api import RunnableStudy
+from epsmesh.arrays import FloatArray, IntArray
+from epsmesh.report.figures import STYLE, save
+from epsmesh.report.figures.style import WIDTH, finish, look, new_figure
+from epsmesh.shapes.files.label_surface import march
+from epsmesh.shapes.files.shells import largest_shell
+from epsmesh.shapes.triangles import enclosed
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 from scripts.make_organs import ORGANS, Organ, stl
 
 LIVER = ORGANS["liver.stl"]

@@ -22,12 +22,12 @@ import psutil
 from mpi4py import MPI
 
 from benchmarks.scenes import many_small
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import execute
-from pipeline.run.progress import Progress
-from pipeline.run.record import Record
-from pipeline.run.store import Store
-from pipeline.study.read import parse
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import execute
+from epsmesh.run.progress import Progress
+from epsmesh.run.record import Record
+from epsmesh.run.store import Store
+from epsmesh.study.read import parse
 
 CASES, _ON_A_MESH = 20_000, 10
 _GROWTH, _RECORD = 30e3, 4e3  # bytes per mesh, and per case

@@ -3,8 +3,8 @@
 A disc on a box, a quarter of it, graded to the probe's edge. Set-up and solve are in units of one application of the
 finest operator (a product with its blocked matrix), measured before and after. The figures therefore mean the same on
 another machine, and on a busy one, as times are those of the processor. Each row is a separate process, since the peak
-memory of a process is that of its largest solve. ``DIRECT_LIMIT`` in ``pipeline/solve/krylov.py`` and
-``pipeline/solve/elements/mixed.py`` is from here, and so are the bytes per dof in ``pipeline/plan/estimate.py``.
+memory of a process is that of its largest solve. ``DIRECT_LIMIT`` in ``epsmesh.solve.krylov`` and
+``epsmesh.solve.elements.mixed`` is from here, and so are the bytes per dof in ``epsmesh.plan.estimate``.
 """
 
 import itertools
@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks.processor import ask
 from benchmarks.scenes import BOX, DISC, graded, study
 from benchmarks.tables import Table, markdown, options, write
-from pipeline.solve.movement import Motion, Movement
+from epsmesh.solve.movement import Motion, Movement
 
 # Element size far from the probe and at its edge, mm.
 SMALL = {1: ((4, 2), (3, 1), (2, 0.8)), 2: ((10, 3), (8, 1), (5, 0.8)), 3: ((20, 4), (15, 3), (10, 2))}
@@ -54,12 +54,12 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
     from mpi4py import MPI
     from threadpoolctl import threadpool_limits
 
-    from pipeline.run.memory import PeakMemory
-    from pipeline.run.meshing import mesh_case
-    from pipeline.solve.conditions import Conditions
-    from pipeline.solve.physics import MaterialLaw
-    from pipeline.solve.quasi_static import QuasiStaticProblem
-    from pipeline.solve.spaces import Spaces
+    from epsmesh.run.memory import PeakMemory
+    from epsmesh.run.meshing import mesh_case
+    from epsmesh.solve.conditions import Conditions
+    from epsmesh.solve.physics import MaterialLaw
+    from epsmesh.solve.quasi_static import QuasiStaticProblem
+    from epsmesh.solve.spaces import Spaces
 
     with threadpool_limits(limits=1), ExitStack() as stack:
         mesh = mesh_case(case_of(degree, size), ("x", "y"), MPI.COMM_SELF)
@@ -98,7 +98,7 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
 
 def case_of(degree: int, size: tuple[float, float]) -> Any:
     """Return the case whose mesh has elements of these sizes (mm)."""
-    from pipeline.study.read import parse
+    from epsmesh.study.read import parse
 
     mesh = graded(f"{size[0]} mm", "20 mm", f"{size[1]} mm", 0.5, degree=degree)
     return parse(study(BOX, 0.3, DISC, mesh)).case(())
@@ -106,9 +106,9 @@ def case_of(degree: int, size: tuple[float, float]) -> Any:
 
 def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
     """Return the operator, and a function that assembles, sets up and solves once."""
-    from pipeline.solve.balance import TOLERANCE
-    from pipeline.solve.compiled import vector
-    from pipeline.solve.linear_solver import LinearSolver
+    from epsmesh.solve.balance import TOLERANCE
+    from epsmesh.solve.compiled import vector
+    from epsmesh.solve.linear_solver import LinearSolver
 
     space = problem.elements.displacements
     unit = stack.enter_context(space.lend(law, entries=False))
@@ -135,9 +135,9 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
 
 def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
     """Return the same for mixed elements; a set-up that serves all Poisson's ratios counts once."""
-    from pipeline.solve.balance import TOLERANCE
-    from pipeline.solve.elements.mixed import LAME
-    from pipeline.solve.saddle import SaddleSolver
+    from epsmesh.solve.balance import TOLERANCE
+    from epsmesh.solve.elements.mixed import LAME
+    from epsmesh.solve.saddle import SaddleSolver
 
     direct, elements, c = method == "direct", problem.elements, 1 / (law.parameters[0].ratio - LAME.lame_lambda[0])
     start = time.process_time()

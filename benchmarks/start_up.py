@@ -71,7 +71,7 @@ def main() -> None:
                     shutil.copytree(trees[-1] / "studies", place / "studies", ignore=shutil.ignore_patterns("results"))
                     (place / "studies" / "many.toml").write_text(_MANY, encoding="utf-8")
                     if not turn and arguments[0] == "run":
-                        _run(tree, ["-m", "pipeline", *arguments], place)  # what it stores is there from then on
+                        _run(tree, ["-m", "epsmesh", *arguments], place)  # what it stores is there from then on
                     if turn:
                         start = time.monotonic()
                         seconds[tree, name].append(_seconds(tree, arguments, place))
@@ -109,18 +109,18 @@ def _run(tree: Path, words: list[str], place: Path) -> str:
 
 def _seconds(tree: Path, arguments: list[str], place: Path) -> float:
     before = processor_seconds()
-    _run(tree, ["-m", "pipeline", *arguments], place)
+    _run(tree, ["-m", "epsmesh", *arguments], place)
     return processor_seconds() - before
 
 
 def _modules(tree: Path, arguments: list[str], place: Path) -> int:
     """Return the number of modules loaded; fail if they are not from ``tree``."""
-    found = _run(tree, ["-c", "import pipeline, sys; print(pipeline.__file__, file=sys.stderr)"], place)
-    if Path(found.strip()).parents[1] != tree:
+    found = _run(tree, ["-c", "import epsmesh, sys; print(epsmesh.__file__, file=sys.stderr)"], place)
+    if Path(found.strip()).parents[2] != tree:
         raise RuntimeError(f"{tree}: Python imports {found.strip()} instead")
     return sum(
         line.startswith("import time:")
-        for line in _run(tree, ["-X", "importtime", "-m", "pipeline", *arguments], place).splitlines()
+        for line in _run(tree, ["-X", "importtime", "-m", "epsmesh", *arguments], place).splitlines()
     )
 
 

@@ -22,11 +22,11 @@ from benchmarks.campaigns import each, ended_soon, finite
 from benchmarks.processor import alone
 from benchmarks.stress_cells import Cell, cells
 from benchmarks.tables import options
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.run.record import UNFORESEEN, Record
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.run.record import UNFORESEEN, Record
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 
 # Largest relative change under an exact invariance.
 INVARIANT = 1e-8

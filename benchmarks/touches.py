@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from epsmesh.export.checks import TOOLS, Check, random_place, random_touch, solved, with_bar
+from epsmesh.export.full import Solver, Tool
 from epsmesh_realtime.model import Model
-from pipeline.export.checks import TOOLS, Check, random_place, random_touch, solved, with_bar
-from pipeline.export.full import Solver, Tool
 
 # Seed of groups; number of Poisson's ratios in one, each from a quarter of the range.
 _SEED, _RATIOS = 5000, 4

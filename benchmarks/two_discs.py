@@ -13,11 +13,11 @@ from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
 from benchmarks.plain_case import model_to_mesh
-from pipeline import compat
-from pipeline.arrays import BoolArray
-from pipeline.arrays import FloatArray as Array
-from pipeline.shapes.tissue import lame
-from pipeline.solve.compiled import cellwise_space, form, vector_space
+from epsmesh import compat
+from epsmesh.arrays import BoolArray
+from epsmesh.arrays import FloatArray as Array
+from epsmesh.shapes.tissue import lame
+from epsmesh.solve.compiled import cellwise_space, form, vector_space
 
 Disc = tuple[float, float, float]
 # A point is on a face or an edge within this share of the height or radius.

@@ -20,10 +20,10 @@ import numpy as np
 
 from benchmarks.realtime import model_of
 from benchmarks.two_discs import Disc, forces, meshed
+from epsmesh.export.checks import random_place
+from epsmesh.export.scope import Scope
+from epsmesh.shapes.body import Layered
 from epsmesh_realtime.model import Model
-from pipeline.export.checks import random_place
-from pipeline.export.scope import Scope
-from pipeline.shapes.body import Layered
 
 _FOLDER = Path("results/two_tools")
 _CHECKS, _SIZES, _DEPTHS, _SEED = 6, (0.04, 0.25), (5e-5, 2e-4), 77

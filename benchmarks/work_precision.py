@@ -22,18 +22,18 @@ from threadpoolctl import threadpool_limits
 from benchmarks.campaigns import ended_soon
 from benchmarks.machine import machine
 from benchmarks.work_precision_figure import draw
-from pipeline.files import result_files, why_not_writable
-from pipeline.mesh.meridian import Meridian
-from pipeline.netcdf import write_netcdf
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.run.record import Record
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.meridian.problem import MeridianProblem
-from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw
-from pipeline.study.read import parse
-from pipeline.verify import known
+from epsmesh.files import result_files, why_not_writable
+from epsmesh.mesh.meridian import Meridian
+from epsmesh.netcdf import write_netcdf
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.run.record import Record
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.meridian.problem import MeridianProblem
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.study.read import parse
+from epsmesh.verify import known
 
 NAME = "work_precision"
 POISSON = (0.3, 0.49)

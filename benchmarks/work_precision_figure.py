@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from pipeline.files import FIGURE_FORMATS
-from pipeline.report.figures import STYLE, save
+from epsmesh.files import FIGURE_FORMATS
+from epsmesh.report.figures import STYLE, save
 
 # Colours by element, line styles by mesh; they can be told apart in grey and by the colour-blind.
 _COLOURS = {"P1": "#777777", "P2": "#1f5fa8", "P3": "#00204d", "P2/P1": "#c98a00", "P3/P2": "#b0413e"}

@@ -10,7 +10,7 @@ sys.path[:0] = [str(DOCS), str(DOCS.parent)]
 
 from generate import write_reference  # noqa: E402
 
-from pipeline import __version__  # noqa: E402
+from epsmesh import __version__  # noqa: E402
 
 project, author = "epsmesh", "the epsmesh authors"
 release = version = __version__

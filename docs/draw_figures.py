@@ -18,10 +18,10 @@ import matplotlib.pyplot as plt
 import xarray as xr
 from matplotlib.figure import Figure
 
-import pipeline
-from pipeline.report.compliance import sinking
-from pipeline.report.figures import STYLE, figure
-from pipeline.report.figures.style import COLOURS
+import epsmesh
+from epsmesh.report.compliance import sinking
+from epsmesh.report.figures import STYLE, figure
+from epsmesh.report.figures.style import COLOURS
 
 DOCS = Path(__file__).parent
 RESULTS, PICTURES = DOCS.parent / "results", DOCS / "figures"
@@ -168,7 +168,7 @@ def main(names: list[str]) -> int:
             missing += 1
             continue
         with mpl.rc_context(STYLE):
-            drawn = draw(pipeline.open(path))
+            drawn = draw(epsmesh.open(path))
             drawn.savefig(PICTURES / f"{name}.png", dpi=DPI)
         plt.close(drawn)
         print(f"{name}: {PICTURES / name}.png")

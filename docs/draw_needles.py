@@ -1,7 +1,7 @@
 """The pressure on a needle that cuts, over the toughness: ``python docs/draw_needles.py``, ten minutes.
 
 Cracks are solved as a run solves them, on the finer mesh, those of flat punches at a few places. They are drawn with
-closed forms of ``pipeline/verify/known.py`` into ``docs/figures/needle_pressure.png``.
+closed forms of ``pipeline/epsmesh/verify/known.py`` into ``docs/figures/needle_pressure.png``.
 """
 
 from collections.abc import Iterator
@@ -15,14 +15,14 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pipeline.report.figures.style import COLOURS, GRID, LINE, STYLE
-from pipeline.solve import SolveError
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.plane.crack import LEVELS, open_crack
-from pipeline.solve.plane.opening import Opening
-from pipeline.solve.plane.ring import ring_cuts
-from pipeline.verify.known import thin_needle, tough_needle
-from pipeline.verify.needles import shaft_pressure
+from epsmesh.report.figures.style import COLOURS, GRID, LINE, STYLE
+from epsmesh.solve import SolveError
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.plane.crack import LEVELS, open_crack
+from epsmesh.solve.plane.opening import Opening
+from epsmesh.solve.plane.ring import ring_cuts
+from epsmesh.verify.known import thin_needle, tough_needle
+from epsmesh.verify.needles import shaft_pressure
 
 PICTURE = Path(__file__).parent / "figures" / "needle_pressure.png"
 DPI = 130

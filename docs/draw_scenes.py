@@ -73,10 +73,10 @@ def draw(path: Path) -> Path:
     from mpi4py import MPI
     from PIL import Image
 
-    from pipeline.run.solved import solve_alone
-    from pipeline.study.read import read_study
-    from pipeline.view.compute import compute_fields
-    from pipeline.view.picture import draw_mesh
+    from epsmesh.run.solved import solve_alone
+    from epsmesh.study.read import read_study
+    from epsmesh.view.compute import compute_fields
+    from epsmesh.view.picture import draw_mesh
 
     study = read_study(path)
     (case,) = study.cases()

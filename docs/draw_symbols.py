@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Rectangle
 
-from pipeline.report.figures import STYLE
+from epsmesh.report.figures import STYLE
 
 PICTURE = Path(__file__).parent / "figures" / "symbols.png"
 # In mm: half the body's width, its thickness, ε, the tool's radius.

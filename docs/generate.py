@@ -7,18 +7,18 @@ from typing import Any
 
 import typer
 
-from pipeline.cli import app
-from pipeline.identify.dataset import WORDS
-from pipeline.plan.plan import make_plan
-from pipeline.quantities import RUN, attributes
-from pipeline.report.dataset import build
-from pipeline.study.capabilities.features import FEATURES
-from pipeline.study.capabilities.obstacles import OBSTACLES
-from pipeline.study.capabilities.refusals import REFUSALS
-from pipeline.study.json_schema import schema_text
-from pipeline.study.keys import SECTION_TEXTS, all_sections, heading, keys_of
-from pipeline.study.read import parse
-from pipeline.study.starter import starter
+from epsmesh.cli import app
+from epsmesh.identify.dataset import WORDS
+from epsmesh.plan.plan import make_plan
+from epsmesh.quantities import RUN, attributes
+from epsmesh.report.dataset import build
+from epsmesh.study.capabilities.features import FEATURES
+from epsmesh.study.capabilities.obstacles import OBSTACLES
+from epsmesh.study.capabilities.refusals import REFUSALS
+from epsmesh.study.json_schema import schema_text
+from epsmesh.study.keys import SECTION_TEXTS, all_sections, heading, keys_of
+from epsmesh.study.read import parse
+from epsmesh.study.starter import starter
 
 # Studies that together have every variable: changes of the one that `epsmesh new` writes.
 _VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
@@ -128,7 +128,7 @@ def dataset_page() -> str:
         "# Dataset",
         "",
         "`results/<study>.nc`: netCDF4, SI units, CF-1.8. The root group has the results; the group `run` has what "
-        "each case cost and how its force was obtained. `pipeline.open` reads both as one dataset, with `status` in "
+        "each case cost and how its force was obtained. `epsmesh.open` reads both as one dataset, with `status` in "
         "words.",
         "",
         "Dimensions are the swept keys, in the file's order. Coordinates are named like the keys. "
@@ -173,7 +173,7 @@ def commands_page() -> str:
     lines = [
         "# Commands",
         "",
-        "`epsmesh COMMAND --help` prints the same. `python -m pipeline` is the same command.",
+        "`epsmesh COMMAND --help` prints the same. `python -m epsmesh` is the same command.",
         "",
         "Exit status: 0 done, 1 some cases failed, 2 the input is wrong, 130 interrupted. "
         "Errors and progress go to standard error. `NO_COLOR=1` switches colours off.",

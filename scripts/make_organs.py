@@ -14,12 +14,12 @@ import igl
 import nibabel
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
-from pipeline.files import atomic
-from pipeline.shapes.files.label_surface import surface_of
-from pipeline.shapes.files.labels import LabelMap
-from pipeline.shapes.files.stl import written
-from pipeline.shapes.triangles import Triangles
+from epsmesh.arrays import FloatArray, IntArray
+from epsmesh.files import atomic
+from epsmesh.shapes.files.label_surface import surface_of
+from epsmesh.shapes.files.labels import LabelMap
+from epsmesh.shapes.files.stl import written
+from epsmesh.shapes.triangles import Triangles
 
 MESHES = Path(__file__).resolve().parents[1] / "meshes"
 Field = Callable[[FloatArray], FloatArray]

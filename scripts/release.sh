@@ -20,7 +20,7 @@ tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --
 "$work/build/bin/python" -m pip install "${quiet[@]}" build
 rm -rf dist
 "$work/build/bin/python" -m build --outdir dist "$work/source" >"$work/log" 2>&1 || { tail -n 30 "$work/log" >&2; fail "cannot be built"; }
-version=$(sed -nE 's/^__version__ = "(.*)"$/\1/p' pipeline/__init__.py)
+version=$(sed -nE 's/^__version__ = "(.*)"$/\1/p' pipeline/epsmesh/__init__.py)
 [[ -f dist/epsmesh-$version.tar.gz && -f dist/epsmesh-$version-py3-none-any.whl ]] || fail "dist/ has $(ls dist), not version $version"
 
 # Templates, C sources, studies to begin with: all that a package folder holds.
@@ -34,9 +34,9 @@ source, wheel, sdist = Path(sys.argv[1]), *sys.argv[2:]
 held = set(zipfile.ZipFile(wheel).namelist())
 sent = {name.split("/", 1)[-1] for name in tarfile.open(sdist).getnames()}
 files = {path.relative_to(source) for path in source.rglob("*") if path.is_file()}
-links = {"studies": "pipeline/study/examples", "meshes": "pipeline/study/meshes"}
+links = {"studies": "epsmesh/study/examples", "meshes": "epsmesh/study/meshes"}
 linked = {Path(links[path.parts[0]], *path.parts[1:]) for path in files if path.parts[0] in links}
-package = {str(path) for path in files | linked if path.parts[0] == "pipeline"}
+package = {str(path.relative_to("pipeline")) for path in files if path.parts[0] == "pipeline"} | set(map(str, linked))
 if missing := sorted(package - held):
     sys.exit(f"release: the wheel lacks {', '.join(missing)}")
 if missing := sorted({str(path) for path in files} - sent):
@@ -60,15 +60,15 @@ try() { # from the file $1: version, a new study, its run, its report
         export EPSMESH_CACHE="$work/cache" OMP_NUM_THREADS=1
         epsmesh=$work/venv/bin/epsmesh
         [[ $("$epsmesh" --version) == "epsmesh $version" ]] || fail "$1: says $("$epsmesh" --version), not $version"
-        where=$("$work/venv/bin/python" -c 'import pipeline; print(pipeline.__file__)')
+        where=$("$work/venv/bin/python" -c 'import epsmesh; print(epsmesh.__file__)')
         [[ $where == "$work/venv"/* ]] || fail "$1: is run from $where"
         "$epsmesh" new mine --like quick >/dev/null
         "$epsmesh" run studies/mine.toml --quiet
         "$epsmesh" report studies/mine.toml >/dev/null
         "$work/venv/bin/python" - <<'PYTHON'
-import pipeline
+import epsmesh
 
-dataset = pipeline.open("studies/mine.toml")
+dataset = epsmesh.open("studies/mine.toml")
 assert (dataset["status"] == "ok").all() and (dataset["force_error"] < 0.1 * dataset["force"]).all(), dataset
 assert "<svg" in open("results/mine.html", encoding="utf-8").read()
 print(f"release: {dataset['status'].size} cases, F = {float(dataset['force'].max()):.6g} N at most")

@@ -4,12 +4,12 @@ from typing import Any
 
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.run.record import Record
-from pipeline.shapes.probe import Probe
-from pipeline.study.read import parse
-from pipeline.study.sweep import Study
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.run.record import Record
+from epsmesh.shapes.probe import Probe
+from epsmesh.study.read import parse
+from epsmesh.study.sweep import Study
 from tests.studies import changed
 
 BASE: dict[str, Any] = {

@@ -10,7 +10,7 @@ from unittest.mock import patch
 
 from typer.testing import CliRunner, Result
 
-from pipeline.cli import app, main
+from epsmesh.cli import app, main
 
 ROOT = Path(__file__).parents[1]
 # Under pytest, mpi4py may have marked this process's environment as a running MPI job.
@@ -44,7 +44,7 @@ def talk(*arguments: object, encoding: str = "utf-8") -> tuple[int, str, str]:
 def command(*arguments: object, ranks: int = 1) -> list[str]:
     """Return what starts ``epsmesh`` in a process of its own, on one rank or on several."""
     launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
-    return [*launcher, sys.executable, "-m", "pipeline", *map(str, arguments)]
+    return [*launcher, sys.executable, "-m", "epsmesh", *map(str, arguments)]
 
 
 def spawn(*arguments: object, ranks: int = 1) -> subprocess.CompletedProcess[str]:

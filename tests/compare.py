@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.report.read import read_file
+from epsmesh.report.read import read_file
 
 # Times, memory, iterations and round-off say how the work was done.
 HOW = {"speedup", "machine_load", "memory", "iterations", "balance"}

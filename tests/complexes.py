@@ -4,11 +4,11 @@ from collections import Counter
 
 import numpy as np
 
-from pipeline.shapes.complex import OUTSIDE, Complex
-from pipeline.shapes.files.labels import LabelMap
-from pipeline.shapes.files.loaded import Loaded
-from pipeline.shapes.files.partition import partition_of
-from pipeline.shapes.triangles import half_edges
+from epsmesh.shapes.complex import OUTSIDE, Complex
+from epsmesh.shapes.files.labels import LabelMap
+from epsmesh.shapes.files.loaded import Loaded
+from epsmesh.shapes.files.partition import partition_of
+from epsmesh.shapes.triangles import half_edges
 
 AXES = np.array([36.0, 27.0, 20.0])  # mm
 CENTRE, INNER = np.array([-12.0, 3.0, 0.0]), np.array([13.0, 9.0, 8.0])

@@ -5,9 +5,9 @@ from math import inf
 
 import pytest
 
-from pipeline.run import store
-from pipeline.shapes.files import checked
-from pipeline.study import case
+from epsmesh.run import store
+from epsmesh.shapes.files import checked
+from epsmesh.study import case
 from tests import commands
 from tests.studies import small_text
 

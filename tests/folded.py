@@ -11,11 +11,11 @@ from typing import Any
 import igl
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
-from pipeline.shapes.files.crossings import crossings
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
-from pipeline.study.sweep import Study
+from epsmesh.arrays import FloatArray, IntArray
+from epsmesh.shapes.files.crossings import crossings
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
+from epsmesh.study.sweep import Study
 
 Surface = tuple[FloatArray, IntArray]
 KINDS = ("sulci", "level", "flow")

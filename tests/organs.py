@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.shapes.files import stl
+from epsmesh.shapes.files import stl
 
 AXES = np.array([60e-3, 45e-3, 30e-3])
 

@@ -333,10 +333,10 @@ def write_bodies(folder: Path) -> None:
 
 def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> Result:
     """Run one study in ``folder``, which has the files of :func:`write_bodies`; only read it unless ``solved``."""
-    from pipeline.plan.plan import declare, make_plan
-    from pipeline.study.capabilities.obstacles import obstacle
-    from pipeline.study.problems import StudyError
-    from pipeline.study.read import read_mapping
+    from epsmesh.plan.plan import declare, make_plan
+    from epsmesh.study.capabilities.obstacles import obstacle
+    from epsmesh.study.problems import StudyError
+    from epsmesh.study.read import read_mapping
 
     name, start = name_of(features), time.process_time()
     done = partial(Result, name)
@@ -355,8 +355,8 @@ def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> 
         return done("taken", key=key)
     from mpi4py import MPI
 
-    from pipeline.run.execute import compute
-    from pipeline.run.given_force import with_depths
+    from epsmesh.run.execute import compute
+    from epsmesh.run.given_force import with_depths
 
     try:
         plan = make_plan(study)

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from pipeline.plan.key import PHYSICS_VERSION
+from epsmesh.plan.key import PHYSICS_VERSION
 
 ROOT = Path(__file__).parent.parent
 FILE = ROOT / "tests" / "physics.txt"
-# Folders and files of pipeline/ between a case and its record.
+# Folders and files of pipeline/epsmesh/ between a case and its record.
 SOURCES = (
     *("shapes", "scene", "mesh", "solve", "insertion", "compat", "viscoelastic.py", "units.py"),
     *(f"study/{name}.py" for name in ("case", "closure", "loads", "output", "own_lengths", "slit", "stages", "sweep")),
@@ -42,8 +42,8 @@ def recorded() -> dict[str, str]:
 
 def _files() -> Iterator[Path]:
     for source in SOURCES:
-        path = ROOT / "pipeline" / source
-        assert path.exists(), f"tests/physics.py names pipeline/{source}, which does not exist"
+        path = ROOT / "pipeline" / "epsmesh" / source
+        assert path.exists(), f"tests/physics.py names pipeline/epsmesh/{source}, which does not exist"
         yield from (path,) if path.is_file() else (one for end in ("py", "c", "h") for one in path.rglob(f"*.{end}"))
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-import pipeline
-from pipeline.plan.plan import Plan
+import epsmesh
+from epsmesh.plan.plan import Plan
 from tests.studies import small_text
 
 WORLD = MPI.COMM_WORLD
@@ -33,7 +33,7 @@ def folder(tmp_path):
 
 @pytest.mark.mpi
 def test_study_runs_and_every_rank_has_the_dataset(folder):
-    study = pipeline.read(folder / "small.toml")
+    study = epsmesh.read(folder / "small.toml")
     assert study.shape == {"young": 2, "epsilon": 2}
     data = study.run(WORLD, output=folder / "out", store=folder / "kept.sqlite")
     assert (data["status"] == "ok").all()
@@ -49,14 +49,14 @@ def test_study_runs_and_every_rank_has_the_dataset(folder):
     assert set(np.unique(again["origin"])) == {f"{origin}, stored" for origin in np.unique(data["origin"])}
     np.testing.assert_array_equal(again["force"], data["force"])
     assert not study.plan(store=folder / "kept.sqlite").solves
-    opened = pipeline.open(folder / "small.toml", folder / "out")
+    opened = epsmesh.open(folder / "small.toml", folder / "out")
     np.testing.assert_array_equal(opened["force"], data["force"])
 
 
 @pytest.mark.mpi
 def test_store_that_cannot_be_used_is_an_exception_on_every_rank(folder):
-    with pytest.raises(pipeline.StoreError, match="cannot be"):
-        pipeline.read(folder / "small.toml").run(WORLD, output=folder, store=folder / "small.toml" / "no.sqlite")
+    with pytest.raises(epsmesh.StoreError, match="cannot be"):
+        epsmesh.read(folder / "small.toml").run(WORLD, output=folder, store=folder / "small.toml" / "no.sqlite")
 
 
 @pytest.mark.mpi
@@ -64,7 +64,7 @@ def test_failed_cases_are_counted_in_a_warning(folder):
     if WORLD.rank == 0:
         (folder / "small.toml").write_text(TEXT.replace('"0.5 mm"', '["1e-9 mm", "0.5 mm"]'))
     WORLD.barrier()
-    study = pipeline.read(folder / "small.toml")
+    study = epsmesh.read(folder / "small.toml")
     if WORLD.rank == 0:
         with pytest.warns(RuntimeWarning, match=r"4 failed, the first: .*GB of memory"):
             data = study.run(WORLD, output=folder)
@@ -77,24 +77,24 @@ def test_failed_cases_are_counted_in_a_warning(folder):
 def test_an_interrupted_run_leaves_what_is_finished(tmp_path, monkeypatch):
     """The signal comes while the second solve is at work."""
     (tmp_path / "small.toml").write_text(TEXT.replace('"4 mm"', '"4 mm", "5 mm"'))
-    study, calls = pipeline.read(tmp_path / "small.toml"), iter(range(9))
+    study, calls = epsmesh.read(tmp_path / "small.toml"), iter(range(9))
 
     def machine_load():
         if next(calls) == 1:
             signal.raise_signal(signal.SIGINT)
         return 1.0
 
-    monkeypatch.setattr("pipeline.run.runner.machine_load", machine_load)
+    monkeypatch.setattr("epsmesh.run.runner.machine_load", machine_load)
     with pytest.raises(KeyboardInterrupt):
         study.run(MPI.COMM_SELF, output=tmp_path)
-    left = pipeline.open(tmp_path / "small.toml", tmp_path)["status"]
+    left = epsmesh.open(tmp_path / "small.toml", tmp_path)["status"]
     assert 0 < int((left == "ok").sum()) < left.size
     assert (study.run(MPI.COMM_SELF, output=tmp_path)["status"] == "ok").all()
 
 
 def test_plan_says_what_a_run_would_do(tmp_path):
     (tmp_path / "small.toml").write_text(TEXT)
-    study = pipeline.read(str(tmp_path / "small.toml"))
+    study = epsmesh.read(str(tmp_path / "small.toml"))
     assert (study.name, study.title, study.warnings) == ("small", "small", ())
     plan = study.plan()
     assert isinstance(plan, Plan)
@@ -109,31 +109,31 @@ def test_plan_says_what_a_run_would_do(tmp_path):
 @pytest.mark.parametrize("name", [None, 3, "", "a b", "../x", "é" * 101])
 def test_a_study_is_called_what_a_file_can_be(name):
     with pytest.raises(ValueError, match="must be letters, digits, - and _, at most 200 bytes"):
-        pipeline.read({}, name=name)
+        epsmesh.read({}, name=name)
 
 
 def test_what_is_wrong_is_raised(tmp_path):
     (tmp_path / "bad.toml").write_text(TEXT.replace('"2 mm"', "2"))
-    with pytest.raises(pipeline.StudyError, match=r"probe.radius = 2: must be a number with a unit"):
-        pipeline.read(tmp_path / "bad.toml")
-    with pytest.raises(pipeline.DatasetError, match="make it with `epsmesh run"):
-        pipeline.open(tmp_path / "bad.toml", tmp_path)
+    with pytest.raises(epsmesh.StudyError, match=r"probe.radius = 2: must be a number with a unit"):
+        epsmesh.read(tmp_path / "bad.toml")
+    with pytest.raises(epsmesh.DatasetError, match="make it with `epsmesh run"):
+        epsmesh.open(tmp_path / "bad.toml", tmp_path)
     (tmp_path / "bad.nc").write_text("no netCDF")
-    with pytest.raises(pipeline.DatasetError, match=r"bad.nc: cannot be read as netCDF"):
-        pipeline.open(tmp_path / "bad.nc")
+    with pytest.raises(epsmesh.DatasetError, match=r"bad.nc: cannot be read as netCDF"):
+        epsmesh.open(tmp_path / "bad.nc")
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        pipeline.nothing  # noqa: B018
+        epsmesh.nothing  # noqa: B018
 
 
 @pytest.mark.parametrize(
     ("code", "heavy"),
     [
         ("pass", {"numpy", "xarray", "pydantic", "mpi4py", "dolfinx", "matplotlib", "gmsh"}),
-        ("pipeline.read('studies/quick.toml').plan()", {"xarray", "mpi4py", "dolfinx", "matplotlib", "gmsh"}),
+        ("epsmesh.read('studies/quick.toml').plan()", {"xarray", "mpi4py", "dolfinx", "matplotlib", "gmsh"}),
     ],
 )
 def test_what_answers_at_once_imports_little(code, heavy):
-    command = f"import sys, pipeline; {code}; print(sorted({heavy} & set(sys.modules)))"
+    command = f"import sys, epsmesh; {code}; print(sorted({heavy} & set(sys.modules)))"
     root = Path(__file__).parents[1]
     done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True, cwd=root)
     assert done.stdout.strip() == "[]"

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.files import atomic, why_not_writable, write_new, write_whole
-from pipeline.netcdf import most_bytes, write_netcdf
+from epsmesh.files import atomic, why_not_writable, write_new, write_whole
+from epsmesh.netcdf import most_bytes, write_netcdf
 
 
 @pytest.mark.parametrize("name", ["a.nc", "a.b.svg", "plain"])
@@ -124,7 +124,7 @@ import resource, sys
 from pathlib import Path
 import numpy as np
 import xarray as xr
-from pipeline.netcdf import write_netcdf
+from epsmesh.netcdf import write_netcdf
 resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
 dataset = xr.Dataset({"a": (("x",), np.random.default_rng(1).random(100_000))})
 try:

@@ -34,7 +34,7 @@ def imported():
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module] if isinstance(node, ast.ImportFrom) and node.module and not node.level else []
             found |= {name.partition(".")[0]: path for name in names}
-    return {name: path for name, path in found.items() if name not in sys.stdlib_module_names | {"pipeline"}}
+    return {name: path for name, path in found.items() if name not in sys.stdlib_module_names | {"epsmesh"}}
 
 
 def test_every_library_that_is_imported_is_declared():

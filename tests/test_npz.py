@@ -6,7 +6,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from pipeline.npz import read_npz
+from epsmesh.npz import read_npz
 
 ARRAYS = {"points": np.arange(12.0).reshape(4, 3), "cells": np.arange(40), "seconds": np.float64(1.5)}
 

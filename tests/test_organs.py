@@ -10,9 +10,9 @@ import nibabel
 import numpy as np
 import pytest
 
-from pipeline.shapes.files.image import read_image
-from pipeline.shapes.files.read import read_surface
-from pipeline.study.read import read_study
+from epsmesh.shapes.files.image import read_image
+from epsmesh.shapes.files.read import read_surface
+from epsmesh.study.read import read_study
 
 ROOT = Path(__file__).resolve().parents[1]
 MESHES = ROOT / "meshes"

@@ -4,8 +4,8 @@ import random
 
 import pytest
 
-from pipeline.study.capabilities.obstacles import OBSTACLES
-from pipeline.study.capabilities.refusals import REFUSALS
+from epsmesh.study.capabilities.obstacles import OBSTACLES
+from epsmesh.study.capabilities.refusals import REFUSALS
 from tests.pairs import Result, name_of, pairs, run, write_bodies
 
 _EVERY = {name_of(pair): pair for pair in pairs()}

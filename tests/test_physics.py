@@ -10,8 +10,8 @@ def test_a_change_of_what_forces_depend_on_is_noticed():
     changed = sorted(name for name in before | now if before.get(name) != now.get(name))
     assert not changed, (
         f"Forces or error bars may depend on what changed: {', '.join(changed)}. If the same study now gives another "
-        "force or bar, raise PHYSICS_VERSION in pipeline/plan/key.py, so that earlier records are not used. Then write "
-        f"the hashes: {physics.COMMAND}"
+        "force or bar, raise PHYSICS_VERSION in pipeline/epsmesh/plan/key.py, so that earlier records are not used. "
+        f"Then write the hashes: {physics.COMMAND}"
     )
 
 

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from pipeline.printable import counted, printable_json
+from epsmesh.printable import counted, printable_json
 from tests.studies import small_text
 
 ONE_CASE = {"material": {"poisson": 0.3}, "mesh": {"epsilon": "full"}}

@@ -4,8 +4,8 @@ from math import inf, nan, pi
 
 import pytest
 
-from pipeline.quantities import MESH_DIMENSIONS, QUANTITIES, quantity_of, symbol, write
-from pipeline.study.schema import Mesh
+from epsmesh.quantities import MESH_DIMENSIONS, QUANTITIES, quantity_of, symbol, write
+from epsmesh.study.schema import Mesh
 from tests.cases import study
 
 

@@ -4,7 +4,7 @@ import re
 import tomllib
 from pathlib import Path
 
-from pipeline import __version__
+from epsmesh import __version__
 
 
 def test_one_version_everywhere(epsmesh):

@@ -11,18 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.files import cache_folder
-from pipeline.plan.plan import make_plan
-from pipeline.report.page import render
-from pipeline.report.read import read
-from pipeline.report.table import DatasetError, study_of
-from pipeline.run.reading import known_of
-from pipeline.run.store import Store, StoreError
-from pipeline.shapes.files.image import read_image
-from pipeline.shapes.files.read import Loaded
-from pipeline.shapes.triangles import SurfaceError
-from pipeline.study.problems import StudyError
-from pipeline.study.read import read_study
+from epsmesh.files import cache_folder
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.page import render
+from epsmesh.report.read import read
+from epsmesh.report.table import DatasetError, study_of
+from epsmesh.run.reading import known_of
+from epsmesh.run.store import Store, StoreError
+from epsmesh.shapes.files.image import read_image
+from epsmesh.shapes.files.read import Loaded
+from epsmesh.shapes.triangles import SurfaceError
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import read_study
 from tests.cases import raw, study
 from tests.commands import ROOT, talk
 from tests.organs import box, write_stl

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipeline import stages
-from pipeline.stages import Times, recharge, recorded, stage
+from epsmesh import stages
+from epsmesh.stages import Times, recharge, recorded, stage
 
 
 @pytest.fixture

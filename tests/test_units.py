@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.study.read import read_study
-from pipeline.units import canonical, parse_quantity
+from epsmesh.study.read import read_study
+from epsmesh.units import canonical, parse_quantity
 from tests.studies import small_text
 
 READ = {

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.shapes.history import History
-from pipeline.viscoelastic import Motion, follow, moduli, respond
+from epsmesh.shapes.history import History
+from epsmesh.viscoelastic import Motion, follow, moduli, respond
 
 TERMS = ((0.4, 2.0), (0.2, 30.0))
 RAMP = Motion((0.0, 1.0, 11.0), (0.0, 2.0, 2.0))

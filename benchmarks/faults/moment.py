@@ -16,10 +16,10 @@ from pathlib import Path
 import psutil
 
 from benchmarks.faults.victim import WIDTH
-from pipeline.report.read import read_file
-from pipeline.report.table import DatasetError
-from pipeline.run.reading import read_rows
-from pipeline.run.store import Store, StoreError
+from epsmesh.report.read import read_file
+from epsmesh.report.table import DatasetError
+from epsmesh.run.reading import read_rows
+from epsmesh.run.store import Store, StoreError
 
 ROOT = Path(__file__).parents[2]
 # Stages of a run by phase; a moment is drawn within one of them.

@@ -20,12 +20,12 @@ from tempfile import TemporaryDirectory
 import psutil
 
 from benchmarks.faults.moment import Scene
-from pipeline.export.kept import Kept
-from pipeline.export.scope import scope_of
-from pipeline.report.read import read_file
-from pipeline.run.begun import store_done
-from pipeline.run.store import Store
-from pipeline.study.read import read_study
+from epsmesh.export.kept import Kept
+from epsmesh.export.scope import scope_of
+from epsmesh.report.read import read_file
+from epsmesh.run.begun import store_done
+from epsmesh.run.store import Store
+from epsmesh.study.read import read_study
 from tests.studies import small_text
 
 ROOT = Path(__file__).parents[2]

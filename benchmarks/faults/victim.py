@@ -13,7 +13,7 @@ WIDTH = 40
 
 
 class _Told(list[str]):
-    """The stack of stages of :mod:`pipeline.stages`, written to the file at every change."""
+    """The stack of stages of :mod:`epsmesh.stages`, written to the file at every change."""
 
     def __init__(self, path: Path):
         super().__init__()
@@ -47,15 +47,15 @@ def tell_done(path: Path, command: str) -> None:
 
         setattr(kind, name, after)
 
-    from pipeline.run.attempts import Attempts
+    from epsmesh.run.attempts import Attempts
 
     if command == "export":
-        from pipeline.export.kept import Kept
+        from epsmesh.export.kept import Kept
 
         told(Kept, "put", lambda kept, _, work, __: f"array {kept._key(work)}")
         return  # its solves have no store
     if command == "identify":
-        from pipeline.identify.kept import Kept as Fitted
+        from epsmesh.identify.kept import Kept as Fitted
 
         told(Fitted, "write", lambda kept, _, specimen, __: f"file {kept._path(specimen).name}")
     told(Attempts, "judge", lambda _, record, *__: f"case {record.key}" if record is not None else "")
@@ -63,8 +63,8 @@ def tell_done(path: Path, command: str) -> None:
 
 def main() -> None:
     """Run the command in the remaining arguments."""
-    from pipeline import stages
-    from pipeline.__main__ import main as run
+    from epsmesh import stages
+    from epsmesh.__main__ import main as run
 
     path = Path(f"{sys.argv[1]}-{os.getpid()}")
     sys.argv[1:] = sys.argv[2:]

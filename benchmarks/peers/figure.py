@@ -11,8 +11,8 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from benchmarks.peers.results import TARGETS, Run
 from benchmarks.peers.tasks import TASKS
-from pipeline.report.figures import STYLE, save
-from pipeline.report.pareto import front
+from epsmesh.report.figures import STYLE, save
+from epsmesh.report.pareto import front
 
 _LOOKS = {
     "this program": ("#d81b60", "-", "*"),

@@ -10,12 +10,12 @@ from mpi4py import MPI
 
 from benchmarks.peers.tasks import Task
 from benchmarks.peers.worker import Answer, serve
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.run.measure import TIMES
-from pipeline.run.record import Record
-from pipeline.study.read import parse
-from pipeline.study.sweep import Study
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.run.measure import TIMES
+from epsmesh.run.record import Record
+from epsmesh.study.read import parse
+from epsmesh.study.sweep import Study
 
 YOUNG = 1e4  # Pa: F is proportional to it
 _MM = 1e-3

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import sqrt
 
-from pipeline.verify import known
+from epsmesh.verify import known
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 /* A real-time model as a co-simulation unit of FMI 3.0, the Functional Mock-up Interface (fmi-standard.org). C99.
  *
  * `epsmesh export --fmu` compiles it with the evaluator. The types are those of the standard, declared here under its names.
- * References of variables are in the order of VARIABLES in pipeline/export/fmu.py, which writes modelDescription.xml.
+ * References of variables are in the order of VARIABLES in pipeline/epsmesh/export/fmu.py, which writes modelDescription.xml.
  */
 #include <math.h>
 #include <stdbool.h>

@@ -11,7 +11,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 REALTIME = HERE.parent
-MADE = REALTIME.parent / "pipeline" / "touch" / "templates" / "evaluator.wasm"
+MADE = REALTIME.parent / "pipeline" / "epsmesh" / "touch" / "templates" / "evaluator.wasm"
 _FLAGS = ("--target=wasm32", "-O2", "-std=c99", "-nostdlib", "-Wall", "-Wextra", "-fvisibility=hidden")
 # Functions of math.h are imported from the page; a page that lacks one does not start.
 _LINK = ("--no-entry", "--export-dynamic", "--allow-undefined", "--gc-sections", "--strip-all", "-zstack-size=1048576")

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from benchmarks import coverage
 from benchmarks.coverage import Coverage, Trial, trials
 from benchmarks.families import FAMILIES
-from pipeline.study.read import parse
+from epsmesh.study.read import parse
 
 
 def test_error_bars_of_random_scenes_hold():

@@ -3,8 +3,8 @@
 import pytest
 
 from benchmarks.organs import PARTS, SCENES, parts_of, study_of
-from pipeline.plan.plan import make_plan
-from pipeline.study.read import parse
+from epsmesh.plan.plan import make_plan
+from epsmesh.study.read import parse
 
 
 def test_parts_hold_all_seconds():

@@ -6,7 +6,7 @@ import xarray as xr
 
 from benchmarks import plain_loop
 from benchmarks.plain_case import MOST_DIRECT, solve
-from pipeline.study.read import read_study
+from epsmesh.study.read import read_study
 from tests import cases
 
 MESH = {"epsilon": ["6 mm", "full"], "outside": ["coarse", "fixed"], "rim": "0.3 mm", "growth": 0.6}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.resolution import BENDS, LIVER, REFERENCE, File, relative, surface, write
-from pipeline.shapes.files.image import read_image
-from pipeline.shapes.triangles import enclosed
+from epsmesh.shapes.files.image import read_image
+from epsmesh.shapes.triangles import enclosed
 from scripts.make_organs import liver
 
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from benchmarks import stress
 from benchmarks.stress import Result, judge, run, summary, table, to_json
 from benchmarks.stress_cells import Cell, cells
-from pipeline.run.record import UNFORESEEN, Record
+from epsmesh.run.record import UNFORESEEN, Record
 
 WORLD = MPI.COMM_WORLD
 CELL = Cell("row", "value", {})

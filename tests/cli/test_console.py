@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from pipeline import __version__
-from pipeline.cli import app
-from pipeline.cli.console import paint, print_json
-from pipeline.report.figures import KINDS
-from pipeline.report.read import read_file
+from epsmesh import __version__
+from epsmesh.cli import app
+from epsmesh.cli.console import paint, print_json
+from epsmesh.report.figures import KINDS
+from epsmesh.report.read import read_file
 from tests.commands import ENVIRONMENT, ROOT, talk
 from tests.conftest import SMALL
 from tests.studies import small_text
@@ -35,7 +35,7 @@ def on_terminal(*arguments: str, **environment: str) -> str:
     leader, follower = pty.openpty()
     settings = {**ENVIRONMENT, "TERM": "xterm", "PYTHONPATH": str(ROOT), **environment}
     process = subprocess.Popen(
-        [sys.executable, "-m", "pipeline", *arguments], stdout=follower, stderr=follower, cwd=ROOT, env=settings
+        [sys.executable, "-m", "epsmesh", *arguments], stdout=follower, stderr=follower, cwd=ROOT, env=settings
     )
     os.close(follower)
     text = b""

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from pipeline.report.dataset import write
+from epsmesh.report.dataset import write
 from tests.commands import epsmesh
 from tests.report.chosen import TEXT, dataset
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import pipeline
-from pipeline.identify.estimate import identify
-from pipeline.study.problems import StudyError
+import epsmesh
+from epsmesh.identify.estimate import identify
+from epsmesh.study.problems import StudyError
 from scripts.make_curves import TRUTH, main, write, write_punch
 from tests.commands import run_script
 
@@ -89,7 +89,7 @@ def test_many_files_are_a_dimension_and_each_is_kept(folder, epsmesh, found, mon
     dataset = xr.load_dataset(folder / "results" / "three.nc")
     assert list(dataset["file"].values) == ["gel_8", "gel_9", "gel_10"]
     assert dataset["estimate"].sel(unknown="young").values == pytest.approx([20e3, 25e3, 30e3], rel=0.03)
-    monkeypatch.setattr("pipeline.identify.many.identify", lambda *_: pytest.fail("is fitted again"))
+    monkeypatch.setattr("epsmesh.identify.many.identify", lambda *_: pytest.fail("is fitted again"))
     again = epsmesh("identify", folder / "three.toml", "--output", folder / "results")
     assert again.exit_code == 0, again.output
     xr.testing.assert_equal(xr.load_dataset(folder / "results" / "three.nc"), dataset)
@@ -105,7 +105,7 @@ def test_an_interrupted_folder_loses_no_more_than_the_curve_in_hand(folder, epsm
             raise KeyboardInterrupt
         return identify(measured, unknowns)
 
-    monkeypatch.setattr("pipeline.identify.many.identify", ended)
+    monkeypatch.setattr("epsmesh.identify.many.identify", ended)
     epsmesh("identify", folder / "ended.toml", "--output", folder / "results")
     assert (len(fitted), (folder / "results" / "ended.nc").exists()) == (3, False)
     again = epsmesh("identify", folder / "ended.toml", "--output", folder / "results")
@@ -131,7 +131,7 @@ def test_a_bad_file_is_a_row_and_what_is_told_of_files_is_told_once(folder, epsm
             raise AssertionError("no such noise")
         return identify(measured, unknowns)
 
-    monkeypatch.setattr("pipeline.identify.many.identify", fitted)
+    monkeypatch.setattr("epsmesh.identify.many.identify", fitted)
     (folder / "many.toml").write_text(STUDY.format(file="many/*.csv", may_hide="[]"))
     result = epsmesh("identify", folder / "many.toml", "--output", folder / "results")
     assert result.exit_code == 1, result.output
@@ -178,7 +178,7 @@ def test_what_curves_and_ranges_give_is_needed_for_cases(folder, epsmesh, comman
     for key in ("[mesh]", "probe.depth", "[material]"):
         assert f"{key}: " in result.stderr
     with pytest.raises(StudyError, match="is required for the study's cases"):
-        pipeline.read(folder / "punch.toml").plan()
+        epsmesh.read(folder / "punch.toml").plan()
 
 
 def test_the_error_of_a_radius_widens_the_bar(folder, epsmesh, found):
@@ -221,7 +221,7 @@ def test_what_was_found_does_not_replace_the_dataset_of_a_run_nor_the_reverse(fo
     result = epsmesh("identify", folder / "punch.toml", "--output", ran)
     assert (result.exit_code, "is the dataset of a study's cases" in result.stderr) == (2, True)
     with pytest.raises(FileExistsError, match="give another output folder"):
-        pipeline.read(folder / "punch.toml").identify(output=ran)
+        epsmesh.read(folder / "punch.toml").identify(output=ran)
     assert (ran / "punch.nc").read_bytes() == before
     (ran / "small.nc").write_bytes((folder / "results" / "punch.nc").read_bytes())
     result = epsmesh("run", small, "--output", ran)
@@ -231,12 +231,12 @@ def test_what_was_found_does_not_replace_the_dataset_of_a_run_nor_the_reverse(fo
 # A rank that fails alone, where the others wait for it.
 FAILS = """
 from mpi4py import MPI
-from pipeline.identify.kept import Kept
+from epsmesh.identify.kept import Kept
 def read(self, specimen):
     if MPI.COMM_WORLD.rank:
         raise ValueError("of one rank")
 Kept.read = read
-from pipeline.__main__ import main
+from epsmesh.__main__ import main
 main()
 """
 
@@ -249,7 +249,7 @@ def test_a_rank_that_fails_alone_ends_all(folder):
 
 
 def test_python_gets_the_dataset(folder, found):
-    dataset = pipeline.read(folder / "punch.toml").identify(output=folder / "results")
+    dataset = epsmesh.read(folder / "punch.toml").identify(output=folder / "results")
     xr.testing.assert_equal(dataset, xr.load_dataset(folder / "results" / "punch.nc"))
 
 

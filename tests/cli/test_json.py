@@ -5,13 +5,13 @@ import shutil
 
 import pytest
 
-from pipeline.cli import app
-from pipeline.report.dataset import write
-from pipeline.report.guide import USUAL_ACCURACY, guide, guide_if_any
-from pipeline.report.guide_text import settings, text
-from pipeline.run.record import Record
-from pipeline.run.store import Store
-from pipeline.shapes.probes.blade import Blade
+from epsmesh.cli import app
+from epsmesh.report.dataset import write
+from epsmesh.report.guide import USUAL_ACCURACY, guide, guide_if_any
+from epsmesh.report.guide_text import settings, text
+from epsmesh.run.record import Record
+from epsmesh.run.store import Store
+from epsmesh.shapes.probes.blade import Blade
 from tests.commands import ROOT
 from tests.report.chosen import TEXT, dataset
 
@@ -117,7 +117,7 @@ def test_warnings_of_a_study_are_told(epsmesh, small, tmp_path):
 
 
 def test_an_exception_is_told_and_goes_on(epsmesh, small, monkeypatch):
-    monkeypatch.setattr("pipeline.plan.plan.make_plan", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("epsmesh.plan.plan.make_plan", lambda *_, **__: 1 / 0)
     done = epsmesh("plan", small, "--json")
     assert failed(done, status=1)[0]["message"] == "ZeroDivisionError: division by zero"
     assert isinstance(done.exception, ZeroDivisionError)

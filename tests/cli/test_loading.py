@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.shapes.registry import BODIES, PROBES
+from epsmesh.shapes.registry import BODIES, PROBES
 from tests.commands import ENVIRONMENT, ROOT
 from tests.studies import small_text
 
 RUN = """
 import sys
-from pipeline.__main__ import main
+from epsmesh.__main__ import main
 sys.argv = ["epsmesh", *sys.argv[1:]]
 try:
     main()
@@ -54,8 +54,8 @@ def study(tmp_path):
 def test_help_loads_no_study_no_plan_and_no_shape():
     modules = loaded("--help")
     assert not libraries(modules) & (_SLOW | _ELSEWHERE | {"pydantic", "psutil", "hashlib", "tomllib"})
-    assert {m for m in modules if m.startswith(("pipeline.study.", "pipeline.plan", "pipeline.shapes"))} <= {
-        "pipeline.study.vocabulary", "pipeline.study.named",
+    assert {m for m in modules if m.startswith(("epsmesh.study.", "epsmesh.plan", "epsmesh.shapes"))} <= {
+        "epsmesh.study.vocabulary", "epsmesh.study.named",
     }  # fmt: skip
 
 
@@ -71,7 +71,7 @@ def test_a_study_loads_the_shapes_that_it_names_alone(command, study, tmp_path):
 def test_a_study_begun_like_another_loads_no_shape(tmp_path):
     modules = loaded("new", "mine", "--like", ROOT / "studies" / "quick.toml", within=tmp_path)
     assert (tmp_path / "studies" / "mine.toml").exists()
-    assert not {module for module in modules if module.startswith("pipeline.shapes")}
+    assert not {module for module in modules if module.startswith("epsmesh.shapes")}
 
 
 def test_a_first_study_lists_every_shape_and_computes_nothing(tmp_path):

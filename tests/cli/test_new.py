@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.plan.plan import make_plan
-from pipeline.study.keys import SECTION_TEXTS, all_sections, keys_of, shapes_of, words_of
-from pipeline.study.named import SCHEMA, SHORT, examples
-from pipeline.study.read import parse, read_study
-from pipeline.study.renamed import RENAMED
-from pipeline.study.starter import starter
+from epsmesh.plan.plan import make_plan
+from epsmesh.study.keys import SECTION_TEXTS, all_sections, keys_of, shapes_of, words_of
+from epsmesh.study.named import SCHEMA, SHORT, examples
+from epsmesh.study.read import parse, read_study
+from epsmesh.study.renamed import RENAMED
+from epsmesh.study.starter import starter
 from tests.commands import epsmesh
 
 _SCHEMA = "#:schema ./study.schema.json\n"

@@ -12,9 +12,9 @@ import subprocess
 import pytest
 import typer
 
-from pipeline.cli import words
-from pipeline.cli.words import or_elsewhere
-from pipeline.study.named import EXAMPLES
+from epsmesh.cli import words
+from epsmesh.cli.words import or_elsewhere
+from epsmesh.study.named import EXAMPLES
 from tests.commands import ENVIRONMENT, command, talk
 from tests.commands import epsmesh as epsmesh_here
 from tests.studies import small_text
@@ -79,7 +79,7 @@ def test_a_disk_that_fills_while_results_are_written_loses_no_record(epsmesh, tm
     file.write_text(small_text(mesh={"epsilon": "full"}, solve={"exact": False}), encoding="utf-8")
     options = ("--output", tmp_path / "out", "--meshes", tmp_path / "meshes")
     with monkeypatch.context() as patched:
-        patched.setattr("pipeline.report.dataset.write", full)
+        patched.setattr("epsmesh.report.dataset.write", full)
         done = epsmesh("run", file, *options)
     assert done.exit_code == 2
     (line,) = [line for line in done.stderr.splitlines() if "cannot be written" in line]
@@ -118,7 +118,7 @@ def test_every_command_finds_first_what_it_cannot_write(name, epsmesh, results, 
     (tmp_path / place).unlink(missing_ok=True)
     (tmp_path / place).mkdir(parents=True)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("pipeline.cli.view._missing", lambda: "")
+    monkeypatch.setattr("epsmesh.cli.view._missing", lambda: "")
     before = sorted(tmp_path.rglob("*"))
     done = epsmesh(*arguments)
     assert done.exit_code == 2, done.output
@@ -139,7 +139,7 @@ def test_a_disk_that_fills_while_a_page_is_written_is_told(epsmesh, results, mon
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "out/small.html")
 
     monkeypatch.chdir(results)
-    monkeypatch.setattr("pipeline.report.page.write_page", full)
+    monkeypatch.setattr("epsmesh.report.page.write_page", full)
     done = epsmesh("report", "out/small.nc", "--json")
     assert (done.exit_code, done.stderr) == (2, "out/small.html: cannot be written: No space left on device\n")
     assert json.loads(done.stdout)["errors"][0]["file"] == "out/small.html"
@@ -161,7 +161,7 @@ def test_a_store_that_cannot_be_changed_is_told(epsmesh, results, tmp_path, monk
     shutil.copy(results / "out" / "cases.sqlite", path)
     with sqlite3.connect(path) as database:
         database.execute("UPDATE records SET record = ''")
-    monkeypatch.setattr("pipeline.run.store._open", lambda path: sqlite3.connect(f"file:{path}?mode=ro", uri=True))
+    monkeypatch.setattr("epsmesh.run.store._open", lambda path: sqlite3.connect(f"file:{path}?mode=ro", uri=True))
     assert epsmesh("status", "--prune", "--store", path).exit_code == 0
     done = epsmesh("status", "--prune", "--store", path, "--yes")
     assert done.exit_code == 2

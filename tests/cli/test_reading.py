@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.record import Record
-from pipeline.run.store import Store
-from pipeline.study.read import read_study
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.record import Record
+from epsmesh.run.store import Store
+from epsmesh.study.read import read_study
 
 LOOKING = ("plan", "status")
 

@@ -41,7 +41,7 @@ def test_it_is_left_out_where_it_is_not_wanted_or_would_take_long(epsmesh, resul
     monkeypatch.chdir(results)
     assert scene(epsmesh, "--scene", "none") == ""
     before = sorted(results.iterdir())
-    monkeypatch.setattr("pipeline.cli.report._MOST_CELLS", 10)
+    monkeypatch.setattr("epsmesh.cli.report._MOST_CELLS", 10)
     assert scene(epsmesh) == ""
     assert "--scene answer" in (results / "small.html").read_text(encoding="utf-8")
     assert sorted(results.iterdir()) == before

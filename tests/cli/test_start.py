@@ -16,10 +16,10 @@ import os, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # who starts the tests may have it ignored
 told = []
 def tell(event, words):
-    if event == "import" and words[0] == "pipeline.cli" and not told:
+    if event == "import" and words[0] == "epsmesh.cli" and not told:
         told.append(os.write(1, b"ready\\n"))
 sys.addaudithook(tell)
-from pipeline.__main__ import main
+from epsmesh.__main__ import main
 main()
 """
 
@@ -42,7 +42,7 @@ def test_an_interrupt_ends_it_with_130_and_without_a_word():
 LOSING = """
 import os, signal, sys, time, weakref
 signal.signal(signal.SIGINT, signal.default_int_handler)
-import pipeline.cli
+import epsmesh.cli
 class Thing: pass
 def interrupt(*_):
     os.kill(os.getpid(), signal.SIGINT)
@@ -56,9 +56,9 @@ def run():
         import interrupted
     time.sleep(20)
     print("still here")
-pipeline.cli.main = run
+epsmesh.cli.main = run
 sys.modules["__main__"].interrupt = interrupt
-from pipeline.__main__ import main
+from epsmesh.__main__ import main
 main()
 """
 INTERRUPTED = """
@@ -92,8 +92,8 @@ def test_an_interrupt_of_which_a_library_made_another_exception_is_one(monkeypat
             raise ImportError("initialization failed") from (interrupt if has_cause else None)
 
     if not has_cause:
-        monkeypatch.setattr("pipeline.interrupts._raised", [signal.SIGINT])
-    monkeypatch.setattr("pipeline.run.provenance.provenance", interrupted)
+        monkeypatch.setattr("epsmesh.interrupts._raised", [signal.SIGINT])
+    monkeypatch.setattr("epsmesh.run.provenance.provenance", interrupted)
     done = epsmesh("--version", "--json")
     assert (done.exit_code, done.stderr) == (130, "")
 
@@ -102,7 +102,7 @@ def test_an_interrupt_of_which_a_library_made_another_exception_is_one(monkeypat
 ONE_RANK_LEAVES = """
 import sys
 from mpi4py import MPI
-from pipeline.cli.group import _end_ranks
+from epsmesh.cli.group import _end_ranks
 comm = MPI.COMM_WORLD
 if comm.rank == 0:
     comm.barrier()
@@ -120,7 +120,7 @@ def test_a_rank_that_is_interrupted_while_mpi_loads_ends_the_others():
 WITHOUT = """
 import sys
 sys.modules[sys.argv.pop(1)] = None  # as if it were not installed
-from pipeline.__main__ import main
+from epsmesh.__main__ import main
 main()
 """
 

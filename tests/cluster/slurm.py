@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.run.reading import read_rows
-from pipeline.run.store import StoreError
+from epsmesh.run.reading import read_rows
+from epsmesh.run.store import StoreError
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]

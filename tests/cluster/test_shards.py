@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
-from pipeline.report.read import read_file
-from pipeline.run.reading import read_rows
+from epsmesh.report.read import read_file
+from epsmesh.run.reading import read_rows
 from tests.commands import ENVIRONMENT, ROOT, epsmesh
 from tests.compare import all_done, assert_same
 from tests.studies import small_text
@@ -30,7 +30,7 @@ SMALL = small_text(
 # The command, killed in its fourth solve.
 KILLED = """
 import os, signal
-from pipeline.run.runner import StepRunner
+from epsmesh.run.runner import StepRunner
 solve, count = StepRunner._solve, []
 def fatal(*arguments):
     count.append(1)
@@ -38,7 +38,7 @@ def fatal(*arguments):
         os.kill(os.getpid(), signal.SIGKILL)
     return solve(*arguments)
 StepRunner._solve = fatal
-from pipeline.__main__ import main
+from epsmesh.__main__ import main
 main()
 """
 

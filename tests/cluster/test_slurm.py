@@ -31,7 +31,7 @@ STUDY = small_text(
 def cluster(tmp_path_factory) -> Iterator[Cluster]:
     if os.geteuid() != 0:
         pytest.skip("slurmd needs root")
-    command = f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m pipeline "$@"\n'
+    command = f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m epsmesh "$@"\n'
     with started(tmp_path_factory.mktemp("slurm"), command) as running:
         yield running
 
@@ -42,7 +42,7 @@ def serial(tmp_path_factory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("serial")
     study = folder / "cluster.toml"
     study.write_text(STUDY)
-    command = [sys.executable, "-m", "pipeline", "run", study, "--output", folder, "--meshes", folder / "meshes", "-q"]
+    command = [sys.executable, "-m", "epsmesh", "run", study, "--output", folder, "--meshes", folder / "meshes", "-q"]
     subprocess.run(command, cwd=ROOT, env=os.environ | {"OMP_NUM_THREADS": "1"}, check=True)
     return study, folder / "cluster.nc"
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.report.dataset import write
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
-from pipeline.study.starter import starter
+from epsmesh.report.dataset import write
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
+from epsmesh.study.starter import starter
 from tests.docs.blocks import PYTHON, ROOT, blocks, missing, pages
 from tests.report.synthetic import FIGURE, dataset
 from tests.test_cli import ENVIRONMENT
@@ -37,7 +37,7 @@ def checkout(tmp_path_factory):
         shutil.copytree(ROOT / name, root / name)
     (root / "Makefile").symlink_to(ROOT / "Makefile")
     commands = {
-        ".venv/bin/epsmesh": f'exec "{sys.executable}" -m pipeline "$@"',
+        ".venv/bin/epsmesh": f'exec "{sys.executable}" -m epsmesh "$@"',
         ".venv/bin/python": f'exec "{sys.executable}" "$@"',
         "scripts/setup.sh": ":",  # what runs the tests is set up
     }

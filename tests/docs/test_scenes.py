@@ -4,8 +4,8 @@ import importlib.util
 
 import pytest
 
-from pipeline.shapes.registry import BODIES, PROBES
-from pipeline.study.read import read_study
+from epsmesh.shapes.registry import BODIES, PROBES
+from epsmesh.study.read import read_study
 from tests.docs.blocks import ROOT
 
 _SPEC = importlib.util.spec_from_file_location("draw_scenes", ROOT / "docs" / "draw_scenes.py")

@@ -6,10 +6,10 @@ import sys
 
 import pytest
 
-from pipeline.cli import app
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.study.keys import all_sections, keys_of
+from epsmesh.cli import app
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.study.keys import all_sections, keys_of
 from tests.cases import study
 from tests.docs.blocks import ROOT
 

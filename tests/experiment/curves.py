@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.arrays import FloatArray
+from epsmesh.arrays import FloatArray
 
 # A ball of 3 mm on tissue of 20 kPa: 1 mm of air, then 1 mm of contact, in 20 s, and 0.2 mN of noise.
 RADIUS, MODULUS, AIR, DEEP, RAMP, NOISE = 3e-3, 20e3 / 0.75, 1e-3, 1e-3, 20.0, 2e-5

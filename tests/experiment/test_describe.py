@@ -5,11 +5,11 @@ import tomllib
 import numpy as np
 import pytest
 
-from pipeline.experiment.describe import describe
-from pipeline.experiment.read import read_curve
-from pipeline.experiment.reading import ExperimentError, Reading
-from pipeline.study.curves import curves_of
-from pipeline.study.read import parse
+from epsmesh.experiment.describe import describe
+from epsmesh.experiment.read import read_curve
+from epsmesh.experiment.reading import ExperimentError, Reading
+from epsmesh.study.curves import curves_of
+from epsmesh.study.read import parse
 from tests.cases import raw
 from tests.experiment.curves import cycle, write
 

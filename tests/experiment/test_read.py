@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.experiment.read import files_of, read_curve, read_curves
-from pipeline.experiment.reading import ExperimentError, Reading, Window
-from pipeline.study.columns import ColumnUnits
+from epsmesh.experiment.read import files_of, read_curve, read_curves
+from epsmesh.experiment.reading import ExperimentError, Reading, Window
+from epsmesh.study.columns import ColumnUnits
 from tests.experiment.curves import AIR, DEEP, RAMP, approach, cycle, write
 
 TIME, DEPTH, FORCE = approach()

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pipeline.arrays import FloatArray
-from pipeline.experiment.columns import Recorded
-from pipeline.experiment.reading import Reading
-from pipeline.experiment.segments import cycles_of
-from pipeline.experiment.signs import signed, signs_of
+from epsmesh.arrays import FloatArray
+from epsmesh.experiment.columns import Recorded
+from epsmesh.experiment.reading import Reading
+from epsmesh.experiment.segments import cycles_of
+from epsmesh.experiment.signs import signed, signs_of
 
 RAMP = 10.0
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.experiment.read import read_curve
-from pipeline.experiment.reading import ExperimentError, Reading, Window
+from epsmesh.experiment.read import read_curve
+from epsmesh.experiment.reading import ExperimentError, Reading, Window
 from tests.experiment.curves import approach, cycle, write
 
 TIME, DEPTH, FORCE = approach()

@@ -10,20 +10,20 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
+from epsmesh.export.checks import check_touches, margin, narrowest, random_touches, with_bar, with_full
+from epsmesh.export.compliance import coarse_mesh, compliances
+from epsmesh.export.curved import curved_model, upright
+from epsmesh.export.forecast import Export, too_large
+from epsmesh.export.full import Full, Solver, Tool
+from epsmesh.export.ranks import Ranks
+from epsmesh.export.region import Region
+from epsmesh.export.scope import ExportError, scope_of
+from epsmesh.export.tabulate import tabulate
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.study.read import parse
+from epsmesh.verify.compare import solve
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Table
-from pipeline.export.checks import check_touches, margin, narrowest, random_touches, with_bar, with_full
-from pipeline.export.compliance import coarse_mesh, compliances
-from pipeline.export.curved import curved_model, upright
-from pipeline.export.forecast import Export, too_large
-from pipeline.export.full import Full, Solver, Tool
-from pipeline.export.ranks import Ranks
-from pipeline.export.region import Region
-from pipeline.export.scope import ExportError, scope_of
-from pipeline.export.tabulate import tabulate
-from pipeline.solve.physics import MaterialLaw
-from pipeline.study.read import parse
-from pipeline.verify.compare import solve
 from tests.commands import epsmesh
 from tests.organs import sphere, write_stl
 from tests.realtime.synthetic import of_place, random_model

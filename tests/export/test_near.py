@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from epsmesh.export.checks import Check
+from epsmesh.export.full import Solver, Tool
+from epsmesh.export.near import calibrated, near_field, needed_room
+from epsmesh.export.ranks import ALONE
+from epsmesh.export.scope import ExportError, scope_of
+from epsmesh.study.read import parse
 from epsmesh_realtime.table import Near
-from pipeline.export.checks import Check
-from pipeline.export.full import Solver, Tool
-from pipeline.export.near import calibrated, near_field, needed_room
-from pipeline.export.ranks import ALONE
-from pipeline.export.scope import ExportError, scope_of
-from pipeline.study.read import parse
 from tests.realtime.synthetic import of_place
 
 LAYER = {"shape": "cylinder", "radius": "800 mm", "height": "40 mm"}

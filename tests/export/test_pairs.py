@@ -5,17 +5,17 @@ import pytest
 from mpi4py import MPI
 
 from benchmarks.two_discs import forces, meshed
+from epsmesh.export import far, tabulate
+from epsmesh.export.compliance import compliances
+from epsmesh.export.curved import curved_model
+from epsmesh.export.far import FarFields, far_fields
+from epsmesh.export.pairs import tabulate_pairs
+from epsmesh.export.scope import scope_of
+from epsmesh.export.surface_body import surface_body
+from epsmesh.run.case_solution import CaseSolution
+from epsmesh.run.solved import solve_alone, solve_fields
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Table
-from pipeline.export import far, tabulate
-from pipeline.export.compliance import compliances
-from pipeline.export.curved import curved_model
-from pipeline.export.far import FarFields, far_fields
-from pipeline.export.pairs import tabulate_pairs
-from pipeline.export.scope import scope_of
-from pipeline.export.surface_body import surface_body
-from pipeline.run.case_solution import CaseSolution
-from pipeline.run.solved import solve_alone, solve_fields
 from tests.export.test_export import BOX, CYLINDER, DISC, DOME, SKIN, Known, study
 from tests.realtime.synthetic import point_force
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.export import curved, far, tabulate
-from pipeline.export.curved import curved_model
-from pipeline.export.export import export
-from pipeline.export.kept import Kept
-from pipeline.export.ranks import ALONE, Ranks
-from pipeline.export.scope import scope_of
+from epsmesh.export import curved, far, tabulate
+from epsmesh.export.curved import curved_model
+from epsmesh.export.export import export
+from epsmesh.export.kept import Kept
+from epsmesh.export.ranks import ALONE, Ranks
+from epsmesh.export.scope import scope_of
 from tests.export.test_export import CYLINDER, DOME, SOFT, Known, study
 
 pytestmark = pytest.mark.mpi

@@ -5,17 +5,17 @@ from math import pi
 import numpy as np
 import pytest
 
+from epsmesh.compat import geometry_dofs
+from epsmesh.export import compliance, far, tabulate
+from epsmesh.export.compliance import compliances
+from epsmesh.export.curved import curved_model
+from epsmesh.export.far import far_fields
+from epsmesh.export.placed_force import PlacedForce
+from epsmesh.export.scope import scope_of
+from epsmesh.export.surface import tabulate_surface
+from epsmesh.export.surface_body import surface_body
+from epsmesh.mesh.curve import EDGES
 from epsmesh_realtime.surface import SurfaceTable
-from pipeline.compat import geometry_dofs
-from pipeline.export import compliance, far, tabulate
-from pipeline.export.compliance import compliances
-from pipeline.export.curved import curved_model
-from pipeline.export.far import far_fields
-from pipeline.export.placed_force import PlacedForce
-from pipeline.export.scope import scope_of
-from pipeline.export.surface import tabulate_surface
-from pipeline.export.surface_body import surface_body
-from pipeline.mesh.curve import EDGES
 from tests.export.test_export import CYLINDER, DISC, DOME, SKIN, Known, study
 from tests.realtime.synthetic import point_force
 

@@ -10,19 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from epsmesh.experiment.read import read_curve
+from epsmesh.experiment.reading import ExperimentError, Reading
+from epsmesh.export.file import open_model
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.reading import known_of, open_to_read, read_rows
+from epsmesh.run.record import Record
+from epsmesh.run.store import Store, StoreError
+from epsmesh.shapes.files.image import read_image
+from epsmesh.shapes.files.read import read_surface
+from epsmesh.shapes.files.step import entities_of, named_faces, unit_of
+from epsmesh.shapes.triangles import SurfaceError
 from epsmesh_realtime import ModelError
 from epsmesh_realtime import read as read_model
-from pipeline.experiment.read import read_curve
-from pipeline.experiment.reading import ExperimentError, Reading
-from pipeline.export.file import open_model
-from pipeline.plan.plan import make_plan
-from pipeline.run.reading import known_of, open_to_read, read_rows
-from pipeline.run.record import Record
-from pipeline.run.store import Store, StoreError
-from pipeline.shapes.files.image import read_image
-from pipeline.shapes.files.read import read_surface
-from pipeline.shapes.files.step import entities_of, named_faces, unit_of
-from pipeline.shapes.triangles import SurfaceError
 from tests.cases import study
 from tests.experiment.curves import cycle, write
 from tests.fuzz.profile import thrown

@@ -17,11 +17,11 @@ SIZE = 100_000_000  # bytes
 # What would end the machine ends the process first: bytes.
 _LIMIT = 6 << 30
 _READERS = {
-    "study": "from pipeline.study.read import read_study; read_study(Path(sys.argv[1]))",
-    "surface": "from pipeline.shapes.files.read import read_surface; read_surface(Path(sys.argv[1]), 1e-3)",
-    "step": "from pipeline.shapes.files.step import entities_of; entities_of(Path(sys.argv[1]).read_bytes())",
-    "dataset": "from pipeline.report.read import read; read(Path(sys.argv[1]))",
-    "store": "from pipeline.run.reading import read_rows; read_rows(Path(sys.argv[1]))",
+    "study": "from epsmesh.study.read import read_study; read_study(Path(sys.argv[1]))",
+    "surface": "from epsmesh.shapes.files.read import read_surface; read_surface(Path(sys.argv[1]), 1e-3)",
+    "step": "from epsmesh.shapes.files.step import entities_of; entities_of(Path(sys.argv[1]).read_bytes())",
+    "dataset": "from epsmesh.report.read import read; read(Path(sys.argv[1]))",
+    "store": "from epsmesh.run.reading import read_rows; read_rows(Path(sys.argv[1]))",
     "model": "from epsmesh_realtime import read; read(sys.argv[1])",
 }
 _READ = r"""

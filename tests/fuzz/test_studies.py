@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from hypothesis import given
 
-from pipeline.plan.describe import summary
-from pipeline.plan.plan import make_plan
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse, read_study
-from pipeline.study.sweep import Study
+from epsmesh.plan.describe import summary
+from epsmesh.plan.plan import make_plan
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse, read_study
+from epsmesh.study.sweep import Study
 from tests.cases import raw, study
 from tests.fuzz.profile import thrown
 from tests.fuzz.studies import extreme, near, studies, texts, toml

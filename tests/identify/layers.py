@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays import FloatArray
-from pipeline.identify.parts import Values
-from pipeline.layered.body import LayeredBody
-from pipeline.layered.compliance import Layer
-from pipeline.layered.contact import Profile
+from epsmesh.arrays import FloatArray
+from epsmesh.identify.parts import Values
+from epsmesh.layered.body import LayeredBody
+from epsmesh.layered.compliance import Layer
+from epsmesh.layered.contact import Profile
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays import FloatArray
-from pipeline.experiment.curve import Curve
-from pipeline.identify.parts import Measured, Unknown, Values
+from epsmesh.arrays import FloatArray
+from epsmesh.experiment.curve import Curve
+from epsmesh.identify.parts import Measured, Unknown, Values
 
 YOUNG = Unknown("young", 1e3, 1e6, "Pa", is_logarithmic=True)
 POISSON = Unknown("poisson", 0.2, 0.5, "1")

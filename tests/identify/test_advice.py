@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.identify.advice import advice
-from pipeline.identify.estimate import identify
-from pipeline.study.read import parse
-from pipeline.study.toml import to_toml
+from epsmesh.identify.advice import advice
+from epsmesh.identify.estimate import identify
+from epsmesh.study.read import parse
+from epsmesh.study.toml import to_toml
 from tests.identify.synthetic import POISSON, YOUNG
 from tests.identify.test_seen import punches
 

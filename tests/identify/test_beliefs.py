@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from pipeline.identify.beliefs import LOG_NOISE, LOG_SIZE, beliefs
-from pipeline.identify.mixture import mixture_of
-from pipeline.identify.noise import DEVIATIONS, GRID, TERMS, Noise, grams
+from epsmesh.identify.beliefs import LOG_NOISE, LOG_SIZE, beliefs
+from epsmesh.identify.mixture import mixture_of
+from epsmesh.identify.noise import DEVIATIONS, GRID, TERMS, Noise, grams
 from tests.identify.synthetic import noise
 
 COUNT = 200

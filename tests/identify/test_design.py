@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.identify import design as module
-from pipeline.identify.candidates import candidates, planned_trials
-from pipeline.identify.design import USUAL, Designer, rank
-from pipeline.identify.design_text import as_data, lines
-from pipeline.identify.estimate import identify
-from pipeline.study.read import parse
-from pipeline.study.toml import to_toml
-from pipeline.surrogate.build import build
-from pipeline.surrogate.cases import SurrogateError, domain_of
-from pipeline.surrogate.wide import solve_wide
+from epsmesh.identify import design as module
+from epsmesh.identify.candidates import candidates, planned_trials
+from epsmesh.identify.design import USUAL, Designer, rank
+from epsmesh.identify.design_text import as_data, lines
+from epsmesh.identify.estimate import identify
+from epsmesh.study.read import parse
+from epsmesh.study.toml import to_toml
+from epsmesh.surrogate.build import build
+from epsmesh.surrogate.cases import SurrogateError, domain_of
+from epsmesh.surrogate.wide import solve_wide
 from tests.identify.synthetic import noise
 
 FILE = "design.toml"

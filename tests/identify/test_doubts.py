@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.experiment.curve import Curve
-from pipeline.identify.doubts import doubts_of_force, doubts_of_moduli, doubts_of_radius, doubts_of_scale
-from pipeline.identify.experiment import cases_of
-from pipeline.identify.parts import Measured, Unknown
-from pipeline.study.read import parse
+from epsmesh.experiment.curve import Curve
+from epsmesh.identify.doubts import doubts_of_force, doubts_of_moduli, doubts_of_radius, doubts_of_scale
+from epsmesh.identify.experiment import cases_of
+from epsmesh.identify.parts import Measured, Unknown
+from epsmesh.study.read import parse
 from tests.cases import raw
 
 

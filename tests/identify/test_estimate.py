@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.experiment.curve import Curve
-from pipeline.experiment.reading import ExperimentError
-from pipeline.identify.estimate import identify
-from pipeline.identify.parts import SOURCES, Measured, Unknown
+from epsmesh.experiment.curve import Curve
+from epsmesh.experiment.reading import ExperimentError
+from epsmesh.identify.estimate import identify
+from epsmesh.identify.parts import SOURCES, Measured, Unknown
 from tests.identify.synthetic import POISSON, YOUNG, Ball, Punch, measured, noise
 
 

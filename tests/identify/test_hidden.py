@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from pipeline.identify import hidden
-from pipeline.identify.fit import fit
-from pipeline.identify.hidden import hidden_bars
-from pipeline.identify.model import Model
-from pipeline.identify.parts import Unknown
-from pipeline.identify.start import start
+from epsmesh.identify import hidden
+from epsmesh.identify.fit import fit
+from epsmesh.identify.hidden import hidden_bars
+from epsmesh.identify.model import Model
+from epsmesh.identify.parts import Unknown
+from epsmesh.identify.start import start
 from tests.identify.synthetic import YOUNG, Ball, measured, noise
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.identify.estimate import identify
-from pipeline.identify.parts import Measured, Unknown
+from epsmesh.identify.estimate import identify
+from epsmesh.identify.parts import Measured, Unknown
 from tests.identify.synthetic import POISSON, YOUNG, Ball, Punch, measured, noise
 
 

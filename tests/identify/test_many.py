@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.experiment.curve import Curve
-from pipeline.identify.experiment import Scenes, Specimen
-from pipeline.identify.forward import SceneForce, unknown_domain
-from pipeline.identify.kept import Kept
-from pipeline.identify.many import Work
-from pipeline.identify.unknowns import unknowns
-from pipeline.study.read import parse
-from pipeline.study.toml import to_toml
-from pipeline.surrogate.build import build
+from epsmesh.experiment.curve import Curve
+from epsmesh.identify.experiment import Scenes, Specimen
+from epsmesh.identify.forward import SceneForce, unknown_domain
+from epsmesh.identify.kept import Kept
+from epsmesh.identify.many import Work
+from epsmesh.identify.unknowns import unknowns
+from epsmesh.study.read import parse
+from epsmesh.study.toml import to_toml
+from epsmesh.surrogate.build import build
 from tests.identify.synthetic import noise
 from tests.surrogate.scenes import BALL, solved_by
 

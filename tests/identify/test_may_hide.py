@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pipeline.identify.may_hide import KINDS, hidden_parts
-from pipeline.identify.tools import tip_of_probe
-from pipeline.layered.body import LayeredBody
-from pipeline.layered.compliance import Solid
-from pipeline.shapes.rounded import Rounded
-from pipeline.surrogate.wide import profile_of
+from epsmesh.identify.may_hide import KINDS, hidden_parts
+from epsmesh.identify.tools import tip_of_probe
+from epsmesh.layered.body import LayeredBody
+from epsmesh.layered.compliance import Solid
+from epsmesh.shapes.rounded import Rounded
+from epsmesh.surrogate.wide import profile_of
 from tests.cases import probe
 
 NOTHING = {

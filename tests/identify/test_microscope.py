@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from pipeline.experiment.curve import Curve
-from pipeline.identify.attraction import attraction
-from pipeline.identify.estimate import identify
-from pipeline.identify.hertz import hertz_young
-from pipeline.identify.parts import Measured, Unknown
-from pipeline.identify.tabulated import tabulated
-from pipeline.layered.body import RIGID, LayeredBody
-from pipeline.layered.compliance import Layer
-from pipeline.layered.contact import Profile
-from pipeline.study.read import parse
+from epsmesh.experiment.curve import Curve
+from epsmesh.identify.attraction import attraction
+from epsmesh.identify.estimate import identify
+from epsmesh.identify.hertz import hertz_young
+from epsmesh.identify.parts import Measured, Unknown
+from epsmesh.identify.tabulated import tabulated
+from epsmesh.layered.body import RIGID, LayeredBody
+from epsmesh.layered.compliance import Layer
+from epsmesh.layered.contact import Profile
+from epsmesh.study.read import parse
 from tests.cases import raw
 from tests.identify.layers import OnLayers
 from tests.identify.synthetic import Ball, measured, noise

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from pipeline.experiment.curve import Curve
-from pipeline.identify.estimate import identify
-from pipeline.identify.model import Model
-from pipeline.identify.noise import Noise, deviation, whiten
-from pipeline.identify.parts import Measured
-from pipeline.identify.relaxing import relaxed
-from pipeline.viscoelastic import Motion, respond
+from epsmesh.experiment.curve import Curve
+from epsmesh.identify.estimate import identify
+from epsmesh.identify.model import Model
+from epsmesh.identify.noise import Noise, deviation, whiten
+from epsmesh.identify.parts import Measured
+from epsmesh.identify.relaxing import relaxed
+from epsmesh.viscoelastic import Motion, respond
 from tests.identify.synthetic import DRIFT, YOUNG, Ball, measured, noise
 
 

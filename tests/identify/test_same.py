@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from pipeline.experiment.curve import Curve
-from pipeline.experiment.read import read_curve
-from pipeline.experiment.reading import ExperimentError, Reading
-from pipeline.identify.estimate import identify
-from pipeline.identify.parts import Measured
+from epsmesh.experiment.curve import Curve
+from epsmesh.experiment.read import read_curve
+from epsmesh.experiment.reading import ExperimentError, Reading
+from epsmesh.identify.estimate import identify
+from epsmesh.identify.parts import Measured
 from tests.identify.synthetic import YOUNG, Ball, Punch, measured, noise
 
 FLAT = Punch(names=("young",))

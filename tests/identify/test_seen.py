@@ -5,10 +5,10 @@ import re
 import numpy as np
 import pytest
 
-from pipeline.identify.estimate import identify
-from pipeline.identify.parts import Unknown
-from pipeline.identify.seen import product
-from pipeline.layered.contact import flat
+from epsmesh.identify.estimate import identify
+from epsmesh.identify.parts import Unknown
+from epsmesh.identify.seen import product
+from epsmesh.layered.contact import flat
 from tests.identify.layers import OnLayers, pad
 from tests.identify.synthetic import POISSON, YOUNG, measured, noise
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.identify.tabulated import tabulated
+from epsmesh.identify.tabulated import tabulated
 from tests.identify.synthetic import POISSON, YOUNG, Ball, Punch
 
 DEPTH = np.linspace(-1e-5, 2e-4, 50)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from pipeline.insertion.near_tip import NearTip, strength
-from pipeline.insertion.paths import lacking
-from pipeline.plan.plan import make_plan
-from pipeline.run.record import Record
-from pipeline.states import FAILED, OK
+from epsmesh.insertion.near_tip import NearTip, strength
+from epsmesh.insertion.paths import lacking
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.record import Record
+from epsmesh.states import FAILED, OK
 
 LENGTH, WIDTH, YOUNG, POISSON = 8e-3, 0.4e-3, 20e3, 0.3
 STIFFNESS, GROWTH, FAR = 80.0, 1e-3, 5e-3  # N/m, N, m

@@ -5,13 +5,13 @@ from math import pi
 import pytest
 from scipy.optimize import brentq
 
-from pipeline.insertion.paths import lacking, paths, scenes
-from pipeline.insertion.steps import CUTTING
-from pipeline.plan.plan import make_plan
-from pipeline.run.record import Record
-from pipeline.states import FAILED, OK, PARTIAL
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh.insertion.paths import lacking, paths, scenes
+from epsmesh.insertion.steps import CUTTING
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.record import Record
+from epsmesh.states import FAILED, OK, PARTIAL
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 from tests.insertion.scenes import answered
 
 RADIUS, STIFFNESS = 0.5e-3, 2e4  # m, N/m²

@@ -11,22 +11,22 @@ from mpi4py import MPI
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from pipeline import workflow
-from pipeline.insertion.paths import followed, paths, possible
-from pipeline.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.report.insertion import answer
-from pipeline.report.page.facts import of_paths
-from pipeline.run.record import Record
-from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.plane import needle
-from pipeline.solve.plane.opening import Opening
-from pipeline.solve.solution import Request
-from pipeline.states import OK, PARTIAL
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh import workflow
+from epsmesh.insertion.paths import followed, paths, possible
+from epsmesh.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.report.insertion import answer
+from epsmesh.report.page.facts import of_paths
+from epsmesh.run.record import Record
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.plane import needle
+from epsmesh.solve.plane.opening import Opening
+from epsmesh.solve.solution import Request
+from epsmesh.states import OK, PARTIAL
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 from tests.insertion.scenes import answered
 
 RADIUS, FRICTION, STORED, TORN, SQUEEZE, STIFFNESS = 0.5e-3, 0.25, 6e-3, 3e-3, 30.0, 2e4  # m, 1, N, N, N/m, N/m²

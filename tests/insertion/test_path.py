@@ -9,17 +9,17 @@ import xarray as xr
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from pipeline.insertion.friction import reaction
-from pipeline.insertion.near_tip import NearTip
-from pipeline.insertion.paths import complete, lacking, possible
-from pipeline.insertion.steps import PHASES
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.report.figures.insertion import insertion
-from pipeline.report.guide import guide
-from pipeline.run.stop import reason_to_skip, waves
-from pipeline.study.problems import StudyError
-from pipeline.study.read import read_mapping
+from epsmesh.insertion.friction import reaction
+from epsmesh.insertion.near_tip import NearTip
+from epsmesh.insertion.paths import complete, lacking, possible
+from epsmesh.insertion.steps import PHASES
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.report.figures.insertion import insertion
+from epsmesh.report.guide import guide
+from epsmesh.run.stop import reason_to_skip, waves
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import read_mapping
 from tests.insertion.scenes import BLADE, FIELD, LENGTH, SCENE, STIFFNESS, elastic, solved, stored
 
 # The blade on a half-space (N/m), by the rectangle's formula: what tissue above adds at most.

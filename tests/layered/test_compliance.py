@@ -5,8 +5,8 @@ from math import inf
 import numpy as np
 import pytest
 
-from pipeline.layered.body import RIGID, LayeredBody
-from pipeline.layered.compliance import Layer, Solid
+from epsmesh.layered.body import RIGID, LayeredBody
+from epsmesh.layered.compliance import Layer, Solid
 
 S = np.array([1e-3, 0.01, 0.1, 0.5, 1.0, 3.0, 10.0])
 THICKNESS = 2.0

@@ -5,11 +5,11 @@ from math import pi, radians, tan
 import numpy as np
 import pytest
 
-from pipeline.layered.body import LayeredBody
-from pipeline.layered.compliance import Layer, Solid
-from pipeline.layered.contact import Profile, flat
-from pipeline.shapes.rounded import Rounded
-from pipeline.verify.known import LAYER, LAYER_ERROR
+from epsmesh.layered.body import LayeredBody
+from epsmesh.layered.compliance import Layer, Solid
+from epsmesh.layered.contact import Profile, flat
+from epsmesh.shapes.rounded import Rounded
+from epsmesh.verify.known import LAYER, LAYER_ERROR
 
 E, NU, R = 1e4, 0.3, 8e-3
 PLANE = E / (1 - NU**2)

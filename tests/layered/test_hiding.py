@@ -5,11 +5,11 @@ from math import radians
 import numpy as np
 import pytest
 
-from pipeline.layered.body import LayeredBody
-from pipeline.layered.compliance import Layer, Solid
-from pipeline.layered.contact import Profile, flat
-from pipeline.layered.hiding import base_factor, flat_tip, layer_factor, strain_factor, tip_of
-from pipeline.shapes.rounded import Rounded
+from epsmesh.layered.body import LayeredBody
+from epsmesh.layered.compliance import Layer, Solid
+from epsmesh.layered.contact import Profile, flat
+from epsmesh.layered.hiding import base_factor, flat_tip, layer_factor, strain_factor, tip_of
+from epsmesh.shapes.rounded import Rounded
 
 NU, R, DEEPEST = 0.45, 8e-3, 1e-3
 ROUNDED = Rounded(radians(70), 1e-3)

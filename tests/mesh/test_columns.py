@@ -7,7 +7,7 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 
-from pipeline.mesh.of_case import mesh_arrays
+from epsmesh.mesh.of_case import mesh_arrays
 from tests.cases import solve, study
 from tests.mesh.test_mesh import area
 from tests.mesh.test_regions import volumes

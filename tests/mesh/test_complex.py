@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.mesh.generate import MeshError
-from pipeline.mesh.organ.base import base
-from pipeline.mesh.organ.field import Field
-from pipeline.mesh.organ.remesh import _closed
-from pipeline.mesh.organ.sheet import FIXED, TangledError
-from pipeline.mesh.organ.untangle import untangled
-from pipeline.mesh.organ.volume import fill
-from pipeline.mesh.size import Sizes
-from pipeline.shapes.complex import OUTSIDE, Complex
-from pipeline.shapes.files.crossings import crossings
-from pipeline.shapes.frame import Frame
-from pipeline.shapes.skin import Skin
+from epsmesh.mesh.generate import MeshError
+from epsmesh.mesh.organ.base import base
+from epsmesh.mesh.organ.field import Field
+from epsmesh.mesh.organ.remesh import _closed
+from epsmesh.mesh.organ.sheet import FIXED, TangledError
+from epsmesh.mesh.organ.untangle import untangled
+from epsmesh.mesh.organ.volume import fill
+from epsmesh.mesh.size import Sizes
+from epsmesh.shapes.complex import OUTSIDE, Complex
+from epsmesh.shapes.files.crossings import crossings
+from epsmesh.shapes.frame import Frame
+from epsmesh.shapes.skin import Skin
 from tests.complexes import are_closed, blocks, neighbours, parted, scene
 
 APART = np.array([[[1, 0, 1]]])

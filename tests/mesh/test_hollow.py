@@ -5,11 +5,11 @@ from math import pi
 import numpy as np
 import pytest
 
-from pipeline.mesh.of_case import mesh_arrays
-from pipeline.plan.key import case_key, mesh_key
-from pipeline.run.loads import loads_of
-from pipeline.scene.model import FREE
-from pipeline.study.problems import StudyError
+from epsmesh.mesh.of_case import mesh_arrays
+from epsmesh.plan.key import case_key, mesh_key
+from epsmesh.run.loads import loads_of
+from epsmesh.scene.model import FREE
+from epsmesh.study.problems import StudyError
 from tests.cases import solve, study
 from tests.organs import sphere, write_stl
 
@@ -62,9 +62,9 @@ def test_a_pressure_in_it_is_a_traction_on_its_wall_alone(folder):
     """The resultant on a closed wall is zero, its size is p A; what acts on the free surface is outside."""
     from mpi4py import MPI
 
-    from pipeline.run.meshing import mesh_case
-    from pipeline.solve.compiled import vector_space
-    from pipeline.solve.loads import apply_loads
+    from epsmesh.run.meshing import mesh_case
+    from epsmesh.solve.compiled import vector_space
+    from epsmesh.solve.loads import apply_loads
 
     with_pressure, on_name = (
         case_of(folder, pressure="2 kPa"),

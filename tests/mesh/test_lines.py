@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.mesh.organ.contact import cross
+from epsmesh.mesh.organ.contact import cross
 
 _SQUARE = np.array([[0.0, 0.0], [1, 0], [1, 1], [0, 1]])
 

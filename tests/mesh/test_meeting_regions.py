@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.export.scope import ExportError, scope_of
-from pipeline.mesh.of_case import mesh_arrays
-from pipeline.run import meshing
-from pipeline.shapes.files.labels import LabelMap
-from pipeline.study.problems import StudyError
+from epsmesh.export.scope import ExportError, scope_of
+from epsmesh.mesh.of_case import mesh_arrays
+from epsmesh.run import meshing
+from epsmesh.shapes.files.labels import LabelMap
+from epsmesh.study.problems import StudyError
 from tests.cases import solve, study
 from tests.complexes import scene
 

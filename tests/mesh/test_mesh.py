@@ -10,13 +10,13 @@ import gmsh
 import numpy as np
 import pytest
 
-from pipeline.compat import gmsh_session
-from pipeline.mesh.curve import curve
-from pipeline.mesh.generate import MeshArrays, MeshError, generate
-from pipeline.mesh.of_case import mesh_arrays
-from pipeline.mesh.reflect import reflect
-from pipeline.mesh.size import Sizes
-from pipeline.scene.model import Scene
+from epsmesh.compat import gmsh_session
+from epsmesh.mesh.curve import curve
+from epsmesh.mesh.generate import MeshArrays, MeshError, generate
+from epsmesh.mesh.of_case import mesh_arrays
+from epsmesh.mesh.reflect import reflect
+from epsmesh.mesh.size import Sizes
+from epsmesh.scene.model import Scene
 from tests.cases import BLADE, study
 from tests.sampling import sampled
 

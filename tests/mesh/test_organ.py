@@ -9,24 +9,24 @@ import numpy as np
 import pytest
 from basix import CellType, make_quadrature
 
-from pipeline.mesh.curve import EDGES, curve
-from pipeline.mesh.generate import MeshError, flat_cells
-from pipeline.mesh.of_case import mesh_arrays, sizes_of
-from pipeline.mesh.organ import make
-from pipeline.mesh.organ.base import far_surface
-from pipeline.mesh.organ.contact import set_in
-from pipeline.mesh.organ.make import mesh_organ, mesh_scanned
-from pipeline.mesh.organ.remesh import _closed
-from pipeline.mesh.organ.sheet import FREE, PROBE, Sheet, TangledError, edges_of
-from pipeline.mesh.organ.untangle import bad_facets, untangled
-from pipeline.mesh.size import Sizes
-from pipeline.plan.plan import make_plan
-from pipeline.scene.model import Scene
-from pipeline.shapes.bodies.surface import FromSurface
-from pipeline.shapes.files.stl import written
-from pipeline.shapes.frame import Frame
-from pipeline.shapes.surface import Surface
-from pipeline.study.read import parse
+from epsmesh.mesh.curve import EDGES, curve
+from epsmesh.mesh.generate import MeshError, flat_cells
+from epsmesh.mesh.of_case import mesh_arrays, sizes_of
+from epsmesh.mesh.organ import make
+from epsmesh.mesh.organ.base import far_surface
+from epsmesh.mesh.organ.contact import set_in
+from epsmesh.mesh.organ.make import mesh_organ, mesh_scanned
+from epsmesh.mesh.organ.remesh import _closed
+from epsmesh.mesh.organ.sheet import FREE, PROBE, Sheet, TangledError, edges_of
+from epsmesh.mesh.organ.untangle import bad_facets, untangled
+from epsmesh.mesh.size import Sizes
+from epsmesh.plan.plan import make_plan
+from epsmesh.scene.model import Scene
+from epsmesh.shapes.bodies.surface import FromSurface
+from epsmesh.shapes.files.stl import written
+from epsmesh.shapes.frame import Frame
+from epsmesh.shapes.surface import Surface
+from epsmesh.study.read import parse
 from tests.cases import raw, study
 from tests.folded import folded, study_of
 from tests.mesh.test_mesh import area, volume

@@ -5,11 +5,11 @@ from math import pi
 import numpy as np
 import pytest
 
-from pipeline.mesh.generate import MeshError
-from pipeline.mesh.of_case import mesh_arrays
-from pipeline.mesh.organ import make, regions
-from pipeline.mesh.organ.embedded import embedded_surfaces
-from pipeline.plan.key import case_key, mesh_key
+from epsmesh.mesh.generate import MeshError
+from epsmesh.mesh.of_case import mesh_arrays
+from epsmesh.mesh.organ import make, regions
+from epsmesh.mesh.organ.embedded import embedded_surfaces
+from epsmesh.plan.key import case_key, mesh_key
 from tests.cases import study
 from tests.mesh.test_regions import volumes
 from tests.organs import ellipsoid, write_stl

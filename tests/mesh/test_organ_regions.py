@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from pipeline.mesh.of_case import mesh_arrays
-from pipeline.plan.describe import summary
-from pipeline.plan.key import case_key, mesh_key
-from pipeline.plan.plan import make_plan
-from pipeline.shapes.ovoid import Ovoid
-from pipeline.shapes.shell import Shell
-from pipeline.shapes.triangles import Triangles
-from pipeline.study.problems import StudyError
+from epsmesh.mesh.of_case import mesh_arrays
+from epsmesh.plan.describe import summary
+from epsmesh.plan.key import case_key, mesh_key
+from epsmesh.plan.plan import make_plan
+from epsmesh.shapes.ovoid import Ovoid
+from epsmesh.shapes.shell import Shell
+from epsmesh.shapes.triangles import Triangles
+from epsmesh.study.problems import StudyError
 from tests.cases import solve, study
 from tests.mesh.test_regions import volumes
 from tests.organs import AXES, ellipsoid, sphere, write_labels, write_stl

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.mesh.generate import MeshArrays, MeshError
-from pipeline.mesh.of_case import coarse_arrays, mesh_arrays, refined_arrays, unrefined_arrays
-from pipeline.mesh.parts import split
-from pipeline.plan import refinement
-from pipeline.plan.estimate import FLATTEST
-from pipeline.plan.key import mesh_key
-from pipeline.plan.symmetry import mirror_planes
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import CaseFailure
-from pipeline.study.case import Case
+from epsmesh.mesh.generate import MeshArrays, MeshError
+from epsmesh.mesh.of_case import coarse_arrays, mesh_arrays, refined_arrays, unrefined_arrays
+from epsmesh.mesh.parts import split
+from epsmesh.plan import refinement
+from epsmesh.plan.estimate import FLATTEST
+from epsmesh.plan.key import mesh_key
+from epsmesh.plan.symmetry import mirror_planes
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import CaseFailure
+from epsmesh.study.case import Case
 from tests.cases import BLADE, solve, study
 from tests.mesh.test_mesh import area
 
@@ -204,8 +204,8 @@ def test_a_coarse_mesh_that_failed_is_not_made_again_and_one_that_lacked_memory_
         made.append("whole")
         raise MeshError("gmsh")
 
-    monkeypatch.setattr("pipeline.run.meshing.coarse_arrays", coarse)
-    monkeypatch.setattr("pipeline.run.meshing.unrefined_arrays", entire)
+    monkeypatch.setattr("epsmesh.run.meshing.coarse_arrays", coarse)
+    monkeypatch.setattr("epsmesh.run.meshing.unrefined_arrays", entire)
     with refining(1), pytest.raises(CaseFailure if tried == ["coarse"] else MeshError, match=r"40 GiB|gmsh"):
         mesh_case(study(mesh={"fine": "3 mm"}).case(()), (), MPI.COMM_SELF)
     assert made == tried

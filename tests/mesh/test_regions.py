@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline import compat
-from pipeline.mesh.distribute import distribute
-from pipeline.mesh.generate import MeshArrays
-from pipeline.mesh.of_case import mesh_arrays
-from pipeline.mesh.reflect import reflect
-from pipeline.plan.symmetry import mirror_planes
-from pipeline.run.mesh_cache import MeshCache
+from epsmesh import compat
+from epsmesh.mesh.distribute import distribute
+from epsmesh.mesh.generate import MeshArrays
+from epsmesh.mesh.of_case import mesh_arrays
+from epsmesh.mesh.reflect import reflect
+from epsmesh.plan.symmetry import mirror_planes
+from epsmesh.run.mesh_cache import MeshCache
 from tests.cases import solve, study
 
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.3}

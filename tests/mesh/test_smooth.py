@@ -5,10 +5,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from pipeline.mesh.generate import MeshArrays, generate
-from pipeline.mesh.of_case import _scene
-from pipeline.mesh.smooth import smoothed
-from pipeline.scene.model import FREE
+from epsmesh.mesh.generate import MeshArrays, generate
+from epsmesh.mesh.of_case import _scene
+from epsmesh.mesh.smooth import smoothed
+from epsmesh.scene.model import FREE
 from tests.cases import study
 
 SKIN = {"name": "skin", "thickness": "4 mm", "young": "50 kPa", "poisson": 0.3}

@@ -4,16 +4,16 @@ import gmsh
 import numpy as np
 import pytest
 
-from pipeline.compat import gmsh_session
-from pipeline.mesh.of_case import mesh_arrays
-from pipeline.plan.key import case_key, mesh_key
-from pipeline.plan.plan import make_plan
-from pipeline.plan.symmetry import mirror_planes
-from pipeline.report.dataset import build
-from pipeline.scene.model import FREE
-from pipeline.shapes.shell import Shell
-from pipeline.shapes.triangles import Triangles
-from pipeline.study.problems import StudyError
+from epsmesh.compat import gmsh_session
+from epsmesh.mesh.of_case import mesh_arrays
+from epsmesh.plan.key import case_key, mesh_key
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.symmetry import mirror_planes
+from epsmesh.report.dataset import build
+from epsmesh.scene.model import FREE
+from epsmesh.shapes.shell import Shell
+from epsmesh.shapes.triangles import Triangles
+from epsmesh.study.problems import StudyError
 from tests.cases import solve, study
 from tests.mesh.test_regions import volumes
 from tests.organs import sphere, write_stl

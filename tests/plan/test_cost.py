@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import pipeline
-from pipeline.plan.cost import CostModel, Observation, fit
-from pipeline.plan.plan import declare, first_attempts
-from pipeline.plan.steps import OperatorStep
-from pipeline.run.record import Record
-from pipeline.run.store import Store
-from pipeline.study.read import read_text
+import epsmesh
+from epsmesh.plan.cost import CostModel, Observation, fit
+from epsmesh.plan.plan import declare, first_attempts
+from epsmesh.plan.steps import OperatorStep
+from epsmesh.run.record import Record
+from epsmesh.run.store import Store
+from epsmesh.study.read import read_text
+from tests import commands
 from tests.cases import study
-from tests.commands import epsmesh
 
 KIND = "displacement 2"
 STUDY = """
@@ -66,7 +66,7 @@ def test_estimates_follow_what_the_store_knows(factor, tmp_path):
     file = tmp_path / "next.toml"
     file.write_text(STUDY)
     known = tmp_path / "cases.sqlite"
-    first = pipeline.read(file).summary()["seconds"]
+    first = epsmesh.read(file).summary()["seconds"]
     store = Store(known)
     model = CostModel()
     for number in range(20):
@@ -80,12 +80,12 @@ def test_estimates_follow_what_the_store_knows(factor, tmp_path):
         )  # fmt: skip
     store.put(Record("other", "failed", "no force"))
     store.close()
-    told = pipeline.read(file).summary(store=known)
+    told = epsmesh.read(file).summary(store=known)
     assert told["fitted_to"] == 20
     assert told["factor"] < 2.0
     assert told["seconds"] == pytest.approx(factor * first, rel=0.2)
-    assert pipeline.read(file).summary()["fitted_to"] == 0
-    shown = epsmesh("plan", file, "--store", known, "--json")
+    assert epsmesh.read(file).summary()["fitted_to"] == 0
+    shown = commands.epsmesh("plan", file, "--store", known, "--json")
     assert json.loads(shown.stdout)["seconds"] == pytest.approx(told["seconds"])
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.run.execute import compute
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run.execute import compute
 from tests.cases import BLADE, study
 
 ROUND = {"shape": "cylinder", "radius": "20 mm", "height": "15 mm"}

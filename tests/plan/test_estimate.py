@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.mesh.of_case import mesh_arrays
-from pipeline.plan import estimate
-from pipeline.plan.cost import CostModel, features
-from pipeline.plan.describe import summary
-from pipeline.plan.plan import make_plan
-from pipeline.plan.steps import MeshStep, OperatorStep, mesh_steps
-from pipeline.run.problem import memory_of
-from pipeline.shapes.files.stl import written
+from epsmesh.mesh.of_case import mesh_arrays
+from epsmesh.plan import estimate
+from epsmesh.plan.cost import CostModel, features
+from epsmesh.plan.describe import summary
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.steps import MeshStep, OperatorStep, mesh_steps
+from epsmesh.run.problem import memory_of
+from epsmesh.shapes.files.stl import written
 from tests.cases import BLADE, solve, study
 from tests.folded import folded, study_of
 

@@ -7,16 +7,16 @@ import pytest
 import xarray as xr
 from mpi4py import MPI
 
-from pipeline.plan.describe import story
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.run.completion import complete, possible
-from pipeline.run.execute import compute
-from pipeline.run.record import Record
-from pipeline.states import FAILED, OK
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse, read_study
-from pipeline.study.toml import to_toml
+from epsmesh.plan.describe import story
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run.completion import complete, possible
+from epsmesh.run.execute import compute
+from epsmesh.run.record import Record
+from epsmesh.states import FAILED, OK
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse, read_study
+from epsmesh.study.toml import to_toml
 
 LINE = {"line": {"from": ["-11 mm", "2 mm"], "to": ["9 mm", "3 mm"], "steps": 41}}
 TUMOUR = {"name": "tumour", "at": ["1 mm", "2 mm", "-7 mm"], "radius": "4 mm", "young": "80 kPa", "poisson": 0.3}

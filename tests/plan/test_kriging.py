@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.plan.kriging import Field, cover
-from pipeline.plan.place_path import PlacePath
+from epsmesh.plan.kriging import Field, cover
+from epsmesh.plan.place_path import PlacePath
 
 X, Y = (grid.ravel() for grid in np.meshgrid(np.linspace(-24, 24, 20), np.linspace(-16, 16, 20)))
 PLACES = np.stack([X, Y, 0.01 * Y**2], axis=1)

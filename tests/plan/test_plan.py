@@ -2,9 +2,9 @@
 
 import pytest
 
-from pipeline.plan.describe import summary
-from pipeline.plan.plan import declare, make_plan
-from pipeline.study.read import parse
+from epsmesh.plan.describe import summary
+from epsmesh.plan.plan import declare, make_plan
+from epsmesh.study.read import parse
 from tests.cases import BLADE, raw, study
 
 SWEEP = {"material": {"poisson": [0.3, 0.4]}, "mesh": {"epsilon": ["5 mm", "full"], "outside": ["coarse", "free"]}}

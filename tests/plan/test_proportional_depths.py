@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.describe import story
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.run.execute import compute
-from pipeline.study.read import parse
+from epsmesh.plan.describe import story
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run.execute import compute
+from epsmesh.study.read import parse
 from tests.cases import raw
 
 # A disc on a stiff skin, from which tissue lifts off within: the area of contact is a question, and has no depth in it.

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.describe import story, summary
-from pipeline.plan.plan import make_plan
-from pipeline.plan.reductions import REDUCTIONS
-from pipeline.report.dataset import build
-from pipeline.run.execute import compute
-from pipeline.study.read import parse
+from epsmesh.plan.describe import story, summary
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.reductions import REDUCTIONS
+from epsmesh.report.dataset import build
+from epsmesh.run.execute import compute
+from epsmesh.study.read import parse
 from tests.cases import BLADE, raw, study
 
 ROUND = {"shape": "cylinder", "radius": "20 mm", "height": "15 mm"}

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from pipeline.mesh.of_case import meridian_of
-from pipeline.plan.symmetry import is_round
-from pipeline.study.read import parse
+from epsmesh.mesh.of_case import meridian_of
+from epsmesh.plan.symmetry import is_round
+from epsmesh.study.read import parse
 from tests.cases import raw
 
 CYLINDER = {"shape": "cylinder", "radius": "20 mm", "height": "10 mm", "fixed": "bottom", "size": None}

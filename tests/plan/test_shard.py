@@ -2,10 +2,10 @@
 
 import pytest
 
-from pipeline.plan.cost import CostModel
-from pipeline.plan.plan import make_plan
-from pipeline.plan.shard import Shard, deal, parse_shard, reason_against, shard_of, stores_of, take
-from pipeline.plan.steps import mesh_steps
+from epsmesh.plan.cost import CostModel
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.shard import Shard, deal, parse_shard, reason_against, shard_of, stores_of, take
+from epsmesh.plan.steps import mesh_steps
 from tests.cases import study
 
 SWEEP = {

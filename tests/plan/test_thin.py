@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from pipeline.mesh import of_case
-from pipeline.mesh.generate import MeshError
-from pipeline.plan.plan import make_plan
-from pipeline.plan.thin import MOST, cause
-from pipeline.run.problem import CaseFailure, check_memory
-from pipeline.shapes.shell import Shell
-from pipeline.shapes.triangles import Triangles
-from pipeline.study.problems import StudyError
+from epsmesh.mesh import of_case
+from epsmesh.mesh.generate import MeshError
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.thin import MOST, cause
+from epsmesh.run.problem import CaseFailure, check_memory
+from epsmesh.shapes.shell import Shell
+from epsmesh.shapes.triangles import Triangles
+from epsmesh.study.problems import StudyError
 from tests.cases import study
 
 SKIN = {"name": "skin", "young": "50 kPa", "poisson": 0.3}

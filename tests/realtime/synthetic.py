@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from epsmesh.export.file import write_model
 from epsmesh_realtime.model import Model, read
 from epsmesh_realtime.surface import Surface, SurfaceTable, read_surface
 from epsmesh_realtime.table import Face, Pairs, Table
-from pipeline.export.file import write_model
 
 
 def random_model(*, is_round: bool = False, turned: bool = False, is_even: bool = True, curved: bool = False) -> Model:

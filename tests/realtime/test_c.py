@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from epsmesh.export.file import write_model
 from epsmesh_realtime import BuildError, Query
 from epsmesh_realtime import library as built
 from epsmesh_realtime.table import Near
-from pipeline.export.file import write_model
 from tests.realtime.synthetic import random_model, random_surface
 
 SOURCES = Path(__file__).parents[2] / "realtime"

@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-import pipeline
+import epsmesh
+from epsmesh.export.file import write_model
+from epsmesh.viscoelastic import Motion, follow, respond
 from epsmesh_realtime import History, ModelError, read
-from pipeline.export.file import write_model
-from pipeline.viscoelastic import Motion, follow, respond
 from tests.realtime.synthetic import random_model
 
 TERMS = ((0.4, 2.0), (0.2, 30.0))
@@ -185,7 +185,7 @@ def test_tissue_that_does_not_relax_has_no_history():
 def test_a_file_has_the_relaxation_and_none_that_gains_modulus(tmp_path):
     write_model(tmp_path / "model.epsm", relaxing(), {}, {})
     assert read(tmp_path / "model.epsm").relaxation == TERMS
-    data = pipeline.open(tmp_path / "model.epsm")
+    data = epsmesh.open(tmp_path / "model.epsm")
     assert list(zip(data["relaxation_share"].values, data["relaxation_time"].values, strict=True)) == [*TERMS]
     assert data["relaxation_time"].attrs["units"] == "s"
     for wrong in (((0.6, 1.0), (0.5, 2.0)), ((-0.1, 1.0),), ((0.1, 0.0),), ((0.01, 1.0),) * 7):
@@ -214,7 +214,7 @@ table = [["0 s", "0 mm"], ["1 s", "0.2 mm"], ["5 s", "0.15 mm"], ["6 s", "0.2 mm
 [mesh]
 accuracy = "10 %"
 """)
-    data = pipeline.read(tmp_path / "ramp.toml").run(output=tmp_path).squeeze()
+    data = epsmesh.read(tmp_path / "ramp.toml").run(output=tmp_path).squeeze()
     times = data["time"].values[1:]
     depths = data["tool_depth"].values[1:]
     found = forces(pressed(DISC, times, depths))[:, 2]

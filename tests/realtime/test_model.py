@@ -9,12 +9,12 @@ import pytest
 import xarray as xr
 from scipy.special import ellipe, ellipk
 
-import pipeline
+import epsmesh
+from epsmesh.verify import known
 from epsmesh_realtime import Model, ModelError
 from epsmesh_realtime.file import pack, unpack
 from epsmesh_realtime.model import about, model_of
 from epsmesh_realtime.query import Query, packed_each
-from pipeline.verify import known
 from tests.realtime.synthetic import of_place, random_model, write_random, write_surface
 
 TOOLS = (
@@ -339,7 +339,7 @@ def test_queries_whose_shapes_do_not_go_together_are_refused():
 def test_a_model_is_a_dataset_too(tmp_path, kind):
     path = tmp_path / "model.epsm"
     surface = write_surface(path, **kind)
-    dataset = pipeline.open(path)
+    dataset = epsmesh.open(path)
     dataset.to_netcdf(tmp_path / "model.nc")
     with xr.open_dataset(tmp_path / "model.nc") as again:
         xr.testing.assert_equal(again.load(), dataset)
@@ -350,4 +350,4 @@ def test_a_model_is_a_dataset_too(tmp_path, kind):
     arrays = unpack(path.read_bytes())
     path.write_bytes(pack(arrays | {"check_x": np.zeros(3), "check_y": np.zeros(4)}))
     with pytest.raises(ModelError, match="damaged"):
-        pipeline.open(path)
+        epsmesh.open(path)

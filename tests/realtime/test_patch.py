@@ -105,9 +105,9 @@ def test_a_rounded_cone_is_that_of_a_full_solve(rounded):
 @pytest.fixture(scope="module")
 def rounded():
     """The middle of a cylinder as a model, and F of a full solve with its bar."""
-    from pipeline.export.compliance import Region, coarse_mesh, compliances
-    from pipeline.export.scope import scope_of
-    from pipeline.verify.compare import solve
+    from epsmesh.export.compliance import Region, coarse_mesh, compliances
+    from epsmesh.export.scope import scope_of
+    from epsmesh.verify.compare import solve
     from tests.export.test_export import BALL as UNILATERAL
     from tests.export.test_export import CYLINDER, SOFT, study
 

@@ -19,7 +19,7 @@ AT = (0.011, 0.017, 0.0)
 _ASK = """
 import importlib.util, sys
 import epsmesh_realtime as realtime
-assert not any(importlib.util.find_spec(name) for name in ("dolfinx", "scipy", "xarray", "pipeline"))
+assert not any(importlib.util.find_spec(name) for name in ("dolfinx", "scipy", "xarray", "epsmesh"))
 surface = realtime.read_surface(sys.argv[1])
 assert surface.press("disc", radius=2e-3, at={at}, depth=3e-4)[1].any()
 assert {{"epsmesh.h", "src/file.c", "examples/hand.h"}} <= {{str(file) for file in realtime.source_files()}}

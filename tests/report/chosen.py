@@ -5,11 +5,11 @@ from collections.abc import Callable
 
 import xarray as xr
 
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.run.record import Record
-from pipeline.study.case import Case
-from pipeline.study.read import parse
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run.record import Record
+from epsmesh.study.case import Case
+from epsmesh.study.read import parse
 
 TEXT = """
 title = "known"

@@ -4,10 +4,10 @@ import itertools
 
 import numpy as np
 
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.run.record import Record
-from pipeline.study.read import parse
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run.record import Record
+from epsmesh.study.read import parse
 from tests.cases import BLADE, raw
 from tests.fuzz.studies import toml
 

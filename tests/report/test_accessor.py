@@ -4,7 +4,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
+from epsmesh.report import accessor  # noqa: F401 (registers dataset.epsmesh)
 from tests.report.chosen import TEXT, dataset
 from tests.report.synthetic import EPSILONS, FIGURE
 from tests.report.synthetic import dataset as synthetic

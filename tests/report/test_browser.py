@@ -8,9 +8,9 @@ from hashlib import sha256
 
 import pytest
 
-from pipeline.report.dataset import build
-from pipeline.report.page import write_page
-from pipeline.study.read import read_mapping
+from epsmesh.report.dataset import build
+from epsmesh.report.page import write_page
+from epsmesh.study.read import read_mapping
 from tests.insertion import test_needle as needles
 from tests.report.browser import CHROMIUM, Browser
 from tests.report.synthetic import EPSILONS, dataset

@@ -4,11 +4,11 @@ import json
 
 import pytest
 
-from pipeline.report.compare import compare
-from pipeline.report.dataset import build, write
-from pipeline.report.parameters import units_of
-from pipeline.report.table import DatasetError
-from pipeline.study.read import read_mapping
+from epsmesh.report.compare import compare
+from epsmesh.report.dataset import build, write
+from epsmesh.report.parameters import units_of
+from epsmesh.report.table import DatasetError
+from epsmesh.study.read import read_mapping
 from tests.commands import epsmesh
 from tests.insertion import test_needle as needles
 from tests.report.chosen import BAR, TEXT, dataset, ratio, seconds

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import pipeline
-from pipeline.netcdf import write_netcdf
-from pipeline.plan.plan import make_plan
-from pipeline.quantities import RUN
-from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
-from pipeline.report.dataset import build, write
-from pipeline.report.values import relative
-from pipeline.study.read import read_study
+import epsmesh
+from epsmesh.netcdf import write_netcdf
+from epsmesh.plan.plan import make_plan
+from epsmesh.quantities import RUN
+from epsmesh.report import accessor  # noqa: F401 (registers dataset.epsmesh)
+from epsmesh.report.dataset import build, write
+from epsmesh.report.values import relative
+from epsmesh.study.read import read_study
 from tests.report.synthetic import FIGURE, dataset
 
 STUDIES = sorted(Path("studies").glob("*.toml"))
@@ -107,11 +107,11 @@ def test_groups_of_a_file_are_results_and_the_run(tmp_path):
         words = [meanings[flag] for flag in status.values.ravel()]
         assert words == found["status"].values.ravel().tolist()
         assert root.epsmesh.to_frame()["status"].tolist() == words
-    again = pipeline.open(tmp_path / "a.nc")
+    again = epsmesh.open(tmp_path / "a.nc")
     assert {*again} == {*found}
     xr.testing.assert_equal(again["status"], found["status"])
     again.to_netcdf(tmp_path / "b.nc")  # one that xarray has written
-    xr.testing.assert_identical(pipeline.open(tmp_path / "b.nc"), again)
+    xr.testing.assert_identical(epsmesh.open(tmp_path / "b.nc"), again)
 
 
 def test_variables_have_the_dimensions_that_they_depend_on():

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.report.dataset import write
-from pipeline.report.read import read_file
-from pipeline.report.table import DatasetError
+from epsmesh.report.dataset import write
+from epsmesh.report.read import read_file
+from epsmesh.report.table import DatasetError
 from tests.report.synthetic import FIGURE, dataset
 
 

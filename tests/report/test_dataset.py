@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import pipeline.report.accessor  # noqa: F401
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build, write
-from pipeline.report.read import read
-from pipeline.report.table import study_of
-from pipeline.study.problems import StudyError
-from pipeline.study.read import read_study
+import epsmesh.report.accessor  # noqa: F401
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build, write
+from epsmesh.report.read import read
+from epsmesh.report.table import study_of
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import read_study
 from tests.cases import raw
 from tests.fuzz.studies import toml
 from tests.organs import ellipsoid, write_stl

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.report.figures import KINDS, choose, draw, figure, lacks
-from pipeline.report.figures.curves import positions
-from pipeline.report.figures.facets import arrange, rest
-from pipeline.report.figures.ratio import ratio_facets
-from pipeline.report.figures.style import COLOURS
-from pipeline.report.pareto import is_by_chance
-from pipeline.report.words import choice, heading, points
-from pipeline.study.problems import StudyError
+from epsmesh.report.figures import KINDS, choose, draw, figure, lacks
+from epsmesh.report.figures.curves import positions
+from epsmesh.report.figures.facets import arrange, rest
+from epsmesh.report.figures.ratio import ratio_facets
+from epsmesh.report.figures.style import COLOURS
+from epsmesh.report.pareto import is_by_chance
+from epsmesh.report.words import choice, heading, points
+from epsmesh.study.problems import StudyError
 from tests.report.synthetic import EPSILONS, FIGURE, dataset
 from tests.sampling import sampled
 

@@ -6,12 +6,12 @@ from math import inf, isnan, nan
 import numpy as np
 import pytest
 
-from pipeline.cli.console import plain
-from pipeline.report.correction import fit, r_without
-from pipeline.report.guide import guide, quantity
-from pipeline.report.guide_text import settings
-from pipeline.report.table import DatasetError, arrange
-from pipeline.report.values import relative
+from epsmesh.cli.console import plain
+from epsmesh.report.correction import fit, r_without
+from epsmesh.report.guide import guide, quantity
+from epsmesh.report.guide_text import settings
+from epsmesh.report.table import DatasetError, arrange
+from epsmesh.report.values import relative
 from tests.report.chosen import BAR, EXACT_BAR, TEXT, dataset
 from tests.report.synthetic import FIGURE
 from tests.report.synthetic import dataset as synthetic

@@ -5,8 +5,8 @@ from math import inf
 
 import pytest
 
-from pipeline.cli.console import plain
-from pipeline.report.guide import guide
+from epsmesh.cli.console import plain
+from epsmesh.report.guide import guide
 from tests.report.chosen import BAR, TEXT, dataset
 
 BALL = """

@@ -5,20 +5,20 @@ import pytest
 import xarray as xr
 from mpi4py import MPI
 
-import pipeline.report.accessor  # noqa: F401
-from pipeline.cli.words import axes_of
-from pipeline.plan.describe import summary
-from pipeline.plan.plan import make_plan
-from pipeline.report.compare import compare
-from pipeline.report.dataset import build, write
-from pipeline.report.figures import choose, figure
-from pipeline.report.guide import guide
-from pipeline.report.page import render
-from pipeline.report.read import read_file
-from pipeline.report.values import at_peak, elastic
-from pipeline.run.execute import compute
-from pipeline.run.outcome import count_states
-from pipeline.run.record import Record
+import epsmesh.report.accessor  # noqa: F401
+from epsmesh.cli.words import axes_of
+from epsmesh.plan.describe import summary
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.compare import compare
+from epsmesh.report.dataset import build, write
+from epsmesh.report.figures import choose, figure
+from epsmesh.report.guide import guide
+from epsmesh.report.page import render
+from epsmesh.report.read import read_file
+from epsmesh.report.values import at_peak, elastic
+from epsmesh.run.execute import compute
+from epsmesh.run.outcome import count_states
+from epsmesh.run.record import Record
 from tests.cases import study
 from tests.report.synthetic import dataset
 

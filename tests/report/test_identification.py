@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.identify.dataset import dataset_of, joined, write
-from pipeline.identify.parts import SOURCES
-from pipeline.report.figures.identification import draw
-from pipeline.report.figures.identification import identification as figure
-from pipeline.report.identified import answer, engineering, material, parts, title
-from pipeline.report.page.identification import render
-from pipeline.report.read import read_any, read_file
+from epsmesh.identify.dataset import dataset_of, joined, write
+from epsmesh.identify.parts import SOURCES
+from epsmesh.report.figures.identification import draw
+from epsmesh.report.figures.identification import identification as figure
+from epsmesh.report.identified import answer, engineering, material, parts, title
+from epsmesh.report.page.identification import render
+from epsmesh.report.read import read_any, read_file
 from tests.identifications import estimate, identification
 
 NONE = {name: np.full(3, np.nan) for name in ("low", "high", "low_hidden", "high_hidden")}

@@ -5,14 +5,14 @@ from math import inf, isnan
 import numpy as np
 import pytest
 
-from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
-from pipeline.report.compliance import beyond
-from pipeline.report.figures import choose, figure
-from pipeline.report.guide import guide
-from pipeline.report.laws import LAWS, Forces, judge
-from pipeline.report.sinking import why_not
-from pipeline.report.table import DatasetError
-from pipeline.study.read import parse
+from epsmesh.report import accessor  # noqa: F401 (registers dataset.epsmesh)
+from epsmesh.report.compliance import beyond
+from epsmesh.report.figures import choose, figure
+from epsmesh.report.guide import guide
+from epsmesh.report.laws import LAWS, Forces, judge
+from epsmesh.report.sinking import why_not
+from epsmesh.report.table import DatasetError
+from epsmesh.study.read import parse
 from tests.cases import raw
 from tests.report.chosen import dataset
 

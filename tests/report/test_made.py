@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.plan.plan import leave_out_stored
-from pipeline.report import made
-from pipeline.report.publish import publish
+from epsmesh.plan.plan import leave_out_stored
+from epsmesh.report import made
+from epsmesh.report.publish import publish
 from tests.report.synthetic import planned
 
 RUN = {"start": "2026-01-01", "end": "2026-01-01"}

@@ -10,7 +10,7 @@ import pytest
 from jupyter_client.kernelspec import KernelSpecManager
 from nbclient import NotebookClient
 
-from pipeline.report.dataset import write
+from epsmesh.report.dataset import write
 from tests.report.chosen import TEXT, dataset
 
 ROOT = Path(__file__).parents[2]

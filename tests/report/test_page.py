@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.pages import json_in_page
-from pipeline.report import page
-from pipeline.report.dataset import write
-from pipeline.report.figures import choose, draw
-from pipeline.report.guide import USUAL_ACCURACY, guide, guide_if_any
-from pipeline.report.page import render, write_page
-from pipeline.report.page.cases import case_table
-from pipeline.report.page.facts import reproduce
-from pipeline.report.read import read_file
-from pipeline.report.table import case_at, study_of
+from epsmesh.pages import json_in_page
+from epsmesh.report import page
+from epsmesh.report.dataset import write
+from epsmesh.report.figures import choose, draw
+from epsmesh.report.guide import USUAL_ACCURACY, guide, guide_if_any
+from epsmesh.report.page import render, write_page
+from epsmesh.report.page.cases import case_table
+from epsmesh.report.page.facts import reproduce
+from epsmesh.report.read import read_file
+from epsmesh.report.table import case_at, study_of
 from tests.cases import BLADE, raw
 from tests.commands import epsmesh
 from tests.report import chosen
@@ -210,7 +210,7 @@ def test_report_is_made_without_the_solver(tmp_path):
     """It answers at once: no dolfinx, gmsh, PETSc or MPI is loaded."""
     write(small(study="title = 'x'"), tmp_path / "small.nc")
     code = (
-        "import sys; from pathlib import Path; from pipeline.cli.report import report;"
+        "import sys; from pathlib import Path; from epsmesh.cli.report import report;"
         f"report(Path({str(tmp_path / 'small.nc')!r}));"
         "assert not {'dolfinx', 'gmsh', 'petsc4py', 'mpi4py'} & set(sys.modules)"
     )

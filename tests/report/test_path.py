@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import pipeline.report.accessor  # noqa: F401
-from pipeline.report.figures import choose, figure
-from pipeline.report.guide import guide_if_any
-from pipeline.report.page.facts import summary
-from pipeline.report.table import DatasetError
+import epsmesh.report.accessor  # noqa: F401
+from epsmesh.report.figures import choose, figure
+from epsmesh.report.guide import guide_if_any
+from epsmesh.report.page.facts import summary
+from epsmesh.report.table import DatasetError
 from tests.cases import raw
 from tests.report.synthetic import dataset
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from pipeline.report.figures import figure
-from pipeline.report.guide import guide
-from pipeline.report.page.facts import facts
-from pipeline.report.times import doubts
+from epsmesh.report.figures import figure
+from epsmesh.report.guide import guide
+from epsmesh.report.page.facts import facts
+from epsmesh.report.times import doubts
 from tests.report.synthetic import EPSILONS, dataset
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipeline.report.words import without_shared
+from epsmesh.report.words import without_shared
 
 
 @pytest.mark.parametrize(

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.key import case_key
-from pipeline.plan.plan import make_plan
-from pipeline.plan.recipe import rungs_for
-from pipeline.report.dataset import build
-from pipeline.run.execute import compute
-from pipeline.run.measure import is_graded_to_contact
-from pipeline.study.read import parse
-from pipeline.verify import known
+from epsmesh.plan.key import case_key
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.recipe import rungs_for
+from epsmesh.report.dataset import build
+from epsmesh.run.execute import compute
+from epsmesh.run.measure import is_graded_to_contact
+from epsmesh.study.read import parse
+from epsmesh.verify import known
 from tests.cases import BLADE, raw
 from tests.sampling import sampled
 
@@ -127,7 +127,7 @@ def test_tissue_that_hardly_changes_its_volume_takes_a_finer_mesh():
 
 def test_a_mesh_that_misses_is_followed_by_a_better_one(monkeypatch):
     """Recipes that promise too much are found out by the error bar, and the next one is tried."""
-    monkeypatch.setattr("pipeline.plan.recipe.MARGIN", 1e3)
+    monkeypatch.setattr("epsmesh.plan.recipe.MARGIN", 1e3)
     _, records = run(mesh={"accuracy": "0.1 %"})
     (record,) = records.values()
     assert record.status == "ok"

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.report.dataset import write
-from pipeline.run.record import Record
-from pipeline.run.store import Store
+from epsmesh.report.dataset import write
+from epsmesh.run.record import Record
+from epsmesh.run.store import Store
 from tests.commands import ENVIRONMENT, ROOT, command
 from tests.compare import assert_same
 from tests.report.synthetic import dataset

@@ -6,14 +6,14 @@ from math import inf, isnan, nan
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.run.attempts import Attempts
-from pipeline.run.execute import compute, execute
-from pipeline.run.progress import Progress
-from pipeline.run.record import Record
-from pipeline.run.runner import StepRunner
-from pipeline.study.read import parse
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run.attempts import Attempts
+from epsmesh.run.execute import compute, execute
+from epsmesh.run.progress import Progress
+from epsmesh.run.record import Record
+from epsmesh.run.runner import StepRunner
+from epsmesh.study.read import parse
 from tests.cases import raw, study
 
 WORLD = MPI.COMM_WORLD
@@ -136,8 +136,8 @@ def test_accuracy_without_memory_for_its_proof_is_refused_and_no_finer_mesh_is_t
     """The force would be worth nothing: neither the case nor F_exact has one."""
     changes = {"mesh": {"accuracy": GOAL, "degree": 2}, "solve": {"exact": True, "method": "iterative"}, "plan": {}}
     plan = make_plan(parse({**raw(), **changes}), without=("axisymmetric",))
-    monkeypatch.setattr("pipeline.run.memory.FreeMemory.available", lambda self: 1e9)
-    monkeypatch.setattr("pipeline.plan.estimate.error_bar_memory", lambda *_, **__: 2e9)
+    monkeypatch.setattr("epsmesh.run.memory.FreeMemory.available", lambda self: 1e9)
+    monkeypatch.setattr("epsmesh.plan.estimate.error_bar_memory", lambda *_, **__: 2e9)
     found, notes = [], Notes()
     execute(plan, WORLD, found.append, notes)
     if WORLD.rank == 0:

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.report.read import read_file
-from pipeline.run.begun import KILLED, Begun, Ended, done_beside, fail_begun, store_done
-from pipeline.run.execute import compute
-from pipeline.run.outbox import Outbox
-from pipeline.run.reading import open_to_read
-from pipeline.run.record import Record
-from pipeline.run.store import Store
-from pipeline.workflow import _lacking as lacking
-from pipeline.workflow import prepare
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.read import read_file
+from epsmesh.run.begun import KILLED, Begun, Ended, done_beside, fail_begun, store_done
+from epsmesh.run.execute import compute
+from epsmesh.run.outbox import Outbox
+from epsmesh.run.reading import open_to_read
+from epsmesh.run.record import Record
+from epsmesh.run.store import Store
+from epsmesh.workflow import _lacking as lacking
+from epsmesh.workflow import prepare
 from tests.cases import study
 from tests.commands import run_script as run
 from tests.studies import small_text
@@ -26,14 +26,14 @@ from tests.studies import small_text
 # The command, with a solve in it that ends the process, and one that only it is told of.
 COMMAND = """
 import os, sys
-from pipeline.run.runner import StepRunner
+from epsmesh.run.runner import StepRunner
 solve = StepRunner._solve
 def fatal(self, case, *rest):
     if "epsilon = 4 mm" in case.label or "poisson = 0.3" in case.label:
         {ends}
     return solve(self, case, *rest)
 StepRunner._solve = fatal
-from pipeline.__main__ import main
+from epsmesh.__main__ import main
 main()
 """
 # Ends the process once another has finished all other cases.
@@ -48,7 +48,7 @@ WAIT = """
 BEGIN = """
 import os, signal, sys
 from pathlib import Path
-from pipeline.run.begun import Begun
+from epsmesh.run.begun import Begun
 signal.signal(signal.SIGTERM, lambda *_: None)
 begun = Begun(Path(sys.argv[1]))
 begun.name(["c"])
@@ -60,8 +60,8 @@ os.kill(os.getpid(), signal.SIGKILL)
 FINISH = """
 import os, signal, sys
 from pathlib import Path
-from pipeline.run.begun import Begun
-from pipeline.run.record import Record
+from epsmesh.run.begun import Begun
+from epsmesh.run.record import Record
 begun = Begun(Path(sys.argv[1]))
 begun.name("ab")
 begun.done(Record("a", "ok", force=1.0))
@@ -189,7 +189,7 @@ def test_a_file_that_its_process_removes_meanwhile_is_none(store: Store, monkeyp
         path.unlink()
         return False
 
-    monkeypatch.setattr("pipeline.run.begun.is_held", ends)
+    monkeypatch.setattr("epsmesh.run.begun.is_held", ends)
     assert not store_done(store)
     assert not fail_begun(store, ["a"]).failed
     (store.path.parent / f".{store.path.name}-done-here-1-2").write_text(Record("a", "ok").to_json())
@@ -256,12 +256,12 @@ def test_a_case_that_ends_its_process_twice_fails_in_the_next_run_alone(epsmesh,
 def test_a_rank_that_fails_alone_ends_the_run_and_the_next_one_knows_why(epsmesh, tmp_path: Path):
     ends = "\n        ".join(
         (
-            "from pipeline.run import failure; failure.PATIENCE = 1.0",
+            "from epsmesh.run import failure; failure.PATIENCE = 1.0",
             "if self._comm.rank: raise MemoryError('no room')",
             "self._comm.barrier()",
         )
     )
-    together = "from pipeline.plan import schedule\nschedule._FEWEST_CELLS = 1\n"
+    together = "from epsmesh.plan import schedule\nschedule._FEWEST_CELLS = 1\n"
     file = tmp_path / "small.toml"
     ratios = {"material": {"poisson": [0.3, 0.4]}}
     file.write_text(small_text(mesh={"epsilon": "full", "degree": 1}, solve={"exact": False}, **ratios))
@@ -277,7 +277,7 @@ def test_results_that_cannot_be_built_are_told_in_words(epsmesh, small, monkeypa
     def broken(*_):
         raise ValueError("dimension `load` against variable `load`")
 
-    monkeypatch.setattr("pipeline.report.dataset.build", broken)
+    monkeypatch.setattr("epsmesh.report.dataset.build", broken)
     done = epsmesh("run", small, "--output", tmp_path / "out", "--json")
     assert done.exit_code == 1
     told = json.loads(done.stdout)

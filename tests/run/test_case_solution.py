@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-import pipeline
-from pipeline import compat
-from pipeline.run.case_solution import CaseSolution
-from pipeline.solve.points.locate import table_of
+import epsmesh
+from epsmesh import compat
+from epsmesh.run.case_solution import CaseSolution
+from epsmesh.solve.points.locate import table_of
 from tests.cases import raw, solve
 from tests.sampling import sampled
 
@@ -28,7 +28,7 @@ BALL = {
 
 
 def solution(comm=MPI.COMM_SELF, **changes) -> CaseSolution:
-    return pipeline.read(raw(**changes)).solve(comm=comm)
+    return epsmesh.read(raw(**changes)).solve(comm=comm)
 
 
 def force_of_stress(found: CaseSolution, height: float) -> float:
@@ -125,7 +125,7 @@ def test_samples_have_coordinates_and_units():
 
 def test_case_is_chosen_by_its_labels():
     probes = [{"name": "disc", **raw()["probe"]}, {"name": "ball", **SPHERE}]
-    study = pipeline.read(raw(probe=None) | {"probe": probes, "material": {"young": "10 kPa", "poisson": [0.3, 0.4]}})
+    study = epsmesh.read(raw(probe=None) | {"probe": probes, "material": {"young": "10 kPa", "poisson": [0.3, 0.4]}})
     found = study.solve({"poisson": 0.4}, probe="ball", comm=MPI.COMM_SELF)
     assert (found.case.probe.shape, found.case.material.poisson) == ("sphere", 0.4)
     with pytest.raises(ValueError, match="2 cases have these labels; they differ in poisson"):

@@ -40,9 +40,9 @@ _PROGRAM = """
 import json, os, sys
 from pathlib import Path
 from mpi4py import MPI
-from pipeline.plan.plan import make_plan
-from pipeline.run.compile import prepare
-from pipeline.run.execute import compute
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.compile import prepare
+from epsmesh.run.execute import compute
 from tests.cases import study
 
 def compilers():

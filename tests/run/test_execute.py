@@ -12,15 +12,15 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline.plan.plan import make_plan
-from pipeline.run import meshing, problem
-from pipeline.run.basis import ReducedBasis
-from pipeline.run.execute import compute, execute
-from pipeline.run.mesh_cache import MeshCache
-from pipeline.run.progress import Progress
-from pipeline.solve import SolveError
-from pipeline.solve.balance import BALANCE_LIMIT
-from pipeline.stages import Times, recharge
+from epsmesh.plan.plan import make_plan
+from epsmesh.run import meshing, problem
+from epsmesh.run.basis import ReducedBasis
+from epsmesh.run.execute import compute, execute
+from epsmesh.run.mesh_cache import MeshCache
+from epsmesh.run.progress import Progress
+from epsmesh.solve import SolveError
+from epsmesh.solve.balance import BALANCE_LIMIT
+from epsmesh.stages import Times, recharge
 from tests.cases import BLADE, solve, study
 from tests.commands import ENVIRONMENT
 
@@ -28,7 +28,7 @@ WORLD = MPI.COMM_WORLD
 SCENE = {"probe": BLADE, "material": {"poisson": [0.3, 0.49]}, "mesh": {"rim": "0.5 mm", "fine": "4 mm"}}
 SCRIPT = """
 from mpi4py import MPI
-from pipeline.plan import schedule
+from epsmesh.plan import schedule
 from tests.cases import solve
 from tests.run.test_execute import SCENE
 schedule._FEWEST_CELLS = 1
@@ -59,7 +59,7 @@ def test_one_and_three_ranks_agree():
 @pytest.fixture
 def together(monkeypatch):
     """No mesh is too small for all ranks."""
-    monkeypatch.setattr("pipeline.plan.schedule._FEWEST_CELLS", 1)
+    monkeypatch.setattr("epsmesh.plan.schedule._FEWEST_CELLS", 1)
 
 
 @pytest.mark.mpi
@@ -95,7 +95,7 @@ def test_solver_that_fails_is_a_failed_case_and_the_others_are_as_without_it(mon
             raise SolveError("the linear solver did not converge: diverged_dtol after 7 iterations")
         return problem.solve_problem(case, *arguments, **options)
 
-    monkeypatch.setattr("pipeline.run.runner.solve_problem", solve_problem)
+    monkeypatch.setattr("epsmesh.run.runner.solve_problem", solve_problem)
     records = solve(WORLD, **ratios)
     assert [records[i,].status for i in range(3)] == ["ok", "failed", "ok"]
     assert "did not converge: diverged_dtol" in records[1,].message
@@ -114,7 +114,7 @@ def test_cases_whose_reduced_basis_fails_are_solved(monkeypatch):
 
     ratios = {"material": {"poisson": [0.05 * i for i in range(8)]}}
     solved = solve(WORLD, **ratios, plan={"without": ["axisymmetric", "reduced"]})
-    monkeypatch.setattr("pipeline.run.basis.ReducedBasis", Broken)
+    monkeypatch.setattr("epsmesh.run.basis.ReducedBasis", Broken)
     found = solve(WORLD, **ratios)
     assert found.keys() == solved.keys()
     for index, record in found.items():
@@ -128,7 +128,7 @@ def test_a_bound_that_is_none_is_not_relied_on(monkeypatch):
         def evaluate(self, t):
             return replace(super().evaluate(t), bound=-1e-9)
 
-    monkeypatch.setattr("pipeline.run.basis.ReducedBasis", Doubtful)
+    monkeypatch.setattr("epsmesh.run.basis.ReducedBasis", Doubtful)
     records = solve(WORLD, material={"poisson": [0.05 * i for i in range(8)]})
     assert {record.origin for record in records.values()} == {"symmetric"}
 
@@ -136,7 +136,7 @@ def test_a_bound_that_is_none_is_not_relied_on(monkeypatch):
 @pytest.mark.mpi
 def test_without_memory_for_a_reduced_basis_every_case_is_solved(monkeypatch):
     ratios = {"poisson": [0.05 * i for i in range(8)]}
-    monkeypatch.setattr("pipeline.plan.estimate.basis_memory", lambda *_: 1e18)
+    monkeypatch.setattr("epsmesh.plan.estimate.basis_memory", lambda *_: 1e18)
     solved = solve(WORLD, material=ratios)
     assert {record.origin for record in solved.values()} == {"symmetric"}
     monkeypatch.undo()
@@ -151,7 +151,7 @@ def test_without_memory_for_a_reduced_basis_every_case_is_solved(monkeypatch):
 def test_bars_of_a_reduced_basis_are_unknown_where_a_neighbours_is(begin, monkeypatch):
     """Memory that suffices for every second bar: what is between a known and an unknown one claims none."""
     calls = itertools.count(begin)
-    monkeypatch.setattr("pipeline.plan.estimate.error_bar_memory", lambda *_, **__: (0.0, 1e18)[next(calls) % 2])
+    monkeypatch.setattr("epsmesh.plan.estimate.error_bar_memory", lambda *_, **__: (0.0, 1e18)[next(calls) % 2])
     records = solve(WORLD, material={"poisson": [0.02 * i for i in range(20)]})
     solved = [index for index, record in sorted(records.items()) if record.origin == "symmetric"]
     unknown = {index for index in solved if isnan(records[index].force_error)}
@@ -188,7 +188,7 @@ def test_whatever_is_raised_fails_its_case_alone(monkeypatch, error):
             raise error
         return problem.solve_problem(case, *arguments, **options)
 
-    monkeypatch.setattr("pipeline.run.runner.solve_problem", solve_problem)
+    monkeypatch.setattr("epsmesh.run.runner.solve_problem", solve_problem)
     records = solve(WORLD, material={"poisson": [0.3, 0.4]})
     assert [records[i,].status for i in range(2)] == ["failed", "ok"]
     assert str(error) in records[0,].message
@@ -206,7 +206,7 @@ def test_whatever_is_raised_on_one_rank_fails_its_case_on_all(monkeypatch):
             raise error
         return 1.0
 
-    monkeypatch.setattr("pipeline.run.runner.machine_load", machine_load)
+    monkeypatch.setattr("epsmesh.run.runner.machine_load", machine_load)
     records = solve(WORLD, material={"poisson": [0.3, 0.4]})
     assert sorted(record.status for record in records.values()) == ["failed", "ok"]
     (failed,) = (record for record in records.values() if record.status == "failed")
@@ -218,7 +218,7 @@ def test_what_is_raised_beside_any_case_fails_those_of_the_step(monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr("pipeline.run.runner.StepRunner._condenses", broken)
+    monkeypatch.setattr("epsmesh.run.runner.StepRunner._condenses", broken)
     records = solve(WORLD, material={"poisson": [0.3, 0.4]})
     assert [record.status for record in records.values()] == ["failed", "failed"]
     assert all("ZeroDivisionError: division by zero" in record.message for record in records.values())
@@ -262,7 +262,7 @@ def test_timed_cases_are_medians_of_repeats_each_made_afresh(monkeypatch, tmp_pa
         recharge(Times(mesh=next(told)))
         return meshing.mesh_case(*arguments)
 
-    monkeypatch.setattr("pipeline.run.runner.mesh_case", mesh_case)
+    monkeypatch.setattr("epsmesh.run.runner.mesh_case", mesh_case)
     plan = make_plan(study(solve={"timing": True, "repeats": 3, "exact": False}))
     found = []
     assert execute(plan, MPI.COMM_SELF, found.append, Progress(), cache=MeshCache(tmp_path)) == 0

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.solve.convergence import Convergence
-from pipeline.solve.estimate import extrapolate_found
-from pipeline.study.read import parse
-from pipeline.verify import known
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.solve.convergence import Convergence
+from epsmesh.solve.estimate import extrapolate_found
+from epsmesh.study.read import parse
+from epsmesh.verify import known
 
 
 def solved(friction, accuracy, law="linear", *, flat=False):

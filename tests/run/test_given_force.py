@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.api import RunnableStudy
-from pipeline.plan.given_force import FoundDepth, Trial, next_depth
-from pipeline.plan.plan import make_plan
-from pipeline.report.compare import compare
-from pipeline.report.dataset import build
-from pipeline.report.figures import figure
-from pipeline.report.values import relative
-from pipeline.run.execute import compute
-from pipeline.run.outcome import count_states, failures
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh.api import RunnableStudy
+from epsmesh.plan.given_force import FoundDepth, Trial, next_depth
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.compare import compare
+from epsmesh.report.dataset import build
+from epsmesh.report.figures import figure
+from epsmesh.report.values import relative
+from epsmesh.run.execute import compute
+from epsmesh.run.outcome import count_states, failures
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 
 BOX = {"shape": "box", "size": ["30 mm", "30 mm", "15 mm"], "fixed": "bottom"}
 CYLINDER = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm", "fixed": "bottom"}

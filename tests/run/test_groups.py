@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.cost import CostModel
-from pipeline.plan.plan import make_plan
-from pipeline.plan.schedule import Phase, schedule
-from pipeline.run import groups
-from pipeline.run.execute import compute
-from pipeline.run.groups import Counter, Mailbox, run_phase
-from pipeline.run.record import Record
+from epsmesh.plan.cost import CostModel
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.schedule import Phase, schedule
+from epsmesh.run import groups
+from epsmesh.run.execute import compute
+from epsmesh.run.groups import Counter, Mailbox, run_phase
+from epsmesh.run.record import Record
 from tests.cases import study
 
 

@@ -3,10 +3,10 @@
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 from tests.sampling import sampled
 
 A, YOUNG = 3e-3, 10e3

@@ -9,8 +9,8 @@ import psutil
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.memory import FreeMemory, return_large_arrays
-from pipeline.run.room import container_room, process_room
+from epsmesh.run.memory import FreeMemory, return_large_arrays
+from epsmesh.run.room import container_room, process_room
 from tests.cases import solve
 
 V2 = ("memory.max", "memory.current", "inactive_file", "")

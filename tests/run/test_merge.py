@@ -6,11 +6,11 @@ import sqlite3
 
 import pytest
 
-from pipeline.run.begun import Begun
-from pipeline.run.merge import merge
-from pipeline.run.reading import read_rows
-from pipeline.run.record import Record
-from pipeline.run.store import Store, StoreError
+from epsmesh.run.begun import Begun
+from epsmesh.run.merge import merge
+from epsmesh.run.reading import read_rows
+from epsmesh.run.record import Record
+from epsmesh.run.store import Store, StoreError
 
 
 def store_of(path, *rows):
@@ -135,7 +135,7 @@ def test_store_that_is_begun_only(tmp_path):
 
 
 def test_all_or_nothing(tmp_path, sources, monkeypatch):
-    monkeypatch.setattr("pipeline.run.store.PATIENCE", 0.05)
+    monkeypatch.setattr("epsmesh.run.store.PATIENCE", 0.05)
     main = store_of(tmp_path / "main.sqlite", (Record("own", "ok"), 0.0))
     store = Store(main)
     other = sqlite3.connect(main, isolation_level=None)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.mesh import parts
-from pipeline.mesh.of_case import mesh_arrays, unrefined_arrays
-from pipeline.mesh.refine import NotRefined
-from pipeline.plan import refinement
-from pipeline.run.mesh_cache import MeshCache
-from pipeline.run.meshing import cached_arrays, mesh_case
-from pipeline.stages import recorded
+from epsmesh.mesh import parts
+from epsmesh.mesh.of_case import mesh_arrays, unrefined_arrays
+from epsmesh.mesh.refine import NotRefined
+from epsmesh.plan import refinement
+from epsmesh.run.mesh_cache import MeshCache
+from epsmesh.run.meshing import cached_arrays, mesh_case
+from epsmesh.stages import recorded
 from tests.cases import study
 
 CASE = study().case(())

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-import pipeline
-from pipeline.plan.key import case_key
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.run.outputs import function_of
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+import epsmesh
+from epsmesh.plan.key import case_key
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.run.outputs import function_of
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 from tests.cases import raw
 
 WORLD = MPI.COMM_WORLD
@@ -74,7 +74,7 @@ def test_numbers_are_those_of_the_solution_at_their_place_in_the_body():
     ball = {"shape": "ellipsoid", "axes": ["15 mm", "12 mm", "10 mm"], "fixed": {"below": "-5 mm"}, "size": None}
     changes = {"body": ball, "probe": {"at": ["15 mm", "0 mm", "0 mm"], "radius": "2 mm"}}
     (record,) = records(outputs, **changes)
-    values = pipeline.read(raw(**changes)).solve(comm=MPI.COMM_SELF).at([at])
+    values = epsmesh.read(raw(**changes)).solve(comm=MPI.COMM_SELF).at([at])
     assert record.largest["displacement_x"] == pytest.approx(float(values.displacement[0, 0]), rel=1e-9)
     assert record.largest["von_mises"] == pytest.approx(float(values.von_mises[0]), rel=1e-9)
     assert record.largest["pressure"] == pytest.approx(-float(np.trace(values.stress[0])) / 3, rel=1e-9)
@@ -120,14 +120,14 @@ def test_dataset_has_the_outputs_and_a_changed_function_is_computed_again(tmp_pa
     (tmp_path / "outputs.py").write_text(CODE)
     outputs = [OUTPUTS[0], {"name": "energy_of_tissue", "function": "outputs.py:energy", "unit": "J"}]
     text = raw(material={"poisson": [0.3, 0.4]}) | {"output": outputs}
-    study = pipeline.read(text, folder=tmp_path)
+    study = epsmesh.read(text, folder=tmp_path)
     data = study.run(MPI.COMM_SELF, output=tmp_path / "out")
     assert (data.lift.units, data.energy_of_tissue_error.units, data.lift.dims) == ("m", "J", ("poisson",))
     assert data.lift.attrs["ancillary_variables"] == "lift_error"
     assert np.isfinite(data.epsmesh.relative("lift_error")).all()
     assert not study.plan(store=tmp_path / "out" / "cases.sqlite").solves
     (tmp_path / "outputs.py").write_text(CODE.replace("lam / 2", "lam"))
-    assert len(pipeline.read(text, folder=tmp_path).plan(store=tmp_path / "out" / "cases.sqlite").solves) == 2
+    assert len(epsmesh.read(text, folder=tmp_path).plan(store=tmp_path / "out" / "cases.sqlite").solves) == 2
 
 
 @pytest.mark.parametrize(

@@ -11,11 +11,11 @@ from unittest.mock import Mock
 
 import pytest
 
-from pipeline.cli.runs import lines_of
-from pipeline.files import state_folder
-from pipeline.plan.plan import make_plan
-from pipeline.run.progress import Progress
-from pipeline.run.registry import Registered, runs
+from epsmesh.cli.runs import lines_of
+from epsmesh.files import state_folder
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.progress import Progress
+from epsmesh.run.registry import Registered, runs
 from tests.cases import study
 from tests.commands import ENVIRONMENT, ROOT
 
@@ -23,9 +23,9 @@ from tests.commands import ENVIRONMENT, ROOT
 BEGIN = """
 import sys, time
 from pathlib import Path
-from pipeline.plan.plan import make_plan
-from pipeline.run.progress import Progress
-from pipeline.run.registry import Registered
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.progress import Progress
+from epsmesh.run.registry import Registered
 from tests.cases import study
 with Registered(Path(sys.argv[1]), make_plan(study()), Progress()) as registered:
     registered.note("the case")

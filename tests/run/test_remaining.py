@@ -2,10 +2,10 @@
 
 import pytest
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.progress import Terminal
-from pipeline.run.remaining import Expected, Remaining, expectations, format_seconds
-from pipeline.study.read import parse
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.progress import Terminal
+from epsmesh.run.remaining import Expected, Remaining, expectations, format_seconds
+from epsmesh.study.read import parse
 from tests.cases import raw
 
 

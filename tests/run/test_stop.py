@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.run.execute import compute, execute
-from pipeline.run.progress import Progress
-from pipeline.run.record import Record
-from pipeline.run.stop import skipped
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run.execute import compute, execute
+from epsmesh.run.progress import Progress
+from epsmesh.run.record import Record
+from epsmesh.run.stop import skipped
 from tests.cases import study
 
 SWEEP = {

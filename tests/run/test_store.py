@@ -6,9 +6,9 @@ from math import nan
 
 import pytest
 
-from pipeline.run.reading import open_to_read, read_rows
-from pipeline.run.record import Record
-from pipeline.run.store import Store, StoreError
+from epsmesh.run.reading import open_to_read, read_rows
+from epsmesh.run.record import Record
+from epsmesh.run.store import Store, StoreError
 
 
 def test_put_and_get(tmp_path):
@@ -93,7 +93,7 @@ def test_a_stored_force_that_is_no_number_is_not_relied_on(tmp_path):
 def test_locked_store_is_not_taken_for_damaged(tmp_path, monkeypatch):
     path = tmp_path / "cases.sqlite"
     Store(path).close()
-    monkeypatch.setattr("pipeline.run.store.PATIENCE", 0.05)
+    monkeypatch.setattr("epsmesh.run.store.PATIENCE", 0.05)
     other = sqlite3.connect(path, isolation_level=None)
     other.execute("BEGIN EXCLUSIVE")
     with pytest.raises(StoreError, match="locked"):

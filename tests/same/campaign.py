@@ -22,7 +22,7 @@ from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
-from pipeline.study.toml import to_toml
+from epsmesh.study.toml import to_toml
 from tests.pairs import Study
 from tests.same import changes, files, forms  # noqa: F401 (they fill the table of changes)
 from tests.same.files import write_files

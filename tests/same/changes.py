@@ -404,7 +404,7 @@ def _sweep(study: Study, dice: random.Random) -> Pair | None:
 
 @change("without a reduction")
 def _reductions(study: Study, dice: random.Random) -> Pair | None:
-    from pipeline.plan.plan import REDUCTIONS
+    from epsmesh.plan.plan import REDUCTIONS
 
     swept = _swept(study)
     if swept is None:
@@ -417,7 +417,7 @@ def _reductions(study: Study, dice: random.Random) -> Pair | None:
 
 @change("without any reduction")
 def _plain(study: Study, dice: random.Random) -> Pair | None:
-    from pipeline.plan.plan import REDUCTIONS
+    from epsmesh.plan.plan import REDUCTIONS
 
     return Pair(study, copied(study, plan={"without": [*REDUCTIONS]}), one_mesh=False, common=True)
 

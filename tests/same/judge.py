@@ -5,7 +5,7 @@ from math import inf
 
 import numpy as np
 
-from pipeline.run.record import UNFORESEEN
+from epsmesh.run.record import UNFORESEEN
 from tests.same.outcome import Outcome, Value
 
 # Largest relative difference on one mesh: that of iterative solvers and of Newton's method.

@@ -54,10 +54,10 @@ def solve(study: Study, folder: Path, store: Path | None = None, at: Mapping[str
     """
     from mpi4py import MPI
 
-    from pipeline import workflow
-    from pipeline.run.store import StoreError
-    from pipeline.study.problems import StudyError
-    from pipeline.study.read import read_mapping
+    from epsmesh import workflow
+    from epsmesh.run.store import StoreError
+    from epsmesh.study.problems import StudyError
+    from epsmesh.study.read import read_mapping
 
     try:
         declared = read_mapping(study, "same", folder)

@@ -9,10 +9,10 @@ from pathlib import Path
 import nrrd
 import numpy as np
 
-from pipeline.plan.describe import summary
-from pipeline.plan.plan import make_plan
-from pipeline.study.problems import StudyError
-from pipeline.study.read import read_mapping
+from epsmesh.plan.describe import summary
+from epsmesh.plan.plan import make_plan
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import read_mapping
 from tests.pairs import BASE, FEATURES, Feature, Study, pieces, write_bodies
 from tests.same.quantities import times
 

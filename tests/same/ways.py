@@ -9,8 +9,8 @@ import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from pipeline.api import open_dataset
-from pipeline.study.toml import to_toml
+from epsmesh.api import open_dataset
+from epsmesh.study.toml import to_toml
 from tests.pairs import Study
 from tests.same.outcome import Outcome, of_dataset
 
@@ -35,7 +35,7 @@ def by_command(
 
 
 def _command(path: Path, *more: str, ranks: bool = False) -> list[str]:
-    program = [sys.executable, "-m", "pipeline", "run", path.name, *more]
+    program = [sys.executable, "-m", "epsmesh", "run", path.name, *more]
     return [*_RANKS, *program] if ranks else program
 
 
@@ -77,7 +77,7 @@ def _by_command(path: Path, _dice: random.Random) -> None:
 
 
 def _by_python(path: Path, _dice: random.Random) -> None:
-    program = "import sys, pipeline; pipeline.read(sys.argv[1]).run()"
+    program = "import sys, epsmesh; epsmesh.read(sys.argv[1]).run()"
     _start([sys.executable, "-c", program, path.name], path)
 
 
@@ -85,7 +85,7 @@ def _merged(path: Path, _dice: random.Random) -> None:
     """Two shards, whose stores are merged; nothing else is run."""
     for shard in ("2/2", "1/2"):
         _run(path, "--shard", shard)
-    _start([sys.executable, "-m", "pipeline", "status", path.name, "--merge"], path)
+    _start([sys.executable, "-m", "epsmesh", "status", path.name, "--merge"], path)
 
 
 _WAYS: dict[str, Callable[[Path, random.Random], None]] = {

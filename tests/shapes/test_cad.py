@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from pipeline.mesh.curve import curve
-from pipeline.mesh.generate import generate
-from pipeline.mesh.size import Sizes
-from pipeline.scene.model import Scene
-from pipeline.shapes.bodies.box import Box
-from pipeline.shapes.bodies.cad import FromCad
-from pipeline.shapes.bodies.cylinder import Cylinder
-from pipeline.shapes.body import Body
-from pipeline.shapes.contact import check_contact
-from pipeline.shapes.frame import PlaceError
-from pipeline.shapes.probes.disc import Disc
+from epsmesh.mesh.curve import curve
+from epsmesh.mesh.generate import generate
+from epsmesh.mesh.size import Sizes
+from epsmesh.scene.model import Scene
+from epsmesh.shapes.bodies.box import Box
+from epsmesh.shapes.bodies.cad import FromCad
+from epsmesh.shapes.bodies.cylinder import Cylinder
+from epsmesh.shapes.body import Body
+from epsmesh.shapes.contact import check_contact
+from epsmesh.shapes.frame import PlaceError
+from epsmesh.shapes.probes.disc import Disc
 
 PHANTOM = str(Path(__file__).parents[2] / "meshes" / "phantom.step")
 _DRAW = """

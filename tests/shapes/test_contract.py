@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from pipeline.mesh.generate import generate
-from pipeline.mesh.size import Sizes
-from pipeline.plan.key import case_key, normalised, reference_key
-from pipeline.scene.model import Scene
-from pipeline.shapes.body import Body, Drawn, Layered
-from pipeline.shapes.frame import Frame
-from pipeline.shapes.probe import PLANES, Probe
-from pipeline.shapes.registry import BODIES, PROBES, specialised
-from pipeline.shapes.section import words_of
+from epsmesh.mesh.generate import generate
+from epsmesh.mesh.size import Sizes
+from epsmesh.plan.key import case_key, normalised, reference_key
+from epsmesh.scene.model import Scene
+from epsmesh.shapes.body import Body, Drawn, Layered
+from epsmesh.shapes.frame import Frame
+from epsmesh.shapes.probe import PLANES, Probe
+from epsmesh.shapes.registry import BODIES, PROBES, specialised
+from epsmesh.shapes.section import words_of
 from tests.cases import study
 
 # A body that is not drawn has a file: see tests/shapes/test_scanned.py.
@@ -265,7 +265,7 @@ def drawn_edge(probe, body):
     """Return points of every curve of the drawn footprint, in its own coordinates, and the curves' types."""
     import gmsh
 
-    from pipeline.compat import gmsh_session
+    from epsmesh.compat import gmsh_session
 
     frame, curves, kinds = probe.frame_on(body), [], set()
     with gmsh_session():
@@ -322,7 +322,7 @@ def test_what_is_drawn_lies_within_the_outline_and_has_its_area(meshed):
 
 
 def test_curved_edges_lie_on_the_outline(meshed):
-    from pipeline.mesh.curve import curve
+    from epsmesh.mesh.curve import curve
 
     scene, _ = meshed
     scene = Scene(scene.body, scene.probe, rim_segments=SIZES.rim_segments(scene.probe))
@@ -504,7 +504,7 @@ def test_a_frame_places_what_is_drawn_and_writes_its_coordinates():
     """A rectangle drawn upright is rotated into the frame's plane, along its direction."""
     import gmsh
 
-    from pipeline.compat import gmsh_session
+    from epsmesh.compat import gmsh_session
 
     for axis in ((0.6, 0.0, -0.8), (0.0, 0.6, 0.8), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)):
         frame = Frame((1e-3, 2e-3, 3e-3), axis=axis).turned((1.0, 2.0, 0.5))
@@ -537,7 +537,7 @@ def test_a_shape_that_leaves_something_out_cannot_be_made(model, base):
 
 
 def test_what_is_not_in_the_registry_is_refused():
-    from pipeline.study.problems import StudyError
+    from epsmesh.study.problems import StudyError
 
     for section, shape in (("body", "torus"), ("probe", "star")):
         with pytest.raises(StudyError, match="unknown shape"):

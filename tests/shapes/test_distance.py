@@ -5,9 +5,9 @@ from math import cos, radians, sin, sqrt, tan
 import numpy as np
 import pytest
 
-from pipeline.shapes.distance import intersection, slab
-from pipeline.shapes.indenter import Indenter
-from pipeline.shapes.registry import PROBES
+from epsmesh.shapes.distance import intersection, slab
+from epsmesh.shapes.indenter import Indenter
+from epsmesh.shapes.registry import PROBES
 from tests.shapes.test_contract import ROUNDED, example
 
 STEP = 1e-8

@@ -5,12 +5,12 @@ from math import asin, cos, inf, log, pi, sqrt, tan
 import numpy as np
 import pytest
 
-from pipeline.plan.key import case_key, mesh_key
-from pipeline.plan.plan import make_plan
-from pipeline.shapes.parabola import Parabola
-from pipeline.shapes.rounded import Rounded, quarter_turn
-from pipeline.study.problems import StudyError
-from pipeline.verify import known
+from epsmesh.plan.key import case_key, mesh_key
+from epsmesh.plan.plan import make_plan
+from epsmesh.shapes.parabola import Parabola
+from epsmesh.shapes.rounded import Rounded, quarter_turn
+from epsmesh.study.problems import StudyError
+from epsmesh.verify import known
 from tests.cases import probe, study
 
 SPHERE = {"shape": "sphere", "radius": "3 mm", "depth": "0.1 mm", "contact": "unilateral"}

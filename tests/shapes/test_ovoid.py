@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from pipeline.shapes.ovoid import Ovoid
+from epsmesh.shapes.ovoid import Ovoid
 
 
 @pytest.mark.parametrize("axes", [(1.0, 1.0, 1.0), (3.0, 2.0, 1.0), (5.0, 1.0, 0.2)])

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.plan.key import case_key, mesh_key
-from pipeline.report.table import study_of
-from pipeline.shapes.bodies.surface import FromSurface
-from pipeline.shapes.frame import PlaceError
-from pipeline.shapes.skin import Skin
-from pipeline.shapes.triangles import Triangles
-from pipeline.study.problems import StudyError
+from epsmesh.plan.key import case_key, mesh_key
+from epsmesh.report.table import study_of
+from epsmesh.shapes.bodies.surface import FromSurface
+from epsmesh.shapes.frame import PlaceError
+from epsmesh.shapes.skin import Skin
+from epsmesh.shapes.triangles import Triangles
+from epsmesh.study.problems import StudyError
 from tests.cases import study
 from tests.organs import AXES, box, ellipsoid, sphere, write_stl
 
@@ -178,7 +178,7 @@ TEXT = (
 
 
 def test_a_file_is_sought_beside_the_study(folder):
-    from pipeline.study.read import read_study
+    from epsmesh.study.read import read_study
 
     (folder / "s.toml").write_text(TEXT)
     assert read_study(folder / "s.toml").case(()).body.extent == pytest.approx(120e-3, rel=2e-3)

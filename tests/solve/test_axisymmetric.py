@@ -6,14 +6,14 @@ from math import inf, pi
 import numpy as np
 import pytest
 
-from pipeline.mesh.meridian import Grading, Meridian
-from pipeline.solve import SolveError
-from pipeline.solve.compiled import compiling
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
-from pipeline.solve.movement import Motion, Movement
-from pipeline.solve.physics import MaterialLaw, Parameters
-from pipeline.verify import known
+from epsmesh.mesh.meridian import Grading, Meridian
+from epsmesh.solve import SolveError
+from epsmesh.solve.compiled import compiling
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.meridian.problem import MeridianProblem, compile_axisymmetric
+from epsmesh.solve.movement import Motion, Movement
+from epsmesh.solve.physics import MaterialLaw, Parameters
+from epsmesh.verify import known
 from tests.sampling import sampled
 
 
@@ -92,7 +92,7 @@ def test_displacement_and_mixed_elements_agree(monkeypatch):
     meridian = Meridian(4, 3, 1, -1.0)
     forces = []
     for threshold in (0.3, 0.5):
-        monkeypatch.setattr("pipeline.solve.meridian.region.MIXED_FROM", threshold)
+        monkeypatch.setattr("epsmesh.solve.meridian.region.MIXED_FROM", threshold)
         forces.append(solve_axisymmetric(meridian, 0.4, True).reaction[2])
     assert forces[0] == pytest.approx(forces[1], rel=1e-7)
 
@@ -132,7 +132,7 @@ def test_error_bar_holds_the_truth(seed, monkeypatch):
     support = [-height * random.uniform(0.05, 1), "bottom", "sides", "bottom+sides"][seed % 4]
     meridian, poisson = Meridian(radius, height, 1, support), [0.0, 0.3, 0.45, 0.49, 0.4999, 0.5][seed]
     exact = solve_axisymmetric(meridian, poisson, seed % 2 == 0)
-    monkeypatch.setattr("pipeline.solve.meridian.problem.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
+    monkeypatch.setattr("epsmesh.solve.meridian.problem.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
     rough = solve_axisymmetric(meridian, poisson, seed % 2 == 0, degree=4)
     assert exact.bar < rough.bar
     assert rough.reaction[2] == pytest.approx(exact.reaction[2], rel=rough.bar + exact.bar)
@@ -182,7 +182,7 @@ def test_error_bar_of_layers_holds_the_truth(number, monkeypatch):
     meridian, moduli = LAYERED[number]
     exact = solve_layers(meridian, moduli, number % 2 == 0)
     assert exact.bar < 1e-5
-    monkeypatch.setattr("pipeline.solve.meridian.problem.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
+    monkeypatch.setattr("epsmesh.solve.meridian.problem.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
     rough = solve_layers(meridian, moduli, number % 2 == 0, degree=4)
     assert exact.bar < rough.bar < 1e-2
     assert rough.reaction[2] == pytest.approx(exact.reaction[2], rel=rough.bar + exact.bar)

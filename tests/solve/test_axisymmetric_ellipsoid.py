@@ -5,15 +5,15 @@ from math import pi
 import numpy as np
 import pytest
 
-from pipeline.mesh.elliptic_meridian import EllipticMeridian
-from pipeline.mesh.meridian import Grading
-from pipeline.solve import SolveError
-from pipeline.solve.compiled import compiling
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
-from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw
-from pipeline.verify import known
+from epsmesh.mesh.elliptic_meridian import EllipticMeridian
+from epsmesh.mesh.meridian import Grading
+from epsmesh.solve import SolveError
+from epsmesh.solve.compiled import compiling
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.meridian.problem import MeridianProblem, compile_axisymmetric
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.verify import known
 from tests.sampling import sampled
 
 SCENES = {
@@ -53,7 +53,7 @@ def test_error_bar_holds_the_truth(name, bonded, poisson, monkeypatch):
     exact = solve(SCENES[name], poisson, bonded)
     assert exact.bar < 1e-5
     assert exact.balance < 1e-9
-    monkeypatch.setattr("pipeline.solve.meridian.problem.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
+    monkeypatch.setattr("epsmesh.solve.meridian.problem.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
     rough = solve(SCENES[name], poisson, bonded, degree=4)
     assert rough.reaction[2] == pytest.approx(exact.reaction[2], rel=rough.bar + exact.bar)
 
@@ -61,7 +61,7 @@ def test_error_bar_holds_the_truth(name, bonded, poisson, monkeypatch):
 def test_arcs_are_followed_closely_enough(monkeypatch):
     """Triangles with half of the angle give the same F."""
     before = solve(SCENES["slender"], 0.3, False).reaction[2]
-    monkeypatch.setattr("pipeline.mesh.elliptic_meridian._WIDEST", pi / 12)
+    monkeypatch.setattr("epsmesh.mesh.elliptic_meridian._WIDEST", pi / 12)
     assert solve(SCENES["slender"], 0.3, False).reaction[2] == pytest.approx(before, rel=1e-7)
 
 

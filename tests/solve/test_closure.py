@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.run import far_field
-from pipeline.run.execute import compute
-from pipeline.solve.far_field import _EXPONENTS, PointForce, Smooth
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run import far_field
+from epsmesh.run.execute import compute
+from epsmesh.solve.far_field import _EXPONENTS, PointForce, Smooth
 from tests.cases import solve, study
 
 MESH = {"epsilon": "6 mm", "fine": "3 mm", "rim": "0.3 mm", "outside": "halfspace"}

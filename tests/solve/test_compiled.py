@@ -11,11 +11,11 @@ import pytest
 import ufl
 from dolfinx import fem
 
-from pipeline import compat
-from pipeline.solve import compiled
-from pipeline.solve.compiled import compiling, form, form_cache, scalar_space, vector_space
-from pipeline.solve.kernels.assembly import cell_kernel
-from pipeline.solve.kernels.native import call
+from epsmesh import compat
+from epsmesh.solve import compiled
+from epsmesh.solve.compiled import compiling, form, form_cache, scalar_space, vector_space
+from epsmesh.solve.kernels.assembly import cell_kernel
+from epsmesh.solve.kernels.native import call
 from tests.solve.test_mixed import make_mesh
 
 _EVERY_MODULE = """
@@ -24,8 +24,8 @@ import dolfinx, dolfinx.fem.petsc, dolfinx.io, dolfinx.jit, dolfinx.mesh, dolfin
 
 modules = {name: module for name, module in sys.modules.items() if name.split(".")[0] in ("dolfinx", "ffcx")}
 before = {name: dict(vars(module)) for name, module in modules.items()}
-import pipeline
-for found in pkgutil.walk_packages(pipeline.__path__, "pipeline."):
+import epsmesh
+for found in pkgutil.walk_packages(epsmesh.__path__, "epsmesh."):
     try:
         importlib.import_module(found.name)
     except ModuleNotFoundError as error:

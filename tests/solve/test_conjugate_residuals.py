@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from petsc4py import PETSc
 
-from pipeline.solve import SolveError
-from pipeline.solve.conjugate_residuals import conjugate_residuals
+from epsmesh.solve import SolveError
+from epsmesh.solve.conjugate_residuals import conjugate_residuals
 
 N = 300
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, movement_of, tool_of
-from pipeline.solve.conditions import WITHOUT_FOOTPRINT
-from pipeline.solve.contact.active_set import ContactError
-from pipeline.solve.contact.tool import Tool
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
-from pipeline.study.problems import StudyError
-from pipeline.verify import known
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import law_of, movement_of, tool_of
+from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
+from epsmesh.solve.contact.active_set import ContactError
+from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
+from epsmesh.study.problems import StudyError
+from epsmesh.verify import known
 from tests.cases import solve, study
 
 SMALL = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm"}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.verify.known import half_space_ball
+from epsmesh.verify.known import half_space_ball
 from tests.cases import solve
 
 BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.arrays import FloatArray
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, movement_of, problem_of
-from pipeline.solve.history import Course, History
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.solution import Request, Solution
-from pipeline.solve.spaces import Spaces
-from pipeline.viscoelastic import Motion, Terms, follow
+from epsmesh.arrays import FloatArray
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import law_of, movement_of, problem_of
+from epsmesh.solve.history import Course, History
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.solution import Request, Solution
+from epsmesh.solve.spaces import Spaces
+from epsmesh.viscoelastic import Motion, Terms, follow
 from tests.cases import solve, study
 
 TERMS = ((0.4, 0.5), (0.2, 3.0))

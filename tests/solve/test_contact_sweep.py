@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.describe import story
-from pipeline.plan.key import case_key, mesh_key, normalised, reference_key
-from pipeline.plan.plan import make_plan
-from pipeline.plan.steps import FEWEST_DEPTHS
-from pipeline.report.dataset import build
-from pipeline.run.execute import compute
-from pipeline.solve.contact.condensed import CondensedElements
-from pipeline.solve.contact.sweep import Sweep
-from pipeline.solve.far_field import PointForce
-from pipeline.solve.physics import MaterialLaw
-from pipeline.study.problems import StudyError
+from epsmesh.plan.describe import story
+from epsmesh.plan.key import case_key, mesh_key, normalised, reference_key
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.steps import FEWEST_DEPTHS
+from epsmesh.report.dataset import build
+from epsmesh.run.execute import compute
+from epsmesh.solve.contact.condensed import CondensedElements
+from epsmesh.solve.contact.sweep import Sweep
+from epsmesh.solve.far_field import PointForce
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.study.problems import StudyError
 from tests.cases import study
 
 SMALL = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm"}

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, movement_of, tool_of
-from pipeline.solve.conditions import WITHOUT_FOOTPRINT
-from pipeline.solve.contact import contact_steps, large
-from pipeline.solve.contact.deformed import solve_contact
-from pipeline.solve.contact.large import LargeContactSolution
-from pipeline.solve.contact.turned import turned_frames
-from pipeline.solve.newton import LargeError
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import law_of, movement_of, tool_of
+from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
+from epsmesh.solve.contact import contact_steps, large
+from epsmesh.solve.contact.deformed import solve_contact
+from epsmesh.solve.contact.large import LargeContactSolution
+from epsmesh.solve.contact.turned import turned_frames
+from epsmesh.solve.newton import LargeError
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
 from tests.cases import force, solve, study
 
 SPHERE = {"shape": "sphere", "radius": "4 mm", "depth": "2 mm"}

@@ -2,9 +2,9 @@
 
 import pytest
 
-from pipeline.solve.ended import ended
-from pipeline.solve.newton import LargeError
-from pipeline.solve.physics import MaterialLaw
+from epsmesh.solve.ended import ended
+from epsmesh.solve.newton import LargeError
+from epsmesh.solve.physics import MaterialLaw
 
 LINEAR, LARGE = MaterialLaw.of_moduli(1.0, 0.3), MaterialLaw.of_moduli(1.0, 0.3, "neo-hookean")
 WHY = LargeError("active sets repeat")

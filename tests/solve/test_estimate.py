@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.run.meshing import mesh_case
-from pipeline.solve.cell_values import plain_share
-from pipeline.solve.convergence import Convergence
-from pipeline.solve.estimate import error_bar, extrapolate, extrapolate_found, found_again_bar, is_graded
-from pipeline.study.read import parse
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.run.meshing import mesh_case
+from epsmesh.solve.cell_values import plain_share
+from epsmesh.solve.convergence import Convergence
+from epsmesh.solve.estimate import error_bar, extrapolate, extrapolate_found, found_again_bar, is_graded
+from epsmesh.study.read import parse
 from tests.cases import BLADE, solve, study
 from tests.sampling import sampled
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, movement_of, tool_of
-from pipeline.solve.conditions import WITHOUT_FOOTPRINT
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
-from pipeline.study.problems import StudyError
-from pipeline.verify import known
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import law_of, movement_of, tool_of
+from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
+from epsmesh.study.problems import StudyError
+from epsmesh.verify import known
 from tests.cases import solve, study
 
 BODY = {"shape": "cylinder", "radius": "60 mm", "height": "60 mm"}

@@ -8,8 +8,8 @@ import pytest
 from dolfinx import fem
 from mpi4py import MPI
 
-from pipeline.solve.compiled import vector_space
-from pipeline.solve.kernels.multigrid import interpolation
+from epsmesh.solve.compiled import vector_space
+from epsmesh.solve.kernels.multigrid import interpolation
 from tests.solve.test_mixed import make_mesh
 
 

@@ -5,18 +5,18 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline.plan.plan import make_plan
-from pipeline.run import far_field
-from pipeline.run.execute import compute
-from pipeline.solve import SolveError, krylov, linear_solver
-from pipeline.solve.balance import BALANCE_LIMIT, check_balance
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.hierarchical_estimate import energy_decrements
-from pipeline.solve.krylov import keep
-from pipeline.solve.linear_solver import Level, LinearSolver
-from pipeline.solve.movement import Movement
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
+from epsmesh.plan.plan import make_plan
+from epsmesh.run import far_field
+from epsmesh.run.execute import compute
+from epsmesh.solve import SolveError, krylov, linear_solver
+from epsmesh.solve.balance import BALANCE_LIMIT, check_balance
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.hierarchical_estimate import energy_decrements
+from epsmesh.solve.krylov import keep
+from epsmesh.solve.linear_solver import Level, LinearSolver
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
 from tests.cases import study
 from tests.solve.test_mixed import DEPTH, PRESS, law, make_mesh
 

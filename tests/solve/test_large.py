@@ -7,20 +7,20 @@ import pytest
 from dolfinx import fem
 from mpi4py import MPI
 
-from pipeline.plan.key import mesh_key
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.run.execute import compute
-from pipeline.run.meshing import mesh_case
-from pipeline.solve.compiled import vector_space
-from pipeline.solve.forms import ElasticForms, HyperelasticForms
-from pipeline.solve.kernels import multigrid
-from pipeline.solve.laws import LAWS
-from pipeline.solve.laws.law import Law
-from pipeline.solve.load_steps import LoadSteps, check_path
-from pipeline.solve.newton import LargeError
-from pipeline.solve.physics import MaterialLaw
-from pipeline.study.case import Scale
+from epsmesh.plan.key import mesh_key
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run.execute import compute
+from epsmesh.run.meshing import mesh_case
+from epsmesh.solve.compiled import vector_space
+from epsmesh.solve.forms import ElasticForms, HyperelasticForms
+from epsmesh.solve.kernels import multigrid
+from epsmesh.solve.laws import LAWS
+from epsmesh.solve.laws.law import Law
+from epsmesh.solve.load_steps import LoadSteps, check_path
+from epsmesh.solve.newton import LargeError
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.study.case import Scale
 from tests.cases import force, solve, study
 
 LARGE = {"law": "neo-hookean"}

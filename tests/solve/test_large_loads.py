@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.loads import loads_of
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, movement_of, problem_of
-from pipeline.solve.conditions import WITHOUT_FOOTPRINT
-from pipeline.solve.dead_loads import sag
-from pipeline.solve.elements import elements_of
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import Spaces
+from epsmesh.run.loads import loads_of
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import law_of, movement_of, problem_of
+from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
+from epsmesh.solve.dead_loads import sag
+from epsmesh.solve.elements import elements_of
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.spaces import Spaces
 from tests.cases import solve, study
 
 YOUNG, HEIGHT, WEIGHT = 10e3, 20e-3, 1060 * 9.81

@@ -8,21 +8,21 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from pipeline import compat
-from pipeline.mesh.distribute import BodyMesh
-from pipeline.plan.plan import make_plan
-from pipeline.run.meshing import mesh_case
-from pipeline.scene.model import FIXED
-from pipeline.solve.compiled import form
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements.mixed import MixedElements
-from pipeline.solve.laws import LAWS
-from pipeline.solve.load_steps import LoadSteps
-from pipeline.solve.measures import dx
-from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw, SplitLaw
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
+from epsmesh import compat
+from epsmesh.mesh.distribute import BodyMesh
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.meshing import mesh_case
+from epsmesh.scene.model import FIXED
+from epsmesh.solve.compiled import form
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.elements.mixed import MixedElements
+from epsmesh.solve.laws import LAWS
+from epsmesh.solve.load_steps import LoadSteps
+from epsmesh.solve.measures import dx
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw, SplitLaw
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
 from tests.cases import force, solve, study
 from tests.sampling import sampled
 

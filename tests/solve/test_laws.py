@@ -9,16 +9,16 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.meshing import mesh_case
-from pipeline.shapes import tissue
-from pipeline.solve.compiled import compiling, vector_space
-from pipeline.solve.forms import ElasticForms, HyperelasticForms
-from pipeline.solve.laws import LAWS
-from pipeline.solve.laws.law import Shape
-from pipeline.solve.physics import MaterialLaw
-from pipeline.study.schema import Material
-from pipeline.verify.laws import FURTHER, YOUNG, Cube, Stress
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.meshing import mesh_case
+from epsmesh.shapes import tissue
+from epsmesh.solve.compiled import compiling, vector_space
+from epsmesh.solve.forms import ElasticForms, HyperelasticForms
+from epsmesh.solve.laws import LAWS
+from epsmesh.solve.laws.law import Shape
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.study.schema import Material
+from epsmesh.verify.laws import FURTHER, YOUNG, Cube, Stress
 from tests.cases import solve, study
 from tests.sampling import sampled
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.arrays import FloatArray
-from pipeline.mesh.distribute import BodyMesh
-from pipeline.run.loads import loads_of
-from pipeline.run.meshing import mesh_case
-from pipeline.solve.compiled import global_sum, vector
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.loads import apply_loads
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.response import load_bars
-from pipeline.solve.spaces import ElasticSpace, Spaces
+from epsmesh.arrays import FloatArray
+from epsmesh.mesh.distribute import BodyMesh
+from epsmesh.run.loads import loads_of
+from epsmesh.run.meshing import mesh_case
+from epsmesh.solve.compiled import global_sum, vector
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.loads import apply_loads
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.response import load_bars
+from epsmesh.solve.spaces import ElasticSpace, Spaces
 from tests.cases import solve, study
 
 YOUNG, HEIGHT = 10e3, 20e-3

@@ -6,23 +6,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.mesh.elliptic_meridian import EllipticMeridian
-from pipeline.mesh.meridian import Meridian
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.run.execute import compute
-from pipeline.scene.model import PROBE
-from pipeline.shapes.rounded import Rounded
-from pipeline.solve import SolveError
-from pipeline.solve.compiled import compiling
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.meridian.contact import DEGREE, MeridianContact
-from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
-from pipeline.solve.meridian.punch import TRIAL_DEGREE, RoundTool
-from pipeline.solve.meridian.signs import LiftsOff, check_signs
-from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw
-from pipeline.verify.known import half_space_contact
+from epsmesh.mesh.elliptic_meridian import EllipticMeridian
+from epsmesh.mesh.meridian import Meridian
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run.execute import compute
+from epsmesh.scene.model import PROBE
+from epsmesh.shapes.rounded import Rounded
+from epsmesh.solve import SolveError
+from epsmesh.solve.compiled import compiling
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.meridian.contact import DEGREE, MeridianContact
+from epsmesh.solve.meridian.problem import MeridianProblem, compile_axisymmetric
+from epsmesh.solve.meridian.punch import TRIAL_DEGREE, RoundTool
+from epsmesh.solve.meridian.signs import LiftsOff, check_signs
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.verify.known import half_space_contact
 from tests.cases import study
 
 LAW = MaterialLaw.of(0.3 / 1.3 / 0.4, 0.5 / 1.3)  # E = 1, ν = 0.3

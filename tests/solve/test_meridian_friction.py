@@ -6,16 +6,16 @@ from math import inf
 import numpy as np
 import pytest
 
-from pipeline.mesh.meridian import Meridian
-from pipeline.shapes.rounded import Rounded
-from pipeline.solve.compiled import compiling
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.meridian.contact import MeridianContact
-from pipeline.solve.meridian.large_contact import DEGREE_OF_STEPS, LargeMeridianContact
-from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
-from pipeline.solve.meridian.punch import RoundTool
-from pipeline.solve.movement import Movement
-from pipeline.verify import known
+from epsmesh.mesh.meridian import Meridian
+from epsmesh.shapes.rounded import Rounded
+from epsmesh.solve.compiled import compiling
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.meridian.contact import MeridianContact
+from epsmesh.solve.meridian.large_contact import DEGREE_OF_STEPS, LargeMeridianContact
+from epsmesh.solve.meridian.problem import MeridianProblem, compile_axisymmetric
+from epsmesh.solve.meridian.punch import RoundTool
+from epsmesh.solve.movement import Movement
+from epsmesh.verify import known
 from tests.cases import solve
 from tests.solve.test_meridian_large_contact import BALL, BODY, law, round_tool
 

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.problem import conditions_of, law_of, meridian_of, movement_of, round_tool_of
-from pipeline.solve.history import History
-from pipeline.solve.meridian.large import LargeMeridian
-from pipeline.solve.meridian.large_contact import LargeMeridianContact
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.solution import Request, Solution
-from pipeline.study.problems import StudyError
-from pipeline.viscoelastic import Motion, Terms, follow, respond
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.problem import conditions_of, law_of, meridian_of, movement_of, round_tool_of
+from epsmesh.solve.history import History
+from epsmesh.solve.meridian.large import LargeMeridian
+from epsmesh.solve.meridian.large_contact import LargeMeridianContact
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.solution import Request, Solution
+from epsmesh.study.problems import StudyError
+from epsmesh.viscoelastic import Motion, Terms, follow, respond
 from tests.cases import solve, study
 from tests.solve.test_contact_in_time import BACK, HOLD, convolved
 from tests.solve.test_time_steps import JUMP, LONG, SKIN, TERMS, course_of

@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.mesh.elliptic_meridian import EllipticMeridian
-from pipeline.mesh.meridian import Grading, Meridian
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.solve.compiled import compiling
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.laws import LAWS
-from pipeline.solve.meridian.large import DEGREE, LargeMeridian, LargeSystem
-from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
-from pipeline.solve.meridian.system import meshes_of
-from pipeline.solve.movement import Movement
-from pipeline.solve.newton import LargeError
-from pipeline.solve.physics import MaterialLaw, Parameters
-from pipeline.verify.laws import FURTHER
+from epsmesh.mesh.elliptic_meridian import EllipticMeridian
+from epsmesh.mesh.meridian import Grading, Meridian
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.solve.compiled import compiling
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.laws import LAWS
+from epsmesh.solve.meridian.large import DEGREE, LargeMeridian, LargeSystem
+from epsmesh.solve.meridian.problem import MeridianProblem, compile_axisymmetric
+from epsmesh.solve.meridian.system import meshes_of
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.newton import LargeError
+from epsmesh.solve.physics import MaterialLaw, Parameters
+from epsmesh.verify.laws import FURTHER
 from tests.cases import study
 from tests.sampling import sampled
 

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from pipeline.mesh.elliptic_meridian import EllipticMeridian
-from pipeline.mesh.meridian import Meridian
-from pipeline.shapes.contour import Contour
-from pipeline.shapes.distance import revolved
-from pipeline.shapes.rounded import Rounded
-from pipeline.solve.compiled import compiling
-from pipeline.solve.meridian.contact import MeridianContact
-from pipeline.solve.meridian.large import DEGREE
-from pipeline.solve.meridian.large_contact import LargeMeridianContact
-from pipeline.solve.meridian.problem import compile_axisymmetric
-from pipeline.solve.meridian.punch import TRIAL_DEGREE, RoundTool
-from pipeline.solve.movement import Movement
-from pipeline.solve.newton import LargeError
-from pipeline.solve.physics import MaterialLaw
+from epsmesh.mesh.elliptic_meridian import EllipticMeridian
+from epsmesh.mesh.meridian import Meridian
+from epsmesh.shapes.contour import Contour
+from epsmesh.shapes.distance import revolved
+from epsmesh.shapes.rounded import Rounded
+from epsmesh.solve.compiled import compiling
+from epsmesh.solve.meridian.contact import MeridianContact
+from epsmesh.solve.meridian.large import DEGREE
+from epsmesh.solve.meridian.large_contact import LargeMeridianContact
+from epsmesh.solve.meridian.problem import compile_axisymmetric
+from epsmesh.solve.meridian.punch import TRIAL_DEGREE, RoundTool
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.newton import LargeError
+from epsmesh.solve.physics import MaterialLaw
 from tests.cases import solve
 
 BODY = Meridian(6.0, 5.0, 1.0)

@@ -7,18 +7,18 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline.mesh.distribute import BodyMesh, distribute
-from pipeline.mesh.of_case import mesh_arrays
-from pipeline.run.meshing import mesh_case
-from pipeline.solve import SolveError
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.estimate import error_bar
-from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.solution import Solution
-from pipeline.solve.spaces import Spaces
-from pipeline.verify import known
+from epsmesh.mesh.distribute import BodyMesh, distribute
+from epsmesh.mesh.of_case import mesh_arrays
+from epsmesh.run.meshing import mesh_case
+from epsmesh.solve import SolveError
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.estimate import error_bar
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.solution import Solution
+from epsmesh.solve.spaces import Spaces
+from epsmesh.verify import known
 from tests.cases import study
 from tests.sampling import sampled
 

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
-from pipeline.report.dataset import build
-from pipeline.run.execute import compute
-from pipeline.solve.balance import Sums
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.convergence import Convergence
-from pipeline.solve.movement import Motion, Movement
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
-from pipeline.study.case import Scale
-from pipeline.verify import known
+from epsmesh.plan.plan import make_plan
+from epsmesh.report import accessor  # noqa: F401 (registers dataset.epsmesh)
+from epsmesh.report.dataset import build
+from epsmesh.run.execute import compute
+from epsmesh.solve.balance import Sums
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.convergence import Convergence
+from epsmesh.solve.movement import Motion, Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
+from epsmesh.study.case import Scale
+from epsmesh.verify import known
 from tests.cases import BLADE, solve, study
 from tests.solve.test_mixed import law, make_mesh
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from pipeline.solve import SolveError
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.kernels import multigrid
-from pipeline.solve.linear_solver import Level, LinearSolver
-from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
+from epsmesh.solve import SolveError
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.kernels import multigrid
+from epsmesh.solve.linear_solver import Level, LinearSolver
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
 from tests.solve.test_mixed import PRESS, law, make_mesh
 
 FINE = {"mesh": {"rim": "0.5 mm", "fine": "3 mm"}}

@@ -5,11 +5,11 @@ from math import pi
 import numpy as np
 import pytest
 
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.plane.crack import LEVELS, open_crack, section
-from pipeline.solve.plane.opening import Opening
-from pipeline.verify.known import thin_needle
-from pipeline.verify.needles import shaft_pressure
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.plane.crack import LEVELS, open_crack, section
+from epsmesh.solve.plane.opening import Opening
+from epsmesh.verify.known import thin_needle
+from epsmesh.verify.needles import shaft_pressure
 
 
 @pytest.fixture(scope="module")

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline import compat
-from pipeline.mesh.distribute import distribute
-from pipeline.mesh.generate import MeshArrays
-from pipeline.solve.compiled import vector, vector_space
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.forms import ElasticForms
-from pipeline.solve.kernels.assembly import StraightStiffness
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import ElasticSpace, Spaces
+from epsmesh import compat
+from epsmesh.mesh.distribute import distribute
+from epsmesh.mesh.generate import MeshArrays
+from epsmesh.solve.compiled import vector, vector_space
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.forms import ElasticForms
+from epsmesh.solve.kernels.assembly import StraightStiffness
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import ElasticSpace, Spaces
 from tests.sampling import sampled
 from tests.solve.test_mixed import PRESS, law, make_mesh
 from tests.solve.test_regions import SKIN

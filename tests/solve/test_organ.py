@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.mesh.distribute import BodyMesh
-from pipeline.run.meshing import mesh_case
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
+from epsmesh.mesh.distribute import BodyMesh
+from epsmesh.run.meshing import mesh_case
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
 from tests.cases import solve, study
 from tests.organs import box, ellipsoid, write_stl
 from tests.solve.test_regions import moduli

@@ -4,7 +4,7 @@ from math import pi
 
 import pytest
 
-from pipeline.verify import known
+from epsmesh.verify import known
 from tests.cases import BLADE, force, solve
 from tests.sampling import sampled
 

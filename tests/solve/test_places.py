@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.mesh.distribute import distribute
-from pipeline.mesh.of_case import mesh_arrays, upright
-from pipeline.plan.steps import Solve
-from pipeline.run.measure import record_of
-from pipeline.run.problem import problem_of, solve_problem
-from pipeline.solve.spaces import Spaces
+from epsmesh.mesh.distribute import distribute
+from epsmesh.mesh.of_case import mesh_arrays, upright
+from epsmesh.plan.steps import Solve
+from epsmesh.run.measure import record_of
+from epsmesh.run.problem import problem_of, solve_problem
+from epsmesh.solve.spaces import Spaces
 from tests.cases import BLADE, solve, study
 
 DISC = {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm"}

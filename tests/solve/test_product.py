@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from petsc4py import PETSc
 
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements.pressures import Pressures
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import ElasticSpace, Spaces
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.elements.pressures import Pressures
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.spaces import ElasticSpace, Spaces
 from tests.solve.test_mixed import make_mesh
 
 LAYERS = {"body": {"layer": [{"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.48}]}}

@@ -5,11 +5,11 @@ import psutil
 import pytest
 from mpi4py import MPI
 
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.reduced_basis import ReducedBasis
-from pipeline.solve.spaces import Spaces
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.reduced_basis import ReducedBasis
+from epsmesh.solve.spaces import Spaces
 from tests.solve.test_mixed import DEPTH, PRESS, make_mesh
 
 RATIOS = (0.1, 0.3, 0.45)

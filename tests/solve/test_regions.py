@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.mesh.distribute import BodyMesh
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw, SplitLaw
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.solution import Solution
-from pipeline.solve.spaces import Spaces
+from epsmesh.mesh.distribute import BodyMesh
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import law_of
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw, SplitLaw
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.solution import Solution
+from epsmesh.solve.spaces import Spaces
 from tests.cases import solve as solve_study
 from tests.cases import study
 

@@ -5,15 +5,15 @@ from math import log, pi, sqrt
 import numpy as np
 import pytest
 
-from pipeline.solve import SolveError
-from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.plane.column import Column
-from pipeline.solve.plane.cut import Cut
-from pipeline.solve.plane.hole import MESHES, open_hole
-from pipeline.solve.plane.needle import NeedleSolver
-from pipeline.solve.plane.ring import Ring, ring_cuts
-from pipeline.verify import known
+from epsmesh.solve import SolveError
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.plane.column import Column
+from epsmesh.solve.plane.cut import Cut
+from epsmesh.solve.plane.hole import MESHES, open_hole
+from epsmesh.solve.plane.needle import NeedleSolver
+from epsmesh.solve.plane.ring import Ring, ring_cuts
+from epsmesh.verify import known
 
 INCOMPRESSIBLE = MaterialLaw.of_moduli(3.0, 0.5, "neo-hookean")
 COMPRESSIBLE = MaterialLaw.of_moduli(2.6, 0.3, "neo-hookean")

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from pipeline.arrays import BoolArray, FloatArray
-from pipeline.shapes.distance import Distance
-from pipeline.solve.contact.constraint import Constraint
-from pipeline.solve.contact.deformed import PlacedTool, solve_contact
+from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.shapes.distance import Distance
+from epsmesh.solve.contact.constraint import Constraint
+from epsmesh.solve.contact.deformed import PlacedTool, solve_contact
 
 COUNT = 9
 

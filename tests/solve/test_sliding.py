@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, tool_of
-from pipeline.solve.conditions import WITHOUT_FOOTPRINT
-from pipeline.solve.contact.contact_steps import ContactPath, Stage, press, press_with_friction
-from pipeline.solve.contact.large import placed_tool
-from pipeline.solve.contact.large_friction import friction_of
-from pipeline.solve.contact.levels import Surface
-from pipeline.solve.contact.tissue import DeformedBody
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import law_of, tool_of
+from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
+from epsmesh.solve.contact.contact_steps import ContactPath, Stage, press, press_with_friction
+from epsmesh.solve.contact.large import placed_tool
+from epsmesh.solve.contact.large_friction import friction_of
+from epsmesh.solve.contact.levels import Surface
+from epsmesh.solve.contact.tissue import DeformedBody
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
 from tests.cases import solve, study
 
 BODY = {"shape": "cylinder", "radius": "12 mm", "height": "8 mm"}

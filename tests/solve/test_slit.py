@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline import compat
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import conditions_of, movement_of
-from pipeline.solve.cell_values import clear_cells
-from pipeline.solve.convergence import Convergence
-from pipeline.solve.crack import Release, moved_on
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
+from epsmesh import compat
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import conditions_of, movement_of
+from epsmesh.solve.cell_values import clear_cells
+from epsmesh.solve.convergence import Convergence
+from epsmesh.solve.crack import Release, moved_on
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
 from tests.cases import BLADE, solve, study
 from tests.solve.test_mixed import law
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import conditions_of
-from pipeline.solve import cell_values
-from pipeline.solve.cell_values import CellValues
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import Spaces
-from pipeline.study.problems import StudyError
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import conditions_of
+from epsmesh.solve import cell_values
+from epsmesh.solve.cell_values import CellValues
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.spaces import Spaces
+from epsmesh.study.problems import StudyError
 from tests.cases import solve, study
 from tests.solve.test_slit import case_of
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from dolfinx import fem
 
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements import elements_of
-from pipeline.solve.laws import LAWS
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import Spaces
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.elements import elements_of
+from epsmesh.solve.laws import LAWS
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.spaces import Spaces
 from tests.sampling import sampled
 from tests.solve.test_mixed import make_mesh
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, movement_of, problem_of
-from pipeline.solve.history import Course, History
-from pipeline.solve.newton import LargeError
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import Spaces
-from pipeline.solve.time_steps import PressedFootprint, TimeSteps
-from pipeline.viscoelastic import Motion, Terms, respond
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import law_of, movement_of, problem_of
+from epsmesh.solve.history import Course, History
+from epsmesh.solve.newton import LargeError
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.spaces import Spaces
+from epsmesh.solve.time_steps import PressedFootprint, TimeSteps
+from epsmesh.viscoelastic import Motion, Terms, respond
 from tests.cases import study
 
 TERMS = ((0.4, 0.5), (0.2, 3.0))

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.study.capabilities.features import FEATURES
-from pipeline.study.capabilities.obstacles import OBSTACLES, obstacle
-from pipeline.study.capabilities.refusals import REFUSALS
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh.study.capabilities.features import FEATURES
+from epsmesh.study.capabilities.obstacles import OBSTACLES, obstacle
+from epsmesh.study.capabilities.refusals import REFUSALS
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 from tests.cases import BLADE, raw, study
 from tests.studies import changed
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from pipeline.experiment.reading import ExperimentError
-from pipeline.study.curves import curves_of
-from pipeline.study.read import parse
+from epsmesh.experiment.reading import ExperimentError
+from epsmesh.study.curves import curves_of
+from epsmesh.study.read import parse
 from tests.cases import raw
 from tests.experiment.curves import approach, write
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from pipeline.identify.dataset import joined, write
-from pipeline.identify.parts import Unknown
-from pipeline.plan.plan import make_plan
-from pipeline.report.identified import material
-from pipeline.report.uncertainty import tissue
-from pipeline.study.identified import NOTHING
-from pipeline.study.problems import StudyError
-from pipeline.study.read import read_mapping, read_text
+from epsmesh.identify.dataset import joined, write
+from epsmesh.identify.parts import Unknown
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.identified import material
+from epsmesh.report.uncertainty import tissue
+from epsmesh.study.identified import NOTHING
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import read_mapping, read_text
 from tests import identifications
 from tests.cases import raw
 from tests.identifications import VALUES, identification

@@ -7,15 +7,15 @@ import nibabel
 import numpy as np
 import pytest
 
-from pipeline.identify.dataset import write
-from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import build
-from pipeline.report.uncertainty import IMAGE, NAME, force_image_uncertainty, unknowns
-from pipeline.run.record import Record
-from pipeline.shapes.files.read import read_surface
-from pipeline.shapes.triangles import SurfaceError
-from pipeline.study.problems import StudyError
-from pipeline.study.read import read_mapping
+from epsmesh.identify.dataset import write
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.report.uncertainty import IMAGE, NAME, force_image_uncertainty, unknowns
+from epsmesh.run.record import Record
+from epsmesh.shapes.files.read import read_surface
+from epsmesh.shapes.triangles import SurfaceError
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import read_mapping
 from tests.cases import raw, study
 from tests.identifications import identification
 from tests.organs import box, write_stl

@@ -10,10 +10,10 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from pipeline.study.json_schema import schema_text, study_schema
-from pipeline.study.keys import all_sections, keys_of
-from pipeline.study.named import SCHEMA, examples
-from pipeline.study.starter import starter
+from epsmesh.study.json_schema import schema_text, study_schema
+from epsmesh.study.keys import all_sections, keys_of
+from epsmesh.study.named import SCHEMA, examples
+from epsmesh.study.starter import starter
 from tests.commands import epsmesh
 
 STUDIES = [*Path("studies").glob("*.toml"), *Path("docs/scenes").glob("*.toml")]
@@ -67,7 +67,7 @@ def test_ranges_of_quantities(validator, value, fits):
 
 
 def test_the_schema_beside_the_studies_is_that_of_the_program():
-    assert SCHEMA.read_text(encoding="utf-8") == schema_text(), "write it anew: python -m pipeline.study.json_schema"
+    assert SCHEMA.read_text(encoding="utf-8") == schema_text(), "write it anew: python -m epsmesh.study.json_schema"
 
 
 @pytest.fixture(scope="module")

@@ -2,11 +2,11 @@
 
 import pytest
 
-from pipeline.plan.key import case_key, mesh_key, operator_key, reference_key
-from pipeline.plan.plan import make_plan
-from pipeline.plan.symmetry import is_round, model_planes
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh.plan.key import case_key, mesh_key, operator_key, reference_key
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.symmetry import is_round, model_planes
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 from tests.cases import raw, study
 
 DOWN = ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]

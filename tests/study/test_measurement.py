@@ -4,11 +4,11 @@ from math import inf
 
 import pytest
 
-from pipeline.identify.unknowns import unknowns
-from pipeline.plan.key import case_key
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse, read_text, scene_of
-from pipeline.study.toml import to_toml
+from epsmesh.identify.unknowns import unknowns
+from epsmesh.plan.key import case_key
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse, read_text, scene_of
+from epsmesh.study.toml import to_toml
 from tests.cases import raw
 
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.48}

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.plan.key import case_key
-from pipeline.shapes.contact import lifted_edge
-from pipeline.study.check_mesh import held_gaps
-from pipeline.study.problems import StudyError
+from epsmesh.plan.key import case_key
+from epsmesh.shapes.contact import lifted_edge
+from epsmesh.study.check_mesh import held_gaps
+from epsmesh.study.problems import StudyError
 from tests.cases import study
 from tests.shapes.files.solids import ball, both, stl
 

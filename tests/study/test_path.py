@@ -7,10 +7,10 @@ from math import pi
 import numpy as np
 import pytest
 
-from pipeline.plan.plan import declare, make_plan
-from pipeline.report.dataset import build
-from pipeline.run.outcome import count_states
-from pipeline.study.problems import StudyError
+from epsmesh.plan.plan import declare, make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run.outcome import count_states
+from epsmesh.study.problems import StudyError
 from tests.cases import BLADE, raw, study
 from tests.report.synthetic import dataset
 

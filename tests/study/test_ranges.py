@@ -2,8 +2,8 @@
 
 import pytest
 
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 from tests.cases import raw, study
 
 

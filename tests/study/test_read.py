@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.plan.key import case_key
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse, read_study, read_text
-from pipeline.study.toml import to_toml
+from epsmesh.plan.key import case_key
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse, read_study, read_text
+from epsmesh.study.toml import to_toml
 from tests import organs
 from tests.cases import BLADE, raw, study
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from pipeline.plan.key import case_key, mesh_key, reference_key
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh.plan.key import case_key, mesh_key, reference_key
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 from tests.cases import raw, study
 
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.48}

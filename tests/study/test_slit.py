@@ -2,9 +2,9 @@
 
 import pytest
 
-from pipeline.plan.plan import make_plan
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse
+from epsmesh.plan.plan import make_plan
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse
 from tests.cases import BLADE, raw
 
 BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}

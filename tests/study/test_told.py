@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.study.howto import page_of, pages
-from pipeline.study.keys import all_sections, keys_of
-from pipeline.study.meant import OTHER_SHAPES
-from pipeline.study.named import examples
-from pipeline.study.problems import StudyError
-from pipeline.study.read import parse, read_text
-from pipeline.study.renamed import RENAMED
-from pipeline.study.schema import SECTIONS
+from epsmesh.study.howto import page_of, pages
+from epsmesh.study.keys import all_sections, keys_of
+from epsmesh.study.meant import OTHER_SHAPES
+from epsmesh.study.named import examples
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import parse, read_text
+from epsmesh.study.renamed import RENAMED
+from epsmesh.study.schema import SECTIONS
 from tests.cases import BLADE, raw, study
 
 

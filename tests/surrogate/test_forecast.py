@@ -4,11 +4,11 @@ import json
 
 import pytest
 
-from pipeline.plan.cost import CostModel
-from pipeline.study.read import read_mapping
-from pipeline.surrogate.build import build
-from pipeline.surrogate.cases import domain_of
-from pipeline.surrogate.forecast import forecast
+from epsmesh.plan.cost import CostModel
+from epsmesh.study.read import read_mapping
+from epsmesh.surrogate.build import build
+from epsmesh.surrogate.cases import domain_of
+from epsmesh.surrogate.forecast import forecast
 from tests.surrogate.scenes import BALL, PUNCH, hertz, solved_by
 
 BONDED = PUNCH | {"probe": PUNCH["probe"] | {"contact": "bonded"}}

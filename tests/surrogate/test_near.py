@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from pipeline.identify.forward import SceneForce
-from pipeline.plan.cost import CostModel
-from pipeline.study.read import read_mapping
-from pipeline.surrogate.build import build
-from pipeline.surrogate.cases import domain_of
-from pipeline.surrogate.forecast import forecast
-from pipeline.surrogate.near import smaller
+from epsmesh.identify.forward import SceneForce
+from epsmesh.plan.cost import CostModel
+from epsmesh.study.read import read_mapping
+from epsmesh.surrogate.build import build
+from epsmesh.surrogate.cases import domain_of
+from epsmesh.surrogate.forecast import forecast
+from epsmesh.surrogate.near import smaller
 from tests.surrogate.scenes import BALL, solved_by
 
 PUNCH = {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "bonded"}

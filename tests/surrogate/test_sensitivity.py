@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.report.sensitivity import answer
-from pipeline.study.problems import StudyError
-from pipeline.study.read import read_mapping
-from pipeline.surrogate.cases import SurrogateError
-from pipeline.surrogate.sensitivity import dataset_of, explain
-from pipeline.surrogate.sobol import _passed_on, sobol
+from epsmesh.report.sensitivity import answer
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import read_mapping
+from epsmesh.surrogate.cases import SurrogateError
+from epsmesh.surrogate.sensitivity import dataset_of, explain
+from epsmesh.surrogate.sobol import _passed_on, sobol
 from tests.surrogate.scenes import BALL, PUNCH, hertz, solved_by
 
 VARIED = {

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.surrogate.nodes import SIZES, hierarchical, nodes
-from pipeline.surrogate.sparse import interpolate, points_of
+from epsmesh.surrogate.nodes import SIZES, hierarchical, nodes
+from epsmesh.surrogate.sparse import interpolate, points_of
 
 
 def _sampled(function, counted=None):

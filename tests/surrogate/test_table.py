@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.identify.forward import forward_of, stored_in
-from pipeline.identify.parts import Unknown
-from pipeline.study.problems import StudyError
-from pipeline.study.read import read_mapping
-from pipeline.surrogate.build import build
-from pipeline.surrogate.cases import SurrogateError, domain_of
+from epsmesh.identify.forward import forward_of, stored_in
+from epsmesh.identify.parts import Unknown
+from epsmesh.study.problems import StudyError
+from epsmesh.study.read import read_mapping
+from epsmesh.surrogate.build import build
+from epsmesh.surrogate.cases import SurrogateError, domain_of
 from tests.surrogate.scenes import BALL, PUNCH, hertz, solved_by
 
 LAYERED = BALL | {

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.identify.forward import forward_of
-from pipeline.identify.parts import Unknown
-from pipeline.layered.body import LayeredBody
-from pipeline.layered.compliance import Layer
-from pipeline.study.read import parse
-from pipeline.surrogate.wide import layered_body, profile_of, solve_wide
-from pipeline.workflow import solve
+from epsmesh.identify.forward import forward_of
+from epsmesh.identify.parts import Unknown
+from epsmesh.layered.body import LayeredBody
+from epsmesh.layered.compliance import Layer
+from epsmesh.study.read import parse
+from epsmesh.surrogate.wide import layered_body, profile_of, solve_wide
+from epsmesh.workflow import solve
 from tests.studies import changed
 
 SKIN = {"name": "skin", "young": "50 kPa", "poisson": 0.45, "thickness": "1 mm"}

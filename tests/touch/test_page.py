@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from epsmesh.export.file import write_model
+from epsmesh.touch.page import render, write_touch_page
+from epsmesh.touch.server import HOST, PageServer
 from epsmesh_realtime import ModelError, read_surface
 from epsmesh_realtime.query import Query
-from pipeline.export.file import write_model
-from pipeline.touch.page import render, write_touch_page
-from pipeline.touch.server import HOST, PageServer
 from tests.realtime.synthetic import random_surface, write_random, write_surface
 from tests.report.browser import CHROMIUM, Browser
 

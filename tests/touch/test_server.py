@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from pipeline.touch.server import HOST, PageServer
+from epsmesh.touch.server import HOST, PageServer
 
 TEXT = "<canvas></canvas>"
 

@@ -3,7 +3,7 @@
 import runpy
 from pathlib import Path
 
-from pipeline.touch.page import EVALUATOR
+from epsmesh.touch.page import EVALUATOR
 
 BUILD = runpy.run_path(str(Path(__file__).parents[2] / "realtime" / "wasm" / "build.py"))
 

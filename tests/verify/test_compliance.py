@@ -5,10 +5,10 @@ from math import radians, tan
 import numpy as np
 import pytest
 
-from pipeline.layered.body import LayeredBody
-from pipeline.layered.compliance import Layer
-from pipeline.layered.contact import Profile
-from pipeline.verify import known
+from epsmesh.layered.body import LayeredBody
+from epsmesh.layered.compliance import Layer
+from epsmesh.layered.contact import Profile
+from epsmesh.verify import known
 from tests.cases import probe
 
 YOUNG, NU = 10e3, 0.3

@@ -8,12 +8,12 @@ import pytest
 from mpi4py import MPI
 from typer.testing import CliRunner
 
-from pipeline import cli, verify
-from pipeline.layered.body import LayeredBody
-from pipeline.layered.compliance import Layer, Solid
-from pipeline.verify import known
-from pipeline.verify.boundary import rectangle_stiffness
-from pipeline.verify.row import Row
+from epsmesh import cli, verify
+from epsmesh.layered.body import LayeredBody
+from epsmesh.layered.compliance import Layer, Solid
+from epsmesh.verify import known
+from epsmesh.verify.boundary import rectangle_stiffness
+from epsmesh.verify.row import Row
 
 
 @pytest.fixture(scope="module")

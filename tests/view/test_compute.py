@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.plan.recipe import Rung
-from pipeline.run.execute import compute
-from pipeline.run.problem import CaseFailure
-from pipeline.run.solved import solve_alone
-from pipeline.scene.model import FIXED, PROBE
-from pipeline.view.compute import compute_fields
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.recipe import Rung
+from epsmesh.run.execute import compute
+from epsmesh.run.problem import CaseFailure
+from epsmesh.run.solved import solve_alone
+from epsmesh.scene.model import FIXED, PROBE
+from epsmesh.view.compute import compute_fields
 from tests.cases import BLADE, solve, study
 
 WORLD = MPI.COMM_WORLD
@@ -99,7 +99,7 @@ def test_nothing_is_solved_where_the_mesh_alone_is_asked_for(monkeypatch):
     def refuse(*_, **__):
         raise AssertionError("solved")
 
-    monkeypatch.setattr("pipeline.run.solved.solve_problem", refuse)
+    monkeypatch.setattr("epsmesh.run.solved.solve_problem", refuse)
     found = fields(mesh_only=True)
     assert found.displacement is None
     assert found.strain is None

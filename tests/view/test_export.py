@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.solved import solve_alone, solve_fields
-from pipeline.scene.model import PROBE
-from pipeline.view.compute import compute_fields, fields_of
-from pipeline.view.export import write_fields
+from epsmesh.run.solved import solve_alone, solve_fields
+from epsmesh.scene.model import PROBE
+from epsmesh.view.compute import compute_fields, fields_of
+from epsmesh.view.export import write_fields
 from tests.cases import study
 
 

@@ -6,12 +6,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 from PIL import Image
 
-from pipeline.report.dataset import build
-from pipeline.study.read import read_mapping
-from pipeline.view.blade_pictures import BladePictures
-from pipeline.view.film import Frame, frames_of, write_film
-from pipeline.view.needle_pictures import NeedlePictures
-from pipeline.view.section import Section
+from epsmesh.report.dataset import build
+from epsmesh.study.read import read_mapping
+from epsmesh.view.blade_pictures import BladePictures
+from epsmesh.view.film import Frame, frames_of, write_film
+from epsmesh.view.needle_pictures import NeedlePictures
+from epsmesh.view.section import Section
 from tests.insertion import test_needle as needles
 from tests.insertion.scenes import BLADE, SCENE, solved
 

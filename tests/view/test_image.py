@@ -8,9 +8,9 @@ import nibabel
 import numpy as np
 import pytest
 
-from pipeline.shapes.files.labels import read_labels
-from pipeline.study.read import read_text
-from pipeline.view.segments import segments_of, slices_of, surfaces_of
+from epsmesh.shapes.files.labels import read_labels
+from epsmesh.study.read import read_text
+from epsmesh.view.segments import segments_of, slices_of, surfaces_of
 from tests.commands import epsmesh
 from tests.report.browser import Browser
 from tests.view.test_page import in_browser

@@ -13,15 +13,15 @@ import pytest
 from matplotlib.image import imread
 from mpi4py import MPI
 
-from pipeline.report.page import write_page as write_report
-from pipeline.run.solved import solve_alone
-from pipeline.scene.model import FIXED, PROBE
-from pipeline.shapes.frame import Frame
-from pipeline.view.compute import compute_fields
-from pipeline.view.numbers import FACES, mesh_arrays
-from pipeline.view.page import render, write_page
-from pipeline.view.tool import tool_of
-from pipeline.view.viewpoint import Viewpoint
+from epsmesh.report.page import write_page as write_report
+from epsmesh.run.solved import solve_alone
+from epsmesh.scene.model import FIXED, PROBE
+from epsmesh.shapes.frame import Frame
+from epsmesh.view.compute import compute_fields
+from epsmesh.view.numbers import FACES, mesh_arrays
+from epsmesh.view.page import render, write_page
+from epsmesh.view.tool import tool_of
+from epsmesh.view.viewpoint import Viewpoint
 from tests.cases import study
 from tests.report.browser import CHROMIUM, Browser
 from tests.report.synthetic import dataset

@@ -20,8 +20,8 @@ if not os.environ.get("DISPLAY"):
 
 
 def fields(mesh_only=False, **changes):
-    from pipeline.run.solved import solve_alone
-    from pipeline.view.compute import compute_fields
+    from epsmesh.run.solved import solve_alone
+    from epsmesh.view.compute import compute_fields
 
     made = study(**changes)
     (case,) = made.cases()
@@ -48,7 +48,7 @@ def colours(path):
     ],
 )
 def test_body_epsilon_and_probe_are_drawn(changes, tmp_path):
-    from pipeline.view.picture import draw_deformed, draw_mesh
+    from epsmesh.view.picture import draw_deformed, draw_mesh
 
     found = fields(**changes)
     deformed, factor = draw_deformed(found, tmp_path / "deformed.png", "a case")
@@ -61,7 +61,7 @@ def test_body_epsilon_and_probe_are_drawn(changes, tmp_path):
 
 
 def test_epsilon_is_drawn_where_there_is_one(tmp_path):
-    from pipeline.view.picture import draw_mesh
+    from epsmesh.view.picture import draw_mesh
 
     black = [
         colours(draw_mesh(fields(mesh_only=True, mesh={"epsilon": epsilon}), tmp_path / "mesh.png", "a case"))[1]
@@ -80,7 +80,7 @@ def test_command_writes_both_pictures_and_says_the_factor(tmp_path):
 
 
 def test_there_is_no_deformation_of_a_mesh(tmp_path):
-    from pipeline.view.picture import draw_deformed
+    from epsmesh.view.picture import draw_deformed
 
     with pytest.raises(ValueError, match="meshed only"):
         draw_deformed(fields(mesh_only=True), tmp_path / "deformed.png", "a case")

@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from pipeline.study.read import read_mapping
-from pipeline.view.fields import Fields
-from pipeline.view.section import section_of
+from epsmesh.study.read import read_mapping
+from epsmesh.view.fields import Fields
+from epsmesh.view.section import section_of
 from tests.insertion.scenes import SCENE
 
 

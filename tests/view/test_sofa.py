@@ -11,9 +11,9 @@ from mpi4py import MPI
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from pipeline.run.solved import solve_alone
-from pipeline.view.compute import compute_fields
-from pipeline.view.sofa import write_sofa
+from epsmesh.run.solved import solve_alone
+from epsmesh.view.compute import compute_fields
+from epsmesh.view.sofa import write_sofa
 from tests.cases import study
 from tests.commands import epsmesh
 from tests.studies import small_text

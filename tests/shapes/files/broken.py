@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays import FloatArray
+from epsmesh.arrays import FloatArray
 from tests.shapes.files.solids import Surface, ball, both, obj, ply, stl, stl_text
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
+from epsmesh.arrays import FloatArray, IntArray
 
 Surface = tuple[FloatArray, IntArray]
 

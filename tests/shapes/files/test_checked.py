@@ -4,10 +4,10 @@ import nrrd
 import numpy as np
 import pytest
 
-from pipeline.shapes.files import checked, image, read
-from pipeline.shapes.files.image import read_image
-from pipeline.shapes.files.read import read_surface
-from pipeline.shapes.triangles import SurfaceError
+from epsmesh.shapes.files import checked, image, read
+from epsmesh.shapes.files.image import read_image
+from epsmesh.shapes.files.read import read_surface
+from epsmesh.shapes.triangles import SurfaceError
 from tests.organs import ellipsoid, write_stl
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.shapes.files import crossings as module
-from pipeline.shapes.files.crossings import crossings
+from epsmesh.shapes.files import crossings as module
+from epsmesh.shapes.files.crossings import crossings
 from tests.organs import sphere
 
 FLAT = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]

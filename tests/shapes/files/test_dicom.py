@@ -9,9 +9,9 @@ import pytest
 from pydicom.dataset import Dataset
 from pydicom.uid import DeflatedExplicitVRLittleEndian
 
-from pipeline.shapes.files.image import read_image
-from pipeline.shapes.files.labels import read_labels
-from pipeline.shapes.triangles import SurfaceError
+from epsmesh.shapes.files.image import read_image
+from epsmesh.shapes.files.labels import read_labels
+from epsmesh.shapes.triangles import SurfaceError
 from tests.shapes.files import dicoms
 
 

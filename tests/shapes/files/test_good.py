@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.arrays import FloatArray
-from pipeline.shapes.files.loaded import Loaded
-from pipeline.shapes.files.read import read_surface, space_of
+from epsmesh.arrays import FloatArray
+from epsmesh.shapes.files.loaded import Loaded
+from epsmesh.shapes.files.read import read_surface, space_of
 from tests.shapes.files.solids import Surface, ball, obj, ply, stl, stl_text
 
 BALL = ball()

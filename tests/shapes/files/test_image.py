@@ -9,11 +9,11 @@ import nrrd
 import numpy as np
 import pytest
 
-from pipeline.arrays import FloatArray
-from pipeline.shapes.files.crossings import crossings
-from pipeline.shapes.files.image import read_image
-from pipeline.shapes.files.label_surface import default_smooth, filtered
-from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals
+from epsmesh.arrays import FloatArray
+from epsmesh.shapes.files.crossings import crossings
+from epsmesh.shapes.files.image import read_image
+from epsmesh.shapes.files.label_surface import default_smooth, filtered
+from epsmesh.shapes.triangles import SurfaceError, Triangles, doubled_normals
 
 AXES = np.array([40.0, 30.0, 20.0])  # mm
 CENTRE = np.array([10.31, -20.17, 55.43])  # mm: right, front, head; on no voxel

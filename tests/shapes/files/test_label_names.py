@@ -8,10 +8,10 @@ import nrrd
 import numpy as np
 import pytest
 
-from pipeline.shapes.files.image import read_image
-from pipeline.shapes.files.labels import of_label, read_labels
-from pipeline.shapes.triangles import SurfaceError
-from pipeline.study.problems import StudyError
+from epsmesh.shapes.files.image import read_image
+from epsmesh.shapes.files.labels import of_label, read_labels
+from epsmesh.shapes.triangles import SurfaceError
+from epsmesh.study.problems import StudyError
 from tests.cases import study
 
 AFFINE = np.diag([2.0, 2.0, 2.0, 1.0])

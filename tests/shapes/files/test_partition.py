@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pipeline.shapes.complex import OUTSIDE
-from pipeline.shapes.files.crossings import crossings
-from pipeline.shapes.files.labels import LabelMap
-from pipeline.shapes.files.marching import march
-from pipeline.shapes.files.partition import partition_of
-from pipeline.shapes.triangles import SurfaceError, doubled_normals
+from epsmesh.shapes.complex import OUTSIDE
+from epsmesh.shapes.files.crossings import crossings
+from epsmesh.shapes.files.labels import LabelMap
+from epsmesh.shapes.files.marching import march
+from epsmesh.shapes.files.partition import partition_of
+from epsmesh.shapes.triangles import SurfaceError, doubled_normals
 from tests.complexes import AXES, CENTRE, INNER, are_closed, neighbours, parted, scene
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.shapes.files.read import read_surface
-from pipeline.shapes.triangles import SurfaceError
+from epsmesh.shapes.files.read import read_surface
+from epsmesh.shapes.triangles import SurfaceError
 from tests.shapes.files.broken import Broken, corpus
 from tests.shapes.files.solids import ball, stl
 

@@ -1,0 +1,52 @@
+"""The command that answers from a dataset how large ε must be."""
+
+from typing import Annotated
+
+import typer
+
+from epsmesh.cli.console import say
+from epsmesh.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
+from epsmesh.cli.words import DEFAULT_OUTPUT, Dataset, Found, Json, read_dataset
+
+# What it asks and answers.
+_HOWTO = "docs/guideline.md"
+
+
+def guide(
+    file: Dataset,
+    accuracy: Annotated[str | None, typer.Option(help='Largest relative distance of F from F_exact: "5%".')] = None,
+    budget: Annotated[str | None, typer.Option(help='Longest run time of a case: "10ms".')] = None,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also corrections of F, all values of outside, and missing cases.")
+    ] = False,
+    output: Found = DEFAULT_OUTPUT,
+    as_json: Json = False,
+) -> None:
+    """Return the smallest ε for an accuracy, or the most accurate setting within a time, over all scenes of a study.
+
+    Exit status 1 if no mesh setting of the study suffices.
+
+    Example: epsmesh guide studies/figure3.toml --accuracy 5%
+
+    Example: epsmesh guide results/figure3.nc --budget 500ms --json
+    """
+    if accuracy is None and budget is None:
+        fail(Fault("give --accuracy, such as 5%, or --budget, such as 10ms, or both", key="--accuracy", howto=_HOWTO))
+    from epsmesh.report.guide import guide as make_guide
+    from epsmesh.report.guide import quantity
+    from epsmesh.report.table import DatasetError
+
+    for name, value, unit in (("--accuracy", accuracy, ""), ("--budget", budget, "s")):
+        try:
+            if value is not None:
+                quantity(name, value, unit)
+        except ValueError as wrong:
+            fail(Fault(str(wrong), key=name, value=value, allowed=str(wrong).rpartition(": ")[2], howto=_HOWTO))
+    _, dataset = read_dataset(file, output)
+    try:
+        found = make_guide(dataset, accuracy, budget)
+    except DatasetError as wrong:
+        fail(of_file(file, str(wrong), _HOWTO))
+    more = "" if verbose else "More: --verbose for corrections of F and what is missing, `epsmesh report` for figures."
+    say(found.to_dict(), found.text(verbose=verbose), *filter(None, [more]))
+    raise typer.Exit(DONE if found.answer else SOME_FAILED)

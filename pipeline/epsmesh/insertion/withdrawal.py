@@ -1,0 +1,170 @@
+"""Withdrawal: the slit stays, its front where cutting ended, and the friction on the flanks acts against the motion.
+
+Below the tip the slit closes. In the layer of the front, U with a front at a distance a from the tip is the energy of
+cutting at that depth less what the front releases from its own distance there to a. The field near the tip gives it,
+with an error bar that was measured on solved slits (docs/howto/insertion.md). That field has the modulus of one layer:
+with the tip in layers above, the slit is solved with the front where cutting ended.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from epsmesh.insertion.cutting import Cutting, sides
+from epsmesh.insertion.friction import rub
+from epsmesh.insertion.near_tip import EXTENSION_ERROR
+from epsmesh.insertion.states import Scene
+from epsmesh.insertion.steps import WITHDRAWAL, Step
+
+# Relative error of the energy, and of the force, that a front far below the tip takes from those of cutting.
+_FAR_ERROR = 0.15
+# Relative error of the force by the change of the field with the depth, from differences of states.
+_CHANGE_ERROR = 0.3
+# Relative error of what a far front releases until it is where cutting ended, a fraction of a width away.
+_SHIFT_ERROR = 0.3
+_TINY = 1e-9
+
+
+@dataclass(frozen=True)
+class _Open:
+    """A blade at rest in a slit: ``ahead`` (m) of its tip, energy (J), and force and friction (N) with bars.
+
+    ``steady`` (N) is the force without that of the front at a fixed field; all of it ``without_field``.
+    """
+
+    state: Cutting
+    ahead: float
+    stored: float
+    steady: float
+    elastic: float
+    elastic_error: float
+    friction: float
+    friction_error: float
+    without_field: bool = False
+
+    def work_from(self, before: "_Open", scene: Scene) -> float:
+        """Return the work (J), but that of friction, since a state ``before`` in which the tip was deeper."""
+        moved = before.state.depth - self.state.depth
+        if before.without_field != self.without_field or scene.crosses(self.state.depth, before.state.depth):
+            return self.stored - before.stored
+        released = 0.0
+        if not self.without_field:
+            fields = (side.state.field for side in (before, self))
+            released = sum(field.per_length(before.ahead, self.ahead) for field in fields) / 2
+        return -scene.blade.length * released - (self.steady + before.steady) / 2 * moved
+
+
+def withdrawn(
+    scene: Scene, pressed: Sequence[Cutting], states: Sequence[Cutting], last: Step
+) -> tuple[list[Step], str]:
+    """Return the steps of a withdrawal after the ``last`` step, and why it ends early, if it does.
+
+    A blade that indents a layer goes back through the ``pressed`` states, then through those of cutting above the
+    front; both from the largest depth up.
+    """
+    front = last.crack_depth
+    opened, message = [_pressed(scene, one) for one in pressed], ""
+    states = [one for one in states if one.depth < front]
+    bends = [0.0] * len(states)
+    if len(states) > 1:
+        bends = np.gradient([one.field.bend for one in states], [one.depth for one in states]).tolist()
+    solved = [_above(scene, state, states[0], front) for state in states]  # all that are needed, at once
+    for state, bending, one in zip(states, bends, solved, strict=True):
+        if isinstance(one, str):
+            message = f"withdrawal, {1e3 * state.depth:.4g} mm: {one}"
+            break
+        opened.append(one or _open(scene, state, bending, front))
+    work, rubbed, found = last.work, last.rubbed, []
+    for number, one in enumerate(opened):
+        if number:
+            before = opened[number - 1]
+            rubs = (one.friction + before.friction) / 2 * (before.state.depth - one.state.depth)
+            rubbed += rubs
+            work += rubs + one.work_from(before, scene)
+        found.append(
+            Step(
+                phase=WITHDRAWAL,
+                depth=one.state.depth,
+                elastic=one.elastic,
+                friction=-one.friction,
+                error=one.elastic_error + one.friction_error,
+                stored=one.stored,
+                fracture=last.fracture,
+                rubbed=rubbed,
+                work=work,
+                crack_depth=front,
+            )
+        )
+    return found, message
+
+
+def _pressed(scene: Scene, state: Cutting) -> _Open:
+    """Return the blade in a ``state`` of indentation."""
+    friction, error = rub(scene.blade, state.flank, state.squeeze, state.squeeze_error, inwards=False)
+    return _Open(
+        state=state,
+        ahead=state.ahead,
+        stored=state.stored,
+        steady=state.elastic,
+        elastic=state.elastic,
+        elastic_error=state.elastic_error,
+        friction=friction,
+        friction_error=error,
+        without_field=True,
+    )
+
+
+def _above(scene: Scene, state: Cutting, deepest: Cutting, front: float) -> _Open | str | None:
+    """Return the blade in a layer above that of the ``front`` (m), or why it is not solved; None in the same layer.
+
+    The front that is solved is that of the ``deepest`` state of cutting, as for any toughness; near to where it is.
+    """
+    depth, length, width = state.depth, scene.blade.length, scene.blade.width
+    if not scene.crosses(depth, (1 - _TINY) * front):
+        return None
+    _, solved, beside = place = scene.far(depth, deepest.depth)
+    cut = scene.cut(*place)
+    if isinstance(cut, str):
+        return cut
+    ahead = front - depth
+    # Far from the tip, G falls with the square of the distance.
+    nearer = solved / ahead
+    shift, pull = length * cut.release * solved * (nearer - 1), length * cut.release * (nearer**2 - 1)
+    corners = state.field.corners(state.ahead, beside) / 2
+    added, widened = sides(scene, state.field, depth, beside) + corners, 2 * state.field.per_length(state.ahead, beside)
+    stored = cut.energy + shift + added
+    error = cut.energy_error + _SHIFT_ERROR * abs(shift) + EXTENSION_ERROR * abs(added)
+    elastic = cut.drive + pull + widened
+    friction = rub(scene.blade, depth, 2 * stored / width, 2 * error / width, inwards=False)
+    return _Open(
+        state=state,
+        ahead=ahead,
+        stored=stored,
+        steady=elastic,
+        elastic=elastic,
+        elastic_error=cut.drive_error + _SHIFT_ERROR * abs(pull) + EXTENSION_ERROR * abs(widened),
+        friction=friction[0],
+        friction_error=friction[1],
+        without_field=True,
+    )
+
+
+def _open(scene: Scene, state: Cutting, bending: float, front: float) -> _Open:
+    """Return the blade at the depth of a ``state`` of cutting, where κ changes by ``bending`` (1/m²) with the depth."""
+    ahead, length, width, field = front - state.depth, scene.blade.length, scene.blade.width, state.field
+    stored = state.stored - length * field.per_length(state.ahead, ahead)
+    stored_error = state.stored_error + _FAR_ERROR * length * max(field.per_length(width, ahead), 0.0)
+    pushed, changed = length * field.release(ahead), length * bending * field.by_bend(state.ahead, ahead)
+    friction = rub(scene.blade, state.depth, 2 * stored / width, 2 * stored_error / width, inwards=False)
+    far_error = _FAR_ERROR * pushed if ahead > width else 0.0
+    return _Open(
+        state=state,
+        ahead=ahead,
+        stored=stored,
+        steady=state.elastic + changed,
+        elastic=state.elastic + changed + pushed,
+        elastic_error=state.elastic_error + far_error + _CHANGE_ERROR * abs(changed),
+        friction=friction[0],
+        friction_error=friction[1],
+    )

@@ -1,0 +1,68 @@
+"""What the environment tells of an MPI launcher, before MPI is loaded, and programs that are none of its own."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from epsmesh import interrupts
+
+# Open MPI 4 and 5 (PMIx), MPICH and Slurm's PMI, Intel's. Slurm's own SLURM_PROCID is no sign of MPI: each process of
+# `srun --mpi=none` is a run of its own.
+_RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
+_LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "MPI_LOCALNRANKS")
+# For one process Open MPI need neither start its daemon nor look for a network: half a second, mostly of waiting.
+_ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_pml": "ob1"}
+_NO_SIGNALS = "-no_signal_handler"
+_PREFIXES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_")
+
+
+def is_launched() -> bool:
+    """Tell whether a launcher has started this process, alone or as one of several ranks."""
+    return any(name in os.environ for name in _LAUNCHED)
+
+
+def prepare_libraries() -> None:
+    """Prepare libraries that are loaded later, wherever that is; what the user set stays.
+
+    PETSc leaves signals alone: it takes a reader that closes a pipe for a crash. MPI starts quickly in a process that
+    no launcher started.
+    """
+    options = os.environ.get("PETSC_OPTIONS", "")
+    if _NO_SIGNALS not in options:
+        os.environ["PETSC_OPTIONS"] = f"{options} {_NO_SIGNALS}".strip()
+    if not is_launched():
+        for name, value in _ALONE.items():
+            os.environ.setdefault(name, value)
+
+
+def is_first_rank() -> bool:
+    """Return whether this process prints messages: the first rank, or a process without launcher."""
+    ranks = (os.environ.get(name) for name in _RANK)
+    return next((rank for rank in ranks if rank is not None), "0") == "0"
+
+
+def is_interrupt(error: BaseException) -> bool:
+    """Tell whether it is Ctrl-C that an import, or a library, has made another exception of."""
+    if interrupts.is_raised():
+        return True
+    cause = error.__cause__ or error.__context__
+    return cause is not None and (isinstance(cause, KeyboardInterrupt) or is_interrupt(cause))
+
+
+def run_alone(
+    program: str, *arguments: str, timeout: float, variables: Mapping[str, str] | None = None
+) -> "subprocess.CompletedProcess[str]":
+    """Run a module of this package as a process of its own, in which a library may end by a fault of memory.
+
+    Raises:
+        subprocess.TimeoutExpired: after ``timeout`` seconds.
+    """
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(_PREFIXES)}
+    environment |= variables or {}
+    root = str(Path(__file__).resolve().parents[1])
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
+    # -P: nothing is imported from the folder that one happens to be in.
+    command = [sys.executable, "-P", "-m", program, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=timeout, env=environment, check=False)

@@ -1,0 +1,292 @@
+"""Quadratic geometry: curved rim and sides, and quarter-point elements at the probe's edge.
+
+The displacement goes like r^½ at the edge of a probe. A quadratic element represents r^½ if the mid node of an edge
+that ends on the rim is at a quarter of its length (R. S. Barsoum, Int. J. Numer. Methods Eng. 10, 1976).
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray, FloatArray, IntArray
+from epsmesh.mesh.generate import MeshArrays, MeshError
+from epsmesh.scene.model import FIXED, FREE, MIRROR, PROBE, Scene
+from epsmesh.shapes.ovoid import Ovoid
+from epsmesh.shapes.scanned import Scanned
+from epsmesh.shapes.surface import Surface
+from epsmesh.shapes.triangles import edge_keys
+from epsmesh.stages import stage
+
+# Edges of the reference tetrahedron in the order of basix's quadratic nodes 4 to 9.
+EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
+# A point is on a surface within this distance, in units of the surface's size.
+_CLOSE = 1e-6
+# Largest distance of straight edges from the rim that they approximate, in units of the footprint's half width.
+_OFF_RIM = 0.2
+# A cell is straightened if its Jacobian falls below this share of the straight cell's.
+_LEAST_JACOBIAN = 1e-3
+# Alternating projections onto two surfaces, until a point is on both.
+_ALTERNATIONS = 30
+
+# From edges (k, 2) of one part of a mesh, and which of them it has chosen: which of them any part has chosen, and
+# whether any edge is; collective.
+Agree = Callable[[IntArray, BoolArray], tuple[BoolArray, bool]]
+
+
+def _of_one_part(_: IntArray, chosen: BoolArray) -> tuple[BoolArray, bool]:
+    return chosen, bool(chosen.any())
+
+
+@stage("curved rim and sides")
+def curve(mesh: MeshArrays, scene: Scene, *, is_finest: bool = True, agree: Agree = _of_one_part) -> MeshArrays:
+    """Return ``mesh`` with ten nodes per cell, on the true rim and sides, with the scene's quarter points.
+
+    ``agree`` is for parts of a mesh, and collective. A mesh that is not the finest has no quarter points, but those at
+    which its edges are to be halved.
+    """
+    mesh = _on_rim_nodes(mesh, scene)
+    corners = mesh.cells
+    pairs = np.sort(corners[:, EDGES].reshape(-1, 2), axis=1)
+    keys, first, inverse = np.unique(
+        pairs[:, 0] * len(mesh.points) + pairs[:, 1], return_index=True, return_inverse=True
+    )
+    edges = pairs[first]
+    straight = mesh.points[edges].mean(axis=1)
+    of_cell = inverse.reshape(-1, len(EDGES))
+    middle = straight if is_finest else _graded(mesh.points, edges)
+    curved = middle if mesh.bent is None else _on_faces(mesh.bent, edges, middle)
+    curved = _on_embedded(mesh, scene, edges, _on_sides(mesh, scene, edges, curved, keys))
+    curved = _on_rim(mesh, scene, edges, curved)
+    middle = curved.copy()
+    if is_finest:
+        if scene.has_quarter_points:
+            middle = _quarter_points(mesh, edges, middle)
+        # A folded cell loses its quarter points first: without its arcs the footprint would be smaller.
+        for milder in (curved, straight):
+            _unfold(mesh.points[corners], middle, of_cell, milder, partial(agree, edges))
+    nodes = np.hstack([corners, len(mesh.points) + of_cell])
+    return replace(mesh, points=np.vstack([mesh.points, middle]), cells=nodes, bent=None)
+
+
+def _graded(points: FloatArray, edges: IntArray) -> FloatArray:
+    """Return the points that halve edges (k, 2) in elements: nearer to the end where elements are smaller.
+
+    If the element size is linear along an edge, from a to b, that is at √a / (√a + √b) of its length.
+    """
+    length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+    total = sum(np.bincount(ends, length, len(points)) for ends in edges.T)
+    count = np.bincount(edges.ravel(), minlength=len(points))
+    root = np.sqrt(total / np.maximum(count, 1))[edges]
+    share = (root[:, 0] / root.sum(axis=1))[:, None]
+    return np.asarray((1 - share) * points[edges[:, 0]] + share * points[edges[:, 1]])
+
+
+def _on_faces(bent: tuple[IntArray, FloatArray], edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid nodes of edges to the geometry kernel's positions, which include rims that are not plane."""
+    among, points = np.sort(bent[0], axis=1), bent[1]
+    count = int(edges.max()) + 1
+    keys, wanted = edges @ np.array([count, 1]), among @ np.array([count, 1])
+    order = np.argsort(keys)
+    at = np.searchsorted(keys, wanted, sorter=order)
+    middle = middle.copy()
+    middle[order[at]] = points
+    return middle
+
+
+def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid nodes of edges along a curved rim onto it, or onto a column that cuts the footprint."""
+    if _is_lifted(scene):
+        if mesh.bent is not None:
+            return middle
+        return _on_lifted_rim(mesh, scene, edges, middle)
+    both = np.isin(edges, mesh.rim).all(axis=1) & np.isin(_key(mesh, edges), _facet_edges(mesh, ["probe"]))
+    if not (scene.probe.is_curved or isinstance(scene.body, Scanned)):
+        return middle
+    beyond = np.zeros(len(mesh.points), dtype=bool)
+    if scene.is_cut:
+        beyond[mesh.rim] = np.abs(scene.cut_face.distance(mesh.points[mesh.rim])) < _CLOSE * scene.column
+    of_column = both & beyond[edges].all(axis=1)
+    middle = middle.copy()
+    middle[of_column] = scene.cut_face.project(middle[of_column])
+    chosen = both & ~of_column
+    local = scene.frame.local(middle[chosen])
+    local[:, :2] = scene.probe.to_edge(local[:, :2])
+    if isinstance(scene.body, Scanned):
+        middle[chosen], _ = scene.body.lift(scene.frame, local[:, :2])
+        return middle
+    middle[chosen] = scene.frame.world(local)
+    return middle
+
+
+def _is_lifted(scene: Scene) -> bool:
+    """Return whether a CAD kernel cut the footprint out of a surface; on triangles its edge was lifted before."""
+    return not (isinstance(scene.body, Scanned) or scene.is_flat)
+
+
+def _on_lifted_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid nodes of edges along a rim onto the curve where the footprint's edge, lifted, meets the surface."""
+    keys, beside = _key(mesh, edges), [name for name in mesh.facets if name != PROBE and name not in MIRROR.values()]
+    chosen = np.isin(edges, mesh.rim).all(axis=1) & np.isin(keys, _facet_edges(mesh, [PROBE]))
+    chosen &= np.isin(keys, _facet_edges(mesh, beside))
+    middle = middle.copy()
+    middle[chosen] = _lifted(scene, middle[chosen])
+    return middle
+
+
+def _lifted(scene: Scene, points: FloatArray) -> FloatArray:
+    """Return the points of the lifted rim that are nearest, in the probe's plane, to points near the rim."""
+    flat = scene.probe.to_edge(scene.frame.local(points)[:, :2])
+    found, _ = scene.body.lift(scene.frame, flat)
+    if not np.all(np.linalg.norm(found - points, axis=1) < _OFF_RIM * scene.probe.half_width):
+        raise MeshError("the mesh does not follow the footprint's edge: use a smaller rim")
+    return found
+
+
+def _on_rim_nodes(mesh: MeshArrays, scene: Scene) -> MeshArrays:
+    """Move the corners of elements on a rim that is not plane exactly onto it: the kernel has a tolerance."""
+    if mesh.bent is not None or not (_is_lifted(scene) and scene.probe.is_curved):
+        return mesh
+    points = mesh.points.copy()
+    moved = _lifted(scene, points[mesh.rim])
+    for plane in scene.mirrors:
+        axis = "xy".index(plane)
+        on_plane = np.abs(points[mesh.rim, axis]) < _CLOSE * scene.body.extent
+        moved[on_plane, axis] = points[mesh.rim, axis][on_plane]
+    points[mesh.rim] = moved
+    return replace(mesh, points=points)
+
+
+def _on_sides(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray, keys: IntArray) -> FloatArray:
+    """Move the mid nodes of edges in a curved surface of the body, or of the column, onto that surface."""
+    surfaces = [surface for group in scene.body.surfaces().values() for surface in group]
+    surfaces += [scene.cut_face] if scene.is_cut else []
+    outer, middle = np.isin(keys, _facet_edges(mesh, mesh.facets)), middle.copy()
+    for surface in (surface for surface in surfaces if surface.is_curved):
+        on_side = np.abs(surface.distance(mesh.points)) < _CLOSE * scene.body.extent
+        chosen = outer & on_side[edges].all(axis=1)
+        if scene.is_ball and surface is scene.cut_face:
+            # An edge between two of its points may also cross the top, or a plane of symmetry.
+            chosen &= np.isin(keys, _facet_edges(mesh, [FIXED]))
+        elif isinstance(surface, Ovoid):
+            # The ellipsoid is the whole boundary: an edge between two of its points may cross a plane of symmetry.
+            chosen &= np.isin(keys, _facet_edges(mesh, [name for name in mesh.facets if name not in MIRROR.values()]))
+        middle[chosen] = surface.project(middle[chosen])
+    return middle
+
+
+def _on_embedded(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid nodes of edges in the surface of an embedded region onto it, and onto a column that cuts it."""
+    if not scene.body.embedded:
+        return middle
+    inner = [] if mesh.regions is None else [edge_keys(interfaces(mesh), len(mesh.points))]
+    inner += [_facet_edges(mesh, [FREE])] if scene.body.cavities else []
+    between = np.isin(_key(mesh, edges), np.concatenate([*inner, np.empty(0, dtype=np.int64)]))
+    used = np.unique(edges[between])
+    middle, close = middle.copy(), _CLOSE * scene.body.extent
+    for surface_of_region in (piece.surface for piece in scene.body.embedded):
+        surfaces: list[Surface] = [surface_of_region]
+        on_side = np.zeros(len(mesh.points), dtype=bool)
+        on_side[used] = np.abs(surface_of_region.distance(mesh.points[used])) < close
+        chosen = between & on_side[edges].all(axis=1)
+        middle[chosen] = surface_of_region.project(middle[chosen])
+        if scene.is_cut:
+            beyond = np.abs(scene.cut_face.distance(mesh.points)) < close
+            both = chosen & beyond[edges].all(axis=1)
+            surfaces.append(scene.cut_face)
+            for surface in _ALTERNATIONS * surfaces:
+                middle[both] = surface.project(middle[both])
+    return middle
+
+
+def interfaces(mesh: MeshArrays) -> IntArray:
+    """Return the triangles (k, 3) between two regions."""
+    if mesh.interfaces is not None or mesh.regions is None:
+        return np.empty((0, 3), dtype=np.int64) if mesh.interfaces is None else mesh.interfaces
+    corners = np.sort(mesh.cells[:, [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)]].reshape(-1, 3), axis=1)
+    order = np.lexsort(corners.T)
+    sorted_corners, owner = corners[order], np.repeat(mesh.regions, 4)[order]
+    twins = np.all(sorted_corners[1:] == sorted_corners[:-1], axis=1) & (owner[1:] != owner[:-1])
+    return np.asarray(sorted_corners[1:][twins])
+
+
+def _key(mesh: MeshArrays, edges: IntArray) -> IntArray:
+    return edges[:, 0] * len(mesh.points) + edges[:, 1]
+
+
+def _facet_edges(mesh: MeshArrays, names: object) -> IntArray:
+    """Return keys of the edges of the boundary triangles in the named groups."""
+    facets = np.concatenate([mesh.facets[name] for name in names])  # type: ignore[attr-defined]
+    return np.unique(edge_keys(facets, len(mesh.points)))
+
+
+def _quarter_points(mesh: MeshArrays, edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid node of every edge with exactly one end on the rim to a quarter of its length from there."""
+    ends = np.isin(edges, mesh.rim)
+    for here in (0, 1):
+        chosen = ends[:, here] & ~ends[:, 1 - here]
+        start, end = mesh.points[edges[chosen, here]], mesh.points[edges[chosen, 1 - here]]
+        # A curved edge keeps its bulge, which at a quarter of the length is 3/4 of that in the middle.
+        bulge = middle[chosen] - (start + end) / 2
+        middle[chosen] = start + (end - start) / 4 + 0.75 * bulge
+    return middle
+
+
+def _unfold(
+    corners: FloatArray,
+    middle: FloatArray,
+    of_cell: IntArray,
+    milder: FloatArray,
+    agree: Callable[[BoolArray], tuple[BoolArray, bool]],
+) -> None:
+    """Replace the mid nodes of folded cells by ``milder`` ones, then those of neighbours that this folds, and so on."""
+    bad, are_any = np.zeros(len(corners), dtype=bool), True
+    while are_any:
+        folded, chosen = _folded(corners, middle[of_cell]) & ~bad, np.zeros(len(middle), dtype=bool)
+        bad |= folded
+        chosen[of_cell[folded]] = True
+        chosen, are_any = agree(chosen)
+        middle[chosen] = milder[chosen]
+
+
+def _folded(corners: FloatArray, middle: FloatArray) -> np.ndarray:
+    """Return a mask of cells whose quadratic map folds at a quadrature point of the stiffness."""
+    curved = np.abs(middle - corners[:, EDGES].mean(axis=2)).max(axis=(1, 2)) > 0
+    result = np.zeros(len(corners), dtype=bool)
+    if curved.any():
+        nodes = np.concatenate([corners[curved], middle[curved]], axis=1)
+        straight = _determinants(np.moveaxis(corners[curved, 1:] - corners[curved, :1], 1, 0))
+        by_node = np.ascontiguousarray(nodes.transpose(1, 0, 2)).reshape(nodes.shape[1], -1)
+        least = np.full(len(nodes), np.inf)
+        for gradients in _gradients():
+            columns = (gradients.T @ by_node).reshape(3, len(nodes), 3)
+            least = np.minimum(least, _determinants(columns))
+        result[curved] = least < _LEAST_JACOBIAN * straight
+    return result
+
+
+def _determinants(columns: FloatArray) -> FloatArray:
+    """Return the triple products (n) of three vectors each, (3, n, 3)."""
+    (a, b, c), (d, e, f), (g, h, i) = (part.T for part in columns)
+    return np.asarray(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
+
+
+@cache
+def _gradients() -> FloatArray:
+    """Return gradients of the quadratic shape functions at interior points near every corner, and between corners.
+
+    Their shape is (points, 10, 3).
+    """
+    weights = [np.full(4, 0.25)]
+    for corner in range(4):
+        weights += [np.where(np.arange(4) == corner, w, (1 - w) / 3) for w in (0.9, 0.7)]
+    for i, j in EDGES:
+        weights.append(np.where(np.isin(np.arange(4), (i, j)), 0.45, 0.05))
+    slope = np.vstack([-np.ones(3), np.eye(3)])  # gradients of the barycentric coordinates
+    gradients = []
+    for w in weights:
+        corner_part = (4 * w - 1)[:, None] * slope
+        edge_part = np.array([4 * (w[i] * slope[j] + w[j] * slope[i]) for i, j in EDGES])
+        gradients.append(np.vstack([corner_part, edge_part]))
+    return np.array(gradients)

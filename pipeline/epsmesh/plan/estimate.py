@@ -1,0 +1,190 @@
+"""Estimates before a case starts: number of tetrahedra, and memory."""
+
+from math import inf, log, pi
+
+from epsmesh.shapes.scanned import FINE, Scanned
+from epsmesh.study.case import Case
+
+# Mean volume of gmsh's tetrahedra, in units of the cube of the element size: measured, docs/performance.md.
+_TETRAHEDRON = 0.21
+# Peak bytes per dof by degree: of a multigrid solve with displacement or mixed elements, or at large displacements; of
+# an error bar, which needs little accuracy; of a factorisation with 50,000 dofs. Measured: docs/solvers.md.
+_BYTES_PER_DOF = {
+    "displacement": {1: 3000, 2: 620, 3: 400, 4: 400},
+    "mixed": {2: 900, 3: 800, 4: 800},
+    "large": {1: 3000, 2: 1900, 3: 2000, 4: 2800},
+    "large-mixed": {2: 3600, 3: 3600, 4: 4400},
+}
+_OF_BAR = {
+    "displacement": {2: 620, 3: 315, 4: 315},
+    "mixed": {3: 440, 4: 440},
+    "large": {2: 600, 3: 600, 4: 600},
+    "large-mixed": {3: 1000, 4: 1000},
+}
+_OF_FACTOR = {1: 9000, 2: 9000, 3: 10_000}
+# Further bytes per dof of a reduced basis: a multigrid hierarchy for its bound, and five vectors for each of some eight
+# solutions.
+_BYTES_OF_BASIS = {1: 1000, 2: 1100, 3: 1800, 4: 2500}
+_BASE = 200e6
+# Further memory of a process after meshing and solving (libraries, compiled forms), and of each further rank.
+_LOADED, _RANK = 60e6, 180e6
+# Dofs per tetrahedron on large meshes, with three components.
+_DOFS_PER_CELL = {1: 0.55, 2: 4.4, 3: 15.0, 4: 35.0}
+# Bytes per tetrahedron of gmsh and the arrays while meshing.
+_BYTES_PER_CELL = 1000
+# Curved sides: far element size in units of the radius; additional tetrahedra per boundary triangle; additional
+# tetrahedra per unit of a surface's curvature, for elements of unit size whose facets deviate least.
+_OF_BEND, _ON_BOUNDARY, _FOLLOW = 0.5, 1.4, 30.0
+_TRIANGLE = 0.43
+# Element size in a layer below the probe in units of its thickness. With elements of degree 2, F is then within .4 % of
+# its value for half this size (docs/accuracy.md), and the error bar accounts for the rest.
+IN_LAYER = 0.5
+# Largest element size in a layer, in its thickness. In a film of 10 µm on a box of 20 mm, elements as long as 700
+# thicknesses (no limit), 20 and 8 take 163, 39 and 25 iterations at ν = .3, and .45 fails without a limit, which takes
+# 82 with 40 and 64 with 20. Without a limit F is 4 % too large, with 20 .2 %.
+FLATTEST = 20.0
+# Factor on the number of elements of regions, because element faces follow the interfaces; tetrahedra per triangle of a
+# film.
+_MEETING, _IN_FILM = 1.75, 3
+
+
+def cells(case: Case) -> float:
+    """Return the estimated number of tetrahedra of a case, within about a factor of two."""
+    mesh, probe, body = case.mesh, case.expected, case.body
+    rim, growth, thickness = mesh.rim_size(probe.half_width), mesh.growth, body.thickness(case.frame)
+    length, area = probe.rim_size
+    # Half discs round the rim: ∫ π s / (rim + growth s)³ ds up to the distance where the size is fine.
+    total = length * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
+    # Below the area where contact may end: ∫ 1 / (rim + growth s)³ ds.
+    total += area / (2 * growth * rim**2)
+    if not probe.is_flat:  # small elements down to the depth of the tool, and beside it
+        _, depth = probe.depths
+        total += area * depth / rim**3 + length * depth / (growth * rim**2)
+    total += _of_bend(case) + _MEETING * sum(_of_regions(case))
+    epsilon = min(mesh.epsilon, (3 * body.volume / (2 * pi)) ** (1 / 3))
+    if case.is_full or mesh.epsilon == inf:
+        return (total + body.volume / mesh.fine**3) / _TETRAHEDRON
+    inside = min(2 / 3 * pi * epsilon**3, body.volume)
+    if case.is_truncated and not case.is_closed:
+        inside = min(inside, pi * mesh.epsilon**2 * thickness)
+        # In a column, elements are at most half its radius.
+        total += min(pi * mesh.epsilon**2 * thickness, body.volume) / (mesh.epsilon / 2) ** 3
+    total += inside / mesh.fine**3
+    if case.is_closed:
+        return total / _TETRAHEDRON
+    # Shells of size fine + growth (r - ε) round the contact, then coarse.
+    total += 2 * pi * epsilon**2 / (2 * growth * mesh.fine**2) + 4 * pi * epsilon / (growth**2 * mesh.fine)
+    total += 2 * pi / growth**3 * log(max(mesh.coarse / mesh.fine, 1.0))
+    if not case.is_truncated:
+        total += max(body.volume - inside, 0.0) / mesh.coarse**3
+    return total / _TETRAHEDRON
+
+
+def _of_bend(case: Case) -> float:
+    """Return the number of elements (as cubes of their size) for curved sides, far from the contact."""
+    body, far = case.body, _OF_BEND * case.body.bend
+    if case.column < inf or far == inf:
+        return 0.0
+    triangles = 6 * body.volume ** (2 / 3) / (_TRIANGLE * far**2)
+    follow = _FOLLOW * body.curvature / far
+    if isinstance(body, Scanned):
+        follow *= FINE / body.deviation(case.mesh.growth, case.probe, straight=case.mesh.degree == 1)
+    return body.volume / far**3 + _TETRAHEDRON * (_ON_BOUNDARY * triangles + follow)
+
+
+def cells_of_regions(case: Case) -> list[float]:
+    """Return the estimated number of tetrahedra that each layer and region of a body asks for, in their order."""
+    return [_MEETING * share / _TETRAHEDRON for share in _of_regions(case)]
+
+
+def _of_regions(case: Case) -> list[float]:
+    """Return the number of elements (as cubes of their size) of each layer and region, but for :data:`_MEETING`."""
+    body, growth = case.body, case.mesh.growth
+    found, high = [], body.heights[1]
+    for low in body.interfaces:
+        found.append(_of_layer(case, high, low) + _of_film(case, FLATTEST * (high - low)))
+        high = low
+    found += [0.0] * (len(body.regions) - len(body.embedded) - len(found))  # the last of layers that fill the body
+    for piece in body.embedded:
+        # Both sides of its surface: ∫ 1 / (size + growth s)³ ds.
+        _, sizes, areas = piece.surface.sizes(case.frame.point)
+        found.append(float((areas / (growth * sizes**2)).sum()))
+    return found
+
+
+def _of_layer(case: Case, high: float, low: float) -> float:
+    """Return the same of a layer between two heights (m), near the tool."""
+    size, radius = IN_LAYER * (high - low), case.probe.circumradius + case.body.heights[1] - low
+    if size >= case.mesh.fine:
+        return 0.0
+    within = pi * radius**2 * (high - low) / size**3
+    rings = 2 * pi * radius * (high - low) + pi * radius**2  # beside and below
+    return within + rings / (2 * case.mesh.growth * size**2)
+
+
+def _of_film(case: Case, size: float) -> float:
+    """Return the same of a layer and what is below it, far from the tool, where its largest ``size`` (m) counts."""
+    if size >= (case.mesh.fine if case.is_full else case.mesh.coarse):
+        return 0.0
+    area = case.body.volume / (case.body.heights[1] - case.body.heights[0])
+    if case.is_truncated:
+        area = min(area, pi * case.mesh.epsilon**2)
+    flat = _IN_FILM * _TETRAHEDRON / (_MEETING * _TRIANGLE)
+    return area / size**2 * (flat + 1 / (2 * case.mesh.growth))
+
+
+def dofs(count: float, degree: int) -> float:
+    """Return the estimated number of unknowns on ``count`` tetrahedra."""
+    return _DOFS_PER_CELL[degree] * count
+
+
+def solving_memory(dofs: float, degree: int, formulation: str = "displacement", *, direct: bool) -> float:
+    """Return the estimated bytes of a solve, all ranks together; ``formulation`` is that of its case."""
+    if direct:  # the fill of a 3D factorisation grows like dofs^(4/3); _OF_FACTOR is for 50,000 dofs
+        return _BASE + _OF_FACTOR[degree] * (dofs / 50_000) ** (1 / 3) * dofs
+    return _BASE + _BYTES_PER_DOF[_kind(formulation)][degree] * dofs
+
+
+def error_bar_memory(dofs: float, degree: int, formulation: str = "displacement") -> float:
+    """Return the estimated bytes of an error bar: a solve of one degree more than that of ``dofs`` unknowns."""
+    growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
+    return _BASE + _OF_BAR[_kind(formulation)][degree + 1] * growth * dofs
+
+
+def _kind(formulation: str) -> str:
+    if formulation in _BYTES_PER_DOF:
+        return formulation
+    return "large-mixed" if formulation.endswith("-mixed") else "large"
+
+
+def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, reduced: bool = False) -> float:
+    """Return the estimated bytes of a case with its error bar, within a factor of 1.5; see :func:`case_memory`.
+
+    ``of_bar`` is the part of the body for the error bar, if it differs; ``reduced`` cases have a reduced basis.
+    """
+    degree = case.mesh.degree
+    count = dofs((share if of_bar is None else of_bar) * cells(case), degree)
+    enriched = error_bar_memory(count, degree, case.formulation)
+    basis = basis_memory(dofs(share * cells(case), degree), degree) if reduced else 0.0
+    return _LOADED + max(case_memory(case, share), enriched) + basis
+
+
+def basis_memory(dofs: float, degree: int) -> float:
+    """Return the estimated bytes of a reduced basis, without its solves and their error bars."""
+    return _BYTES_OF_BASIS[degree] * dofs
+
+
+def on_ranks(memory: float, ranks: int) -> float:
+    """Return the estimated bytes of all ``ranks`` together, for a task of ``memory`` bytes on one."""
+    return memory + (ranks - 1) * _RANK
+
+
+def case_memory(case: Case, share: float = 1.0) -> float:
+    """Return the estimated bytes of meshing and solving a case, within about a factor of two.
+
+    ``share`` is the modelled part of the body.
+    """
+    count, degree = share * cells(case), case.mesh.degree
+    direct = case.solve.method == "direct" or case.is_factorised
+    solving = solving_memory(dofs(count, degree), degree, case.formulation, direct=direct)
+    return max(_BASE + _BYTES_PER_CELL * count, solving)

@@ -1,0 +1,205 @@
+"""The mesh for an accuracy: degree, rim and growth of the elements, cheapest first.
+
+The error of F comes from the singular edge of the probe, and from the elements between it and the support. Both parts
+scale with the probe, hardly with the body. The expected error bars are measured ones (docs/accuracy.md). If a case's
+own error bar exceeds the accuracy, the next mesh is tried.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot, pi, sqrt
+from typing import Any
+
+from epsmesh.plan import ladders
+from epsmesh.plan.ladders import Recipe
+from epsmesh.plan.symmetry import mirror_planes, movement_planes
+from epsmesh.shapes.body import Layered
+from epsmesh.shapes.contact import is_level
+from epsmesh.study.case import Case
+from epsmesh.study.check_mesh import held_gaps
+from epsmesh.study.schema import Mesh
+
+
+@dataclass(frozen=True)
+class Rung:
+    """Mesh settings of a recipe for one case, with the expected relative error bar."""
+
+    mesh: Mesh
+    bar: float
+
+
+# Deeper balls, in units of their radius, need small elements: contact must end within the region that is searched.
+_SHALLOW = 0.8
+# Nearer to a held side, in units of the radius, F has errors that the next degree does not remove.
+_FROM_HELD = 2.0
+# Error bars at large displacements, in units of those of linear elasticity: at small depths, and their growth with the
+# depth in units of the half width.
+_OF_LARGE, _BY_DEPTH = 1.8, 6.0
+# Error bars grow by 1 + 10 a/H with the probe's half width a over the body's thickness H, measured up to _THINNEST;
+# where the probe's edge dominates, by 1 + a/H.
+_THICKNESS, _THICKNESS_EVEN, _THINNEST = 10.0, 1.0, 0.15
+# Error bars of mixed elements, in units of those of displacement elements at ν = 0.3, by degree, and the same at large
+# displacements.
+_MIXED, _MIXED_LARGE = {2: 1.2, 3: 1.05}, {2: 1.0, 3: 1.05}
+# Error bars with several movements, of a column, or of a tool that is not round, in units of those without, by degree.
+_SEVERAL = {2: 1.5, 3: 1.15}
+# Factor for several materials, curved surfaces, and plates, by element (solve/estimate.py).
+_ELSEWHERE = {"displacement": 1.6, "mixed": 2.6}
+# Error bars of displacement elements grow like (1 - 2 ν)^-0.35 (locking), measured from ν = 0.3 to 0.49.
+_LOCKING = 0.35
+# The error bar of the axial force grows by this factor times slide over depth, if both movements couple.
+_SLIDE = 0.8
+# A mesh is chosen if its expected error bar is below MARGIN times the accuracy. If its error bar exceeds the accuracy,
+# the next one's expected bar is smaller by _STEP at least; rungs in between only serve as first meshes.
+MARGIN, _STEP = 0.9, 1.4
+# Thickness of a thin body, in half widths of contact: its pressure follows the tool's shape, and is smoother.
+_SQUEEZED = 1.5
+# Number of elements between the probe's edge and a fixed face.
+_ACROSS_GAP = 3
+# Number of elements through the thickness near the probe.
+_THROUGH = 2
+
+
+def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
+    """Return the meshes to try, in turn, for a relative error of F below ``accuracy``.
+
+    Values that the study gives for rim, growth, degree and sizes stay.
+    """
+    ladder = _ladder(case)
+    expected = _expected(case, ladder)
+    first = next((i for i, bar in enumerate(expected) if bar <= MARGIN * accuracy), len(ladder) - 1)
+    tried = [first]
+    for number in range(first + 1, len(ladder)):
+        if _STEP * expected[number] <= expected[tried[-1]] or number == len(ladder) - 1:
+            tried.append(number)
+    rungs: dict[Mesh, Rung] = {}
+    for number in tried:  # several recipes give one mesh where the study gives the rest
+        rung = Rung(_mesh(case, ladder[number]), expected[number])
+        rungs.setdefault(rung.mesh, rung)
+    return tuple(rungs.values())
+
+
+def _ladder(case: Case) -> tuple[Recipe, ...]:
+    """Return the recipes for a probe, cheapest first."""
+    if not case.probe.is_flat:
+        if not case.material.is_large:
+            return ladders.BALL if has_sure_contact(case) else ladders.FOUND[case.element]
+        ball = case.probe.hertz_radius if is_ball(case) and case.is_plain and not case.probe.friction else None
+        return ladders.FOUND_LARGE if ball is None or case.probe.depth > _SHALLOW * ball else ladders.BALL_LARGE
+    if not case.has_quarter_points:
+        return ladders.DEEP
+    if case.material.is_large:
+        return ladders.LARGE
+    if case.probe.is_unilateral:
+        return ladders.FLAT
+    if case.is_plain:
+        return ladders.EVEN
+    return ladders.LADDER if is_level(case.body, case.frame) else ladders.ROUND
+
+
+def half_width_of(case: Case) -> float:
+    """Return the half width (m) of contact, estimated if contact is found."""
+    return case.expected.contact_width
+
+
+def edge_width_of(case: Case) -> float:
+    """Return the length (m) that elements at the edge of contact resolve, to which ``rim`` of a recipe is relative."""
+    return case.expected.edge_width
+
+
+def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
+    """Return the expected relative error bars of recipes for a case."""
+    shape = case.probe.EXPECTED_ERROR
+    if mirror_planes(case) == movement_planes(case):
+        shape *= 1 + _SLIDE * _slide(case)
+    if not case.is_plain:
+        shape *= _ELSEWHERE[case.element]
+    if case.is_plain and not case.probe.is_unilateral:
+        shape *= _near(case)
+    if case.material.is_large and case.has_quarter_points and not case.probe.is_unilateral:
+        shape *= _OF_LARGE * (1 + _BY_DEPTH * case.probe.depth / half_width_of(case))
+    locking = 1.0 if case.element == "mixed" else ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
+    if not case.probe.is_flat:  # elements in a thin body are small anyway
+        return [float(recipe.bar * shape * locking) for recipe in ladder]
+    is_even = ladder is ladders.EVEN
+    thin = min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
+    shape *= locking * (1 + (_THICKNESS_EVEN if is_even else _THICKNESS) * thin)
+    of_degree = _MIXED_LARGE if case.material.is_large else _MIXED
+    if case.element == "displacement":
+        of_degree = dict.fromkeys(_MIXED, 1.0)
+    if is_even and not has_sure_limit(case):
+        of_degree = {degree: factor * _SEVERAL[degree] for degree, factor in of_degree.items()}
+    return [float(recipe.bar * shape * of_degree[recipe.degree]) for recipe in ladder]
+
+
+def has_sure_limit(case: Case) -> bool:
+    """Return whether the limit of F is known well on small elements: :mod:`epsmesh.solve.estimate`.
+
+    It is for one movement of a disc on a whole plain body. Below blades, one degree more removes less of the error.
+    """
+    return case.is_plain and case.probe.is_round and case.movements == 1 and not case.is_truncated
+
+
+def is_ball(case: Case) -> bool:
+    """Return whether F has the limit of balls; at large displacements not in histories, nor close to a held side."""
+    if (radius := case.probe.hertz_radius) is None or not case.material.is_large:
+        return radius is not None
+    gaps = held_gaps(case.body, case.probe, case.mesh).values()
+    return not case.is_stepped and all(gap >= _FROM_HELD * radius for gap in gaps)
+
+
+def has_sure_contact(case: Case) -> bool:
+    """Return whether the limit of F in unilateral contact is known well on large elements, too.
+
+    It is for a frictionless ball on a plain body that is not thin, with displacement elements at small displacements.
+    """
+    is_simple = case.element == "displacement" and not case.is_stepped and not case.is_truncated
+    return is_ball(case) and case.probe.is_unilateral and is_simple and case.is_plain and not is_thin(case)
+
+
+def is_thin(case: Case) -> bool:
+    """Return whether the body is so thin for the contact that the limit of F is less sure than on a deep one."""
+    return case.body.thickness(case.frame) < _SQUEEZED * half_width_of(case)
+
+
+def _near(case: Case) -> float:
+    """Return the share of the compliance near the probe, where the error arises.
+
+    A slender body fixed at its bottom is a half-space near a disc, in series with a column: the part that is deeper
+    than the body is wide.
+    """
+    body = case.body
+    if not isinstance(body, Layered) or body.fixed != "bottom" or case.is_truncated:
+        return 1.0
+    thickness = body.thickness(case.frame)
+    area = body.volume / thickness
+    stiffness = 2 * half_width_of(case) / (1 - case.poisson**2)
+    return float(1 / (1 + stiffness * max(thickness - sqrt(area / pi), 0.0) / area))
+
+
+def _slide(case: Case) -> float:
+    """Return the probe's movement across its axis, per unit of depth."""
+    across = [t - case.probe.depth * a for t, a in zip(case.travel, case.frame.axis, strict=True)]
+    return hypot(*across) / case.probe.depth
+
+
+def _mesh(case: Case, recipe: Recipe) -> Mesh:
+    """Return the mesh section of a recipe for the body and probe of ``case``."""
+    given, probe, thickness = case.mesh, case.probe, case.body.thickness(case.frame)
+    reach = case.body.reach(case.frame) + thickness
+    gaps = held_gaps(case.body, probe, given).values()
+    sizes = {
+        "fine": min(thickness / _THROUGH, reach),
+        "coarse": reach,
+        "rim": min([recipe.rim * edge_width_of(case), *(gap / _ACROSS_GAP for gap in gaps)]),
+        "growth": recipe.growth,
+        "degree": recipe.degree,
+    }
+    chosen: dict[str, Any] = {key: value for key, value in sizes.items() if key not in given.model_fields_set}
+    chosen.setdefault("fine", given.fine)
+    if "rim" in chosen:
+        chosen["rim"] = min(chosen["rim"], chosen["fine"])
+    if not (case.is_truncated or case.is_linear_beyond):
+        chosen["epsilon"] = probe.circumradius + thickness
+        chosen["outside"] = "coarse"
+    return given.model_copy(update=chosen | {"accuracy": None})

@@ -1,0 +1,374 @@
+"""The dataset of a study: every record in its place, with labels, units and provenance."""
+
+import json
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isinf, nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from epsmesh import __version__
+from epsmesh.netcdf import write_netcdf
+from epsmesh.plan.equivalent_places import EquivalentPlace
+from epsmesh.plan.given_force import FoundDepth
+from epsmesh.plan.key import digest
+from epsmesh.plan.plan import Plan
+from epsmesh.quantities import LARGEST, MESH_DIMENSIONS, RUN, attributes, quantity_of
+from epsmesh.report.along_path import along_path
+from epsmesh.report.history import over_time
+from epsmesh.report.uncertainty import uncertainties
+from epsmesh.report.values import at_full_order, with_flags
+from epsmesh.run.given_force import at_force, with_depths
+from epsmesh.run.outcome import without_contact
+from epsmesh.run.record import Record
+from epsmesh.shapes.frame import Frame, PlaceError
+from epsmesh.shapes.scanned import Scanned
+from epsmesh.states import LOST, OK, PENDING
+from epsmesh.study.axis import Axis
+from epsmesh.study.case import Case
+from epsmesh.study.sweep import Study
+
+_SIZES = {"component": 3, "movement": 6, "conjugate": 6}
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Variables that records hold: their dimensions beside the study's, and the cases of which one must be swept.
+
+    ``is_exact`` variables are those of F_exact's records, which are the same for all meshes of a scene.
+    """
+
+    names: tuple[str, ...]
+    dims: tuple[str, ...] = ()
+    of: Callable[[Case], bool] = lambda case: True
+    is_exact: bool = False
+
+
+def _has_slit(case: Case) -> bool:
+    return case.probe.slit is not None
+
+
+def _may_end_early(case: Case) -> bool:
+    return case.has_load_steps or case.probe.force is not None
+
+
+_COSTS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total", "time_spread")
+_COUNTS = ("dofs", "cells", "iterations")
+_OF_LOADS = ("load_force", "load_force_error", "load_energy", "sag", "load_force_vector")
+_OF_FRICTION = tuple(f"{name}{bar}" for name in ("slip_area", "friction_force", "torque") for bar in ("", "_error"))
+_PARTS = (
+    _Part(("force", "force_error", "energy", "balance", *_COSTS, "machine_load", "memory")),
+    _Part(
+        ("contact_area", "contact_area_error", "contact_radius", "contact_radius_error"),
+        of=lambda case: case.probe.is_unilateral,
+    ),
+    _Part(_OF_FRICTION, of=lambda case: case.probe.friction > 0),
+    _Part(("depth_reached", "force_reached"), of=_may_end_early),
+    _Part(("surface_deviation",), of=lambda case: isinstance(case.body, Scanned)),
+    _Part((*LARGEST, *_COUNTS)),
+    _Part(("force_exact", "force_exact_error"), is_exact=True),
+    _Part(("force_vector", "force_vector_error"), ("component",)),
+    _Part(("stiffness", "stiffness_error"), ("movement", "conjugate"), lambda case: case.probe.motion == "all"),
+    _Part(("energy_release", "energy_release_error"), of=_has_slit),
+    _Part(("energy_release_exact", "energy_release_exact_error"), of=_has_slit, is_exact=True),
+    _Part(_OF_LOADS[:-1], of=lambda case: case.load.acts),
+    _Part(_OF_LOADS[-1:], ("component",), lambda case: case.load.acts),
+)
+# What a record calls otherwise than the dataset.
+_IN_RECORD = {"machine_load": "load"}
+# Error bars that a record has as a share of the value.
+_RELATIVE = {"force_error", "energy_release_error", "contact_area_error", "contact_radius_error"}
+# What is known of a failed case, too: what it took, and by how much its error bars are too wide.
+_OF_FAILURES = {*_COSTS, *_RELATIVE, "machine_load", "memory", "surface_deviation", "depth_reached", "force_reached"}
+# Translations, and rotations about the axes of the point of contact.
+_MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
+# Where the probe touches, and along which unit vector it advances.
+_PLACE = ("at_x", "at_y", "at_z")
+_OF_CLOSURE = "error bars of half balls that a far field closes are those of the mesh alone, not of the closure"
+_MISSING = -1  # of counts, which have no NaN
+
+
+def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | None = None) -> xr.Dataset:
+    """Arrange ``records`` (by key) as the dataset of the plan's study; ``run`` adds attributes of the run."""
+    plan = with_depths(plan, records)
+    study = plan.study
+    cases = list(study.cases())
+    flat = _records_of(plan, cases, plan.keys, records)
+    flat = [_imaged(record, plan.equivalent.get(case.index)) for record, case in zip(flat, cases, strict=True)]
+    reference_keys = plan.reference_keys or [""] * len(cases)
+    exact = _records_of(plan, cases, reference_keys, records, is_exact=True)
+    variables, of_scene = {}, ["force_exact_message"]
+    for part in _PARTS:
+        if any(map(part.of, cases)):
+            for name in part.names:
+                values = [
+                    _value(record, case, name, part.dims)
+                    for record, case in zip(exact if part.is_exact else flat, cases, strict=True)
+                ]
+                variables[name] = _variable(study, name, values, *part.dims)
+                of_scene += [name] if part.is_exact else []
+    if study.gives_force:
+        variables |= _depths(plan, cases, flat)
+    for output in study.outputs:
+        for name in output.variables:
+            values = [record.largest.get(name, nan) if record and record.is_ok else nan for record in flat]
+            variables[name] = _variable(study, name, values)
+    variables |= _of_places(study, cases) | _texts(plan, cases, flat, exact)
+    component = ("component", ["x", "y", "z"], attributes("component"))
+    coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": component}
+    if "stiffness" in variables:
+        coordinates |= _motions()
+    dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
+    dataset = along_path(over_time(dataset, study, cases, flat), plan, records)
+    if any(case.is_closed for case in cases if not case.lost_contact):
+        dataset["force_error"].attrs["comment"] = _OF_CLOSURE
+    # At a given force each mesh has its own depth.
+    alike = {} if study.gives_force else _shared(study, reference_keys)
+    for name in (name for name in of_scene if name in dataset):
+        dataset[name] = dataset[name].isel(alike, drop=True)
+    path = {axis.name for axis in study.axes if axis.off}
+    for name in {*_PLACE, "axis", "body_message", "tool_depth"} & {*dataset.variables}:
+        dataset[name] = _along(dataset[name], {*path, "component", "time"})
+    for name, bar in uncertainties(plan, dataset["force"], lambda end: build(end, records)["force"]).items():
+        dataset[name] = bar
+    return _linked(_add_ratios(dataset.set_coords(_PLACE if path else ()), plan))
+
+
+def _shared(study: Study, keys: Sequence[str], at: Mapping[str, int] | None = None) -> dict[str, int]:
+    """Return dimensions of meshes along which ``keys``, one a case, are the same, each with its first place.
+
+    ``at`` has the place along a dimension that is not asked about.
+    """
+    dims = [axis.name for axis in study.axes]
+    table = xr.DataArray(np.array(keys, dtype=object).reshape(study.shape), dims=dims).isel(at or {})
+    return {str(dim): 0 for dim in table.dims if dim in MESH_DIMENSIONS and bool((table == table.isel({dim: 0})).all())}
+
+
+def _records_of(
+    plan: Plan, cases: Sequence[Case], keys: Sequence[str], records: Mapping[str, Record], *, is_exact: bool = False
+) -> list[Record | None]:
+    """Return the record of each case, at its scale; None if there is none."""
+    found = []
+    for key, case in zip(keys, cases, strict=True):
+        record = records.get(key)
+        here = at_force(plan, case, record and record.scaled(plan.scale_of(case)), is_exact=is_exact)
+        found.append(here or without_contact(case))
+    return found
+
+
+def _value(record: Record | None, case: Case, name: str, dims: Sequence[str]) -> Any:
+    """Return what a record holds of a variable, not a number if nothing; what loads add that do not act is nought."""
+    if name in _COUNTS:
+        return getattr(record, name) if record and record.status == OK else _MISSING
+    value, own = nan, name.replace("_exact", "")
+    if record and name in _OF_LOADS and record.is_ok and not case.load.acts:
+        value = 0.0
+    elif record and (record.is_ok or record.status == LOST or own in _OF_FAILURES):
+        value = record.largest.get(own, nan) if own in LARGEST else getattr(record, _IN_RECORD.get(own, own))
+        if own in _RELATIVE:
+            value *= abs(getattr(record, own.removesuffix("_error")))
+    numbers = np.array(value, dtype=float)
+    return np.broadcast_to(numbers if numbers.size else nan, [_SIZES[dim] for dim in dims])
+
+
+def _variable(study: Study, name: str, values: Sequence[Any], *more: str) -> tuple[Any, ...]:
+    """Return a variable of ``values``, one a case, of which each has ``more`` dimensions."""
+    array = np.array(values, dtype=object if isinstance(values[0], str) else None)
+    dims = tuple(axis.name for axis in study.axes)
+    known = next((texts for output in study.outputs for own, texts in output.variables.items() if own == name), None)
+    missing = {"missing_value": _MISSING} if name in _COUNTS else {}
+    return (*dims, *more), array.reshape((*study.shape, *array.shape[1:])), (known or attributes(name)) | missing
+
+
+def _motions() -> dict[str, Any]:
+    """Return the coordinates of stiffness: its rows, its columns, and the unit of each entry, which differ by block."""
+    rotates = [name.startswith("r") for name in _MOTIONS]
+    units = [[("N/m", "N", "N m")[one + other] for other in rotates] for one in rotates]
+    return {
+        "movement": ("movement", list(_MOTIONS), attributes("movement")),
+        "conjugate": ("conjugate", list(_MOTIONS), attributes("conjugate")),
+        "stiffness_unit": (("movement", "conjugate"), np.array(units, dtype=object), attributes("stiffness_unit")),
+    }
+
+
+def _of_places(study: Study, cases: Sequence[Case]) -> dict[str, Any]:
+    """Return where the probe touches, and along what it advances."""
+    frames = [_frame(case) for case in cases]
+    variables = {
+        name: _variable(study, name, [frame.point[number] if frame else nan for frame in frames])
+        for number, name in enumerate(_PLACE)
+    }
+    axes = [frame.axis if frame else (nan,) * 3 for frame in frames]
+    return variables | {"axis": _variable(study, "axis", axes, "component")}
+
+
+def _depths(plan: Plan, cases: Sequence[Case], flat: Sequence[Record | None]) -> dict[str, Any]:
+    """Return the depths at given forces, with their error bars; not a number where the force is not reached."""
+    found = [
+        depth if record and record.is_ok and (depth := plan.found_depths.get(case.index)) else FoundDepth(nan)
+        for case, record in zip(cases, flat, strict=True)
+    ]
+    return {
+        "depth": _variable(plan.study, "depth", [one.depth for one in found]),
+        "depth_error": _variable(plan.study, "depth_error", [one.error for one in found]),
+    }
+
+
+def _texts(
+    plan: Plan, cases: Sequence[Case], flat: Sequence[Record | None], exact: Sequence[Record | None]
+) -> dict[str, Any]:
+    """Return what is told in words of each case."""
+    notices = ["; ".join(case.body.notices) for case in cases]
+    texts = {
+        "status": [r.status if r else PENDING for r in flat],
+        "message": [r.message if r else "" for r in flat],
+        "origin": [_origin(plan, key, record) for key, record in zip(plan.keys, flat, strict=True)],
+        "force_exact_message": [r.message if r else "" for r in exact],
+    } | ({"body_message": notices} if any(notices) else {})
+    return {name: _variable(plan.study, name, words) for name, words in texts.items()}
+
+
+def write(dataset: xr.Dataset, path: Path) -> None:
+    """Write ``dataset`` to ``path`` as netCDF4: to a new file beside it, which then takes its place.
+
+    What cases cost, and how they were obtained, is the group ``run`` of the file; ``status`` is a flag.
+    """
+    run = [name for name in RUN if name in dataset]
+    write_netcdf(with_flags(dataset.drop_vars(run)), path, groups={"run": dataset[run]})
+
+
+def _along(place: xr.DataArray, own: Collection[str]) -> xr.DataArray:
+    """Return a variable without the dimensions, other than its ``own``, along which its values are the same."""
+    for dim in place.dims:
+        first = place.isel({dim: 0}, drop=True)
+        if dim not in own and bool(((place == first) | (place.isnull() & first.isnull())).all()):
+            place = first
+    return place
+
+
+def _add_ratios(dataset: xr.Dataset, plan: Plan) -> xr.Dataset:
+    """Add F_max, F/F_max and speed-up: against the full-order case of the same scene and mesh settings."""
+    force, seconds = dataset["force"], dataset["time_total"]
+    full_force = _of_full_order(dataset, "force")
+    if plan.study.gives_force:
+        full_force = full_force * _by_depth(dataset, plan)
+    ratios = {
+        "force_exact_ratio": force / dataset["force_exact"],
+        "force_ratio": force / full_force,
+        "speedup": _of_full_order(dataset, "time_total") / seconds,
+    }
+    for name in ("energy_release", "load_force"):
+        if name in dataset:
+            ratios[f"{name}_ratio"] = dataset[name] / _of_full_order(dataset, name)
+    if "law" in dataset.dims and "linear" in dataset["law"].values:
+        ratios["linear_ratio"] = force / force.sel(law="linear", drop=True)
+    ratios = {name: values.transpose(*force.dims, missing_dims="ignore") for name, values in ratios.items()}
+    full = {"epsilon": int(np.argmax(dataset["epsilon"].values))} if "epsilon" in dataset.dims else {}
+    alike = {} if plan.study.gives_force else _shared(plan.study, plan.keys, full)
+    ratios["force_max"] = full_force.isel(alike, drop=True)
+    return dataset.assign({name: values.assign_attrs(attributes(name)) for name, values in ratios.items()})
+
+
+def _by_depth(dataset: xr.Dataset, plan: Plan) -> xr.DataArray:
+    """Return the factor of the full order's force from its own depth to that of each case, by F's power of the depth.
+
+    At one force the depths of meshes differ; F_max is the force at the same depth.
+    """
+    powers = [found.exponent if (found := plan.found_depths.get(i)) else nan for i in plan.study.indices()]
+    power = dataset["depth"].copy(data=np.array(powers).reshape(dataset["depth"].shape))
+    return (dataset["depth"] / _of_full_order(dataset, "depth")) ** power
+
+
+def _of_full_order(dataset: xr.Dataset, name: str) -> xr.DataArray:
+    """Return a variable of the full-order case of the same scene and mesh settings."""
+    values = dataset[name]
+    if "epsilon" in values.dims:
+        return at_full_order(values)
+    return values.where(bool(dataset.attrs["epsilon_is_full"]))
+
+
+def _linked(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset in which each value names its error bar, and those that can be missing the reason."""
+    of_status = {"force": "status message", "force_exact": "force_exact_message"}
+    for name, variable in dataset.data_vars.items():
+        error = f"{name}_error" if f"{name}_error" in dataset else ""
+        if found := f"{error} {of_status.get(str(name), '')}".strip():
+            variable.attrs["ancillary_variables"] = found
+    return dataset
+
+
+def _imaged(record: Record | None, image: EquivalentPlace | None) -> Record | None:
+    """Return the record of the image of a case's place for the case itself."""
+    if record is None or image is None or not record.is_ok:
+        return record
+    vector, bars = image.vector(record.force_vector), image.bars(record.force_vector_error)
+    course = dict(record.course)
+    if course:
+        moved = [image.vector(one) for one in zip(*(course[name] for name in "xyz"), strict=True)]
+        course |= dict(zip("xyz", zip(*moved, strict=True), strict=True))
+    torque = image.handedness * record.torque
+    return replace(record, origin="image", force_vector=vector, force_vector_error=bars, torque=torque, course=course)
+
+
+def _frame(case: Case) -> Frame | None:
+    """Return where the probe touches; None where it has left the body, or what describes no surface cannot tell."""
+    if case.lost_contact:
+        return None
+    try:
+        return case.frame
+    except PlaceError:
+        return None
+
+
+def _origin(plan: Plan, key: str, record: Record | None) -> str:
+    """Return how the force was obtained, and whether that was in an earlier run."""
+    if record is None or record.status != OK:
+        return ""
+    return f"{record.origin}, stored" if key in plan.stored else record.origin
+
+
+def _coordinate(axis: Axis) -> Any:
+    known = quantity_of(axis.name)
+    texts = {"long_name": known.meaning if known else f"{axis.path} of the study file"}
+    if axis.unit and not isinstance(axis.labels[0], str):  # labels in words have their units in them
+        texts["units"] = axis.unit
+    values = np.array(axis.labels, dtype=object if isinstance(axis.labels[0], str) else None)
+    return (axis.name, values, texts)
+
+
+def _is_monotonic(axis: Axis) -> bool:
+    """Tell whether a dimension's labels are words, or rise or fall all along, as the CF conventions require."""
+    if isinstance(axis.labels[0], str):
+        return True
+    steps = np.diff(np.array(axis.labels, dtype=float))
+    return bool((steps > 0).all() or (steps < 0).all())
+
+
+def _attributes(plan: Plan, records: list[Record | None], run: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the dataset's attributes: what does not vary by case."""
+    study = plan.study
+    seen: dict[str, list[Any]] = {}
+    for record in records:
+        for name, value in (record.provenance if record else {}).items():
+            seen.setdefault(name, []).append(value)
+    seen.pop("date", None)
+    provenance = {name: ", ".join(map(str, dict.fromkeys(values))) for name, values in seen.items()}
+    epsilons = {section.epsilon for section in study.sections["mesh"]}  # type: ignore[attr-defined]
+    return {
+        **({"Conventions": "CF-1.8"} if all(map(_is_monotonic, study.axes)) else {}),
+        "title": study.title,
+        "study": study.text,
+        "study_hash": digest(study.text),
+        "study_file": Path(study.file).name,
+        "study_folder": str(Path(study.file).absolute().parent),
+        "reductions": json.dumps([vars(struck) for struck in plan.struck], ensure_ascii=False),
+        "epsilon_is_full": int(all(isinf(epsilon) for epsilon in epsilons)),
+        "timing": int(study.solve.timing),
+        **({"warnings": "\n".join(study.warnings)} if study.warnings else {}),
+        "version_epsmesh": __version__,
+        **provenance,
+        **run,
+    }

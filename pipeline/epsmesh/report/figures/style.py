@@ -1,0 +1,206 @@
+"""Style of all figures: colours, sizes, legend, notes, files."""
+
+import textwrap
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.style.core import STYLE_BLACKLIST
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+
+from epsmesh.files import atomic
+
+WIDTH, LEGEND = 7.1, 1.9  # inches: the width of a page's text, and of the legend beside the panels
+# From dark to light, told apart by the colour-blind and in grey; markers tell them apart as well.
+COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#b87d00", "#b0413e", "#9030f0", "#480000")
+MARKERS = "osD^vPX"
+CLAIM, FAILED, QUIET, LINE, GRID, PAPER = "#d81b60", "#c62828", "#555555", "#000000", "#dddddd", "#ffffff"
+SIZE = 9.0  # points
+# Inches: the width of a phone, the height of a panel there and of a line of its legend; letters of a line.
+_PHONE, _PHONE_PANEL, _PHONE_LINE, _PHONE_LETTERS = 3.4, 2.2, 0.19, 38
+# Letters of SIZE in an inch of a line, and in a line of the legend.
+_LETTERS, _LEGEND_LETTERS = 13, 24
+_DECADES = {"x": 1.4, "y": 2.2}  # from here on a logarithmic axis writes powers of ten alone
+_NARROW = 3.0  # below this ratio of its ends, even steps
+# A matplotlibrc, of the user or of the current folder, changes nothing: the same dataset gives the same file.
+DEFAULTS = {name: value for name, value in mpl.rcParamsDefault.items() if name not in STYLE_BLACKLIST}
+STYLE = DEFAULTS | {
+    "font.size": SIZE,
+    "axes.titlesize": SIZE,
+    "legend.fontsize": SIZE,
+    "svg.fonttype": "none",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.linewidth": 0.4,
+    "grid.color": GRID,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4,
+    "svg.hashsalt": "epsmesh",
+}
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure of a size in inches, whose parts make room for each other."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def look(position: int) -> dict[str, str]:
+    """Return colour and marker of the curve at ``position``; markers are open where colours come again."""
+    style = {"color": COLOURS[position % len(COLOURS)], "marker": MARKERS[position % len(MARKERS)]}
+    return style if position < len(COLOURS) else style | {"markerfacecolor": PAPER}
+
+
+def finish(figure: Figure, title: str, caption: str = "", warning: str = "", *, legend: bool = True) -> None:
+    """Add the title, a legend beside the panels, and the caption below them; with a warning it is red.
+
+    The caption is the figure's label as well, for a page, which writes it itself.
+    """
+    letters = int(_LETTERS * figure.get_figwidth())
+    if title:
+        figure.suptitle(textwrap.fill(title, int(0.9 * letters)), fontsize=SIZE + 1, fontweight="bold")
+    parts = [text for text in (caption, warning) if text]
+    figure.set_label(" ".join(parts))
+    if lines := [textwrap.fill(text, letters) for text in parts]:
+        colour = FAILED if warning else QUIET
+        figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize=SIZE, color=colour)
+    if legend:
+        write_legend(figure)
+    figure.align_ylabels()
+
+
+def add_note(figure: Figure, note: str, warning: str = "") -> None:
+    """Add a sentence to the caption, which stays red with a warning."""
+    figure.set_label(f"{figure.get_label()} {note}".strip())
+    words = textwrap.fill(str(figure.get_label()), int(_LETTERS * figure.get_figwidth()))
+    figure.supxlabel(words, x=0.01, ha="left", fontsize=SIZE, color=FAILED if warning else QUIET)
+
+
+def write_legend(figure: Figure, above: Axes | None = None) -> None:
+    """Name the curves of all panels, to the right of the upper right one, or in the empty axes ``above`` them."""
+    known = [ax.get_legend_handles_labels() for ax in figure.axes]
+    entries = {
+        label: handle for handles, labels in reversed(known) for handle, label in zip(handles, labels, strict=True)
+    }
+    if len(entries) < 2:
+        return
+    names = list(dict.fromkeys(label for _, labels in known for label in labels))
+    first = figure.axes[0].get_subplotspec()
+    last = first.get_gridspec().ncols - 1 if first else 0
+    beside = next(ax for ax in figure.axes if not first or ax.get_subplotspec().colspan.start == last)
+    (above or beside).legend(
+        [entries[name] for name in names],
+        [textwrap.fill(name, _LEGEND_LETTERS if above is None else _PHONE_LETTERS) for name in names],
+        loc="upper left",
+        bbox_to_anchor=(1.02, 1.0) if above is None else (0.0, 1.0),
+        borderaxespad=0.0,
+        frameon=False,
+    )
+
+
+def write_above(ax: Axes, title: str, letters: int, columns: int) -> None:
+    """Name the curves of a panel above it."""
+    handles, texts = ax.get_legend_handles_labels()
+    ax.legend(
+        handles,
+        [textwrap.fill(text, letters) for text in texts],
+        title=title,
+        title_fontsize="medium",
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.01),
+        borderaxespad=0.0,
+        ncol=columns,
+        frameon=False,
+    )
+
+
+def stack(figure: Figure) -> Figure:
+    """Put the panels of a figure below one another, each with its own title, ticks and axis titles: for a phone."""
+    # A bar of colours is no panel: it follows those that it belongs to.
+    specs = {ax: ax.get_subplotspec() for ax in figure.axes if hasattr(ax, "get_subplotspec")}
+    # By where they are, since grids may be within one another.
+    at = {ax: _corner(ax) for ax, spec in specs.items() if spec is not None}
+    panels = sorted(at, key=at.__getitem__)
+    words = {}
+    for ax in panels:
+        row, column = ([p for p in panels if at[p][i] == at[ax][i]] for i in (0, 1))
+        words[ax] = (
+            next(filter(None, (p.get_title() for p in (ax, *column, *row))), ""),
+            next(filter(None, (p.get_xlabel() for p in (*column[column.index(ax) :], *reversed(column)))), ""),
+            next(filter(None, (p.get_ylabel() for p in (ax, *row))), ""),
+        )
+    legends = [legend for ax in panels if (legend := ax.get_legend()) is not None]
+    is_beside = len(legends) == 1 and legends[0].get_bbox_to_anchor().x0 > legends[0].axes.bbox.x1
+    lines = sum(text.get_text().count("\n") + 1 for text in legends[0].get_texts()) if is_beside else 0
+    heights = [_PHONE_LINE * lines + 0.01, *([_PHONE_PANEL] * len(panels))]
+    turned = [label for ax in panels for label in ax.get_xticklabels() if label.get_rotation()]
+    figure.set_size_inches(_PHONE, sum(heights) + (1.3 if turned else 0.4) * len(panels))
+    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    for number, ax in enumerate(panels, start=1):
+        ax.set_subplotspec(grid[number, 0])
+        ax.tick_params(labelbottom=True, labelleft=True)
+        title, x, y = (" ".join(text.split()) for text in words[ax])
+        ax.set_title(textwrap.fill(title, _PHONE_LETTERS))
+        ax.set_xlabel(textwrap.fill(x, _PHONE_LETTERS))
+        ax.set_ylabel(textwrap.fill(y, 26))
+        if own := None if is_beside else ax.get_legend():
+            write_above(ax, own.get_title().get_text(), _PHONE_LETTERS - 12, 1)
+            _lift_title(ax)
+        for label in ax.get_xticklabels() if turned else ():
+            if label.get_rotation():
+                label.set(rotation=90, ha="center", rotation_mode="default")
+    if is_beside:
+        legends[0].remove()
+        above = figure.add_subplot(grid[0, 0])
+        above.axis("off")
+        write_legend(figure, above)
+    return figure
+
+
+def _corner(ax: Axes) -> tuple[float, float]:
+    """Return where the upper left corner of a panel is: from the top, and from the left."""
+    box = ax.get_position()
+    return round(-box.y1, 3), round(box.x0, 3)
+
+
+def _lift_title(ax: Axes) -> None:
+    """Put the title of a panel above the legend that is above the panel."""
+    legend = ax.get_legend()
+    if legend is None or not ax.get_title():
+        return
+    texts = [text for text in (legend.get_title(), *legend.get_texts()) if text.get_text()]
+    lines = sum(text.get_text().count("\n") + 1 for text in texts)
+    ax.set_title(ax.get_title(), pad=6 + 1.5 * lines * texts[-1].get_fontsize())
+
+
+def log_scale(ax: Axes, which: str = "y") -> None:
+    """Make an axis logarithmic, with round numbers written as people write them."""
+    getattr(ax, f"set_{which}scale")("log")
+    axis: Axis = getattr(ax, f"{which}axis")
+    low, high = sorted(axis.get_view_interval())
+    if high < _NARROW * low:
+        axis.set_major_locator(MaxNLocator(3 if which == "x" else 6))
+        axis.set_minor_locator(NullLocator())
+        axis.set_major_formatter(FuncFormatter(_written))
+        return
+    subs = (1.0,) if high > 10 ** _DECADES[which] * low else (1.0, 2.0, 5.0)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=5 if which == "x" else 10))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(_written))
+
+
+def _written(value: float, _position: int | None = None) -> str:
+    return f"{value:,.12g}"
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write ``figure`` to ``path``, in place of an earlier one only once it is whole."""
+    # Without a date the same dataset gives the same file.
+    metadata: dict[str, str | None] = {"Date": None} if path.suffix == ".svg" else {}
+    with atomic(path) as temporary:
+        figure.savefig(temporary, dpi=200, metadata=metadata)
+    return path

@@ -1,0 +1,114 @@
+"""The report of a study: one HTML page that holds all it needs, made from the dataset alone."""
+
+import re
+from importlib.resources import files
+from pathlib import Path
+from shlex import quote as shell
+from typing import Any
+from urllib.parse import quote
+
+import matplotlib as mpl
+import xarray as xr
+
+from epsmesh.files import write_whole
+from epsmesh.pages import hash_of, joined, render_page
+from epsmesh.printable import counted
+from epsmesh.report.figures import choose, figure
+from epsmesh.report.figures.style import STYLE, stack
+from epsmesh.report.guide import guide_if_any
+from epsmesh.report.page.cases import FIRST_ROWS, case_table
+from epsmesh.report.page.facts import (
+    by_status,
+    facts,
+    of_paths,
+    origins,
+    provenance,
+    reproduce,
+    struck,
+    summary,
+    without_exact,
+)
+from epsmesh.report.page.inline import inline_svg
+from epsmesh.report.table import warnings_of
+from epsmesh.report.uncertainty import unknowns
+from epsmesh.report.values import answer_of, at_peak, has_path
+from epsmesh.states import FAILURES, SKIPPED
+
+# What the answer says of times, and the headlines need not say again.
+_TOLD = "speed-ups"
+# What the curves show first.
+_MAIN = ("force_ratio", "force_exact_ratio", "force")
+_TEMPLATES, _VENDOR = Path(__file__).parent / "templates", Path(__file__).parent / "vendor"
+_BUNDLE = Path(str(files("itables"))) / "html" / "dt_bundle.js"
+_EXPORT = re.compile(r"export\s*\{[^}]*?([\w$]+) as default[^}]*\};?")
+_SCRIPT = re.compile(r"'sha256-[A-Za-z0-9+/=]+'")
+
+
+def write_page(dataset: xr.Dataset, path: Path, scene: str = "") -> Path:
+    """Write the report of ``dataset`` to ``path``, in place of an earlier one only once it is whole.
+
+    ``scene`` is the page of one case, to stand in the report.
+    """
+    return write_whole(path, render(dataset, path.stem, scene))
+
+
+def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
+    """Return the report of ``dataset`` as HTML; ``name`` is the study's, for files and commands.
+
+    A page in a page is bound by the policies of both: the report's must allow the scripts of the ``scene``.
+    """
+    over_time, dataset = dataset, at_peak(dataset)
+    study = str(dataset.attrs.get("study", ""))
+    guide = guide_if_any(over_time)
+    table = case_table(dataset)
+    varying = {column.name for column in table.columns if column.varies}
+    plotly = joined(_VENDOR / "plotly-basic.min.js")
+    return render_page(
+        _TEMPLATES / "page.html.j2",
+        f"{_data_tables()}\n{joined(_TEMPLATES / 'page.js')}",
+        plotly=plotly,
+        plotly_hash=hash_of(plotly),
+        title=dataset.attrs.get("title", name),
+        name=name,
+        style=joined(_BUNDLE.with_suffix(".css"), _TEMPLATES / "page.css"),
+        scene=scene,
+        scene_scripts=_SCRIPT.findall(scene)[:2],
+        facts=[fact for fact in facts(dataset) if not (guide and fact[0] == _TOLD)],
+        failures=[line for state in FAILURES for line in by_status(dataset, state)],
+        without_exact=without_exact(dataset),
+        warnings=warnings_of(dataset),
+        figures=_figures(over_time),
+        guide=guide,
+        answer=guide.sentence if guide else of_paths(over_time) if has_path(over_time) else summary(dataset),
+        tissue=unknowns(dataset),
+        table=table,
+        many_cases=counted(len(table.order), "case"),
+        main=next((name for name in _MAIN if name in varying), answer_of(dataset)),
+        first_rows=FIRST_ROWS,
+        struck=struck(dataset),
+        origins=origins(dataset),
+        skipped=by_status(dataset, SKIPPED),
+        study=study,
+        study_link=f"data:text/plain;charset=utf-8,{quote(study)}",
+        provenance=provenance(dataset),
+        commands=reproduce(dataset, name),
+        turn=f"epsmesh report {shell(f'results/{name}.nc')} --scene answer",
+    )
+
+
+def _data_tables() -> str:
+    """Return the script of DataTables, from itables, as a part of a module: it exports nothing."""
+    return _EXPORT.sub(r"const DataTable=\1;", joined(_BUNDLE))
+
+
+def _figures(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the figures that suit the study as SVG, for a wide page and for a phone, with what to see."""
+    found: list[dict[str, Any]] = []
+    for kind in choose(dataset):
+        if kind != "nothing":
+            drawn = figure(dataset, kind, titled=False)
+            svg, width = inline_svg(drawn, kind)
+            with mpl.rc_context(STYLE):
+                phone, _ = inline_svg(stack(drawn), f"{kind}-phone")
+            found.append({"kind": kind, "caption": drawn.get_label(), "svg": svg, "width": width, "phone": phone})
+    return found

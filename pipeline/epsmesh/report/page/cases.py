@@ -1,0 +1,202 @@
+"""The table of cases: columns in the units people read, rows in the order in which a reader needs them."""
+
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from markupsafe import Markup
+
+from epsmesh.pages import json_in_page
+from epsmesh.quantities import LARGEST, QUANTITIES
+from epsmesh.report.table import study_of
+from epsmesh.report.values import by_case, relative
+from epsmesh.report.words import heading as title_of_axis
+from epsmesh.report.words import is_numeric, lengths, number, scale, symbol
+from epsmesh.states import WORST_FIRST
+
+# Rows of a page of the table.
+FIRST_ROWS = 50
+# The columns of numbers; some are shown only when asked for.
+_QUANTITIES = (
+    "depth",
+    "depth_error",
+    "force",
+    "force_error_share",
+    "force_error",
+    "puncture_depth",
+    "puncture_force",
+    "force_ratio",
+    "force_exact_ratio",
+    "force_exact_error",
+    "speedup",
+    "time_total",
+    "dofs",
+    "cells",
+    "iterations",
+    "time_mesh",
+    "time_assemble",
+    "time_setup",
+    "time_solve",
+    "time_error",
+    "memory",
+    *LARGEST,
+    "energy",
+    "balance",
+)
+_SHARE = "force_error_share"  # of F: what errors of different forces are compared by
+_SHOWN = {
+    "puncture_depth",
+    "puncture_force",
+    "depth",
+    "depth_error",
+    "force",
+    _SHARE,
+    "force_ratio",
+    "force_exact_ratio",
+    "speedup",
+    "time_total",
+}
+_DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: ``values`` are numbers (None: none) or, where there are ``words``, the index of a word.
+
+    ``keys`` sort the words of a swept number; ``hint`` is the long name, ``axis`` the title of an axis; ``is_first``
+    columns are shown at first, an ``is_axis`` column is swept.
+    """
+
+    name: str
+    heading: str
+    values: list[float | int | None]
+    hint: str = ""
+    words: list[str] | None = None
+    keys: list[float] | None = None
+    is_filter: bool = False
+    is_first: bool = True
+    is_axis: bool = False
+    axis: str = ""
+
+    @property
+    def varies(self) -> bool:
+        """Whether its numbers differ."""
+        return len({value for value in self.values if value is not None}) > 1
+
+    def text(self, row: int) -> str:
+        """Return what stands in a row."""
+        value = self.values[row]
+        if self.words is not None:
+            return self.words[int(value or 0)]
+        return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+@dataclass(frozen=True)
+class Table:
+    """The table of cases; ``order`` lists the rows with failed ones first."""
+
+    columns: list[Column]
+    order: list[int]
+
+    @property
+    def json(self) -> Markup:
+        """The table as JSON that can stand in a ``<script>`` element."""
+        columns = [vars(column) for column in self.columns]
+        return json_in_page({"columns": columns, "order": self.order, "rows": FIRST_ROWS})
+
+    @property
+    def across(self) -> str:
+        """What curves are drawn against at first: ε, else the first numbers, else the first axis, or ""."""
+        swept = [column for column in self.columns if column.is_axis and len(column.words or ()) > 1]
+        return min(swept, key=lambda c: (c.name != "epsilon", c.keys is None)).name if swept else ""
+
+    @property
+    def filters(self) -> list[Column]:
+        """The columns by whose words cases can be chosen."""
+        return [column for column in self.columns if column.is_filter]
+
+
+def case_table(dataset: xr.Dataset) -> Table:
+    """Return the table of the cases of ``dataset``."""
+    dims = [str(dim) for dim in dataset["status"].dims]
+    size = dataset["status"].size
+    states = [str(state) for state in dataset["status"].values.ravel()]
+    dataset = dataset.assign({_SHARE: relative(dataset, "force_error")})
+    study = study_of(dataset)
+    stages = prod(len(axis) for axis in (study.axes if study else ()) if axis.is_stage)  # the last axis of a plan
+    numbers = Column(
+        "case", "case", [stages * (n + 1) - 1 for n in range(size)], "the number by which `epsmesh plan` knows it"
+    )
+    axes = [_axis(dataset, dim, position, dims) for position, dim in enumerate(dims)]
+    quantities = [
+        _quantity(by_case(dataset, name), name)
+        for name in _QUANTITIES
+        if name in dataset and {*dataset[name].dims} <= {*dims}
+    ]
+    status = _texts("status", states, QUANTITIES["status"].meaning, is_filter=True)
+    origin = _texts(
+        "origin",
+        by_case(dataset, "origin").values.ravel(),
+        QUANTITIES["origin"].meaning,
+        is_filter=True,
+        is_first=False,
+    )
+    message = _texts("message", by_case(dataset, "message").values.ravel(), "why there is no force")
+    known = [column for column in quantities if any(value is not None for value in column.values)]
+    told = [column for column in (origin, message) if any(column.words or ())]
+    rank = {state: position for position, state in enumerate(WORST_FIRST)}
+    order = sorted(range(size), key=lambda row: rank.get(states[row], 0))
+    return Table([numbers, status, *axes, *known, *told], order)
+
+
+def _axis(dataset: xr.Dataset, dim: str, position: int, dims: list[str]) -> Column:
+    coordinate = dataset[dim]
+    codes = np.indices([dataset.sizes[d] for d in dims])[position].ravel()
+    values = coordinate.values
+    keys = [min(float(value), 1e300) for value in values] if is_numeric(coordinate) else None
+    hint = str(coordinate.attrs.get("long_name", dim))
+    words = [lengths(coordinate, number(coordinate, value)) for value in values]
+    return Column(
+        dim,
+        symbol(coordinate),
+        codes.tolist(),
+        hint,
+        words,
+        keys,
+        is_filter=True,
+        is_axis=True,
+        axis=title_of_axis(coordinate),
+    )
+
+
+def _quantity(array: xr.DataArray, name: str) -> Column:
+    if name == _SHARE:
+        heading, factor, unit = "± F", 100.0, "%"
+    else:
+        heading, (factor, unit) = symbol(array), scale(array)
+    hint = str(array.attrs.get("long_name", name))
+    if np.issubdtype(array.dtype, np.integer):
+        values: list[Any] = [int(value) if value >= 0 else None for value in array.values.ravel()]
+    else:
+        flat = array.values.ravel()
+        values = [_rounded(value, name, factor) if np.isfinite(value) else None for value in flat]
+    title = f"{heading} ({unit})" if unit else heading
+    return Column(
+        name, title, values, hint, is_first=name in _SHOWN, axis=title if name == _SHARE else title_of_axis(array)
+    )
+
+
+def _rounded(value: float, name: str, factor: float) -> float | int:
+    if name in ("dofs", "cells", "iterations"):
+        return int(value)
+    # Ratios near 1 are told apart by what they differ from it.
+    return float(f"{value * factor:.{_DIGITS + 2 if name in ('force_ratio', 'force_exact_ratio') else _DIGITS}g}")
+
+
+def _texts(name: str, values: Any, hint: str, *, is_filter: bool = False, is_first: bool = True) -> Column:
+    texts = [str(value) for value in values]
+    words = list(dict.fromkeys(texts))
+    codes = {word: code for code, word in enumerate(words)}
+    return Column(name, name, [codes[text] for text in texts], hint, words, is_filter=is_filter, is_first=is_first)

@@ -1,0 +1,111 @@
+"""Values of a dataset's arrays in the words and units that people use: mm, kPa, mN, per cent."""
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import takewhile
+from math import isfinite
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from epsmesh import quantities
+
+_NOUGHT = 1e-9  # what rounding leaves of no error
+_NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
+# Of sizes and semi-axes, the last word of their dimensions' names.
+_SIZES = ("size", "axes")
+_POINT = re.compile(rf"{_NUMBER} (?P<unit>[a-zµ]+)(?: {_NUMBER} (?P=unit))+\b")
+_WORD = re.compile(rf"{_POINT.pattern}|\S+")
+
+
+def scale(array: xr.DataArray) -> tuple[float, str]:
+    """Return the factor from the array's unit to the one that people read, and that one's name ('': none)."""
+    return quantities.readable(str(array.name), _unit(array))
+
+
+def number(array: xr.DataArray, value: Any) -> str:
+    """Write one value of ``array`` with its unit: ``10 mm``, ``full``, ``coarse``; '' where there is none."""
+    return quantities.write(str(array.name), value, _unit(array))
+
+
+def choice(coordinate: xr.DataArray, value: Any) -> str:
+    """Write a choice along a dimension: ``ν = 0.45``, ``ε = full``, ``outside free``, or a table's own name."""
+    if isinstance(value, str):
+        return value if coordinate.name in ("probe", "body") else f"{symbol(coordinate)} {lengths(coordinate, value)}"
+    return f"{symbol(coordinate)} = {re.sub(r'^-', '−', number(coordinate, value))}"
+
+
+def percent(share: float) -> str:
+    """Write a share as people read it; nothing for what is not known."""
+    if not isfinite(share):
+        return ""
+    if abs(share) < _NOUGHT:
+        return "0 %"
+    return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
+
+
+def choices(coordinates: Mapping[Any, xr.DataArray], selection: Mapping[str, Any]) -> str:
+    """Write a choice along several dimensions, with the units of ``coordinates``: of a dataset, or its own."""
+    known = {name: coordinates[name] if name in coordinates else xr.DataArray(name=name) for name in selection}
+    return ", ".join(choice(known[name], value) for name, value in selection.items())
+
+
+def lengths(coordinate: xr.DataArray, text: str) -> str:
+    """Return ``text`` with points, or, of sizes, with products as people write them: ``40 × 40 × 20 mm``."""
+    if str(coordinate.name).rsplit("_", 1)[-1] not in _SIZES:
+        return points(text)
+    return _POINT.sub(lambda found: f"{' × '.join(found[0].split()[::2])} {found['unit']}", text)
+
+
+def points(text: str) -> str:
+    """Return ``text`` with its points as people write them: ``at 0 mm 2 mm -7 mm`` is ``at (0, 2, −7) mm``."""
+
+    def written(found: re.Match[str]) -> str:
+        numbers = ", ".join(found[0].split()[::2]).replace("-", "−")
+        return f"({numbers}) {found['unit']}"
+
+    return _POINT.sub(written, text)
+
+
+def without_shared(names: Sequence[str]) -> list[str]:
+    """Return ``names`` without the first and the last words that all of them have; a point is one word."""
+    words = [[found[0] for found in _WORD.finditer(name)] for name in names]
+    most = min(map(len, words)) - 1
+    first = min(_shared(words), most)
+    last = min(_shared([each[::-1] for each in words]), most - first)
+    return [" ".join(each[first : len(each) - last]) for each in words]
+
+
+def _shared(words: Sequence[list[str]]) -> int:
+    """Return how many first words are the same in all."""
+    return sum(1 for _ in takewhile(lambda each: len(set(each)) == 1, zip(*words, strict=False)))
+
+
+def symbol(coordinate: xr.DataArray) -> str:
+    """Return the letter or the word for a dimension."""
+    return quantities.symbol(str(coordinate.name))
+
+
+def heading(array: xr.DataArray) -> str:
+    """Return what an axis of a figure says: name and unit."""
+    name = str(array.name)
+    known = quantities.quantity_of(name)
+    text = (known.axis if known else "") or str(array.attrs.get("long_name", name))
+    unit = scale(array)[1]
+    return f"{text}, {unit}" if unit else text
+
+
+def at_most(error: xr.DataArray) -> str:
+    """Write the largest of relative errors, `` (at most 0.08 %)``; '' where none is known."""
+    largest = float(error.max())
+    return f" (at most {100 * largest:.2g} %)" if np.isfinite(largest) else ""
+
+
+def is_numeric(array: xr.DataArray) -> bool:
+    """Tell numbers from words."""
+    return bool(np.issubdtype(array.dtype, np.number))
+
+
+def _unit(array: xr.DataArray) -> str | None:
+    return array.attrs.get("units")

@@ -1,0 +1,81 @@
+"""The loads of a case for the solver: in newtons, on the mesh turned so that the probe presses along -z."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.shapes.frame import Frame, Vector
+from epsmesh.shapes.surface import Surface
+from epsmesh.solve.movement import Loads, SurfaceLoad
+from epsmesh.study.case import Case
+from epsmesh.study.loads import FREE, Cap, Traction
+
+_Test = Callable[[FloatArray, FloatArray], BoolArray]
+# A facet belongs to a cap if the cosine between its normal and that at the cap's centre exceeds this.
+_SAME_WAY = 0.5
+
+
+def loads_of(case: Case) -> Loads | None:
+    """Return the loads of ``case``, None if there are none."""
+    load, turn = case.load, case.frame.turn
+    if not load.acts:
+        return None
+    weights: tuple[Vector, ...] = ()
+    if any(load.gravity):
+        gravity = _turned(turn, load.gravity)
+        densities = [density or 0.0 for density in case.densities] * (2 if case.is_linear_beyond else 1)
+        weights = tuple((rho * gravity[0], rho * gravity[1], rho * gravity[2]) for rho in densities)
+    return Loads(weights, tuple(_surface_load(case, traction) for traction in load.traction if traction.acts))
+
+
+def _surface_load(case: Case, traction: Traction) -> SurfaceLoad:
+    turn, on = case.frame.turn, traction.on
+    vector, pressure = _turned(turn, traction.traction or (0.0, 0.0, 0.0)), traction.pressure or 0.0
+    outer, cavities = case.body.surfaces(), {name: (wall,) for name, wall in case.body.cavities.items()}
+    is_outside = _on_face(outer | cavities, (*outer,), case.frame) if cavities else _everywhere
+    if isinstance(on, Cap):
+        place = case.body.frame(on.around)
+        outward = np.array(_turned(turn, place.outward))
+        within = _turned(turn, place.point), on.radius
+
+        def in_cap(corners: FloatArray, normals: FloatArray) -> BoolArray:
+            return np.asarray(normals @ outward > _SAME_WAY) & is_outside(corners, normals)
+
+        return SurfaceLoad(in_cap, vector, pressure, within)
+    if on == FREE:
+        return SurfaceLoad(is_outside, vector, pressure)
+    return SurfaceLoad(_on_face(outer | cavities, (on,), case.frame), vector, pressure)
+
+
+def _everywhere(corners: FloatArray, _: FloatArray) -> BoolArray:
+    return np.ones(len(corners), dtype=bool)
+
+
+def _on_face(surfaces: Mapping[str, tuple[Surface, ...]], names: tuple[str, ...], frame: Frame) -> _Test:
+    """Return a test of facets: whether one of the faces ``names`` is the nearest of all ``surfaces``.
+
+    All corners of a facet beside an edge may be on another face; its middle is then not.
+    """
+
+    def on_face(corners: FloatArray, _: FloatArray) -> BoolArray:
+        points = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
+        points = points.reshape(-1, 3) if frame.turn is None else points.reshape(-1, 3) @ frame.turn
+        away = {
+            key: np.min([_farthest(surface, points) for surface in parts], axis=0) for key, parts in surfaces.items()
+        }
+        return np.asarray(np.min([away[name] for name in names], axis=0) <= np.min(list(away.values()), axis=0))
+
+    return on_face
+
+
+def _farthest(surface: Surface, points: FloatArray) -> FloatArray:
+    """Return the largest distance (m) of each facet's four points from a surface."""
+    return np.asarray(np.abs(surface.distance(points)).reshape(-1, 4).max(axis=1))
+
+
+def _turned(turn: FloatArray | None, vector: Vector) -> Vector:
+    if turn is None:
+        return vector
+    x, y, z = map(float, turn @ np.array(vector))
+    return x, y, z

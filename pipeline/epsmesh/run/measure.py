@@ -1,0 +1,228 @@
+"""From solutions to records: the force along the probe's axis, its error bar, its costs."""
+
+from dataclasses import replace
+from math import hypot, isnan, nan
+from typing import Any
+
+import numpy as np
+
+from epsmesh.arrays import FloatArray
+from epsmesh.plan.cost import features
+from epsmesh.plan.recipe import edge_width_of, half_width_of, has_sure_contact, has_sure_limit, is_ball, is_thin
+from epsmesh.plan.refinement import is_refined
+from epsmesh.plan.steps import Solve
+from epsmesh.run.record import Record
+from epsmesh.shapes.body import Layered
+from epsmesh.shapes.contact import first_touch
+from epsmesh.shapes.frame import Vector
+from epsmesh.solve.convergence import Convergence
+from epsmesh.solve.estimate import is_fine, is_graded
+from epsmesh.solve.history import History
+from epsmesh.solve.response import Contact
+from epsmesh.solve.solution import Solution
+from epsmesh.states import OK
+from epsmesh.study.case import Case
+
+_ROUNDING = 1e-9
+# The mesh is graded to the axis. If first contact is farther away, in units of the half width, it is not graded to it.
+_BESIDE = 0.1
+BARS = (
+    "force_error",
+    "force_vector_error",
+    "stiffness_error",
+    "energy_release_error",
+    "load_force_error",
+    "contact_area_error",
+    "contact_radius_error",
+    "slip_area_error",
+    "friction_force_error",
+    "torque_error",
+)
+_OF_FRICTION = ("slip_area", "friction_force", "torque")
+TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
+
+
+def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Record:
+    """Return the record of a solution, which is on the modelled part of the body.
+
+    With an accuracy, F is extrapolated with the elements of one degree more; without one, F is that of the study's
+    elements. A meridian's F is already its best.
+    """
+    case = solve.case
+    kind, planned_cells, poisson = features(solve)
+    if solve.goal is not None and not solve.axisymmetric:
+        # Refined meshes have larger elements away from the edge: F has more of the errors of other places.
+        is_plain = case.is_plain and not is_refined(solve.meshed_case)
+        known = Convergence(
+            degree=case.mesh.degree,
+            element=case.element,
+            is_graded=is_graded_to_contact(case),
+            is_fine=is_plain and has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
+            has_others=not is_plain,
+            is_large=case.material.is_large,
+            is_ball=is_ball(case),
+        )
+        solution = solution.extrapolated(known)
+    # The solution is in the frame where the probe presses along -z; the record is in the body's coordinates.
+    turn, force, bar = case.frame.turn, solution.reaction[2], solution.reaction_bars[2]
+    return Record(
+        key=solve.key,
+        status=OK,
+        origin="axisymmetric" if solve.axisymmetric else "symmetric" if solve.mirrors else "solved",
+        young=case.scale.stress,
+        depth=case.scale.length,
+        force=force,
+        force_error=bar / abs(force),
+        force_vector=turned_back(turn, _known_of(case, solution.reaction)),
+        force_vector_error=_vector_bars(solution, turn),
+        stiffness=_rows(solution.stiffness, turn) if case.probe.motion == "all" else (),
+        stiffness_error=_rows(solution.bars, turn, bars=True) if case.probe.motion == "all" else (),
+        energy=solution.energy,
+        energy_release=solution.release / _front_length(case) if case.probe.slit else nan,
+        energy_release_error=solution.release_bar,
+        largest=solution.largest,
+        **_of_contact(solution.contact),
+        **_of_loads(case, solution),
+        balance=solution.balance,
+        course=_course(case, solution.history),
+        dofs=solution.dofs,
+        cells=solution.cells * 2 ** len(solve.mirrors),
+        iterations=solution.iterations,
+        time_mesh=mesh_seconds + solution.times.mesh,
+        time_assemble=solution.times.assemble,
+        time_setup=solution.times.setup,
+        time_solve=solution.times.solve,
+        time_error=solution.times.error,
+        kind=kind,
+        planned_cells=planned_cells,
+        poisson=poisson,
+    )
+
+
+def _course(case: Case, history: History | None) -> dict[str, tuple[float, ...]]:
+    """Return what a case does over time, by the names of ``COURSE``; nothing for a case without time steps."""
+    if history is None:
+        return {}
+    vectors = [turned_back(case.frame.turn, _known_of(case, (x, y, z))) for x, y, z in history.forces.tolist()]
+    found: dict[str, Any] = {
+        "time": history.times,
+        "force": history.forces[:, 2],
+        "step_error": history.bars,
+        **dict(zip("xyz", np.array(vectors).T, strict=True)),
+        "dissipated": history.dissipated,
+        "dissipated_error": np.abs(history.imbalance),
+    }
+    if case.probe.is_unilateral:
+        found["area"] = history.areas
+    return {name: tuple(map(float, values)) for name, values in found.items()}
+
+
+def _of_contact(contact: Contact | None) -> dict[str, Any]:
+    """Return the fields of a record for found contact, none for a prescribed footprint."""
+    if contact is None:
+        return {}
+    found = {name: getattr(contact, name) for name in _OF_FRICTION}
+    found |= {f"{name}_error": getattr(contact, f"{name}_bar") for name in _OF_FRICTION}
+    found |= {"contact_area": contact.area, "contact_area_error": contact.bar}
+    return found | {"contact_radius": contact.radius, "contact_radius_error": contact.bar / 2}
+
+
+def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:
+    """Return the fields of a record for loads, none without loads."""
+    loaded, contact = solution.load_response, solution.contact
+    if contact and not isnan(contact.sag):  # loads bend the surface, and the depth counts from the first touch
+        none = (0.0, 0.0, 0.0)
+        touching = {"load_force": 0.0, "load_force_error": 0.0, "load_force_vector": none}
+        return touching | {"load_energy": contact.load_energy, "sag": contact.sag}
+    if loaded is None:
+        return {}
+    force, axis = solution.load_force, (0.0, 0.0, -1.0)
+    return {
+        "load_force": force[2],
+        "load_force_error": solution.load_force_bar,
+        "load_force_vector": turned_back(case.frame.turn, _known_of(case, force)),
+        "load_energy": loaded.energy,
+        # With a linear law the axial force at depth d is k d + load_force; at the sag it is zero.
+        "sag": loaded.sag if loaded.sag is not None else -force[2] / loaded.stiffness_along(axis),
+    }
+
+
+def _known_of(case: Case, force: Vector) -> Vector:
+    """Return a ``force`` (N) on the probe, with NaN for components that are neither computed nor zero by symmetry.
+
+    The far field of an axial force gives no lateral force. Along a frictionless blade in a slit, the forces on its two
+    ends are not computed.
+    """
+    x, y, z = force
+    if case.is_closed and case.probe.contact == "bonded":
+        return x and nan, y and nan, z
+    if case.probe.slit and case.probe.contact != "bonded":
+        along = case.frame.upright.along
+        return (x and nan, y, z) if abs(along[0]) > abs(along[1]) else (x, y and nan, z)
+    return x, y, z
+
+
+def is_graded_to_contact(case: Case) -> bool:
+    """Return whether the mesh of ``case`` is graded to the expected edge of contact, and that is enough."""
+    rim = _rim(case)
+    # The coarsest recipe equals the limit of `is_graded`: rounding must not exceed it.
+    found = not case.probe.is_flat
+    rim *= 1 - _ROUNDING if found else 1.0
+    if case.probe.is_unilateral:  # small elements surround the axis, so contact must be there
+        *beside, _ = first_touch(case.body, case.probe, case.frame)
+        if hypot(*beside) > _BESIDE * half_width_of(case):
+            return False
+        if is_ball(case) and not case.material.is_large and is_thin(case):
+            return False
+    sure = has_sure_contact(case) and case.mesh.degree == 2
+    return is_graded(rim, case.mesh.growth, found=found, large=case.material.is_large, sure=sure)
+
+
+def _rim(case: Case) -> float:
+    """Return the size of elements at the edge of contact, in units of the width that they resolve."""
+    return case.mesh.rim_size(case.probe.half_width) / edge_width_of(case)
+
+
+def _front_length(case: Case) -> float:
+    """Return the length (m) of the front of the probe's slit."""
+    slit = case.probe.slit
+    assert slit is not None
+    if not slit.is_open:
+        return 2 * slit.reach
+    assert isinstance(case.body, Layered)
+    (x, y, _), along = case.frame.point, case.frame.along
+    return sum(min(case.column, case.body.to_side((x, y), (i * along[0], i * along[1]))) for i in (-1, 1))
+
+
+def turned_back(turn: FloatArray | None, vector: Vector) -> Vector:
+    """Return a vector of the turned mesh in the body's coordinates; the rows of ``turn`` are the mesh's axes."""
+    if turn is None:
+        return vector
+    x, y, z = map(float, np.array(vector) @ turn)
+    return x, y, z
+
+
+def _vector_bars(solution: Solution, turn: FloatArray | None) -> Vector:
+    """Return the error bars (N) of the force's components; 0 for components that are zero by symmetry.
+
+    In turned coordinates, the bar of a component is the sum over its contributions.
+    """
+    x, y, z = (0.0 if f == 0 else bar for f, bar in zip(solution.reaction, solution.reaction_bars, strict=True))
+    return turned_back(None if turn is None else np.abs(turn), (x, y, z))
+
+
+def _rows(matrix: FloatArray | None, turn: FloatArray | None, *, bars: bool = False) -> tuple[tuple[float, ...], ...]:
+    """Return a stiffness matrix (6, 6), or its error bars, in the body's coordinates."""
+    if matrix is None:
+        return ()
+    if turn is not None:
+        both = np.kron(np.eye(2), np.abs(turn) if bars else turn)
+        matrix = both.T @ matrix @ both
+    return tuple(tuple(map(float, row)) for row in matrix)
+
+
+def add_times(record: Record, earlier: list[Record]) -> Record:
+    """Return ``record`` with the total time for its accuracy: with error bars and earlier attempts."""
+    sums = {name: sum(getattr(r, name) for r in [*earlier, record]) for name in TIMES}
+    sums["time_solve"] += sum(r.time_error for r in [*earlier, record])
+    return replace(record, **sums, time_error=0.0)

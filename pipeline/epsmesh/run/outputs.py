@@ -1,0 +1,186 @@
+"""The numbers that ``[[output]]`` asks for. Their error bars are the changes by elements of one degree more."""
+
+import hashlib
+import importlib.util
+import sys
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from math import isfinite, nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray
+from epsmesh.plan.steps import Solve
+from epsmesh.run.case_solution import CaseSolution
+from epsmesh.run.compile import prepare
+from epsmesh.run.memory import FreeMemory
+from epsmesh.run.problem import conditions_of, lacks_memory, law_of, memory_of, problem_of, solve_problem
+from epsmesh.run.record import Record
+from epsmesh.run.solved import Solved, compile_law, put_back
+from epsmesh.solve import SolveError
+from epsmesh.solve.cell_values import clear_cells
+from epsmesh.solve.points.reduce import CHANGES, Number, at_point, over_region
+from epsmesh.solve.points.state import State
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.spaces import Spaces
+from epsmesh.study.case import Case
+from epsmesh.study.output import OWN, WHOLE, Output
+
+# Least change, in units of the mean pointwise change over the region.
+POINTWISE = {"at": 1.0, "max": 0.5, "mean": 0.1, "quantile": 0.3}
+# The highest degree for which the whole case is solved again in one degree more.
+_HIGHEST = 2
+
+
+def outputs_of(
+    solve: Solve, problem: QuasiStaticProblem, spaces: Spaces, record: Record, *, has_bar: bool
+) -> tuple[dict[str, float], str]:
+    """Return outputs of the last solution of a ``problem``, with their bars, by name, and what is told; collective."""
+    case, meshed, body = solve.case, solve.meshed_case, spaces.body
+    state = problem.state()
+    finer, why = (problem.finer_state, "") if has_bar else (None, "not requested")
+    if has_bar and finer is None:
+        finer, why = _solved_again(solve, spaces)
+    law = law_of(case, in_body=True)
+    compile_law(body.comm, state)
+    clear = clear_cells(body, conditions_of(case).front, wholly=True)
+    found: dict[str, float] = {}
+    told = [f"no error bars on outputs: {why}"] if why else []
+    undo = put_back(case, meshed, body, [each for each in (state, finer) if each is not None])
+    try:
+        states = [each and replace(each, law=law) for each in (state, finer)]
+        for output in case.outputs:
+            if output.function is not None:
+                number = _of_function(output, solve, record, states)
+            else:
+                number = _of_fields(output, case, states[0], states[1], clear)
+            bar = nan if isinstance(number, str) else _bar(output, number)
+            value = nan if isinstance(number, str) else number.value
+            found |= {output.name: value, f"{output.name}_error": bar}
+            told += _told(output, number)
+    finally:
+        undo()
+    return found, "; ".join(told)
+
+
+def _of_fields(output: Output, case: Case, state: State | None, finer: State | None, clear: BoolArray) -> Number:
+    assert output.of is not None and state is not None
+    if output.at is not None:
+        return at_point(output.of, np.array(output.at), state, finer, clear)
+    body = state.body
+    chosen = np.ones(body.owned_cells, bool)
+    if output.region != WHOLE and body.regions is not None:
+        names = [OWN, *(region.name for region in case.body.regions)]
+        # Beyond ε, the linear part of each region has a number of its own.
+        chosen = body.regions[: body.owned_cells] % len(case.tissues) == names.index(str(output.region))
+    return over_region(output.of, output.reduction, chosen, state, finer, clear)
+
+
+def _of_function(output: Output, solve: Solve, record: Record, states: list[State | None]) -> Number | str:
+    """Return the number of a function of the study's author, or why there is none; collective."""
+    values: list[float] = []
+    try:
+        function = function_of(output)
+        for state in states:
+            if state is not None:
+                values.append(float(function(CaseSolution(Solved(solve, record, state, None, record.dofs)))))
+    except Exception as error:
+        message = f"{type(error).__name__}: {error}"
+    else:
+        message = "" if all(map(isfinite, values)) else f"it returned {values[0]}"
+    comm = states[0].body.comm if states[0] is not None else None
+    assert comm is not None
+    if messages := [each for each in comm.allgather(message) if each]:
+        return messages[0]
+    return Number(values[0], abs(values[0] - values[1]) if len(values) > 1 else nan, 0.0)
+
+
+def function_of(output: Output) -> Callable[[CaseSolution], Any]:
+    """Return the function of an output; this executes its file.
+
+    Raises:
+        Exception: what the file raises; AttributeError, if it has no such function.
+    """
+    file, name = output.path
+    function: Callable[[CaseSolution], Any] = getattr(_module(file.resolve(), output.sources), name)
+
+    def called(solution: CaseSolution) -> Any:
+        with _beside(file.resolve().parent):
+            return function(solution)
+
+    return called
+
+
+def _module(path: Path, sources: Sequence[Path]) -> Any:
+    # By content, too: the files may have changed since this process last executed them.
+    content = hashlib.sha256(b"\0".join(source.read_bytes() for source in sources)).hexdigest()[:16]
+    key = f"_epsmesh_output_{path.stem}_{content}_{abs(hash(path))}"
+    if key not in sys.modules:
+        specification = importlib.util.spec_from_file_location(key, path)
+        assert specification is not None and specification.loader is not None
+        module = sys.modules[key] = importlib.util.module_from_spec(specification)
+        with _beside(path.parent, {source.resolve() for source in sources}):
+            try:
+                specification.loader.exec_module(module)
+            except BaseException:
+                del sys.modules[key]
+                raise
+    return sys.modules[key]
+
+
+@contextmanager
+def _beside(folder: Path, changed: Collection[Path] = ()) -> Iterator[None]:
+    """Import modules of a ``folder`` first, as a script there does, and afresh those that may have changed."""
+    loaded = {name: getattr(module, "__file__", None) for name, module in [*sys.modules.items()] if changed}
+    for name in (name for name, file in loaded.items() if file and Path(file).resolve() in changed):
+        if not name.startswith("_epsmesh_output_"):
+            del sys.modules[name]
+    importlib.invalidate_caches()
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+
+
+def _bar(output: Output, number: Number) -> float:
+    """Return the 95 % bar of a number; NaN if it has none."""
+    if number.is_singular or number.is_outside:
+        return nan
+    kind = "at" if output.at is not None else output.reduction if output.reduction in ("max", "mean") else "quantile"
+    return CHANGES * max(number.change, POINTWISE[str(kind)] * number.pointwise)
+
+
+def _told(output: Output, number: Number | str) -> list[str]:
+    if isinstance(number, str):
+        return [f"{output.name}: {number}"]
+    if number.is_outside:
+        return [f"{output.name}: there is no tissue there"]
+    if number.is_singular:
+        return [f"{output.name}: no error bar, because it grows without bound at an edge nearby as elements shrink"]
+    return []
+
+
+def _solved_again(solve: Solve, spaces: Spaces) -> tuple[State | None, str]:
+    """Return the fields of the case in elements of one degree more on the same mesh, or why not; collective."""
+
+    def raised(case: Case) -> Case:
+        return replace(case, mesh=case.mesh.model_copy(update={"degree": case.mesh.degree + 1}), outputs=())
+
+    degree, comm = solve.case.mesh.degree, spaces.body.comm
+    if degree > _HIGHEST:
+        return None, f"they need elements of degree {degree + 1}"
+    case, meshed = raised(solve.case), raised(solve.meshed_case)
+    prepare(comm, [replace(solve, case=case)])
+    try:
+        with problem_of(spaces, meshed) as problem:
+            needed, _ = memory_of(case, problem.dofs)
+            if missing := lacks_memory(FreeMemory(comm).available(), needed, f"degree {degree + 1}"):
+                return None, missing
+            solve_problem(case, problem, estimate=False, meshed=meshed)
+            return problem.state(), ""
+    except SolveError as error:
+        return None, f"degree {degree + 1}: {error}"

@@ -1,0 +1,71 @@
+"""Regions of a body with a material of their own: layers under a flat top, and regions wholly inside it."""
+
+from typing import Annotated
+
+from epsmesh.shapes.closed import Closed
+from epsmesh.shapes.ovoid import Ovoid
+from epsmesh.shapes.section import Name, Words
+from epsmesh.shapes.tissue import Tissue
+from epsmesh.units import Coordinate, Length, Toughness
+
+
+class Region(Tissue):
+    """A region of a body with a material of its own; the ``name`` is the prefix of its sweeps."""
+
+    name: Annotated[
+        Name,
+        Words(
+            "Name of the layer, inclusion or region: letters, digits, _ and -. The dimension of a sweep "
+            "begins with it: skin_young.",
+            '"skin"',
+        ),
+    ]
+
+
+class Layer(Region):
+    """A horizontal layer. The last one may omit its thickness: it then extends to the bottom."""
+
+    thickness: Annotated[
+        Length | None,
+        Words("Thickness of the layer. Optional for the last layer, which then reaches the bottom.", '"2 mm"'),
+    ] = None
+    toughness: Annotated[
+        Toughness | None,
+        Words("Toughness of the layer, for a tool that is inserted.", '"500 J/m^2"', default="that of the probe's key"),
+    ] = None
+
+
+class Embedded(Region):
+    """A region wholly inside the body, bounded by a closed surface."""
+
+    @property
+    def surface(self) -> Closed:
+        """Its surface."""
+        raise NotImplementedError
+
+    @property
+    def is_hollow(self) -> bool:
+        """Whether it is empty, so that the tissue ends at its surface."""
+        return False
+
+
+class Inclusion(Embedded):
+    """A ball, or an ellipsoid with axes along the coordinates, wholly inside the body."""
+
+    at: Annotated[
+        tuple[Coordinate, Coordinate, Coordinate],
+        Words("Centre, in the coordinates of the body.", '["0 mm", "0 mm", "-10 mm"]'),
+    ]
+    radius: Annotated[Length | None, Words("Radius of a ball.", '"3 mm"', default="none: axes are given")] = None
+    axes: Annotated[
+        tuple[Length, Length, Length] | None,
+        Words("Semi-axes of an ellipsoid, along x, y and z.", '["6 mm", "6 mm", "4 mm"]', default="none: it is a ball"),
+    ] = None
+
+    @property
+    def surface(self) -> Ovoid:
+        """Its surface."""
+        if self.axes is not None:
+            return Ovoid(self.at, self.axes)
+        assert self.radius is not None  # validated with the study
+        return Ovoid(self.at, (self.radius,) * 3)

@@ -1,0 +1,72 @@
+"""Registry of shapes: one file each, in ``bodies/`` and ``probes/``, named like the shape.
+
+A shape is imported when its class is first used: a study loads only the shapes that it names.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Generic, TypeVar, get_args
+
+from epsmesh.shapes.body import Body
+from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.section import Section
+
+Shape_co = TypeVar("Shape_co", bound=Section, covariant=True)
+
+
+class Shapes(Mapping[str, type[Shape_co]], Generic[Shape_co]):
+    """Classes by the names of their shapes: from each file of a folder, the class with that ``shape``."""
+
+    def __init__(self, folder: str):
+        self._folder = folder
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        files = Path(__file__).with_name(self._folder).glob("[a-z]*.py")
+        return tuple(sorted(file.stem for file in files))
+
+    def __getitem__(self, name: str) -> type[Shape_co]:
+        if name not in self._names:
+            raise KeyError(name)
+        found: type[Shape_co] = _kind(f"epsmesh.shapes.{self._folder}.{name}", name)
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+def _kind(path: str, shape: str) -> Any:
+    """Return the class of a module with the given ``shape``."""
+    kinds = [kind for kind in vars(import_module(path)).values() if isinstance(kind, type) and kind.__module__ == path]
+    return next(kind for kind in kinds if _shape(kind) == (shape,))
+
+
+def specialised(section: Section) -> Section:
+    """Return a section in the class that its values require: a disc or blade with a rounded edge finds its contact."""
+    if not getattr(section, "is_rounded", False):
+        return section
+    shape: str = section.shape  # type: ignore[attr-defined]
+    kind = _kind(f"epsmesh.shapes.probes._rounded_{shape}", shape)
+    known = type(section).model_fields.keys() & kind.model_fields.keys()
+    rounded: Section = kind.model_construct(
+        section.model_fields_set, **{name: getattr(section, name) for name in known}
+    )
+    return rounded
+
+
+def _shape(kind: type) -> tuple[object, ...]:
+    """Return the allowed values of a section's key ``shape``; empty without that key."""
+    field = kind.model_fields.get("shape") if issubclass(kind, Section) else None
+    return get_args(field.annotation) if field else ()
+
+
+BODIES: Shapes[Body] = Shapes("bodies")
+PROBES: Shapes[Probe] = Shapes("probes")

@@ -1,0 +1,248 @@
+"""Load steps of contact at large displacements: the whole depth at once, or as many steps as the loop needs.
+
+The initial guess of a step continues the last one linearly, and is dropped where it turns tissue inside out. Without
+friction the equilibrium does not depend on the path: steps on the way are solved roughly.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from epsmesh.arrays import FloatArray
+from epsmesh.solve import SolveError
+from epsmesh.solve.contact.coulomb import Neighbours, Slide, most_simplified
+from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, Tissue, first_set, solve_contact
+from epsmesh.solve.contact.friction_step import FrictionStep, meeting_places
+from epsmesh.solve.newton import LargeError
+
+# Smallest step, as a share of the depth, and a step that leaves less than this share goes to the end.
+_SMALLEST, _SLIVER = 1 / 64, 1e-6
+# Larger steps than this share, without friction, are given up soon.
+_LARGE = 1 / 8
+# Residual and gaps of steps on the way to the depth, without friction.
+_ON_THE_WAY = 1e-2
+# Depth of inactive nodes inside the tool, in units of the depth at the end. Corners beside active nodes are less deep,
+# even on a coarse mesh.
+_INSIDE = 0.25
+# The first step ends where the tool's normals at the nodes that it penetrates have this mean part along its way, after
+# so many halvings at most: nodes beside the flank of a ball do not stay in contact, and would fold the tissue.
+_FACING, _FIRST_HALVINGS = 0.7, 2
+# The next step is longer by this factor if this one took at most so many iterations.
+_LONGER, _EASY = 1.5, 8
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """Equilibrium at a ``depth`` (m): the tissue's ``state`` and the contact, None without any."""
+
+    depth: float
+    state: FloatArray
+    touched: ContactSolution | None = None
+
+
+@dataclass(eq=False)
+class ContactPath:
+    """The last two equilibria of a load path, and the ``step`` (m) that the next one may have."""
+
+    last: Stage
+    before: Stage | None = None
+    step: float = inf
+
+    def __post_init__(self) -> None:
+        self.start = self.last
+
+    def add(self, stage: Stage) -> None:
+        """Go on to a stage."""
+        self.before, self.last = self.last, stage
+
+    def guess(self, depth: float) -> FloatArray | None:
+        """Return the state continued to a ``depth`` (m), None from a single equilibrium."""
+        if self.before is None or self.before.touched is None:
+            return None
+        share = (depth - self.last.depth) / (self.last.depth - self.before.depth)
+        return self.last.state + share * (self.last.state - self.before.state)
+
+
+@dataclass(frozen=True, eq=False)
+class Friction:
+    """Coulomb's ``coefficient`` (infinite: it sticks) for a tool that moves along the unit vector ``advance``.
+
+    ``penalty`` (n), N/m: see :mod:`.coulomb`. ``deepest`` (m) is the depth at the end of the path.
+    """
+
+    coefficient: float
+    advance: FloatArray
+    penalty: FloatArray
+    neighbours: Neighbours
+    deepest: float
+
+
+def press(
+    tissue: Tissue,
+    tool_at: Callable[[float], PlacedTool],
+    path: ContactPath,
+    depth: float,
+    friction: Friction | None = None,
+) -> int:
+    """Continue a load ``path`` to a ``depth`` (m); return Newton's iterations; collective.
+
+    Raises:
+        LargeError: if a step becomes too small; the path keeps the steps that converged.
+    """
+    iterations, deepest = 0, depth if friction is None else friction.deepest
+    path.start, tissue.state = path.last, path.last.state
+    if path.last.touched is None and path.step == inf and friction is None:
+        path.step = _first_step(tissue, tool_at, path.last.depth, depth)
+    while path.last.depth < depth:
+        left = depth - path.last.depth
+        step = min(path.step, left)
+        there = depth if step > (1 - _SLIVER) * left else path.last.depth + step
+        try:
+            is_patient = friction is not None or there - path.last.depth <= _LARGE * depth
+            limit = _ON_THE_WAY if friction is None and there < depth else 0.0
+            touched = _step(tissue, tool_at, path, there, friction, is_patient=is_patient, limit=limit)
+            check_outside(tissue, touched, deepest)
+        except SolveError as error:
+            path.step = (there - path.last.depth) / 2
+            if path.step < _SMALLEST * depth:
+                _end(tissue, tool_at, path, friction)
+                raise LargeError(str(error)) from error
+            continue
+        iterations += touched.iterations
+        step = there - path.last.depth
+        path.add(Stage(there, tissue.state, touched))
+        path.step = step * (_LONGER if touched.iterations <= _EASY else 1.0)
+    return iterations
+
+
+def check_outside(tissue: Tissue, touched: ContactSolution, deepest: float) -> None:
+    """Check that no tissue is left inside the tool: such an equilibrium goes round a tool that is ``deepest`` (m) deep.
+
+    Raises:
+        LargeError: if nodes that are not of the support are inside.
+    """
+    if touched.gap[~tissue.fixed.all(axis=1)].min() < -_INSIDE * deepest:
+        raise LargeError("tissue is left inside the tool")
+
+
+def _first_step(tissue: Tissue, tool_at: Callable[[float], PlacedTool], start: float, depth: float) -> float:
+    """Return the first step (m) from ``start`` towards a ``depth`` (m); collective."""
+    step, nothing = depth - start, np.zeros(len(tissue.fixed), dtype=bool)
+    for _ in range(_FIRST_HALVINGS):
+        tool = tool_at(start + step)
+        through = first_set(tissue, tool, nothing)
+        if not through.any() or -tool.distance(tissue.positions()).normal[through, -1].mean() >= _FACING:
+            break
+        step /= 2
+    return step
+
+
+def _end(tissue: Tissue, tool_at: Callable[[float], PlacedTool], path: ContactPath, friction: Friction | None) -> None:
+    """Leave the tissue in equilibrium at the last depth of a ``path`` that goes no farther; collective."""
+    last = path.last
+    tissue.state = last.state
+    if last.touched is None or friction is not None:
+        return
+    try:
+        touched = solve_contact(tissue, tool_at(last.depth), last.touched.active)
+    except SolveError:  # settled roughly, but no better
+        path.last, path.before = path.start, None
+        tissue.state = path.last.state
+        return
+    path.last = Stage(last.depth, tissue.state, touched)
+
+
+def press_with_friction(
+    tissue: Tissue,
+    tool_at: Callable[[float], PlacedTool],
+    path: ContactPath,
+    depth: float,
+    friction: Friction,
+    steps: int,
+) -> int:
+    """Continue a new load ``path`` to a ``depth`` (m) with friction; return Newton's iterations; collective.
+
+    There are at least so many ``steps``, whose depths go with the square of their numbers. At the first ones, the tool
+    may touch no node, or too few for the contact to settle.
+
+    Raises:
+        LargeError: if a step becomes too small; the path keeps the steps that converged.
+    """
+    iterations, start, farthest = 0, path.last, path.last
+    for number in range(1, steps + 1):
+        there = depth * (number / steps) ** 2
+        if path.last.touched is None:
+            tissue.state = path.last.state
+            nothing = np.zeros(len(tissue.fixed), dtype=bool)
+            if number < steps and not first_set(tissue, tool_at(there), nothing).any():
+                path.add(Stage(there, path.last.state))
+                continue
+        path.step = inf
+        try:
+            iterations += press(tissue, tool_at, path, there, friction)
+        except LargeError:  # few nodes touch, whose state does not settle: contact begins with the next step
+            farthest = max(farthest, path.last, key=lambda stage: stage.depth if stage.touched else 0.0)
+            if number > steps // 2:
+                path.last = farthest
+                raise
+            path.last, path.before = start, None
+    return iterations
+
+
+def _friction_step(
+    tissue: Tissue, tool_at: Callable[[float], PlacedTool], last: Stage, depth: float, friction: Friction
+) -> FrictionStep:
+    """Return the friction of a step from the ``last`` stage to a ``depth`` (m), whose state is predicted."""
+    after, guess = tissue.positions(), tissue.state
+    tissue.state = last.state
+    before = tissue.positions()
+    tissue.state = guess
+
+    def gap(points: FloatArray, there: float) -> FloatArray:
+        return tool_at(there).distance(points).gap
+
+    references = meeting_places(gap, (before, after), (last.depth, depth), friction.advance)
+    nothing = np.zeros(len(before), dtype=bool)
+    touched = last.touched
+    if touched is not None:
+        carried = before + (depth - last.depth) * friction.advance
+        references = np.where(touched.active[:, None], carried, references)
+    normal = np.zeros(len(before)) if touched is None else touched.pressed
+    slide = None if touched is None else touched.slide
+    return FrictionStep(
+        friction.coefficient,
+        references,
+        friction.penalty,
+        friction.neighbours,
+        slide or Slide(nothing, np.zeros(before.shape)),
+        normal,
+        tissue.fixed,
+        most_simplified(depth, friction.deepest),
+    )
+
+
+def _step(
+    tissue: Tissue,
+    tool_at: Callable[[float], PlacedTool],
+    path: ContactPath,
+    depth: float,
+    friction: Friction | None,
+    *,
+    is_patient: bool,
+    limit: float,
+) -> ContactSolution:
+    tool, last = tool_at(depth), path.last
+    active = np.zeros(len(tissue.fixed), dtype=bool) if last.touched is None else last.touched.active
+    guess = path.guess(depth)
+    if guess is not None:
+        tissue.state = guess
+        if not tissue.is_sound:
+            guess = None
+    if guess is None:
+        tissue.state = path.last.state
+    friction_step = None if friction is None else _friction_step(tissue, tool_at, last, depth, friction)
+    return solve_contact(
+        tissue, tool, first_set(tissue, tool, active), friction_step, is_patient=is_patient, limit=limit
+    )

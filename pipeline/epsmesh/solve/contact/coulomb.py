@@ -1,0 +1,229 @@
+"""Coulomb's law at the nodes of a contact: which of them stick, and the traction of those that slide.
+
+With λ the normal reaction, R its tangential part and s the slip since a reference, the trial traction is T = R − c s. A
+node sticks (s = 0) if |T| ≤ μ λ; otherwise it slides, with R = μ λ T/|T|. Both are equations for any c > 0, which
+Newton's method solves with the tangents of the last iterate (P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng.
+92, 353, 1991). Tissue that "sticks" has infinite friction.
+
+The sign of a corner's reaction means nothing (:mod:`epsmesh.solve.contact.active_set`), nor does its trial traction:
+corners slide where most of their neighbours do, in the mean direction of these.
+"""
+
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Protocol
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray, FloatArray, IntArray
+from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.response import Rubbing
+
+# Nodes change between sticking and sliding beyond this share of the largest friction.
+_SLACK = 1e-6
+_TINY = 1e-300
+# Largest share of the force on simplified nodes: friction then changes by about as much, half of the bar on it.
+_MOST_SIMPLIFIED = 0.1
+# Changes of a node's state after which it is simplified.
+_CHANGES = 3
+# Steps of iterations are halved where a change of directions of slip is not smaller than the one before by this share.
+_CONTRACTS = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Corners of facets: a mask ``is_corner`` (n), and pairs ``beside`` (k, 2) of a corner and a node next to it."""
+
+    is_corner: BoolArray
+    beside: IntArray
+
+    def enclosed(self, active: BoolArray) -> BoolArray:
+        """Return a mask (n) of corners whose neighbours are all active."""
+        corner, beside = self.beside.T
+        has = np.bincount(corner, minlength=len(active)) > 0
+        return np.asarray(has & (np.bincount(corner, ~active[beside], len(active)) == 0))
+
+    def majority(self, chosen: BoolArray, active: BoolArray) -> BoolArray:
+        """Return ``chosen`` (n), at corners the choice of most of their ``active`` neighbours, true if it is even."""
+        corner, beside = self.beside.T
+        votes = np.bincount(corner, np.where(chosen[beside], 1.0, -1.0) * active[beside], len(chosen))
+        return np.where(self.is_corner, votes >= 0, chosen)
+
+    def mean(self, vectors: FloatArray, chosen: BoolArray) -> FloatArray:
+        """Return ``vectors`` (n, t), at corners the sum of those of the ``chosen`` neighbours."""
+        corner, beside = self.beside.T
+        found = vectors.copy()
+        for axis, values in enumerate(vectors.T):
+            total = np.bincount(corner, np.where(chosen[beside], values[beside], 0.0), len(vectors))
+            found[self.is_corner, axis] = total[self.is_corner]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Slide:
+    """Nodes that slide (n), and their trial tractions (n, t) in N."""
+
+    sliding: BoolArray
+    trial: FloatArray
+
+    @property
+    def directions(self) -> FloatArray:
+        """Unit vectors (n, t) of the friction on the tissue."""
+        return self.trial / np.maximum(self.sizes, _TINY)[:, None]
+
+    @property
+    def sizes(self) -> FloatArray:
+        """Sizes (n) of the trial tractions (N)."""
+        return np.asarray(np.linalg.norm(self.trial, axis=1))
+
+    def share(self, weights: FloatArray, active: BoolArray) -> float:
+        """Return the sliding part of the area of ``active`` nodes (n), whose own areas are ``weights`` (n)."""
+        return float(weights[active & self.sliding].sum()) / float(weights[active].sum())
+
+    def unsure(self, facets: IntArray, areas: FloatArray, active: BoolArray) -> float:
+        """Return the area of the ``facets`` (m, k) in which sliding begins or ends, at least that of one.
+
+        ``areas`` (m) are theirs. Beside the edge of contact tissue slides wherever friction is finite.
+        """
+        sticks, touches = (active & ~self.sliding)[facets], active[facets].any(axis=1)
+        mixed = sticks.any(axis=1) & ~sticks.all(axis=1)
+        return float(max(areas[mixed].sum(), areas[touches].mean()))
+
+    def turning(self, most: FloatArray) -> FloatArray:
+        """Return (n, t, t), the change of the unit vector with the trial traction, times ``most`` (n), the friction."""
+        along = self.directions
+        across = np.eye(along.shape[1]) - along[:, :, None] * along[:, None, :]
+        share = np.clip(most / np.maximum(self.sizes, _TINY), 0.0, 1.0)
+        return np.asarray(share[:, None, None] * across)
+
+    def towards(self, other: "Slide", share: float) -> "Slide":
+        """Return ``other`` with directions a ``share`` of the way from these: for directions that swing to and fro."""
+        middle = (1 - share) * self.directions + share * other.directions
+        return Slide(other.sliding, other.sizes[:, None] * np.where(self.sliding[:, None], middle, other.directions))
+
+    def following(
+        self, trial: FloatArray, most: FloatArray, active: BoolArray, neighbours: Neighbours, *, single: bool = False
+    ) -> "Slide":
+        """Return the next guess, from ``trial`` tractions (n, t) and the largest friction ``most`` (n).
+
+        A node whose trial traction reverses would slide back and forth: it sticks. With ``single``, only the first node
+        of those that change does so: neighbours that change together may do so forever.
+        """
+        size = np.linalg.norm(trial, axis=1)
+        reverses = np.einsum("nt,nt->n", trial, self.trial) < 0
+        stays = (size > (1 - _SLACK) * most) & ~reverses
+        sliding = np.where(self.sliding, stays, size > (1 + _SLACK) * most) & active
+        if single:
+            changes = (sliding != self.sliding) & active & ~neighbours.is_corner
+            sliding = np.where(changes & (np.cumsum(changes) > 1), self.sliding, sliding)
+        sliding = neighbours.majority(sliding, active) & active
+        return Slide(sliding, neighbours.mean(trial, sliding))
+
+
+class Touching(Protocol):
+    """Contact with friction at n nodes."""
+
+    @property
+    def active(self) -> BoolArray:
+        """Nodes in contact (n)."""
+
+    @property
+    def slide(self) -> Slide | None:
+        """How they slide."""
+
+    @property
+    def tangential(self) -> FloatArray:
+        """Sizes of the tangential forces (n), N, with the sign of the normal reaction."""
+
+
+def rubbing_of(candidates: Candidates, coefficient: float, fine: Touching, coarse: Touching) -> Rubbing:
+    """Return the friction on ``candidates``, and its change to that of half as many load steps, ``coarse``.
+
+    At an infinite ``coefficient`` tissue slides nowhere, by definition.
+    """
+    force, change = float(fine.tangential.sum()), abs(float(fine.tangential.sum() - coarse.tangential.sum()))
+    if coefficient == inf:
+        return Rubbing(0.0, force, 0.0, change, 0.0)
+    assert fine.slide is not None
+    assert coarse.slide is not None
+    share = fine.slide.share(candidates.weights, fine.active)
+    other = coarse.slide.share(candidates.weights, coarse.active)
+    unsure = fine.slide.unsure(candidates.facets, candidates.areas, fine.active)
+    return Rubbing(share, force, abs(share - other), change, unsure)
+
+
+@dataclass(frozen=True, eq=False)
+class Simplified:
+    """Nodes (n) that do not settle, by how often they ``entered`` or left the active set, or ``turned`` to sliding.
+
+    Beyond a few times, friction is left out of the former, and the latter slide.
+    """
+
+    entered: IntArray
+    turned: IntArray
+
+    @staticmethod
+    def none(count: int) -> "Simplified":
+        """Return zero counts of ``count`` nodes."""
+        nothing = np.zeros(count, dtype=np.int64)
+        return Simplified(nothing, nothing)
+
+    @property
+    def nodes(self) -> BoolArray:
+        """Mask of the nodes that slide whatever their traction."""
+        return np.maximum(self.entered, self.turned) >= _CHANGES
+
+    def counting(self, moves: BoolArray, turns: BoolArray) -> "Simplified":
+        """Return the counts after an iteration in which these nodes (n) change."""
+        return Simplified(self.entered + moves, self.turned + turns)
+
+    def law(self, friction: float) -> FloatArray:
+        """Return the coefficient of friction of each node."""
+        return np.where(self.entered >= _CHANGES, 0.0, friction)
+
+    def sliding(self, slide: Slide, active: BoolArray) -> Slide:
+        """Return ``slide`` with these nodes sliding, if they are ``active``."""
+        return replace(slide, sliding=(slide.sliding | self.nodes) & active)
+
+    def steady(self, before: Slide, after: Slide) -> Slide:
+        """Return the state ``after``, in which these nodes slide as ``before``: next to sticking, they reverse."""
+        kept = self.nodes & before.sliding
+        return replace(after, trial=np.where(kept[:, None], before.trial, after.trial))
+
+
+class Damping:
+    """Shorter changes of the directions of slip, from some iteration on, where these do not settle.
+
+    ``swings``: only changes that turn back are, and a change in a part of a step need only contract by this part. That
+    is for iterations of friction alone, which may creep in one direction. Where the tissue changes in each iteration,
+    too, as at large displacements, directions wander in any way, and every change that does not contract is damped.
+    """
+
+    def __init__(self, begins: int, *, swings: bool):
+        """Begin after ``begins`` iterations."""
+        self._begins, self._swings, self._share, self._before = begins, swings, 1.0, np.zeros(0)
+
+    def towards(self, before: Slide, after: Slide, iteration: int) -> Slide:
+        """Return the next state: ``after``, with its directions some of the way from those ``before``."""
+        both = before.sliding & after.sliding
+        change = np.where(both[:, None], after.directions - before.directions, 0.0).ravel()
+        if iteration > self._begins and (change @ self._before < 0 or not self._swings):
+            least = 1 - _CONTRACTS * (self._share if self._swings else 1.0)
+            contracts = np.linalg.norm(change) <= least * np.linalg.norm(self._before)
+            self._share *= 1.0 if contracts else 0.5
+        self._before = change
+        return before.towards(after, self._share)
+
+
+def most_simplified(depth: float, deepest: float) -> float:
+    """Return the largest share of the force on simplified nodes at a ``depth`` of a path to the ``deepest`` one (m).
+
+    At a smaller depth, where few nodes touch, the share may be larger, since that force is smaller.
+    """
+    return _MOST_SIMPLIFIED * deepest / depth
+
+
+def largest_friction(law: FloatArray, normal: FloatArray) -> FloatArray:
+    """Return the largest friction (n) in N, from coefficients ``law`` (n) and ``normal`` reactions (n)."""
+    sticks = law == inf
+    return np.where(sticks, inf, np.where(sticks, 0.0, law) * np.maximum(normal, 0.0))

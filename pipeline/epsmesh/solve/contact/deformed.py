@@ -1,0 +1,328 @@
+"""Unilateral contact at large displacements: one Newton loop for the law and the active set together.
+
+With the tissue's nodal forces R(w), and the tool's signed distance g and outward normal n at the deformed nodes,
+
+    R(w) = λ n,    g >= 0,    λ >= 0,    λ g = 0    at the nodes that the tool may touch.
+
+A step holds the normal displacement of active nodes at -g, and takes the turn of the normals into account: the tangent
+is K - Σ λ H with H = ∂n/∂x. An active node whose predicted reaction pulls leaves the set, a node that penetrates enters
+it. This is a semismooth Newton method (M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 865, 2002).
+
+The loop knows only nodes of a surface: a body in three dimensions and one in the half plane have the same interface.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import hypot, inf
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.shapes.distance import Distance
+from epsmesh.solve.contact.active_set import SLACK
+from epsmesh.solve.contact.constraint import Constraint
+from epsmesh.solve.contact.coulomb import Slide
+from epsmesh.solve.contact.friction_step import FrictionIteration, FrictionStep, Placed
+from epsmesh.solve.contact.turned import turned_frames
+from epsmesh.solve.newton import LargeError
+
+# Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
+LEFT, _CLOSED = 1e-8, 1e-8
+# A residual below this that no longer falls is the rounding error of a body that is large compared with the contact.
+_ROUNDING = 1e-6
+# With friction: the residual of nodes that slide, whose friction is that of the iteration before, and of all others.
+_LEFT_WITH_FRICTION, _LEFT_BESIDE = 1e-4, 1e-7
+# Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
+_MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
+# Without patience: the least share of the first increment that may be taken, and the number of iterations after which
+# gaps of active nodes are at most so large, in units of the depth.
+_WHOLE, _SOON, _NEARLY_CLOSED = 0.5, 10, 1e-3
+# A set that is solved so often ends the entry of followers, and then changes of many nodes at once.
+_WITHOUT_FOLLOWERS, _ONE_BY_ONE = 2, 3
+
+
+class Tissue(Protocol):
+    """A body seen from n nodes of its surface, at its current ``state``. Methods are collective.
+
+    ``fixed`` (n, d) marks prescribed components; ``state`` are the unknowns of this rank; ``is_sound`` says that J > 0.
+    """
+
+    fixed: BoolArray
+    state: FloatArray
+
+    @property
+    def is_sound(self) -> bool: ...  # noqa: D102
+
+    def positions(self) -> FloatArray:
+        """Return the nodes' deformed positions (n, d), in m."""
+
+    def forces(self) -> FloatArray:
+        """Return the nodal forces (n, d), N, that hold the nodes; zero at prescribed components."""
+
+    def unbalanced(self) -> float:
+        """Return the norm (N) of the residual at all other free dofs."""
+
+    def linearise(self, constraint: Constraint) -> FloatArray:
+        """Find the increment under a ``constraint``; return the nodal forces (n, d), N, that it predicts.
+
+        Raises:
+            SolveError: if the linear solver fails.
+        """
+
+    def advance(self, share: float) -> bool:
+        """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedTool:
+    """The tool at one ``depth`` (m): its ``distance`` from points (n, d).
+
+    Reactions of the ``followers`` (n) mean nothing, as those of corners in degree 2. ``complete`` returns an active set
+    that nodes may have: without those of the support, and with followers only where all their neighbours are active.
+    """
+
+    distance: Callable[[FloatArray], Distance]
+    complete: Callable[[BoolArray], BoolArray]
+    followers: BoolArray
+    depth: float
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSolution:
+    """Contact at equilibrium: the ``active`` nodes (n), forces of the tool on the nodes (n, d), N, and gaps (n), m.
+
+    ``pressed`` (n) are the normal parts of the forces (N). ``slide`` is the state of friction, None without.
+    """
+
+    active: BoolArray
+    forces: FloatArray
+    gap: FloatArray
+    iterations: int
+    pressed: FloatArray
+    slide: Slide | None = None
+
+    @property
+    def tangential(self) -> FloatArray:
+        """Sizes (n) of the tangential forces (N), with the sign of the normal part."""
+        squares = (self.forces**2).sum(axis=1) - self.pressed**2
+        return np.asarray(np.sign(self.pressed) * np.sqrt(np.maximum(squares, 0.0)))
+
+
+class Residual(NamedTuple):
+    """Norms (N) of the residual inside the body, and at the nodes that the tool may touch."""
+
+    inside: float
+    on_surface: float
+
+    @property
+    def size(self) -> float:
+        """The norm (N) of all."""
+        return hypot(self.inside, self.on_surface)
+
+
+def first_set(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> BoolArray:
+    """Return an initial active set: ``active`` nodes and all that the tool penetrates; collective."""
+    through = tool.distance(tissue.positions()).gap < -SLACK * tool.depth
+    return tool.complete(active | through)
+
+
+def solve_contact(
+    tissue: Tissue,
+    tool: PlacedTool,
+    active: BoolArray,
+    friction_step: FrictionStep | None = None,
+    *,
+    is_patient: bool = True,
+    limit: float = 0.0,
+    scale: float | None = None,
+) -> ContactSolution:
+    """Find equilibrium and contact from the tissue's state and an initial ``active`` set (n); collective.
+
+    Without ``friction_step`` there is no friction. Without patience, the loop ends where smaller load steps need fewer
+    iterations. A residual and gaps below ``limit`` are enough, in units of the forces and the depth; nodes that pull or
+    penetrate less may then still change the set. The tool must touch a node, unless the ``scale`` (N) of the contact
+    forces is known, to which the residual is then compared.
+
+    Raises:
+        LargeError: if the loop does not converge.
+        SolveError: if a linear solver fails.
+    """
+    loop = _Loop(tissue, tool, active, friction_step, is_patient=is_patient, limit=limit, scale=scale)
+    for iteration in range(_MOST + 1):
+        found = loop.judge(iteration)
+        if found is not None:
+            return found
+        loop.step(iteration)
+    raise LargeError(f"no equilibrium after {_MOST} iterations")
+
+
+class _Loop:
+    """The iterations of :func:`solve_contact`: the ``active`` set, what was predicted, and the sets seen."""
+
+    def __init__(
+        self,
+        tissue: Tissue,
+        tool: PlacedTool,
+        active: BoolArray,
+        friction_step: FrictionStep | None,
+        *,
+        is_patient: bool,
+        limit: float,
+        scale: float | None,
+    ):
+        self._tissue, self._tool, self._active = tissue, tool, active
+        self._friction = None if friction_step is None else FrictionIteration(friction_step)
+        self._is_patient, self._limit, self._scale = is_patient, limit, scale
+        self._predicted, self._reactions = np.zeros(tissue.fixed.shape), np.full(len(active), np.inf)
+        self._before, self._repeats, self._seen = inf, 0, Counter[bytes]()
+
+    def judge(self, iteration: int) -> ContactSolution | None:
+        """Evaluate the state and take the next set; return the solution if that is one; collective.
+
+        Raises:
+            LargeError: if the loop will not converge.
+        """
+        tissue, tool, before = self._tissue, self._tool, self._active
+        positions, forces = tissue.positions(), tissue.forces()
+        self._place = tool.distance(positions)
+        normal = _within_planes(self._place.normal, tissue.fixed)
+        self._there = Placed(positions, normal)
+        following = _next_set(tool, before, self._reactions, self._place.gap)
+        self._active = active = _with_care(tool, before, following, self._repeats)
+        is_same, is_rough = np.array_equal(active, before), self._limit > 0
+        # A rough solution has the next set: forces of nodes that leave it are residuals.
+        pressing = before & active if is_rough else before
+        self._pressed = np.where(pressing, np.einsum("ni,ni->n", forces, normal), 0.0)
+        exerted = self._exerted(iteration, forces, before)
+        if is_same and self._scale is None and not active.any():
+            raise LargeError("the probe does not touch a single node: use smaller elements below it")
+        residual = Residual(tissue.unbalanced(), float(np.linalg.norm(forces - exerted)))
+        enough = max(self._limit, _ROUNDING) if residual.size > self._before / 2 else self._limit
+        self._before = residual.size
+        # An initial guess may be an equilibrium whose tool pulls: no reaction was predicted yet.
+        pulls = iteration == 0 and (is_rough or _pulls(tool, active, self._pressed))
+        if (is_same or is_rough) and not pulls and self._is_converged(residual, enough):
+            return self._solution(iteration, forces)
+        self._check_patience(iteration)
+        if not is_same:
+            self._count()
+        return None
+
+    def step(self, iteration: int) -> None:
+        """Take Newton's step with the set; collective.
+
+        Raises:
+            LargeError: if it turns tissue inside out.
+            SolveError: if a linear solver fails.
+        """
+        active, normal = self._active, self._there.normal
+        constraint = _constraint(self._place, normal, np.where(active, self._pressed, 0.0), active)
+        if self._friction is not None:
+            constraint = self._friction.constrain(constraint, self._there, active)
+        self._predicted = np.where(self._tissue.fixed, 0.0, self._tissue.linearise(constraint))
+        self._reactions = np.einsum("ni,ni->n", self._predicted, normal)
+        if _advance(self._tissue) < _WHOLE and iteration == 0 and not self._is_patient:
+            raise LargeError("the load step turns tissue inside out")
+
+    def _exerted(self, iteration: int, forces: FloatArray, before: BoolArray) -> FloatArray:
+        """Return the forces (n, d) of the tool on nodes of the set ``before``; the state of friction follows."""
+        exerted = self._pressed[:, None] * self._there.normal
+        if self._friction is None:
+            return exerted
+        if iteration:
+            self._friction.update(iteration, self._there, self._predicted, before, self._active)
+        return np.asarray(exerted + self._friction.exerted(self._there, forces, before))
+
+    def _is_converged(self, residual: Residual, limit: float) -> bool:
+        most = max(float(np.linalg.norm(self._pressed)), self._scale or 0.0)
+        if not self._open <= max(_CLOSED, limit) * self._tool.depth:
+            return False
+        if self._friction is None:
+            return residual.size <= max(LEFT, limit) * most
+        is_close = residual.inside <= _LEFT_BESIDE * most and residual.on_surface <= _LEFT_WITH_FRICTION * most
+        return is_close and self._friction.is_same
+
+    @property
+    def _open(self) -> float:
+        """The largest gap (m) of active nodes."""
+        return float(np.abs(self._place.gap[self._active]).max(initial=0.0))
+
+    def _solution(self, iteration: int, forces: FloatArray) -> ContactSolution:
+        active, friction = self._active, self._friction
+        if friction is not None and not friction.is_sound(active):
+            raise LargeError("the states of nodes with friction repeat")
+        exerted, slide = np.where(active[:, None], forces, 0.0), None if friction is None else friction.slide
+        return ContactSolution(active, exerted, self._place.gap, iteration, self._pressed, slide)
+
+    def _check_patience(self, iteration: int) -> None:
+        is_late = not self._is_patient and iteration >= _SOON
+        if is_late and self._open > _NEARLY_CLOSED * self._tool.depth:
+            raise LargeError(f"no equilibrium is near after {iteration} iterations")
+
+    def _count(self) -> None:
+        """Count how often a new set was seen; friction leaves nodes that do not settle."""
+        key = self._active.tobytes()
+        self._seen[key] += 1
+        self._repeats = max(self._repeats, self._seen[key])
+        if self._repeats >= _MOST_REPEATS and self._friction is None:
+            raise LargeError("active sets repeat")
+
+
+def _constraint(place: Distance, normal: FloatArray, pressed: FloatArray, active: BoolArray) -> Constraint:
+    held = np.zeros(normal.shape, dtype=bool)
+    held[:, -1] = active
+    values = np.zeros(normal.shape)
+    values[active, -1] = -place.gap[active]
+    turning = np.maximum(pressed, 0.0)[:, None, None] * place.curvature
+    return Constraint(turned_frames(normal, active), held, values, turning, np.zeros(normal.shape))
+
+
+def _next_set(tool: PlacedTool, active: BoolArray, reactions: FloatArray, gap: FloatArray) -> BoolArray:
+    """Return active nodes under pressure, and inactive nodes that penetrate the tool."""
+    pull = -SLACK * float(np.abs(reactions[active]).mean()) if active.any() else 0.0
+    following = np.where(active, reactions > pull, gap < -SLACK * tool.depth)
+    return tool.complete(following)
+
+
+def _pulls(tool: PlacedTool, active: BoolArray, pressed: FloatArray) -> bool:
+    """Return whether the tool pulls at an active node whose force ``pressed`` (n), N, means something."""
+    forces = pressed[active & ~tool.followers]
+    return bool((forces < -SLACK * np.abs(forces).mean()).any()) if len(forces) else False
+
+
+def _with_care(tool: PlacedTool, active: BoolArray, following: BoolArray, repeats: int) -> BoolArray:
+    """Return the ``following`` set with fewer changes where sets repeat, of which one was solved ``repeats`` times.
+
+    A follower that enters may push its neighbours out, and so leave again. Without their entry, the sets are those of a
+    linear complementarity problem at each linearisation, in which single changes, the first one each, cannot repeat
+    (K. G. Murty, Opsearch 11, 42, 1974). Followers then leave only, so there is an end to that, too.
+    """
+    if repeats >= _ONE_BY_ONE:
+        changes = np.flatnonzero((active != following) & ~tool.followers)
+        following = active.copy()
+        following[changes[:1]] ^= True
+        following = tool.complete(following)
+    if repeats >= _WITHOUT_FOLLOWERS:
+        following = following & (active | ~tool.followers)
+    return following
+
+
+def _advance(tissue: Tissue) -> float:
+    """Take the longest step, by halves, that leaves no tissue inside out; return it as a share of the whole one.
+
+    Raises:
+        LargeError: if there is none.
+    """
+    for halvings in range(_HALVINGS):
+        share = 0.5**halvings
+        if tissue.advance(share):
+            return share
+    raise LargeError("tissue is turned inside out")
+
+
+def _within_planes(normal: FloatArray, fixed: BoolArray) -> FloatArray:
+    """Return unit normals without their components across planes of symmetry, which are zero but for rounding."""
+    normal = np.where(fixed, 0.0, normal)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None])

@@ -1,0 +1,141 @@
+"""Friction of contact at large displacements, as a term of the loop of :mod:`epsmesh.solve.contact.deformed`.
+
+Nodes that stick are held at a place of the tool, their reference; those that slide carry friction along the tool's
+surface, which the next iteration corrects. The law is that of :mod:`epsmesh.solve.contact.coulomb`. Of a new node, the
+reference is the place at which its predicted path meets the tool.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.solve.contact.constraint import Constraint
+from epsmesh.solve.contact.coulomb import Damping, Neighbours, Simplified, Slide, largest_friction
+
+# Iterations from which changes of the directions of slip are damped.
+_SWINGING = 4
+# Share of the force below which friction is no part of it.
+_NO_PART = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionStep:
+    """Friction between n nodes and a tool at one depth: its coefficient ``friction``, infinite for tissue that sticks.
+
+    ``references`` (n, d) are places on the tool at this depth (m); ``penalty`` (n) is the parameter c (N/m). ``slide``
+    and ``normal`` (n, N) are the state and the normal reactions at the equilibrium before. ``fixed`` (n, d) are the
+    components that symmetry or the support fixes. ``simplified`` is the largest share of the force on nodes that do not
+    settle.
+    """
+
+    friction: float
+    references: FloatArray
+    penalty: FloatArray
+    neighbours: Neighbours
+    slide: Slide
+    normal: FloatArray
+    fixed: BoolArray
+    simplified: float
+
+
+class FrictionIteration:
+    """The state of friction during the iterations of one equilibrium."""
+
+    def __init__(self, friction_step: FrictionStep):
+        self._with, self.slide, self.normal = friction_step, friction_step.slide, friction_step.normal
+        self._simple = Simplified.none(len(friction_step.normal))
+        self._damping = Damping(_SWINGING, swings=False)
+        self._seen, self._single = set[bytes](), False
+        self.is_same = False
+
+    def update(self, iteration: int, place: "Placed", predicted: FloatArray, before: BoolArray, now: BoolArray) -> None:
+        """Take the next state from ``predicted`` forces (n, d) N; active sets (n) are those ``before`` and ``now``."""
+        self.normal = np.einsum("ni,ni->n", predicted, place.normal)
+        friction_step, law = self._with, self._simple.law(self._with.friction)
+        across = predicted - self.normal[:, None] * place.normal
+        trial = across - friction_step.penalty[:, None] * place.slips(friction_step.references)
+        most = largest_friction(law, self.normal)
+        state = before.tobytes() + self.slide.sliding.tobytes()
+        self._single = self._single or state in self._seen
+        following = self.slide.following(trial, most, now, friction_step.neighbours, single=self._single)
+        after = self._simple.sliding(following, now)
+        moves = before != now
+        turns = (after.sliding != self.slide.sliding) & ~moves
+        if moves.any() or turns.any():
+            self._seen.add(state)
+        self._simple = self._simple.counting(moves, turns) if self._single else self._simple
+        self.is_same = not turns.any()
+        self.slide = self._damping.towards(self.slide, self._simple.steady(self.slide, after), iteration)
+
+    def is_sound(self, active: BoolArray) -> bool:
+        """Return whether nodes whose state was simplified carry little of the force, or friction no part of it."""
+        there = active & self._simple.nodes & ~self._with.neighbours.is_corner
+        pressed = np.abs(self.normal)
+        share = float(pressed[there].sum()) / float(pressed[active].sum())
+        return share <= self._with.simplified or self._with.friction * share <= _NO_PART
+
+    def friction(self, place: "Placed") -> FloatArray:
+        """Return the friction (n, d) N on nodes that slide, zero on others.
+
+        At corners, whose normal reactions may have any sign, it has that of the reaction: the sum then obeys the law.
+        """
+        law = self._simple.law(self._with.friction)
+        most = largest_friction(law, self.normal)
+        if self._with.friction < np.inf:
+            most = np.where(self._with.neighbours.is_corner, law * self.normal, most)
+        within = self.slide.trial - np.einsum("ni,ni->n", self.slide.trial, place.normal)[:, None] * place.normal
+        directions = replace(self.slide, trial=np.where(self._with.fixed, 0.0, within)).directions
+        return np.where(self.slide.sliding & (most < np.inf), most, 0.0)[:, None] * directions
+
+    def exerted(self, place: "Placed", forces: FloatArray, active: BoolArray) -> FloatArray:
+        """Return the friction (n, d) N of the tool: of nodes that stick what their ``forces`` (n, d) need."""
+        across = forces - np.einsum("ni,ni->n", forces, place.normal)[:, None] * place.normal
+        return np.where(self.sticks(active)[:, None], across, self.friction(place))
+
+    def constrain(self, constraint: Constraint, place: "Placed", active: BoolArray) -> Constraint:
+        """Return a ``constraint`` with the tangents of sticking nodes held, and the friction on sliding ones."""
+        held, values = constraint.held.copy(), constraint.values.copy()
+        sticks = self.sticks(active)
+        along = -np.einsum("nji,nj->ni", constraint.frames, self.slips(place))
+        held[sticks, :-1] = True
+        values[sticks, :-1] = along[sticks, :-1]
+        return replace(constraint, held=held, values=values, forces=self.friction(place))
+
+    def sticks(self, active: BoolArray) -> BoolArray:
+        """Return a mask (n) of the nodes that stick."""
+        return active & (~self.slide.sliding | (self._simple.law(self._with.friction) == np.inf))
+
+    def slips(self, place: "Placed") -> FloatArray:
+        """Return the slips (n, d) since the references, m."""
+        return place.slips(self._with.references)
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Deformed ``positions`` (n, d) of the nodes, and unit normals (n, d) of the tool there."""
+
+    positions: FloatArray
+    normal: FloatArray
+
+    def slips(self, references: FloatArray) -> FloatArray:
+        """Return the vectors (n, d) from ``references`` (n, d), along the tool's surface."""
+        moved = self.positions - references
+        return np.asarray(moved - np.einsum("ni,ni->n", moved, self.normal)[:, None] * self.normal)
+
+
+def meeting_places(
+    gap: Callable[[FloatArray, float], FloatArray],
+    paths: tuple[FloatArray, FloatArray],
+    depths: tuple[float, float],
+    advance: FloatArray,
+) -> FloatArray:
+    """Return the places (n, d) on the tool, at the second depth, which nodes meet on straight ``paths``.
+
+    The tool moves along the unit vector ``advance``; ``gap`` returns distances (n) of places to it at a depth.
+    """
+    first, second = (gap(place, depth) for place, depth in zip(paths, depths, strict=True))
+    share = np.clip(np.divide(first, first - second, out=np.ones_like(first), where=first - second > 0), 0.0, 1.0)
+    moved = paths[1] - paths[0] - (depths[1] - depths[0]) * advance  # relative to the tool
+    return np.asarray(paths[0] + (depths[1] - depths[0]) * advance + share[:, None] * moved)

@@ -1,0 +1,299 @@
+"""Contact at large displacements: equilibrium, force, checks and error bar of one depth after another.
+
+The force is the sum of the reactions. Three checks are independent of the loop: the support carries the same force,
+the work of the reactions in a small change of the displacement is the change of the stored energy, and J > 0.
+
+The error bar comes from one degree more, from the same state on and with contact found again: the contact area is the
+larger part of the error.
+"""
+
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
+from math import nan
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray
+from epsmesh.solve import SolveError
+from epsmesh.solve.balance import check_balance, check_work
+from epsmesh.solve.compiled import global_sum
+from epsmesh.solve.contact.active_set import ContactError, Obstacle
+from epsmesh.solve.contact.contact_steps import ContactPath, Stage, check_outside, press
+from epsmesh.solve.contact.corrections import Corrections
+from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
+from epsmesh.solve.contact.elements import State
+from epsmesh.solve.contact.geometry import Area, contact_area
+from epsmesh.solve.contact.levels import Surface
+from epsmesh.solve.contact.sagged import Sagged, sagged_body
+from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.tissue import DeformedBody
+from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
+from epsmesh.solve.elements.fields import Column
+from epsmesh.solve.ended import ended
+from epsmesh.solve.estimate import AT_EDGE_LARGE, found_again_bar
+from epsmesh.solve.movement import Loads, Movement
+from epsmesh.solve.newton import LargeError
+from epsmesh.solve.response import Contact, Response, reaction
+from epsmesh.solve.solution import Request
+from epsmesh.stages import stage
+
+# Relative change of the displacement for the check of the work.
+_SMALL = 1e-4
+# Residual and gaps of one degree more, for the error bar.
+_FOUND_AGAIN = 1e-3
+
+
+class LargeContact:
+    """Contact of a tool with a hyperelastic body of one law under loads; a load path continues to larger depths."""
+
+    def __init__(self, surface: Surface, elements: Elements, tool: Tool, asked: Request):
+        """Prepare for law and loads of a request."""
+        self._surface, self._elements, self._tool = surface, elements, tool
+        self._law, self._loads = asked.law, asked.movement.loads
+        self._applied = None if self._loads is None else elements.displacements.applied(self._loads)
+        self._sagged: Sagged | None = None
+        self._path: ContactPath | None = None
+        self._corrections = Corrections()
+
+    def can_reach(self, asked: Request) -> bool:
+        """Return whether the load path can be continued to a request; collective."""
+        loads, reached = asked.movement.loads, 0.0 if self._path is None else self._path.last.depth
+        is_same = loads is None
+        if self._applied is not None:
+            is_same = loads is not None and self._applied.is_same(self._elements.displacements.applied(loads))
+        return is_same and asked.law == self._law and reached <= asked.movement.amounts[0]
+
+    def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
+        """Find equilibrium and contact at the depth of the movement; the ``stack`` frees what is made; collective.
+
+        Raises:
+            LargeError: if the load steps end before the depth, or the solution fails a check.
+            ContactError: if contact reaches the support or the edge of the candidates.
+        """
+        found, iterations = self.find(asked, stack)
+        return found.equilibrium(asked.movement, iterations, stack)
+
+    def find(self, asked: Request, stack: ExitStack) -> "tuple[LargeContactSolution, int]":
+        """Return contact at the depth of the movement, and Newton's iterations; see :meth:`solve`."""
+        (depth,) = asked.movement.amounts
+        body = DeformedBody(self._elements, self._surface, self._law, asked.method, stack, self._applied)
+        if self._sagged is None:
+            self._sagged = sagged_body(body, self._tool, self._loads)
+        tool = self._sagged.placed(self._tool)
+        if self._path is None:
+            self._path = ContactPath(Stage(0.0, self._sagged.state))
+        try:
+            iterations = press(body, lambda there: placed_tool(body, tool, there), self._path, depth)
+        except LargeError as error:
+            raise stopped(body, self._path, depth, error) from error
+        touched = self._path.last.touched
+        assert touched is not None
+        body.state = self._path.last.state
+        return LargeContactSolution(
+            self._surface, body, self._tool, touched, depth, self._sagged, self._corrections
+        ), iterations
+
+
+def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError, friction: float = 0.0) -> LargeError:
+    """Return the error of a ``path`` that ends before ``depth`` (m)."""
+    last, whole = path.last, 2.0 ** len(body.elements.body.mirrored)
+    reached = last.depth, 0.0 if last.touched is None else -whole * float(last.touched.forces[:, 2].sum())
+    return ended(why, body.law, reached, depth, is_found=True, friction=friction)
+
+
+def placed_tool(body: DeformedBody, tool: Tool, depth: float) -> PlacedTool:
+    """Return the tool at a ``depth`` (m) above the candidates of a body."""
+    candidates, on_support = body.candidates, body.fixed.all(axis=1)
+    # In degree 2 a pressure has no forces at corners, whose own reactions are noise; in degree 3 they have some.
+    followers = candidates.is_corner & (candidates.shape.degree == 2)
+
+    def complete(active: BoolArray) -> BoolArray:
+        return np.asarray((active & ~followers | candidates.enclosed(active) & followers) & ~on_support)
+
+    return PlacedTool(lambda points: tool.distance(points, depth), complete, followers, depth)
+
+
+@dataclass(frozen=True, eq=False)
+class LargeContactSolution:
+    """Contact at a ``depth`` (m) with the state of a ``body``; methods are collective.
+
+    ``sagged`` is the body before, from whose first touch the depth counts. ``corrections`` are those of the path.
+    """
+
+    surface: Surface
+    body: DeformedBody
+    tool: Tool
+    touched: ContactSolution
+    depth: float
+    sagged: Sagged
+    corrections: Corrections
+
+    @property
+    def placed(self) -> Tool:
+        """The tool whose depth counts from there."""
+        return self.sagged.placed(self.tool)
+
+    @property
+    def stored(self) -> float:
+        """The energy (J) of the modelled part that is due to the depth."""
+        return self.body.energy - self.sagged.energy
+
+    @property
+    def force(self) -> float:
+        """The force (N) on the modelled part of the tool, along its axis."""
+        return -float(self.touched.forces[:, 2].sum())
+
+    @property
+    def is_ended(self) -> bool:
+        """Whether the contact reaches the edge of the candidates, where the tool itself ends."""
+        return bool((self.touched.active & self.body.candidates.is_edge).any())
+
+    @property
+    def whole_area(self) -> float:
+        """The contact area (m²) of the whole body, normal to the axis."""
+        return float(2.0 ** len(self.body.elements.body.mirrored) * self._area().value)
+
+    def equilibrium(self, movement: Movement, iterations: int, stack: ExitStack) -> Equilibrium:
+        """Return the checked equilibrium of a ``movement``; the ``stack`` frees its columns."""
+        columns, elements, body = self.body.elements.columns(movement, stack), self.body.elements, self.body
+        elements.put(columns[0], body.split(body.state - self.sagged.state), self.depth)
+        for of_loads in columns[1:]:
+            elements.put(of_loads, body.split(self.sagged.state))
+        self.check()
+        return Equilibrium(self, columns, movement, iterations, self.response(movement), contact=self.summary())
+
+    def summary(self) -> Contact:
+        """Return the area of the whole contact, with loads their effects."""
+        loaded = 2.0 ** len(self.body.elements.body.mirrored) * self.sagged.stored
+        return Contact(self.whole_area, sag=self.sagged.sag, load_energy=loaded, is_ended=self.is_ended)
+
+    def check(self) -> None:
+        """Check the work, and that contact ends within the candidates.
+
+        Raises:
+            LargeError: if the work of the reactions is not the change of the energy.
+            ContactError: if contact reaches the support or the edge of the candidates.
+        """
+        body, candidates = self.body, self.body.candidates
+        if np.any(self.touched.gap[body.fixed.all(axis=1)] < 0):
+            raise ContactError("the probe reaches the fixed part of the body: no displacement satisfies both")
+        if not np.all(self.tool.ends_at(candidates.points[self.touched.active & candidates.is_edge])):
+            raise ContactError(
+                "the contact reaches the edge of the surface region that is searched for contact: use a smaller depth"
+            )
+        state, work = body.state, float((self.touched.forces * (body.positions() - candidates.points)).sum())
+        energies = []
+        for change in (_SMALL, -_SMALL):
+            body.state = (1 + change) * state
+            energies.append(body.energy)
+        body.state = state
+        check_work(work, (energies[0], energies[1]), _SMALL, LargeError)
+
+    def response(self, movement: Movement) -> Response:
+        """Return the force at this depth as a stiffness, F/d."""
+        space = self.body.elements.displacements
+        local = self.body.residual().reshape(-1, 3)[space.fixed_owned, 2].sum()
+        support = float(global_sum(space.comm, np.array([local]))[0])
+        if self.body.applied is not None:
+            support += float(self.body.applied.resultant[2])
+        balance = abs(support / self.force - 1)
+        check_balance(balance)
+        on_probe = self.touched.forces.sum(axis=0)[None] / self.depth
+        return reaction(movement, -on_probe[:, 2:], on_probe, self.body.elements.body.mirrored, balance)
+
+    def hierarchical_estimate(
+        self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
+    ) -> HierarchicalEstimate:
+        """Return the change of the force in one degree more, where contact is found again, and its bar.
+
+        Raises:
+            LargeError: if the next degree does not converge.
+        """
+        finer = self._found_again(movement.loads, stack)
+        share, at_edge = 1 - finer.force / self.force, self._area().bar
+        least = AT_EDGE_LARGE[self.body.elements.degree]
+        taken, bar = found_again_bar(share, at_edge, least, at_end=self._at_sharp_end())
+        # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue
+        # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
+        of_area = nan if self.is_ended else at_edge + bar + abs(finer.whole_area / self.whole_area - 1)
+        return HierarchicalEstimate(
+            finer.body.elements,
+            [],
+            decrements=np.array([[taken * self.force / self.depth]]),
+            relative=np.array([bar]),
+            area_bar=of_area,
+            at_edge=at_edge,
+        )
+
+    @stage("contact sets")
+    def _found_again(self, loads: Loads | None, stack: ExitStack) -> "LargeContactSolution":
+        coarse, degree = self.body.elements, self.body.elements.degree + 1
+        finer = self.surface.elements(degree, coarse.element, stack)
+        applied, state = None if loads is None else finer.displacements.applied(loads), self.body.state
+        body = DeformedBody(finer, self.surface, self.body.law, self.body.method, stack, applied)
+        try:
+            self.body.state = self.sagged.state
+            self.body.show()
+            body.interpolate(coarse)
+            sagged = sagged_body(body, self.tool, loads, body.state)
+            self.body.state = state
+            self.body.show()
+            body.interpolate(coarse)
+            interpolated, correction = body.state, self.corrections.at(self.depth)
+            if correction is not None:
+                body.state = interpolated + correction
+                if not body.is_sound:
+                    body.state = interpolated
+            touched = self._settled_on(body, sagged)
+            self.corrections.add(self.depth, body.state - interpolated)
+        except SolveError as error:
+            raise LargeError(f"no error bar: elements of degree {degree} fail ({error})") from error
+        return replace(self, body=body, touched=touched, sagged=sagged)
+
+    def _settled_on(self, body: DeformedBody, sagged: Sagged) -> ContactSolution:
+        """Return contact on a ``body`` of another degree: from its state, or along a load path where that fails.
+
+        Raises:
+            SolveError: if both fail.
+        """
+
+        def tool_at(depth: float) -> PlacedTool:
+            return placed_tool(body, sagged.placed(self.tool), depth)
+
+        there = tool_at(self.depth)
+        active = self.body.candidates.raised(self.touched.active, body.candidates)
+        if body.is_sound:
+            with suppress(SolveError):
+                first = first_set(body, there, active)
+                touched = solve_contact(body, there, first, is_patient=False, limit=_FOUND_AGAIN)
+                check_outside(body, touched, self.depth)
+                return touched
+        path = ContactPath(Stage(0.0, sagged.state))
+        press(body, tool_at, path, self.depth)
+        assert path.last.touched is not None
+        return path.last.touched
+
+    def _at_sharp_end(self) -> float:
+        """Return the share of the facets in contact that are at a sharp end of the tool, off which nodes slide."""
+        if not self.tool.is_sharp:
+            return 0.0
+        candidates, edge = self.body.candidates, np.flatnonzero(self.body.candidates.is_edge)
+        at_end = np.zeros(len(candidates), dtype=bool)
+        at_end[edge] = self.tool.ends_at(candidates.points[edge])
+        touching = self.touched.active[candidates.facets].any(axis=1)
+        areas = candidates.areas * touching
+        return float(areas[at_end[candidates.facets].any(axis=1)].sum() / areas.sum())
+
+    def _area(self) -> Area:
+        moved = replace(self.body.candidates, points=self.body.positions())
+        return touched_area(self.body, moved, self.touched, self.depth)
+
+
+def touched_area(body: DeformedBody, candidates: Candidates, touched: ContactSolution, depth: float) -> Area:
+    """Return the contact area of the modelled part, where its ``candidates`` are, normal to the axis."""
+    modulus = candidates.from_regions(body.law.plane_moduli)
+    state = State(np.zeros(len(candidates)), touched.forces[:, 2], nan)
+    obstacle = Obstacle(candidates, touched.gap, depth)
+    return contact_area(obstacle, touched.active, state, modulus, body.elements.body.mirrored)

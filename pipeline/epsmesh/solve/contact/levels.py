@@ -1,0 +1,190 @@
+"""Multigrid operators in which candidate nodes are fixed along the probe's axis, different ones for each active set."""
+
+from contextlib import ExitStack
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from epsmesh.solve.compiled import global_sum
+from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
+from epsmesh.solve.contact.surface import Candidates, find_candidates
+from epsmesh.solve.elements import elements_of
+from epsmesh.solve.elements.base import Elements
+from epsmesh.solve.kernels.product import is_product
+from epsmesh.solve.linear_solver import Level
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.spaces import ElasticSpace, Spaces
+
+_SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
+
+
+class Surface:
+    """Elements of a mesh with unilateral contact, and the candidate nodes of each degree, found at first use.
+
+    ``spaces`` are those of the mesh.
+    """
+
+    def __init__(self, spaces: Spaces):
+        self.spaces = spaces
+        self._found: dict[int, Candidates] = {}
+
+    def of(self, degree: int) -> Candidates:
+        """Return the candidates of a ``degree``; collective."""
+        if degree not in self._found:
+            space = self.spaces.get(degree, WITHOUT_FOOTPRINT).space
+            self._found[degree] = find_candidates(self.spaces.body, space)
+        return self._found[degree]
+
+    def elements(self, degree: int, element: str, stack: ExitStack) -> Elements:
+        """Return elements of a ``degree`` and kind, which the ``stack`` closes; collective."""
+        found = elements_of(self.spaces, degree, WITHOUT_FOOTPRINT, element)
+        stack.callback(found.close)
+        return found
+
+
+class Numbering:
+    """Positions of the candidates among the local dofs of a space, and transfer of values from there to all ranks.
+
+    ``local`` (n) are the blocks of this rank, −1 where it has none; ``is_owned`` (n) are those that it owns.
+    """
+
+    def __init__(self, space: Any, numbers: IntArray):
+        """Find nodes with global ``numbers`` (n) in ``space``."""
+        index_map = space.dofmap.index_map
+        self._comm: MPI.Comm = space.mesh.comm
+        local = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+        known = np.asarray(index_map.local_to_global(local), dtype=np.int64)
+        order = np.argsort(known)
+        place = np.searchsorted(known, numbers, sorter=order)
+        at = np.append(order, -1)[place]
+        self.local = np.where(np.append(known, -2)[at] == numbers, at, -1)
+        self.is_owned = (self.local >= 0) & (self.local < index_map.size_local)
+
+    def normal_dofs(self, chosen: BoolArray, *, owned: bool = False) -> Int32Array:
+        """Return the local dofs (unrolled) along z of the ``chosen`` (n): all on this rank, or owned ones only."""
+        here = chosen & self.is_owned if owned else chosen & (self.local >= 0)
+        return np.sort(3 * self.local[here] + 2).astype(np.int32)
+
+    def put(self, into: FloatArray, values: FloatArray, chosen: BoolArray) -> None:
+        """Write ``values`` (n) of the ``chosen`` (n) along z into an array of owned dofs (unrolled)."""
+        here = chosen & self.is_owned
+        into[3 * self.local[here] + 2] = values[here]
+
+    def gather(self, values: FloatArray) -> FloatArray:
+        """Return the entries along z, (n), of ``values`` on owned dofs (unrolled), on every rank; collective."""
+        found = np.zeros(len(self.local))
+        found[self.is_owned] = values[3 * self.local[self.is_owned] + 2]
+        return global_sum(self._comm, found)
+
+    def gather_vectors(self, values: FloatArray) -> FloatArray:
+        """Return all entries, (n, 3), of ``values`` on owned dofs (unrolled), on every rank; collective."""
+        found = np.zeros((len(self.local), 3))
+        found[self.is_owned] = values.reshape(-1, 3)[self.local[self.is_owned]]
+        return global_sum(self._comm, found)
+
+    def put_vectors(self, into: FloatArray, values: FloatArray) -> None:
+        """Write ``values`` (n, 3) into an array that begins with the owned dofs (unrolled)."""
+        into[self._unrolled] = values[self.is_owned]
+
+    def add_vectors(self, into: FloatArray, values: FloatArray) -> None:
+        """Add ``values`` (n, 3) to such an array."""
+        into[self._unrolled] += values[self.is_owned]
+
+    @cached_property
+    def _unrolled(self) -> Int32Array:
+        return np.asarray(3 * self.local[self.is_owned][:, None] + np.arange(3))
+
+
+class Hierarchy:
+    """Operators of degrees 1 … p, or of p alone for a direct solve. On lower levels the active set is a majority vote.
+
+    For iterations only the smoothers change with the active set: above degree 1 the operators stay the same. ``masks``
+    says that the solver supports this.
+    """
+
+    def __init__(
+        self, surface: Surface, degree: int, law: MaterialLaw, stack: ExitStack, *, direct: bool, masks: bool = True
+    ):
+        """Assemble; collective. Matrices are freed with the ``stack``."""
+        degrees = [degree] if direct else range(1, degree + 1)
+        found = [surface.spaces.get(d, WITHOUT_FOOTPRINT) for d in degrees]
+        self._operators = [
+            HeldOperator(space, law, stack, direct=direct, masked=masks and not direct and space.degree > 1)
+            for space in found
+        ]
+        self._candidates = [surface.of(d) for d in degrees]
+        self._numberings = [Numbering(s.space, c.numbers) for s, c in zip(found, self._candidates, strict=True)]
+
+    @property
+    def finest(self) -> PETSc.Mat:
+        """The operator without an active set."""
+        return self._operators[-1].free
+
+    @property
+    def numbering(self) -> Numbering:
+        """Positions of the candidates in the finest space."""
+        return self._numberings[-1]
+
+    def hold(self, active: BoolArray) -> list[Level]:
+        """Return the levels with the ``active`` candidates (n) fixed, valid until the next call; collective."""
+        *coarser, finest = self._candidates
+        sets = [*(finest.lowered(active, lower) for lower in coarser), active]
+        return [
+            operator.hold(numbering.normal_dofs(chosen))
+            for operator, numbering, chosen in zip(self._operators, self._numberings, sets, strict=True)
+        ]
+
+    def hold_facets(self, facets: Int32Array) -> list[Level]:
+        """Return the levels with all of the local ``facets`` fixed, valid until the next call; collective."""
+        return [operator.hold(normal_dofs(operator.space, facets)) for operator in self._operators]
+
+
+class HeldOperator:
+    """The operator of a space with further fixed dofs, which change from call to call.
+
+    ``free`` has the conditions of the space alone. With ``masked`` the smoothers fix the dofs, not the operator.
+    """
+
+    def __init__(self, space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool, masked: bool):
+        """Assemble; collective. Matrices are freed with the ``stack``."""
+        matrix = stack.enter_context(space.lend(law, entries=direct))
+        self.space, self._matrix, self._law, self._is_masked = space, matrix, law, masked
+        self.free, self._is_held, self._stack = matrix, False, stack
+        if not masked and not is_product(matrix):
+            # An assembled PETSc matrix multiplies faster than its copy: other matrices are made from the copy.
+            self.free = matrix.copy()
+            stack.callback(self.free.destroy)
+
+    def hold(self, dofs: Int32Array) -> Level:
+        """Return the level with the local ``dofs`` (unrolled, owned and ghosts) fixed, too; collective.
+
+        It is valid until the next call.
+        """
+        space, matrix, is_uniform = self.space, self._matrix, self._law.is_uniform
+        if not self._is_masked and is_product(matrix):
+            matrix = matrix.getPythonContext().holding(dofs).matrix()
+            self._stack.callback(matrix.destroy)
+        elif not self._is_masked:
+            if self._is_held:
+                self.free.copy(matrix, structure=_SAME)
+            self._is_held = True
+            first, _ = matrix.getOwnershipRange()
+            matrix.zeroRowsColumns((first + dofs[dofs < space.owned]).astype(PETSc.IntType), diag=self._law.lame_mu[0])
+        return Level(
+            space=space.space,
+            matrix=matrix,
+            prescribed=np.union1d(space.prescribed, dofs),
+            jumps=not is_uniform,
+            held=dofs if self._is_masked else None,
+        )
+
+
+def normal_dofs(space: ElasticSpace, facets: Int32Array) -> Int32Array:
+    """Return the local dofs (unrolled, owned and ghosts) along z in the local ``facets``; collective."""
+    found = fem.locate_dofs_topological(space.space, space.body.mesh.topology.dim - 1, facets)
+    return np.asarray(3 * found + 2, dtype=np.int32)

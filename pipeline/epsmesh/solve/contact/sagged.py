@@ -1,0 +1,56 @@
+"""The body before contact at large displacements: as it is, or sagged under dead loads.
+
+The tool then touches another place of the surface first. The depth counts from that touch, along the axis.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from epsmesh.arrays import FloatArray
+from epsmesh.solve.contact.geometry import Touch
+from epsmesh.solve.contact.tissue import DeformedBody
+from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.dead_loads import sag
+from epsmesh.solve.loads import Applied
+from epsmesh.solve.movement import Loads
+
+
+@dataclass(frozen=True, eq=False)
+class Sagged:
+    """The ``state`` (owned dofs) of a body before the tool touches it, and its ``energy`` (J).
+
+    ``sag`` (m) is how much farther the tool moves to the first touch, ``stored`` (J) the strain energy; both NaN
+    without loads. Energies are those of the modelled part.
+    """
+
+    state: FloatArray
+    applied: Applied | None = None
+    energy: float = 0.0
+    stored: float = np.nan
+    sag: float = np.nan
+
+    def placed(self, tool: Tool) -> Tool:
+        """Return a tool whose depths count from the first touch of the sagged surface."""
+        if self.applied is None:
+            return tool
+        return replace(tool, distance=lambda points, depth: tool.distance(points, depth + self.sag))
+
+
+def sagged_body(body: DeformedBody, tool: Tool, loads: Loads | None, guess: FloatArray | None = None) -> Sagged:
+    """Return a body under its loads, whose state is then that; ``guess`` is an initial guess of it; collective.
+
+    Raises:
+        SolveError: see :func:`epsmesh.solve.dead_loads.sag`.
+    """
+    if loads is None:
+        return Sagged(np.zeros(body.elements.unknowns))
+    body.state = sag(body.elements, body.law, loads, guess)
+    energy = body.energy
+    return Sagged(
+        body.state,
+        body.applied,
+        energy,
+        energy + body.work_of_loads,
+        Touch(tool.height, tool.first).sag_at(body.candidates, body.positions()),
+    )

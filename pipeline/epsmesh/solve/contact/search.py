@@ -1,0 +1,232 @@
+"""Unilateral contact with unknown area, without tension or penetration.
+
+The active set is found on elements of degree 1 first, at little cost, then on higher degrees. F is the sum of the
+reactions K u of its nodes. F is no bound: a coarse contact area may be too large or too small.
+
+Loads deform the surface before the probe touches it. The depth counts from the first touch of the deformed surface,
+along the axis.
+"""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray
+from epsmesh.solve import SolveError
+from epsmesh.solve.balance import check_balance
+from epsmesh.solve.contact.active_set import ContactError, Found, Obstacle, find_set
+from epsmesh.solve.contact.condensed import CondensedElements, suits
+from epsmesh.solve.contact.elements import ContactElements, FarShare, FreeResponse
+from epsmesh.solve.contact.found import FoundContact
+from epsmesh.solve.contact.frictional import add_friction
+from epsmesh.solve.contact.geometry import Touch
+from epsmesh.solve.contact.in_time import PressedTool
+from epsmesh.solve.contact.large import LargeContact
+from epsmesh.solve.contact.large_friction import LargeFrictionalContact
+from epsmesh.solve.contact.levels import Numbering, Surface
+from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.sweep import Sweep
+from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.elements.base import Elements, Equilibrium
+from epsmesh.solve.elements.fields import Column, close_far
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.solution import Request
+from epsmesh.solve.spaces import Spaces
+from epsmesh.stages import recharge, recorded, stage
+
+# Energy norm of the error for all active sets but the last one, relative to that of the solution.
+_LOOSE = 1e-3
+# Factor on the tolerance of a prescribed displacement: here F is linear in the solver's error.
+_STRICTER = 0.01
+# Largest λ/μ for the first active set (ν = 0.3), so that elements of degree 1 do not lock.
+_FIRST_RATIO = 1.5
+
+
+class ContactSearch:
+    """Finds the contact of a tool for any material and depth; ``contact`` is the last one found, or None."""
+
+    def __init__(self, spaces: Spaces, elements: Elements, tool: Tool, *, reuse: bool = False, condense: bool = False):
+        """Prepare; collective.
+
+        With ``reuse``, earlier depths of the same material give the initial guess. ``condense`` says that many depths
+        of each material follow: the surface of a small body is then condensed for them, and they share error bars.
+        """
+        self._elements, self._tool = elements, tool
+        self._surface, self._touch = Surface(spaces), Touch(tool.height, tool.first)
+        self.candidates: Candidates = self._surface.of(elements.degree)
+        self._supported = self._held_by_support()
+        self.contact: FoundContact | None = None
+        self._reuse, self._condense = reuse or condense, condense
+        self._sweep: Sweep | None = None  # kept from depth to depth of one material
+        self._large: LargeContact | None = None
+
+    def close(self) -> None:
+        """Free what is kept between solves."""
+        self.contact = self._large = None
+        if self._sweep is not None:
+            self._sweep.close()
+            self._sweep = None
+
+    @stage("solve")
+    def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
+        """Find contact and force at the depth of the movement; the ``stack`` frees what is made; collective.
+
+        Raises:
+            SolveError: if a linear solver fails, or the solution fails a check.
+            ContactError: if the contact does not settle, reaches the support, or reaches the candidates' edge where
+                the probe does not end.
+        """
+        if not asked.law.is_linear:
+            return self._solve_large(asked, stack)
+        law, movement, strict = asked.law, asked.movement, _STRICTER * asked.tolerance
+        columns = self._elements.columns(movement, stack)
+        sweep = self._sweep_of(law, asked.method, stack)
+        elements, depth = sweep.elements, movement.amounts[0]
+        self._couple(elements, movement, columns, law.lame_mu[0], strict)
+        loaded = None if movement.loads is None else elements.free_response(columns[-1], strict)
+        obstacle = self._obstacle(self.candidates, depth, loaded)
+        if np.any(obstacle.bounds[self._supported] < 0):
+            raise ContactError("the probe reaches the fixed part of the body: no displacement satisfies both")
+        first, found = self._find(sweep, obstacle, (_LOOSE, strict), loaded)
+        self._check_edge(found.active)
+        unknowns = elements.unknowns()
+        self._elements.put(columns[0], unknowns, depth)
+        if elements.far is not None:
+            movement = close_far(columns, movement, elements.far.share / depth)
+        self.contact = contact = FoundContact(
+            sweep=sweep,
+            obstacle=obstacle,
+            found=found,
+            loaded=loaded,
+            obstacle_above=lambda: self._obstacle(self._surface.of(self._elements.degree + 1), depth, loaded),
+        )
+        if self._tool.friction:
+            self.contact = contact = add_friction(contact, self._tool, unknowns, stack)
+            self._elements.put(columns[0], contact.frictional, depth)
+            found = replace(found, sets=found.sets + contact.pressed.iterations)
+        response = contact.response(columns[0], movement)
+        check_balance(response.balance)
+        if self._reuse:
+            sweep.keep(depth, found, unknowns)
+        sag = nan if loaded is None else self._touch.sag(self.candidates, loaded)
+        iterations = first + found.sets
+        return Equilibrium(contact, columns, movement, iterations, response, contact=contact.summary(sag))
+
+    def _solve_large(self, asked: Request, stack: ExitStack) -> Equilibrium:
+        """Find contact at large displacements: see :class:`LargeContact`."""
+        if self._large is None or not (self._reuse and self._large.can_reach(asked)):
+            kind = LargeFrictionalContact if self._tool.friction else LargeContact
+            self._large = kind(self._surface, self._elements, self._tool, asked)
+        return self._large.solve(asked, stack)
+
+    def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> PressedTool:
+        """Return the tissue that the tool presses in time steps; the ``stack`` frees it; collective."""
+        depth = found.movement.amounts[0]
+        return PressedTool(self._surface, self._elements, self._tool, asked.law, depth, stack)
+
+    # ---- far field ------------------------------------------------------------------------------------
+
+    def _couple(
+        self, elements: ContactElements, movement: Movement, columns: Sequence[Column], mu: float, tolerance: float
+    ) -> None:
+        """Couple the far field of ``movement``, if there is one, to the cut face; collective."""
+        if movement.far is None:
+            elements.couple(None)
+            return
+        far = columns[1]
+        if elements.far is None or elements.far.field != movement.far:
+            unit = elements.free_response(far, tolerance)
+            beyond = movement.far.stiffness(mu) / 2.0 ** len(self._elements.body.mirrored)
+            elements.couple(FarShare(movement.far, unit, unit.energy + beyond))
+        else:
+            self._elements.put(far, elements.far.unit.unknowns)
+
+    # ---- contact --------------------------------------------------------------------------------------
+
+    def _obstacle(self, candidates: Candidates, depth: float, loaded: FreeResponse | None) -> Obstacle:
+        """Return the obstacle above candidates of some degree at a ``depth`` (m), without the far field."""
+        return Obstacle(candidates, self._touch.heights(candidates, loaded, self.candidates) - depth, depth)
+
+    def _find(
+        self, sweep: Sweep, obstacle: Obstacle, tolerances: tuple[float, float], loaded: FreeResponse | None
+    ) -> tuple[int, Found]:
+        """Return the number of active sets solved in lower degrees, and the contact found; collective."""
+        try:
+            found = sweep.find(obstacle, tolerances)
+            if found is not None:
+                return 0, found
+        except SolveError:  # then without the initial guess
+            if sweep.elements.is_exact:
+                raise
+        with ExitStack() as stack:
+            first, elements, before = self._first_set(sweep, obstacle.depth, loaded, stack)
+            sweep.elements.start_from(elements)
+            active = elements.candidates.raised(before.active, self.candidates)
+        return first, find_set(sweep.elements, obstacle, active, tolerances, before.state.energy)
+
+    def _first_set(
+        self, sweep: Sweep, depth: float, loaded: FreeResponse | None, stack: ExitStack
+    ) -> tuple[int, ContactElements, Found]:
+        """Return the sets solved, the elements of one degree less, and the contact found on them; collective."""
+        sets, found = 0, None
+        elements: ContactElements | None = None
+        for degree in range(1, self._elements.degree):
+            kind = self._elements.element if degree > 1 else "displacement"
+            law = sweep.law if kind == "mixed" else sweep.law.softened(_FIRST_RATIO)
+            plain = self._surface.elements(degree, kind, stack)
+            lower = ContactElements(plain, self._surface, law, sweep.method, stack)
+            obstacle = self._obstacle(lower.candidates, depth, loaded)
+            if elements is None or found is None:
+                active = obstacle.bounds < 0
+                if not active.any():
+                    raise ContactError("the probe reaches no corner of an element: use smaller elements below it")
+            else:
+                lower.start_from(elements)
+                active = elements.candidates.raised(found.active, lower.candidates)
+            energy = None if found is None else found.state.energy
+            found = find_set(lower, obstacle, active, (_LOOSE,), energy, roughly=True)
+            lower.show()
+            elements, sets = lower, sets + found.sets
+        assert elements is not None
+        assert found is not None
+        return sets, elements, found
+
+    def _sweep_of(self, law: MaterialLaw, method: str, stack: ExitStack) -> Sweep:
+        """Return the sweep kept for a material, or a new one; the ``stack`` frees it unless it is to be kept.
+
+        The surface is condensed if that was requested; collective.
+        """
+        if self._sweep is not None and (self._sweep.law, self._sweep.method) == (law, method):
+            recharge(self._sweep.cost)
+            return self._sweep
+        self.close()
+        with ExitStack() as inner, recorded() as cost:
+            if self._condense and suits(self._elements, self.candidates, method):
+                elements: ContactElements = CondensedElements(self._elements, self._surface, law, "direct", inner)
+            else:
+                elements = ContactElements(self._elements, self._surface, law, method, inner)
+            sweep = Sweep(law, method, elements, inner.pop_all(), cost)
+        if self._reuse:
+            self._sweep = sweep
+        else:
+            stack.callback(sweep.close)
+        return sweep
+
+    def _held_by_support(self) -> BoolArray:
+        """Return a mask (n) of candidates that the support fixes; they never become active; collective."""
+        space = self._elements.displacements
+        is_held = np.zeros(space.owned)
+        is_held[3 * space.fixed_owned + 2] = 1.0
+        return np.asarray(Numbering(space.space, self.candidates.numbers).gather(is_held) > 0)
+
+    def _check_edge(self, active: BoolArray) -> None:
+        points = self.candidates.points[active & self.candidates.is_edge]
+        if not np.all(self._tool.ends_at(points)):
+            raise ContactError(
+                "the contact reaches the edge of the surface region that is searched for contact: "
+                "use a smaller depth, or align the probe's axis with the surface normal"
+            )

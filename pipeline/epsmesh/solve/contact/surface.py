@@ -1,0 +1,254 @@
+"""Candidate nodes: the part of a body's surface that a probe may touch, its facets and nodes, equal on every rank.
+
+The active set is decided for all ranks at once. Candidates are a few thousand at most, and each rank stores them all.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+import basix
+import numpy as np
+
+from epsmesh import compat
+from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from epsmesh.mesh.distribute import BodyMesh
+from epsmesh.scene.model import PROBE
+from epsmesh.solve.physics import of_regions
+
+FACET_CORNERS = 3
+# Corners of the facet opposite to each corner of the reference tetrahedron, and an equilateral facet.
+_OPPOSITE = [[j for j in range(4) if j != i] for i in range(4)]
+_EQUILATERAL = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.75**0.5]])
+
+
+@dataclass(frozen=True, eq=False)
+class FacetNodes:
+    """The k nodes of a facet, corners first.
+
+    ``places`` (4, k) are their numbers within a cell, for each of its facets, ``corners`` (k, 3) their barycentric
+    coordinates. ``boundary`` are the nodes along the edges, in order; ``edges`` (3, ·) those of each edge, its two ends
+    first. ``weights`` (k) are the nodal shares of a uniform pressure.
+    """
+
+    degree: int
+    places: IntArray
+    corners: FloatArray
+    boundary: IntArray
+    edges: IntArray
+    weights: FloatArray
+
+    @property
+    def facets_per_node(self) -> FloatArray:
+        """Number of facets that share each node (k): one inside, two on an edge, about six at a corner."""
+        found = np.ones(len(self.corners))
+        found[self.boundary] = 2.0
+        found[:FACET_CORNERS] = 6.0
+        return found
+
+    def distances(self, other: "FacetNodes") -> FloatArray:
+        """Return the distances (k, l) to the nodes of another degree, in edge lengths of an equilateral facet."""
+        here, there = self.corners @ _EQUILATERAL, other.corners @ _EQUILATERAL
+        return np.asarray(np.linalg.norm(here[:, None] - there[None], axis=2))
+
+    def values(self, points: FloatArray) -> FloatArray:
+        """Return the shape functions at points (q, 3) in barycentric coordinates, (q, k)."""
+        return np.asarray(np.linalg.solve(_monomials(self.degree, self.corners).T, _monomials(self.degree, points).T).T)
+
+
+def _monomials(degree: int, points: FloatArray) -> FloatArray:
+    """Return all monomials of ``degree`` in barycentric coordinates at points (q, 3)."""
+    powers = [(i, j, degree - i - j) for i in range(degree + 1) for j in range(degree + 1 - i)]
+    return np.prod(points[:, None, :] ** np.array(powers)[None], axis=2)
+
+
+@cache
+def facet_nodes(degree: int) -> FacetNodes:
+    """Return the nodes of ``degree``."""
+    element = compat.reference_element(degree)
+    points = np.column_stack([1 - element.points.sum(axis=1), element.points])  # barycentric
+    found = [np.array(element.entity_closure_dofs[2][side]) for side in range(4)]
+    first = points[found[0]][:, _OPPOSITE[0]]
+    first = first[np.lexsort([*first.T, -first.max(axis=1)])]
+    first[:FACET_CORNERS] = np.eye(FACET_CORNERS)
+    places = np.empty((4, len(first)), dtype=np.int64)
+    for side, (dofs, corners) in enumerate(zip(found, _OPPOSITE, strict=True)):
+        away = np.abs(points[dofs][:, corners][:, None] - first[None]).max(axis=2)
+        places[side] = dofs[away.argmin(axis=0)]
+    angle = np.arctan2(*((first - 1 / 3) @ _EQUILATERAL).T[::-1])
+    on_edge = np.flatnonzero(first.min(axis=1) < 1e-9)
+    edges = [np.flatnonzero(first[:, opposite] < 1e-9) for opposite in range(FACET_CORNERS)]
+    rule, shares = basix.make_quadrature(basix.CellType.triangle, 2 * degree)
+    inside = np.column_stack([rule, np.zeros(len(rule))])  # the facet opposite to the last corner
+    values = np.asarray(element.tabulate(0, inside)[0, :, :, 0])
+    weights = 2 * shares @ values[:, places[3]]
+    weights[np.abs(weights) < 1e-12] = 0.0
+    return FacetNodes(degree, places, first, on_edge[np.argsort(angle[on_edge])], np.array(edges), weights)
+
+
+# A point counts as in a plane of symmetry within this distance, in units of the candidates' extent.
+_IN_PLANE = 1e-9
+# Nodes of two degrees are neighbours within this share of an edge, divided by p; mid nodes are included.
+_NEAR = 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Candidate nodes of one degree, and the facets between them; equal on every rank.
+
+    ``numbers`` (n) are the nodes' global numbers (blocks) in the space, ``points`` (n, 3) are in m. ``facets`` (m, k)
+    index the nodes, in the order of ``shape``; candidates of all degrees on a mesh have the same facets. ``is_edge``
+    (n) marks nodes on the boundary of the candidates, planes of symmetry aside. ``regions`` (m) are those of the tissue
+    below the facets. Only ``local_facets`` (m) differ by rank: the facets' numbers there, −1 for facets of others.
+    """
+
+    numbers: IntArray
+    points: FloatArray
+    facets: IntArray
+    shape: FacetNodes
+    is_edge: BoolArray
+    regions: IntArray
+    local_facets: Int32Array
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    @cached_property
+    def is_corner(self) -> BoolArray:
+        """Mask of the nodes that are corners of facets (n)."""
+        return self._marked(self.facets[:, :FACET_CORNERS])
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """The areas of the facets (m², normal to the probe's axis), (m)."""
+        x, y = np.moveaxis(self.points[self.facets[:, self.shape.boundary], :2], 2, 0)
+        doubled = x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)
+        return np.asarray(np.abs(doubled.sum(axis=1)) / 2)
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """Nodal forces of a uniform unit pressure, i.e. areas (m²), (n): zero at corners in degree 2."""
+        return np.asarray(np.bincount(self.facets.ravel(), np.outer(self.areas, self.shape.weights).ravel(), len(self)))
+
+    @cached_property
+    def widths(self) -> FloatArray:
+        """Sides (m) of squares with the area of each node, (n); planes of symmetry are accounted for."""
+        shares = np.outer(self.areas, self.shape.weights * self.shape.facets_per_node).ravel()
+        count = np.bincount(self.facets.ravel(), minlength=len(self))
+        # Shares of degree 4 are negative in the middle of edges.
+        return np.asarray(np.sqrt(np.maximum(np.bincount(self.facets.ravel(), shares, len(self)), 0.0) / count))
+
+    def from_regions(self, values: Sequence[float]) -> FloatArray:
+        """Return ``values`` by region as values of the nodes (n), from the tissue below their facets."""
+        found = np.empty(len(self))
+        found[self.facets] = of_regions(values, self.regions, len(self.facets))[:, None]
+        return found
+
+    def enclosed(self, active: BoolArray) -> BoolArray:
+        """Return a mask (n) of corners whose neighbours along all edges are active."""
+        if self.shape.degree == 1:
+            return np.zeros(len(self), dtype=bool)
+        corner, beside = self._beside_corners.T
+        return np.asarray((np.bincount(corner, ~active[beside], len(self)) == 0) & self.is_corner)
+
+    def bordering(self, active: BoolArray) -> BoolArray:
+        """Return a mask (n) of nodes that share a facet with both active and inactive nodes; corners do not count."""
+        inner = active[self.facets[:, FACET_CORNERS:]]
+        return self._marked(self.facets[inner.any(axis=1) & ~inner.all(axis=1)])
+
+    def closed(self, active: BoolArray) -> BoolArray:
+        """Return a mask (m) of facets whose nodes, corners aside, are all active."""
+        return np.asarray(active[self.facets[:, FACET_CORNERS:]].all(axis=1))
+
+    def held_facets(self, active: BoolArray) -> Int32Array:
+        """Return the local numbers of the closed facets on this rank."""
+        return self.local_facets[self.closed(active) & (self.local_facets >= 0)]
+
+    def raised(self, active: BoolArray, higher: "Candidates") -> BoolArray:
+        """Return the initial guess in a ``higher`` degree: its nodes near an active node."""
+        pairs = self._near(higher)
+        return higher._marked(pairs[active[pairs[:, 0]], 1])
+
+    def lowered(self, active: BoolArray, lower: "Candidates") -> BoolArray:
+        """Return the nodes of a ``lower`` degree around which most nodes are active."""
+        near, this = lower._near(self).T
+        return np.asarray(np.bincount(near, np.where(active[this], 1.0, -1.0), len(lower)) > 0)
+
+    def _near(self, higher: "Candidates") -> IntArray:
+        """Return pairs (k, 2) of a node and a neighbouring node of a ``higher`` degree, each once."""
+        near = np.argwhere(self.shape.distances(higher.shape) < _NEAR / self.shape.degree)
+        pairs = [np.column_stack([self.facets[:, i], higher.facets[:, j]]) for i, j in near]
+        return np.unique(np.concatenate(pairs), axis=0)
+
+    def beside_corners(self, nodes: IntArray) -> IntArray:
+        """Return pairs (k, 2) of a corner and a node next to it, as positions in ``nodes`` that contain both."""
+        position = np.full(len(self), -1)
+        position[nodes] = np.arange(len(nodes))
+        pairs = position[self._beside_corners]
+        return np.asarray(pairs[(pairs >= 0).all(axis=1)])
+
+    @cached_property
+    def _beside_corners(self) -> IntArray:
+        near = np.argwhere(self.shape.distances(self.shape)[:FACET_CORNERS] < 0.5 + 1e-9)
+        pairs = [self.facets[:, (i, j)] for i, j in near if i != j]
+        return np.unique(np.concatenate(pairs), axis=0)
+
+    def _marked(self, nodes: IntArray) -> BoolArray:
+        found = np.zeros(len(self), dtype=bool)
+        found[nodes] = True
+        return found
+
+
+def find_candidates(body: BodyMesh, space: Any) -> Candidates:
+    """Return the nodes of ``space`` on the footprint of ``body``; collective."""
+    topology, tdim = body.mesh.topology, body.mesh.topology.dim
+    facets = body.facets[PROBE]
+    topology.create_connectivity(tdim, tdim - 1)
+    topology.create_connectivity(tdim - 1, tdim)
+    of_facet, of_cell = topology.connectivity(tdim - 1, tdim), topology.connectivity(tdim, tdim - 1)
+    cell = of_facet.array[of_facet.offsets[facets]]
+    facets, cell = facets[cell < body.owned_cells], cell[cell < body.owned_cells]
+    side = np.argmax(of_cell.array.reshape(-1, tdim + 1)[cell] == facets[:, None], axis=1)
+    shape = facet_nodes(compat.degree(space))
+    dofs = np.take_along_axis(compat.cell_dofs(space)[cell], shape.places[side], axis=1)
+    x = np.asarray(space.tabulate_dof_coordinates())[dofs]
+    regions = np.zeros(len(cell), dtype=np.int64) if body.regions is None else body.regions[cell]
+    of_all = (np.concatenate(body.comm.allgather(part)) for part in (_global(space, dofs), x, regions))
+    numbers, points, regions = of_all
+    local = np.full(len(numbers), -1, dtype=np.int32)
+    first = body.mesh.comm.scan(len(facets)) - len(facets)
+    local[first : first + len(facets)] = facets
+    return _assembled(body, numbers, points, shape, regions, local)
+
+
+def _assembled(
+    body: BodyMesh, of_facets: IntArray, x: FloatArray, shape: FacetNodes, regions: IntArray, local: Int32Array
+) -> Candidates:
+    """Number the nodes of the facets of all ranks, in an order independent of the number of ranks."""
+    _, first = np.unique(of_facets, return_index=True)
+    points = x.reshape(-1, 3)[first]
+    order = np.lexsort(points.T)
+    numbers, points = of_facets.ravel()[first[order]], points[order]
+    rank = np.argsort(numbers)
+    facets = rank[np.searchsorted(numbers[rank], of_facets)]
+    is_edge = _edge(body, points, facets, shape)
+    return Candidates(numbers, points, facets, shape, is_edge, regions, local)
+
+
+def _edge(body: BodyMesh, points: FloatArray, facets: IntArray, shape: FacetNodes) -> BoolArray:
+    """Return a mask of nodes on the boundary of the facets, planes of symmetry aside."""
+    is_edge = np.zeros(len(points), dtype=bool)
+    edges = np.concatenate([facets[:, edge] for edge in shape.edges])
+    _, which, count = np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_inverse=True, return_counts=True)
+    single = edges[count[which.ravel()] == 1]
+    extent = np.abs(points[:, :2]).max()
+    for axis in body.mirrored:
+        single = single[np.abs(points[single, axis]).max(axis=1) > _IN_PLANE * extent]
+    is_edge[single] = True
+    return is_edge
+
+
+def _global(space: Any, dofs: IntArray) -> IntArray:
+    numbers = space.dofmap.index_map.local_to_global(dofs.ravel().astype(np.int32))
+    return np.asarray(numbers, dtype=np.int64).reshape(dofs.shape)

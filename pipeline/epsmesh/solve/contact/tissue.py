@@ -1,0 +1,184 @@
+"""A hyperelastic body seen from the nodes that a tool may touch: the interface of :mod:`.deformed` on its elements.
+
+Linear systems are solved in turned frames, in which the normal displacement of an active node is one unknown.
+"""
+
+from contextlib import ExitStack
+
+import numpy as np
+
+from epsmesh.arrays import FloatArray
+from epsmesh.solve.compiled import global_sum
+from epsmesh.solve.contact.constraint import Constraint
+from epsmesh.solve.contact.deformed import LEFT
+from epsmesh.solve.contact.levels import Numbering, Surface
+from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.turned_tangent import FactorisedTangent, IteratedTangent, TurnedTangent
+from epsmesh.solve.elements.base import Elements
+from epsmesh.solve.loads import Applied
+from epsmesh.solve.newton import HyperelasticBody
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.stages import stage
+
+
+class DeformedBody:
+    """Elements of a hyperelastic ``law`` with ``candidates`` of contact: see :class:`.deformed.Tissue`.
+
+    The state is one vector of owned dofs: displacement, and in mixed elements pressure. What is made is freed with the
+    stack.
+    """
+
+    def __init__(
+        self,
+        elements: Elements,
+        surface: Surface,
+        law: MaterialLaw,
+        method: str,
+        stack: ExitStack,
+        applied: Applied | None = None,
+        *,
+        prestressed: bool = False,
+    ):
+        """Set up; collective. ``method`` is the requested solver, ``applied`` are dead loads.
+
+        ``prestressed``: the energy of ``hyperelastic`` may change; only iterations know that.
+
+        Raises:
+            SolveError: if the preconditioner cannot be set up.
+        """
+        self.elements, self.law, self.method = elements, law, method
+        self.candidates: Candidates = surface.of(elements.degree)
+        space = self._space = elements.displacements
+        self.hyperelastic = self._body = HyperelasticBody(elements, law, prestressed=prestressed)
+        stack.callback(self._body.close)
+        self.applied = applied
+        if applied is not None:
+            self._body.carry(applied)
+        self._unit = elements.unit(law)
+        self._numbering = Numbering(space.space, self.candidates.numbers)
+        self._tangent: TurnedTangent
+        if method == "direct":
+            self._tangent = FactorisedTangent(elements, law, self._body, self._numbering, stack)
+        else:
+            self._tangent = IteratedTangent(elements, law, self._body, self._numbering, surface, stack)
+        elements.set_law(law)
+        self._now, self._residual, self._change = (stack.enter_context(self._body.state()) for _ in range(3))
+        self._from = self._now.array.copy()
+        is_fixed = np.zeros(space.owned)
+        is_fixed[space.prescribed_owned] = 1.0
+        self.fixed = self._numbering.gather_vectors(is_fixed) > 0
+        self._is_current = False
+        self.iterations = 0
+
+    # ---- the interface --------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> FloatArray:
+        """The unknowns of this rank."""
+        return np.array(self._now.array)
+
+    @state.setter
+    def state(self, values: FloatArray) -> None:
+        self._now.array[:] = values
+        self._from, self._is_current = values.copy(), False
+
+    def positions(self) -> FloatArray:
+        """Return the nodes' deformed positions (n, 3), in m."""
+        return self.candidates.points + self._numbering.gather_vectors(self._now.array[: self._space.owned])
+
+    def forces(self) -> FloatArray:
+        """Return the nodal forces (n, 3), N; zero at prescribed components."""
+        return np.where(self.fixed, 0.0, self._numbering.gather_vectors(self._forces()[: self._space.owned]))
+
+    def elastic_forces(self) -> FloatArray:
+        """Return the nodal forces (n, 3), N, of the law without relaxation, which the energy has from then on."""
+        self._body.impose(None, (1.0,) * len(self.law.parameters))
+        with self._body.state() as forces:
+            self._body.forces(self._now, forces)
+            found = self._numbering.gather_vectors(forces.array[: self._space.owned])
+        return np.where(self.fixed, 0.0, found)
+
+    def unbalanced(self) -> float:
+        """Return the norm (N) of the residual at all other free dofs."""
+        left = self._forces().copy()
+        left[self._space.prescribed_owned] = 0.0
+        self._numbering.put_vectors(left, np.zeros(self.fixed.shape))
+        return float(np.sqrt(global_sum(self._space.comm, np.array([left @ left]))[0]))
+
+    @stage("tangent solves")
+    def linearise(self, constraint: Constraint) -> FloatArray:
+        """Find the increment under a ``constraint``; return the nodal forces (n, 3), N, that it predicts.
+
+        Raises:
+            SolveError: if the linear solver fails.
+        """
+        self._from = self.state
+        self._tangent.update(self._now, constraint)
+        self._prescribe(constraint)
+        with self._body.state() as right:
+            self._tangent.multiply(self._change, right)
+            right.array[:] = -right.array - self._forces() / self._unit
+            self._numbering.add_vectors(right.array, constraint.forces / self._unit)
+            target = LEFT * float(np.linalg.norm(self.forces())) / self._unit
+            self._tangent.solve(constraint, right, self._change, target)
+            self._tangent.multiply(self._change, right)
+            moved = self._numbering.gather_vectors(self._change.array[: self._space.owned])
+            change = self._numbering.gather_vectors(self._unit * right.array[: self._space.owned])
+        self.iterations += 1
+        return self.forces() + change + np.einsum("nij,nj->ni", constraint.turning, moved)
+
+    def advance(self, share: float) -> bool:
+        """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
+        self._now.array[:] = self._from + share * self._change.array
+        self._is_current = False
+        return self.is_sound
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether J > 0 everywhere; collective."""
+        return bool(np.isfinite(self.energy))
+
+    @property
+    def energy(self) -> float:
+        """Energy (J) of the modelled part less the work of loads, NaN if tissue is inside out; collective."""
+        return self._body.energy(self._now)
+
+    # ---- results ----------------------------------------------------------------------------------------
+
+    def residual(self) -> FloatArray:
+        """Return the nodal forces (N) of the displacement, owned dofs, reactions of the support included."""
+        return self._forces()[: self._space.owned].copy()
+
+    def split(self, state: FloatArray) -> list[FloatArray]:
+        """Return a state by field."""
+        with self.elements.fields() as parts:
+            return self._body.split(state, parts)
+
+    @property
+    def work_of_loads(self) -> float:
+        """The work (J) of the loads on the modelled part; collective."""
+        own = 0.0 if self.applied is None else float(self.applied.forces @ self.state[: self._space.owned])
+        return float(global_sum(self._space.comm, np.array([own]))[0])
+
+    def show(self) -> None:
+        """Set the fields of the forms."""
+        self._body.show(self._now)
+
+    def interpolate(self, coarse: Elements) -> None:
+        """Set the state to the fields of the forms of ``coarse``."""
+        self.elements.interpolate(coarse)
+        self.state = self.elements.values
+
+    # ---- the linear system ------------------------------------------------------------------------------
+
+    def _forces(self) -> FloatArray:
+        if not self._is_current:
+            self._body.forces(self._now, self._residual)
+            self._is_current = True
+        return np.asarray(self._residual.array)
+
+    def _prescribe(self, constraint: Constraint) -> None:
+        """Write the prescribed increment into the change."""
+        moved = np.einsum("nij,nj->ni", constraint.frames, np.where(constraint.held, constraint.values, 0.0))
+        self._change.set(0.0)
+        self._numbering.put_vectors(self._change.array, np.where(self.fixed, 0.0, moved))

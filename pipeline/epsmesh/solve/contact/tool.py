@@ -1,0 +1,43 @@
+"""The tool of a contact that is found: its surface, its friction and its axis."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.shapes.distance import Distance
+
+
+def _no_distance(points: FloatArray, depth: float) -> Distance:
+    """Raise the error of a tool whose distance was not given."""
+    raise NotImplementedError("a tool without a distance has no contact at large displacements")
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A probe's surface, pressed in along -z.
+
+    ``height`` gives the initial height of the probe above points (n, 3) of the undeformed surface (m), infinite where
+    there is no probe. ``ends_at`` is a mask of points (n, 3) on the edge of the candidates: true where the probe itself
+    ends. Elsewhere contact must not reach that edge. ``first`` (m) is the smallest height, zero on the
+    axis. ``friction`` is Coulomb's coefficient, infinite for tissue that sticks. ``distance`` is that of
+    points (n, 3) to the probe pressed in by a depth (m) from the first touch, for contact at large displacements.
+    ``foot`` (m) are x and y of its axis. ``is_sharp`` says that it ends at a sharp edge, off which tissue slides.
+    """
+
+    height: Callable[[FloatArray], FloatArray]
+    ends_at: Callable[[FloatArray], BoolArray]
+    first: float = 0.0
+    friction: float = 0.0
+    distance: Callable[[FloatArray, float], Distance] = _no_distance
+    foot: tuple[float, float] = (0.0, 0.0)
+    is_sharp: bool = False
+
+    def torque(self, points: FloatArray, forces: FloatArray) -> float:
+        """Return the torque (N m) of the tissue on the tool about its advance, −z.
+
+        The tool's ``forces`` (n, 2 or 3) in N act on the tissue at ``points`` (n, 3), m.
+        """
+        (x, y), (along_x, along_y) = (points[:, :2] - np.array(self.foot)).T, forces[:, :2].T
+        return float(x @ along_y - y @ along_x)

@@ -1,0 +1,237 @@
+"""Linear systems of the tangent in turned frames, in which normal displacements of active nodes are held.
+
+Systems are solved by conjugate gradients, in mixed elements by generalised conjugate residuals, with the matrix-free
+tangent, or factorised on request. The preconditioner is that of linear elasticity, which holds the same nodes
+along z: it knows neither the turn of the frames nor the strain, and needs more iterations the larger both are.
+"""
+
+from abc import ABC, abstractmethod
+from contextlib import ExitStack
+from functools import cached_property
+
+import numpy as np
+from petsc4py import PETSc
+
+from epsmesh.arrays import FloatArray, Int32Array
+from epsmesh.solve.contact.constraint import Constraint
+from epsmesh.solve.contact.levels import Hierarchy, Numbering, Surface
+from epsmesh.solve.elements.assembled import AssembledTangent
+from epsmesh.solve.elements.base import Elements, Solver
+from epsmesh.solve.elements.displacement import DisplacementSolver
+from epsmesh.solve.elements.mixed import MixedElements, MixedSolver
+from epsmesh.solve.elements.pressures import without_columns
+from epsmesh.solve.kernels.pressure import matrix_of
+from epsmesh.solve.krylov import INDEFINITE, check_converged, explained, factorised, keep, solver_of
+from epsmesh.solve.newton import HyperelasticBody, forcing
+from epsmesh.solve.physics import MaterialLaw
+
+_MOST_ITERATIONS = 300
+
+
+class TurnedTangent(ABC):
+    """The tangent K - Σ λ H of a ``body`` with contact, in the unit of the forms. Methods are collective."""
+
+    def __init__(
+        self, elements: Elements, law: MaterialLaw, body: HyperelasticBody, numbering: Numbering, stack: ExitStack
+    ):
+        """Prepare; what is made is freed with the stack."""
+        self._elements, self._space = elements, elements.displacements
+        self._law, self._unit, self._stack = law, elements.unit(law), stack
+        self._body, self._numbering = body, numbering
+        self._here = numbering.is_owned
+        self._dofs = 3 * numbering.local[self._here][:, None] + np.arange(3)
+
+    @abstractmethod
+    def update(self, state: PETSc.Vec, constraint: Constraint) -> None:
+        """Evaluate the tangent at a state."""
+
+    @abstractmethod
+    def multiply(self, x: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Write the product with a change of the state, which is zero at prescribed dofs; other rows are valid."""
+
+    @abstractmethod
+    def solve(self, constraint: Constraint, right: PETSc.Vec, change: PETSc.Vec, target: float) -> None:
+        """Add to ``change`` the solution for ``right`` that is zero where the constraint holds.
+
+        ``target`` is the norm of the residual at the end of Newton's method, in the unit of the forms.
+
+        Raises:
+            SolveError: if the solver fails.
+        """
+
+    def _slots(self, constraint: Constraint) -> Int32Array:
+        """Return the owned dofs that are held in the turned frames: of the constraint, and prescribed ones."""
+        held = np.zeros(self._space.owned)
+        self._numbering.put_vectors(held, constraint.held.astype(float))
+        held[self._space.prescribed_owned] = 1.0
+        return np.flatnonzero(held).astype(np.int32)
+
+
+class FactorisedTangent(TurnedTangent):
+    """The assembled tangent, factorised at each solve."""
+
+    @cached_property
+    def _tangent(self) -> AssembledTangent:
+        return AssembledTangent(self._elements, self._law, self._stack)
+
+    def update(self, state: PETSc.Vec, constraint: Constraint) -> None:
+        """Assemble the tangent at a state."""
+        self._body.show(state)
+        self._tangent.update()
+        stiffness, index_map = self._tangent.blocks[0], self._space.space.dofmap.index_map
+        for number in np.flatnonzero(self._here & constraint.turning.any(axis=(1, 2))):
+            rows = 3 * (index_map.local_range[0] + self._numbering.local[number]) + np.arange(3)
+            rows = rows.astype(PETSc.IntType)
+            stiffness.setValues(rows, rows, -constraint.turning[number] / self._unit, PETSc.InsertMode.ADD_VALUES)
+        self._tangent.matrix.assemble()
+
+    def multiply(self, x: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Write the product with a change of the state."""
+        self._tangent.matrix.mult(x, result)
+
+    def solve(self, constraint: Constraint, right: PETSc.Vec, change: PETSc.Vec, target: float) -> None:
+        """Add the solution that is zero where the constraint holds."""
+        owned, held = self._space.owned, self._slots(constraint)
+        with ExitStack() as stack, explained():
+            turn = keep(stack, self._turn(constraint))
+            matrix = keep(stack, self._turned(turn, held, stack))
+            load, found = (keep(stack, vector) for vector in matrix.createVecs())
+            whole, turned = (keep(stack, vector) for vector in turn.createVecs())
+            whole.array[:] = right.array[:owned]
+            turn.multTranspose(whole, turned)
+            load.array[:owned], load.array[owned:] = turned.array, right.array[owned:]
+            load.array[held] = 0.0
+            factorised(matrix, stack).solve(load, found)
+            turned.array[:] = found.array[:owned]
+            turn.mult(turned, whole)
+            change.array[:owned] += whole.array
+            change.array[owned:] += found.array[owned:]
+
+    def _turn(self, constraint: Constraint) -> PETSc.Mat:
+        """Return the orthogonal matrix Q of the frames, on displacements."""
+        space, blocks = self._space, self._space.owned // 3
+        frames = np.broadcast_to(np.eye(3), (blocks, 3, 3)).copy()
+        frames[self._numbering.local[self._here]] = constraint.frames[self._here]
+        first = space.space.dofmap.index_map.local_range[0]
+        columns = 3 * (first + np.arange(blocks))[:, None, None] + np.arange(3)
+        columns = np.broadcast_to(columns, (blocks, 3, 3)).astype(PETSc.IntType).ravel()
+        rows = np.arange(0, len(columns) + 1, 3, dtype=PETSc.IntType)
+        size = (space.owned, space.size)
+        return PETSc.Mat().createAIJ((size, size), csr=(rows, columns, frames.ravel()), comm=space.comm)
+
+    def _turned(self, turn: PETSc.Mat, held: Int32Array, stack: ExitStack) -> PETSc.Mat:
+        """Return the tangent in the turned frames, with the ``held`` slots eliminated."""
+        stiffness, *others = self._tangent.blocks
+        turned = stiffness.ptap(turn)
+        first, _ = turned.getOwnershipRange()
+        turned.zeroRowsColumns((first + held).astype(PETSc.IntType), 1.0)
+        if others:
+            keep(stack, turned)
+            coupling, of_pressures = others
+            coupled = keep(stack, coupling.matMult(turn))
+            without_columns(coupled, held)
+            transpose = keep(stack, coupled.transpose(PETSc.Mat()))
+            nest = keep(stack, PETSc.Mat().createNest([[turned, transpose], [coupled, of_pressures]], comm=turn.comm))
+            turned = nest.convert("aij", PETSc.Mat())
+        turned.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        return turned
+
+
+class IteratedTangent(TurnedTangent):
+    """The matrix-free tangent, with linear elasticity as preconditioner; a context for PETSc."""
+
+    def __init__(
+        self,
+        elements: Elements,
+        law: MaterialLaw,
+        body: HyperelasticBody,
+        numbering: Numbering,
+        surface: Surface,
+        stack: ExitStack,
+    ):
+        """Set up; freed with the stack.
+
+        Raises:
+            SolveError: if the set-up fails.
+        """
+        super().__init__(elements, law, body, numbering, stack)
+        elastic = elements.elastic(law)
+        self._hierarchy = Hierarchy(surface, elements.degree, elastic, stack, direct=False, masks=elements.masks)
+        self._solver: Solver | None = None
+        self._active = np.zeros(len(numbering.local), dtype=bool)
+        self._before = 0.0  # norm of the last right-hand side
+        stack.callback(self._close)
+        self._work = [stack.enter_context(body.state()) for _ in range(2)]
+        size = self._work[0].getLocalSize()
+        self._matrix = keep(stack, matrix_of(self, size, size, self._space.comm))
+
+    def _close(self) -> None:
+        if self._solver is not None:
+            self._solver.close()
+
+    def update(self, state: PETSc.Vec, constraint: Constraint) -> None:
+        """Evaluate the moduli at a state."""
+        self._body.assemble(state)
+        self._turning = constraint.turning[self._here] / self._unit
+
+    def multiply(self, x: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Write the product with a change of the state."""
+        self._body.tangent.mult(x, result)
+        result.array[self._dofs] -= np.einsum("nij,nj->ni", self._turning, x.array_r[self._dofs])
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Write the product in the turned frames, identity at held slots; PETSc calls this."""
+        whole, image = self._work
+        whole.array[:] = x.array_r
+        whole.array[self._held] = 0.0
+        self._rotate(whole.array, "nij,nj->ni")
+        self.multiply(whole, image)
+        self._rotate(image.array, "nji,nj->ni")
+        image.array[self._held] = x.array_r[self._held]
+        result.array[:] = image.array
+
+    def solve(self, constraint: Constraint, right: PETSc.Vec, change: PETSc.Vec, target: float) -> None:
+        """Add the solution that is zero where the constraint holds."""
+        self._frames, self._held = constraint.frames[self._here], self._slots(constraint)
+        with ExitStack() as stack, self._body.state() as load, self._body.state() as found, explained():
+            load.array[:] = right.array
+            self._rotate(load.array, "nji,nj->ni")
+            load.array[self._held] = 0.0
+            self._iterate(self._preconditioner(constraint, stack), load, found, target, stack)
+            self._rotate(found.array, "nij,nj->ni")
+            change.axpy(1.0, found)
+
+    def _iterate(
+        self, preconditioner: object, load: PETSc.Vec, found: PETSc.Vec, target: float, stack: ExitStack
+    ) -> None:
+        is_mixed, norm = isinstance(self._elements, MixedElements), load.norm()
+        gained, self._before = norm / self._before if self._before else 1.0, norm
+        tolerance = forcing(gained, target / norm if norm else 1.0)
+        for kind in ("tangent, mixed",) if is_mixed else ("tangent", "tangent, mixed"):
+            how = {"ksp_rtol": tolerance, "ksp_max_it": _MOST_ITERATIONS}
+            ksp = solver_of(kind, self._matrix, stack, preconditioner, **how)
+            found.set(0.0)
+            ksp.solve(load, found)
+            if ksp.getConvergedReason() > 0:
+                break
+            # Conjugate gradients end where the tangent is indefinite, as far from equilibrium.
+            if ksp.getConvergedReason() == INDEFINITE and isinstance(self._solver, DisplacementSolver):
+                self._solver.linear.refine_eigenvalues()
+        self._body.iterations += check_converged(ksp)
+
+    def _preconditioner(self, constraint: Constraint, stack: ExitStack) -> object:
+        """Return the preconditioner of linear elasticity with the same nodes held along z."""
+        active = constraint.held[:, -1]
+        if self._solver is None or not np.array_equal(active, self._active):
+            held = self._numbering.normal_dofs(active, owned=True)
+            levels = self._hierarchy.hold(active)
+            self._solver = self._elements.solver_on(levels, self._law, held, direct=False, earlier=self._solver)
+            self._active = active
+        if isinstance(self._solver, MixedSolver):
+            elements = self._solver.elements
+            return self._solver.saddle.preconditioner(elements.compliance(self._law), stack)
+        assert isinstance(self._solver, DisplacementSolver)
+        return self._solver.linear
+
+    def _rotate(self, values: FloatArray, how: str) -> None:
+        values[self._dofs] = np.einsum(how, self._frames, values[self._dofs])

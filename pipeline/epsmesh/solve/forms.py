@@ -1,0 +1,281 @@
+"""Forms of all elements, compiled once and cached in the project's own folder; ``physics`` has their formulas.
+
+λ and μ are constants of the compiled form, or functions that are constant on each cell: no value is compiled in. Each
+form is made at its first use, which is collective.
+"""
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from epsmesh import compat
+from epsmesh.arrays import BoolArray, Int32Array
+from epsmesh.mesh.curve import EDGES
+from epsmesh.mesh.distribute import distribute
+from epsmesh.mesh.generate import MeshArrays
+from epsmesh.solve.compiled import MORE, cellwise_space, form, scalar_space, vector_space
+from epsmesh.solve.laws import LAWS
+from epsmesh.solve.laws.law import Pressure
+from epsmesh.solve.measures import STRAIGHT, curved_cells, dx, measures_of
+from epsmesh.solve.physics import COEFFICIENTS, MaterialLaw, of_regions, strain
+from epsmesh.solve.point_law import PointLaw
+
+
+class CellKernel(Protocol):
+    """Returns the address of a stiffness kernel for straight cells, with the signature that dolfinx calls."""
+
+    def __call__(self, degree: int, *, of_regions: bool) -> int: ...  # noqa: D102
+
+
+class ElasticForms:
+    """Forms of linear elasticity, K = λ ∫ div u div v + μ ∫ 2 ε(u) : ε(v), on one space.
+
+    ``coefficients`` are the law's parameters by name: constants, or, on a mesh of several ``regions`` (of the local
+    cells, ghosts included), functions that are constant on each cell. ``displacement`` is the u of ``action``, K u.
+    With a ``cell_kernel``, that kernel integrates K on straight cells.
+    """
+
+    def __init__(self, space: Any, regions: Int32Array | None = None, cell_kernel: CellKernel | None = None):
+        self._space, self._regions, self._cell_kernel = space, regions, cell_kernel
+        self.displacement = fem.Function(space)
+        self.coefficients = {name: self._coefficient() for name in COEFFICIENTS}
+
+    def set_law(self, law: MaterialLaw) -> None:
+        """Set the parameters of ``law`` for the next assembly."""
+        for name, coefficient in self.coefficients.items():
+            self.put(coefficient, law.values(name))
+
+    def coefficients_of(self, laws: Iterable[str]) -> dict[str, Any]:
+        """Return the coefficients of these laws by name; the next :meth:`set_law` sets new ones."""
+        for name in (name for law in laws for name in LAWS[law].parameters):
+            self.coefficients.setdefault(name, self._coefficient())
+        return self.coefficients
+
+    def cells_of(self, laws: Sequence[str]) -> dict[str, BoolArray | None]:
+        """Return for each law the mask of its local cells; None if it is the law of all regions."""
+        if len(set(laws)) == 1:
+            return {laws[0]: None}
+        return {law: np.array([each == law for each in laws])[self._regions] for law in sorted(set(laws))}
+
+    def by_region(self, values: tuple[float, ...]) -> Any:
+        """Return a coefficient with the given ``values`` by region: a constant, or a function."""
+        result = self._coefficient()
+        self.put(result, values)
+        return result
+
+    def _coefficient(self) -> Any:
+        if self._regions is None:
+            return fem.Constant(self._space.mesh, 1.0)
+        return fem.Function(self._cellwise)
+
+    @cached_property
+    def _cellwise(self) -> Any:
+        return cellwise_space(self._space.mesh, ())
+
+    def put(self, coefficient: Any, values: tuple[float, ...]) -> None:
+        """Set the values of a ``coefficient`` by region; a single one applies to all."""
+        if self._regions is None:
+            (coefficient.value,) = set(values)
+        else:
+            coefficient.x.array[compat.cell_dofs(coefficient.function_space).reshape(-1)] = of_regions(
+                values, self._regions, len(self._regions)
+            )
+
+    @cached_property
+    def stiffness(self) -> Any:
+        """Stiffness K."""
+        return self._form(ufl.TrialFunction(self._space), dx(self._space), self._kernels())
+
+    @cached_property
+    def curved_stiffness(self) -> Any:
+        """The part of K from cells with curved edges: the same code, with only these cells marked."""
+        return self._form(ufl.TrialFunction(self._space), dx(self._space, curved_only=True))
+
+    @cached_property
+    def action(self) -> Any:
+        """Product K u."""
+        return self._form(self.displacement, dx(self._space))
+
+    def _kernels(self) -> dict[int, int]:
+        """Return the hand-written kernel for straight cells: it takes a twelfth of the time of the generated one."""
+        if self._cell_kernel is None:
+            return {}
+        kernel = self._cell_kernel(compat.degree(self._space), of_regions=self._regions is not None)
+        return {compat.EVERYWHERE if curved_cells(self._space.mesh) is None else STRAIGHT: kernel}
+
+    def _form(self, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
+        v, of = ufl.TestFunction(self._space), self.coefficients
+        work = of["lame_lambda"] * ufl.div(u) * ufl.div(v) + 2 * of["lame_mu"] * ufl.inner(strain(u), strain(v))
+        return form(work * measure, kernels)
+
+
+class MixedForms:
+    """Coupling of displacement and pressure in mixed elements: B(q, u) = ∫ q div u and M(p, q) = ∫ p q.
+
+    ``dilation`` is for the ``displacement`` that was passed, ``pull`` for the function ``pressure``.
+    """
+
+    def __init__(self, displacement: Any, pressures: Any):
+        self._displacement, self._pressures = displacement, pressures
+        self.pressure = fem.Function(pressures)
+
+    @cached_property
+    def mass(self) -> Any:
+        """Mass M."""
+        p, q = ufl.TrialFunction(self._pressures), ufl.TestFunction(self._pressures)
+        return self._form(p * q)
+
+    @cached_property
+    def coupling(self) -> Any:
+        """Coupling B."""
+        u, q = ufl.TrialFunction(self._displacement.function_space), ufl.TestFunction(self._pressures)
+        return self._form(q * ufl.div(u))
+
+    @cached_property
+    def dilation(self) -> Any:
+        """Product B u, a vector on pressures."""
+        return self._form(ufl.TestFunction(self._pressures) * ufl.div(self._displacement))
+
+    @cached_property
+    def pull(self) -> Any:
+        """Product Bᵀ p, a vector on displacements."""
+        return self._form(self.pressure * ufl.div(ufl.TestFunction(self._displacement.function_space)))
+
+    def _form(self, integrand: Any) -> Any:
+        return form(integrand * dx(self._displacement.function_space))
+
+
+class HyperelasticForms:
+    """Derivatives of the energy, with coefficients and displacement u shared with the ``elastic`` forms.
+
+    ``laws`` are the names of the laws by region, or a single one. ``pressure`` of mixed elements is p, and the
+    coefficient 1/λ₁ (see :mod:`epsmesh.solve.elements.mixed`). Forms are by field, u or (u, p); ``directions`` are the
+    functions of ``products``.
+    """
+
+    def __init__(
+        self,
+        space: Any,
+        elastic: ElasticForms,
+        laws: Sequence[str],
+        pressure: Pressure | None = None,
+        *,
+        scaled: bool = False,
+    ):
+        """With ``scaled`` the energy has a factor, which :meth:`set_factors` sets for each region."""
+        self._space, self._cells, self._pressure = space, elastic.cells_of(laws), pressure
+        self._elastic, self._factor = elastic, elastic.by_region((1.0,)) if scaled else None
+        self._displacement, self._coefficients = elastic.displacement, elastic.coefficients_of(laws)
+        self._fields = (elastic.displacement, *(pressure or ())[:1])
+        self.directions = tuple(fem.Function(field.function_space) for field in self._fields)
+
+    def _derivative(self, *directions: tuple[int, Any]) -> Any:
+        """Return the derivative of the energy along ``directions``, each with the number of its field."""
+        gradient = ufl.Identity(3) + ufl.grad(self._displacement)
+        found = []
+        for law, measure in self._measures.items():
+            energy = LAWS[law].density(gradient, self._coefficients, self._pressure)
+            for column, direction in directions:
+                energy = energy.derivative(self._fields[column], direction, of_shape=column == 0)
+            value = energy.value if self._factor is None else self._factor * energy.value
+            found.append(value * measure)
+        return sum(found)
+
+    def set_factors(self, values: tuple[float, ...]) -> None:
+        """Set the factor of the energy in each region, of forms made with one."""
+        self._elastic.put(self._factor, values)
+
+    @cached_property
+    def _measures(self) -> dict[str, Any]:
+        return measures_of(self._space, self._cells, more=MORE)
+
+    def _test(self, row: int) -> tuple[int, Any]:
+        return row, ufl.TestFunction(self._fields[row].function_space)
+
+    @cached_property
+    def energy(self) -> Any:
+        """Stored energy; NaN where J < 0 anywhere."""
+        return form(self._derivative())
+
+    @cached_property
+    def residuals(self) -> tuple[Any, ...]:
+        """First derivatives of the energy: nodal forces, and the residual of the pressure."""
+        return tuple(form(self._derivative(self._test(row))) for row in range(len(self._fields)))
+
+    @cached_property
+    def tangents(self) -> tuple[Any, ...]:
+        """Second derivatives of the energy: K, and in mixed elements the coupling B and the block of the pressures."""
+        pairs = [(row, column) for row in range(len(self._fields)) for column in range(row + 1)]
+        trials = [ufl.TrialFunction(field.function_space) for field in self._fields]
+        return tuple(form(self._derivative(self._test(row), (column, trials[column]))) for row, column in pairs)
+
+    @cached_property
+    def products(self) -> tuple[Any, ...]:
+        """Products of the tangent with the ``directions``."""
+        columns = [*enumerate(self.directions)]
+        return tuple(
+            form(sum(self._derivative(self._test(row), column) for column in columns))
+            for row in range(len(self._fields))
+        )
+
+    def set_directions(self) -> None:
+        """Copy the fields to the ``directions``."""
+        for direction, field in zip(self.directions, self._fields, strict=True):
+            direction.x.array[:] = field.x.array
+
+
+def compile_forms(
+    degree: int,
+    element: str = "displacement",
+    laws: Sequence[str] = ("linear",),
+    *,
+    straight: bool = False,
+    of_regions: bool = False,
+    of_contact: bool = False,
+    of_steps: bool = False,
+) -> None:
+    """Compile the forms for elements of ``degree``, for all lower degrees, and for the next one (error bar).
+
+    ``of_contact``: with those of contact at large displacements; ``of_steps``: with those of time steps.
+    """
+    regions = np.zeros(1, dtype=np.int32) if of_regions else None
+    mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
+    for level in range(1, degree + 2):
+        space = vector_space(mesh, level)
+        elastic, mixed = ElasticForms(space, regions), None
+        _ = elastic.stiffness, elastic.action
+        if element == "mixed" and level > 1:  # the search for contact begins at the lowest degree
+            mixed = MixedForms(elastic.displacement, scalar_space(mesh, level - 1))
+            _ = mixed.mass, mixed.coupling, mixed.dilation, mixed.pull
+        if set(laws) != {"linear"} and level >= degree:
+            pressure = (mixed.pressure, elastic.by_region((1.0,))) if mixed is not None else None
+            large = HyperelasticForms(space, elastic, laws, pressure)
+            _ = large.residuals, large.products
+            if of_contact:
+                _ = large.energy
+                for law in sorted(set(laws)):
+                    PointLaw(mesh, law, is_mixed=mixed is not None).compile()
+            if level == degree:
+                _ = large.energy
+                for law in sorted(set(laws)):
+                    PointLaw(mesh, law, is_mixed=mixed is not None).compile()
+        if of_steps and level == degree:
+            pressure = (mixed.pressure, elastic.by_region((1.0,))) if mixed is not None else None
+            large = HyperelasticForms(space, elastic, laws, pressure, scaled=True)
+            _ = large.residuals, large.energy
+            for law in sorted(set(laws)):
+                PointLaw(mesh, law, is_mixed=mixed is not None).compile(relaxes=True)
+
+
+def one_cell(*, straight: bool) -> MeshArrays:
+    """Return a mesh of one tetrahedron, on which forms are compiled."""
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    middle = corners[EDGES].mean(axis=1)
+    points = corners if straight else np.vstack([corners, middle])
+    cells = np.arange(len(points), dtype=np.int64)[None, :]
+    return MeshArrays(points, cells, {"fixed": np.array([[0, 1, 2]])}, np.array([0]), 0.0)

@@ -1,0 +1,79 @@
+"""Movement of a probe over time, and what a body answers."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import inf
+
+import numpy as np
+
+from epsmesh.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Course:
+    """The movement over time: ``shares`` of the whole movement at ``times`` (s), which do not decrease.
+
+    The share is linear in between. ``breaks`` are those numbers of times at which its rate changes. The first time is
+    0 s; if its share is not zero, the movement begins with a jump. ``share_at`` returns the shares at any times.
+
+    ``accuracy`` is that of the largest force, relative to it: of the time steps and, in a request, of the mesh, too.
+    """
+
+    times: tuple[float, ...]
+    shares: tuple[float, ...]
+    breaks: frozenset[int] = frozenset()
+    share_at: Callable[[FloatArray], FloatArray] | None = None
+    accuracy: float = inf
+
+    def left(self, error: float) -> "Course":
+        """Return the course with what the relative ``error`` of a mesh leaves of the accuracy, a tenth at least."""
+        return replace(self, accuracy=max(self.accuracy - error, self.accuracy / 10))
+
+    def refined(self) -> "Course":
+        """Return the course with one more time between any two."""
+        assert self.share_at is not None
+        own = np.array(self.times)
+        times = np.insert(own, np.arange(1, len(own)), (own[1:] + own[:-1]) / 2)
+        shares = tuple(map(float, self.share_at(times)))
+        return replace(self, times=tuple(times.tolist()), shares=shares, breaks=frozenset(2 * n for n in self.breaks))
+
+    def halves(self) -> frozenset[int]:
+        """Return the numbers of the times of a course of every other time, all breaks included."""
+        found, last = {0, *self.breaks, len(self.times) - 1}, 0
+        for number in range(1, len(self.times)):
+            if number in found or number - last == 2:
+                found.add(number)
+                last = number
+        return frozenset(found)
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """What a body answers at n ``times`` (s); of the whole body, global.
+
+    ``forces`` (n, 3) are those of the tissue on the probe (N), with ``bars`` (n) of the time steps, and of
+    the distance of nodes at the edge of contact, along the axis (N).
+    ``dissipated`` (n) is the energy (J) turned into heat since the beginning, ``imbalance`` (n) the difference (J) of
+    work and of what is stored and dissipated. ``areas`` (n, m²) are those of found contact, NaN without.
+    """
+
+    times: FloatArray
+    forces: FloatArray
+    bars: FloatArray
+    dissipated: FloatArray
+    imbalance: FloatArray
+    areas: FloatArray
+
+    @property
+    def bar(self) -> float:
+        """The largest bar, relative to the largest force."""
+        return float(self.bars.max() / np.abs(self.forces[:, 2]).max())
+
+
+def between(found: dict[int, float], count: int) -> FloatArray:
+    """Return values at ``count`` points from those ``found`` at some: of the two neighbours, the larger one."""
+    known = np.array(sorted(found))
+    values = np.array([found[number] for number in known])
+    right = np.clip(np.searchsorted(known, np.arange(count)), 0, len(known) - 1)
+    left = np.where(known[right] == np.arange(count), right, np.maximum(right - 1, 0))
+    return np.maximum(values[left], values[right])

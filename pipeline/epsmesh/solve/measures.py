@@ -1,0 +1,76 @@
+"""Measures of the integrals of forms: quadrature degrees on straight and on curved cells."""
+
+from collections.abc import Mapping
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+from epsmesh import compat
+from epsmesh.arrays import BoolArray
+from epsmesh.mesh.curve import EDGES
+from epsmesh.solve.compiled import quadrature_degree
+
+# Marks of cells, and the rounding error of an edge's bulge, in units of its length.
+_NEITHER, STRAIGHT, _CURVED = 0, 1, 2
+_FLAT = 1e-9
+_curved: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
+
+
+def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:
+    """Return the measure for forms of elasticity on ``space``, with quadrature degrees; of curved cells only, if so.
+
+    On straight cells degree 2p - 2 is exact; ``more`` is added for integrands that are no such polynomials. Curved
+    cells have a higher degree of their own, since few cells of a mesh are curved.
+    """
+    degree, mesh = compat.degree(space), space.mesh
+    exact, enough = ({"quadrature_degree": d} for d in (2 * degree - 2 + more, quadrature_degree(degree)))
+    curved = curved_cells(mesh)
+    if curved is None:
+        return ufl.dx(metadata=exact)
+    marks = np.where(curved, _CURVED, _NEITHER if curved_only else STRAIGHT)
+    measure = ufl.Measure("dx", domain=mesh, subdomain_data=compat.cell_tags(mesh, marks))
+    return measure(STRAIGHT, metadata=exact) + measure(_CURVED, metadata=enough)
+
+
+def measures_of(space: Any, cells: Mapping[str, BoolArray | None], *, more: int) -> dict[str, Any]:
+    """Return a measure for each law on its ``cells``, None for all of them: see :func:`dx`."""
+    masks = [mask for mask in cells.values() if mask is not None]
+    if not masks:
+        return {law: dx(space, more=more) for law in cells}
+    degree, mesh, count = compat.degree(space), space.mesh, len(masks)
+    exact, enough = ({"quadrature_degree": d} for d in (2 * degree - 2 + more, quadrature_degree(degree)))
+    curved, marks = curved_cells(mesh), np.array(masks).argmax(axis=0) + 1
+    if curved is not None:
+        marks[curved] += count
+    measure = ufl.Measure("dx", domain=mesh, subdomain_data=compat.cell_tags(mesh, marks))
+    straight = [measure(number, metadata=exact) for number in range(1, count + 1)]
+    if curved is None:
+        return dict(zip(cells, straight, strict=True))
+    bent = [measure(count + number, metadata=enough) for number in range(1, count + 1)]
+    return {law: one + other for law, one, other in zip(cells, straight, bent, strict=True)}
+
+
+def curved_cells(mesh: Any) -> BoolArray | None:
+    """Return a mask of local cells with a mid node off the middle of its edge; None if cells have no mid nodes."""
+    if mesh not in _curved:
+        _curved[mesh] = _find_curved(mesh)
+    return _curved[mesh]
+
+
+def has_curved_cells(mesh: Any) -> bool:
+    """Return whether any rank has a curved cell; collective."""
+    curved = curved_cells(mesh)
+    return bool(mesh.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR))
+
+
+def _find_curved(mesh: Any) -> BoolArray | None:
+    nodes = compat.geometry_dofs(mesh)
+    if nodes.shape[1] == 4:
+        return None
+    points = mesh.geometry.x[nodes]
+    ends = points[:, EDGES]
+    bulge = np.abs(points[:, 4:] - ends.mean(axis=2)).max(axis=(1, 2))
+    return np.asarray(bulge > _FLAT * np.abs(ends[:, :, 1] - ends[:, :, 0]).max(axis=(1, 2)))

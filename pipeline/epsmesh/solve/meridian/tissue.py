@@ -1,0 +1,99 @@
+"""A half plane at large displacements, seen from the surface nodes that a tool may touch.
+
+The interface is that of :mod:`epsmesh.solve.contact.deformed`, in two dimensions. Lengths are in units of the mesh,
+forces per radian.
+"""
+
+import numpy as np
+import scipy.sparse as sp
+
+from epsmesh.arrays import FloatArray, IntArray
+from epsmesh.solve.contact.deformed import Constraint
+from epsmesh.solve.meridian.system import FreeSystem
+from epsmesh.stages import stage
+
+
+class MeridianTissue:
+    """The elements of a ``system``, with nodes ``dofs`` (n, 2) at ``places`` (n, 2): see :class:`.deformed.Tissue`."""
+
+    def __init__(self, system: FreeSystem, dofs: IntArray, places: FloatArray):
+        """Begin at rest."""
+        self.system, self.places = system, places
+        self._dofs, self._free = dofs, system.free
+        self.fixed = ~np.isin(dofs, system.free)
+        self._now = self._from = self._change = np.zeros(system.forms.dofs)
+        self._residual: FloatArray | None = None
+        self.iterations = 0
+
+    @property
+    def state(self) -> FloatArray:
+        """All dofs: displacement, and in mixed elements pressure."""
+        return self._now
+
+    @state.setter
+    def state(self, values: FloatArray) -> None:
+        self._now, self._residual = values, None
+
+    def positions(self) -> FloatArray:
+        """Return the nodes' deformed positions (n, 2)."""
+        return self.places + self._now[self._dofs]
+
+    def forces(self) -> FloatArray:
+        """Return the nodal forces (n, 2); zero at prescribed components."""
+        return np.where(self.fixed, 0.0, self.residual()[self._dofs])
+
+    def residual(self) -> FloatArray:
+        """Return the derivative of the energy by all dofs."""
+        if self._residual is None:
+            self._residual = self.system.forms.residual(self._now)
+        return self._residual
+
+    def unbalanced(self) -> float:
+        """Return the norm of the residual at all other free dofs."""
+        return float(np.linalg.norm(self.residual()[np.setdiff1d(self._free, self._dofs)]))
+
+    def linearise(self, constraint: Constraint) -> FloatArray:
+        """Find the increment under a ``constraint``; return the nodal forces (n, 2) that it predicts.
+
+        Raises:
+            SolveError: if the linear solver fails.
+        """
+        self._from, dofs = self._now, self._dofs
+        with stage("assembly"):
+            tangent = self.system.forms.stiffness(self._now)
+            turn = self._blocks(constraint.frames) + sp.diags(self._apart())
+            turned = (turn.T @ (tangent - self._blocks(constraint.turning)) @ turn).tocsr()
+        change: FloatArray = np.zeros_like(self._now)
+        held = dofs[constraint.held]
+        change[held] = constraint.values[constraint.held]
+        load = -self.residual()
+        load[dofs] += constraint.forces
+        unknown = np.setdiff1d(self._free, held)
+        rows = turned[unknown]
+        with self.system.inverse(rows[:, unknown], is_definite=False) as solve, stage("solve"):
+            change[unknown] = solve((turn.T @ load)[unknown] - rows @ change)
+        self._change = turn @ change
+        self.iterations += 1
+        return np.where(self.fixed, 0.0, (self.residual() + tangent @ self._change)[dofs])
+
+    def advance(self, share: float) -> bool:
+        """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
+        self.state = self._from + share * self._change
+        return self.is_sound
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether no tissue is inside out."""
+        return bool(np.isfinite(self.system.forms.energy(self._now)))
+
+    def _blocks(self, blocks: FloatArray) -> sp.csr_matrix:
+        """Return the matrix with ``blocks`` (n, 2, 2) at the nodes."""
+        rows, columns = (np.repeat(self._dofs, 2, axis=1), np.tile(self._dofs, 2))
+        size = len(self._now)
+        return sp.csr_matrix((blocks.reshape(-1, 4).ravel(), (rows.ravel(), columns.ravel())), shape=(size, size))
+
+    def _apart(self) -> FloatArray:
+        """Return 1 at all dofs but those of the nodes."""
+        apart = np.ones(len(self._now))
+        apart[self._dofs] = 0.0
+        return apart

@@ -1,0 +1,298 @@
+"""A round tool above the half plane (r, z): the load path of its contact, with or without friction, and the checks.
+
+The tissue is seen from the nodes of the surface that faces the tool. In linear elasticity the normal of the contact is
+the tool's axis, and a node meets the tool at its radius at rest.
+
+Lengths are in units of the mesh, stresses in units of μ of region 0.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf, nan, pi
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.mesh.meridian import MeridianArrays
+from epsmesh.scene.model import FREE, PROBE
+from epsmesh.shapes.distance import Distance
+from epsmesh.solve import SolveError
+from epsmesh.solve.balance import check_balance, check_work
+from epsmesh.solve.contact.contact_steps import ContactPath, Friction, Stage, press, press_with_friction
+from epsmesh.solve.contact.coulomb import Neighbours
+from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
+from epsmesh.solve.meridian.forms import Meshes
+from epsmesh.solve.meridian.punch import RoundTool
+from epsmesh.solve.meridian.signs import seen_from_above
+from epsmesh.solve.meridian.system import System
+from epsmesh.solve.meridian.tissue import MeridianTissue
+from epsmesh.solve.newton import LargeError
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.stages import stage
+
+# Change of the displacement for the check of the work.
+_SMALL = 1e-3
+# Rounding error of an energy, in units of μ and the volume.
+_ROUNDING = 1e-15
+# Nodes are beside the tool beyond this share of its radius (rounding); its height there is out of reach.
+_BESIDE, _OUT_OF_REACH = 1e-9, 1e6
+# The tool's advance.
+_DOWN = np.array([0.0, -1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class MeridianTouch:
+    """A ``tool`` above ``tissue`` of a ``law``, whose nodes are those of the surface from the axis outwards.
+
+    ``unit`` (m) is that of the mesh, ``volume`` that of a cylinder round the body. ``touched`` is the contact.
+    """
+
+    tissue: MeridianTissue
+    tool: RoundTool
+    law: MaterialLaw
+    unit: float
+    volume: float
+    touched: ContactSolution | None = None
+
+    @staticmethod
+    def of(arrays: MeridianArrays, meshes: Meshes, degree: int, law: MaterialLaw, tool: RoundTool) -> "MeridianTouch":
+        """Return tissue at rest, in elements of one degree."""
+        with stage("assembly"):
+            system = System(meshes, degree, law)
+        groups = [system.forms.on(name) for name in (PROBE, FREE)]
+        dofs, first = np.unique(np.vstack([dofs for dofs, _ in groups]), axis=0, return_index=True)
+        places = np.vstack([places for _, places in groups])[first]
+        order = np.argsort(places[:, 0], kind="stable")
+        order = order[seen_from_above(arrays, places[order])]
+        wide, high = np.ptp(arrays.points, axis=0)
+        tissue = MeridianTissue(system, dofs[order], places[order])
+        return MeridianTouch(tissue, tool, law, arrays.unit, pi * wide**2 * high)
+
+    def pressed(self, depth: float) -> "MeridianTouch":
+        """Return the contact without friction at the end of the load path to a ``depth`` (m).
+
+        Raises:
+            LargeError: if the path ends before; ``reached`` are the depth and the force there.
+        """
+        return self._at_end(lambda path, there: press(self.tissue, self.placed, path, there), depth)
+
+    def along(self, depths: Sequence[float]) -> Iterator["MeridianTouch"]:
+        """Yield the contact without friction at rising ``depths`` (m) of one load path, as far as it goes."""
+        path = ContactPath(Stage(0.0, np.zeros_like(self.tissue.state)))
+        for depth in depths:
+            try:
+                press(self.tissue, self.placed, path, depth / self.unit)
+            except LargeError:
+                return
+            yield replace(self, touched=path.last.touched)
+
+    def pressed_with_friction(self, depth: float, steps: int) -> "MeridianTouch":
+        """Return the contact with friction at the end of a load path of at least so many ``steps`` to a ``depth`` (m).
+
+        Raises:
+            LargeError: if the path ends before; ``reached`` are the depth and the force there.
+        """
+        friction = self._friction(depth / self.unit)
+        return self._at_end(
+            lambda path, there: press_with_friction(self.tissue, self.placed, path, there, friction, steps), depth
+        )
+
+    def _at_end(self, follow: Callable[[ContactPath, float], int], depth: float) -> "MeridianTouch":
+        path = ContactPath(Stage(0.0, np.zeros_like(self.tissue.state)))
+        self.tissue.state = path.last.state
+        try:
+            follow(path, depth / self.unit)
+        except LargeError as error:
+            there = replace(self, touched=path.last.touched)
+            raise LargeError(str(error), (path.last.depth, there.force) if path.last.touched else None) from error
+        return replace(self, touched=path.last.touched)
+
+    def raised(self, coarse: "MeridianTouch", depth: float) -> "MeridianTouch":
+        """Return the contact at a ``depth`` (m), found from that of elements of a lower degree on the same mesh.
+
+        Raises:
+            LargeError: if it is not found.
+        """
+        self.tissue.state = self.tissue.system.forms.interpolate(coarse.tissue.system.forms, coarse.tissue.state)
+        return self._found_from(coarse, depth)
+
+    def moved(self, other: "MeridianTouch", depth: float) -> "MeridianTouch":
+        """Return the contact at a ``depth`` (m), found from that on another mesh of straight cells.
+
+        Raises:
+            LargeError: if it is not found.
+        """
+        forms, ratio = self.tissue.system.forms, other.unit / self.unit
+        with stage("set-up"):
+            self.tissue.state = forms.transferred(other.tissue.system.forms, other.tissue.state, ratio)
+        return self._found_from(other, depth)
+
+    def _found_from(self, other: "MeridianTouch", depth: float) -> "MeridianTouch":
+        if not self.tissue.is_sound:
+            raise LargeError("tissue is turned inside out")
+        tool = self.placed(depth / self.unit)
+        active = first_set(self.tissue, tool, self.tissue.places[:, 0] * self.unit < other.edge * other.unit)
+        return replace(self, touched=solve_contact(self.tissue, tool, active))
+
+    def placed(self, depth: float) -> PlacedTool:
+        """Return the tool at a ``depth`` (units of the mesh)."""
+        on_support = self.tissue.fixed.all(axis=1)
+
+        def complete(active: BoolArray) -> BoolArray:
+            # The shape function of the node on the axis has no share of the pressure, so its reaction means nothing.
+            return np.concatenate([active[1:2], active[1:]]) & ~on_support
+
+        above = self._along_axis if self.law.is_linear else self._at_deformed_place
+        follows = np.arange(len(on_support)) == 0
+        return PlacedTool(lambda points: above(points, depth), complete, follows, depth)
+
+    def _at_deformed_place(self, points: FloatArray, depth: float) -> Distance:
+        assert self.tool.distance is not None
+        in_space = self.unit * np.insert(points, 1, 0.0, axis=1)
+        found, plane = self.tool.distance(in_space, self.unit * depth), np.ix_([0, 2], [0, 2])
+        curvature = self.unit * found.curvature[:, plane[0], plane[1]]
+        return Distance(found.gap / self.unit, found.normal[:, [0, 2]], curvature)
+
+    def _along_axis(self, points: FloatArray, depth: float) -> Distance:
+        moved = points[:, 1] - self.tissue.places[:, 1]
+        return Distance.along_axis(self._heights - depth - moved, 2)
+
+    @cached_property
+    def _heights(self) -> FloatArray:
+        """The heights (n) of the tool above the nodes at first touch."""
+        radii = self.tissue.places[:, 0] * self.unit
+        beside = radii > (1 + _BESIDE) * self.tool.limit
+        return np.where(beside, _OUT_OF_REACH, self.tool.gap(np.minimum(radii, self.tool.limit)) / self.unit)
+
+    def _friction(self, deepest: float) -> Friction:
+        """Return the friction on a load path to the depth ``deepest`` (units of the mesh)."""
+        radii, nobody = self.tissue.places[:, 0], np.zeros(len(self.tissue.places), dtype=bool)
+        # Forces are per radian: the stiffness of a node is its radius times a modulus. None follows its neighbours.
+        penalty = self.law.plane_moduli[0] / self.law.lame_mu[0] * np.maximum(radii, radii[1])
+        neighbours = Neighbours(nobody, np.empty((0, 2), dtype=np.int64))
+        return Friction(self.tool.friction, _DOWN, penalty, neighbours, deepest)
+
+    @property
+    def _contact(self) -> ContactSolution:
+        assert self.touched is not None
+        return self.touched
+
+    @cached_property
+    def force(self) -> float:
+        """F on the tool, against its advance."""
+        return -2 * pi * float(self._contact.forces[:, 1].sum())
+
+    @property
+    def force_in_metres(self) -> float:
+        """F in units of μ times m²."""
+        return self.force * self.unit**2
+
+    @cached_property
+    def balance(self) -> float:
+        """The relative difference of the forces on tool and support."""
+        system = self.tissue.system
+        assert isinstance(system, System)
+        return abs(2 * pi * float(self.tissue.residual()[system.support].sum()) / self.force - 1)
+
+    @cached_property
+    def energy(self) -> float:
+        """The stored energy."""
+        return 2 * pi * self.tissue.system.forms.energy(self.tissue.state)
+
+    @property
+    def _outermost(self) -> tuple[float, float]:
+        """The radii at rest of the last active node and of the next one.
+
+        Raises:
+            SolveError: if there is no next one.
+        """
+        if self._contact.active[-1]:
+            raise SolveError("contact reaches the edge of the modelled part of the body")
+        last = int(np.flatnonzero(self._contact.active)[-1])
+        inner, outer = self.tissue.places[last : last + 2, 0]
+        return float(inner), float(outer)
+
+    @property
+    def edge(self) -> float:
+        """The radius at rest at which contact ends."""
+        return sum(self._outermost) / 2
+
+    @property
+    def resolution(self) -> float:
+        """The distance of the two nodes between which contact ends, relative to its radius."""
+        inner, outer = self._outermost
+        return (outer - inner) / self.edge
+
+    @property
+    def _radii(self) -> FloatArray:
+        """The radii (n) of the nodes, in linear elasticity at rest, else at the deformed place."""
+        return (self.tissue.places if self.law.is_linear else self.tissue.positions())[:, 0]
+
+    @property
+    def areas(self) -> FloatArray:
+        """The areas (n) of the nodes normal to the axis, between the middles to their neighbours."""
+        radii = self._radii
+        ends = np.append((radii[:-1] + radii[1:]) / 2, radii[-1])
+        return pi * (ends**2 - np.insert(ends[:-1] ** 2, 0, 0.0))
+
+    @property
+    def area(self) -> float:
+        """The contact area. It ends where the gap would be zero, which grows with the distance to the power 3/2."""
+        touched, radii = self._contact, self._radii
+        last = int(np.flatnonzero(touched.active)[-1])
+        inner, outer, beside = radii.take([last, last + 1, last + 2], mode="clip")
+        near, far = np.maximum(touched.gap.take([last + 1, last + 2], mode="clip"), 0.0) ** (2 / 3)
+        edge = outer - (beside - outer) * near / (far - near) if far > near else outer
+        beyond = max(edge, inner) ** 2 - ((inner + outer) / 2) ** 2
+        return float(self.areas[touched.active].sum() + pi * beyond)
+
+    @property
+    def slip_area(self) -> float:
+        """The part of the contact area that slides, NaN without friction; where tissue sticks by definition, none."""
+        touched = self._contact
+        if touched.slide is None:
+            return nan
+        return touched.slide.share(self.areas, touched.active) * self.area if self.tool.friction < inf else 0.0
+
+    @property
+    def slip_resolution(self) -> float:
+        """The area of the nodes beside which sliding begins or ends."""
+        touched = self._contact
+        if touched.slide is None:
+            return nan
+        slides = touched.slide.sliding & touched.active
+        areas, changes = self.areas, np.diff(slides.astype(int)) != 0
+        return float((areas[:-1] + areas[1:])[changes].sum()) / 2
+
+    @property
+    def results(self) -> FloatArray:
+        """F and the friction in units of μ times m², the contact area and the part that slides in m²: (4,)."""
+        return self.unit**2 * np.array([self.force, self.friction, self.area, self.slip_area])
+
+    @property
+    def friction(self) -> float:
+        """The sum of the sizes of the tangential forces."""
+        return 2 * pi * float(np.abs(self._contact.tangential).sum())
+
+    def check(self) -> None:
+        """Check balance and work, and that contact ends on the surface.
+
+        Raises:
+            SolveError: if forces do not balance, the work is not the change of the energy, or the support is touched.
+        """
+        tissue, touched = self.tissue, self._contact
+        self.check_outside(touched)
+        check_balance(self.balance)
+        work = 2 * pi * float((touched.forces * (tissue.positions() - tissue.places)).sum())
+        more, less = (2 * pi * tissue.system.forms.energy((1 + change) * tissue.state) for change in (_SMALL, -_SMALL))
+        check_work(work, (more, less), _SMALL, LargeError, _ROUNDING * self.volume)
+
+    def check_outside(self, touched: ContactSolution) -> None:
+        """Check that the tool does not reach the support.
+
+        Raises:
+            SolveError: if it does.
+        """
+        if np.any(touched.gap[self.tissue.fixed.all(axis=1)] < 0):
+            raise SolveError("the probe reaches the fixed part of the body: no displacement satisfies both")

@@ -1,0 +1,263 @@
+"""The quasi-static problem: a body, a probe that displaces part of its surface, and the reaction force.
+
+    Find u with K u = 0 inside, u = the probe's motion on its footprint (bonded) or its normal part only
+    (frictionless), u = 0 on the support.
+
+The tool is a constraint: its motion is prescribed (:mod:`epsmesh.solve.prescribed`), or its contact area is found
+(:mod:`epsmesh.solve.contact.search`). Both give an equilibrium. The force is the reaction
+(:mod:`epsmesh.solve.response`): stress integrated under the probe is wrong by tens of per cent.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+from petsc4py import PETSc
+
+from epsmesh.arrays import FloatArray
+from epsmesh.solve.cell_values import CellValues, plain_share
+from epsmesh.solve.conditions import Conditions, Front
+from epsmesh.solve.contact.search import ContactSearch
+from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.crack import Advance
+from epsmesh.solve.elements import elements_of
+from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
+from epsmesh.solve.elements.displacement import DisplacementElements
+from epsmesh.solve.elements.fields import Column
+from epsmesh.solve.estimate import error_bar, stiffness_bars
+from epsmesh.solve.linear_solver import LinearSolver
+from epsmesh.solve.movement import Motion, Movement
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.points.state import State
+from epsmesh.solve.prescribed import PrescribedMotion, respond
+from epsmesh.solve.response import Contact, LoadResponse, Response, shares
+from epsmesh.solve.solution import Problem, Request, Solution
+from epsmesh.solve.spaces import Spaces
+from epsmesh.solve.time_steps import Pressed, TimeSteps, follow
+from epsmesh.stages import recorded, stage
+
+
+class Constraint(Protocol):
+    """Constraint of the surface under a tool: a prescribed motion, or unilateral contact."""
+
+    def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
+        """Find the equilibrium for a movement of the tool; the ``stack`` frees what is made; collective.
+
+        Raises:
+            SolveError: if there is none, or it fails a check.
+        """
+
+    def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> Pressed:
+        """Return the body in time steps up to the equilibrium that was found; collective."""
+
+    def close(self) -> None:
+        """Free what is kept between solves."""
+
+
+class QuasiStaticProblem(Problem):
+    """Elements on a mesh with conditions, ready for any material and movement. A context manager."""
+
+    def __init__(
+        self,
+        spaces: Spaces,
+        degree: int,
+        conditions: Conditions,
+        element: str = "displacement",
+        *,
+        tool: Tool | None = None,
+        reuse: bool = False,
+        condense: bool = False,
+    ):
+        """Prepare elements of a ``degree``, of the kind "displacement" or "mixed"; collective.
+
+        Unilateral contact needs the ``tool``. With ``reuse`` the last solution is the initial guess of the next solve;
+        ``condense``: see ``ContactSearch``.
+
+        Raises:
+            SolveError: if footprint and support share a point: no displacement satisfies both.
+        """
+        self.elements: Elements = elements_of(spaces, degree, conditions, element)
+        self.constraint: Constraint = PrescribedMotion(self.elements, reuse=reuse)
+        if tool is not None:
+            self.constraint = ContactSearch(spaces, self.elements, tool, reuse=reuse, condense=condense)
+        self._body, self._conditions = spaces.body, conditions
+        displacement = self.elements.displacements.forms.displacement
+        self._values = CellValues(self._body, displacement, is_mixed=element == "mixed")
+        self._law: MaterialLaw | None = None  # of the last solution
+        # The fields of the last solution in elements of one degree more, if they were requested and are known.
+        self.finer_state: State | None = None
+
+    def close(self) -> None:
+        """Free what is kept between solves."""
+        self.constraint.close()
+        self.elements.close()
+
+    @property
+    def corrections(self) -> dict[Motion, tuple[FloatArray, ...]]:
+        """The last solution per unit of each prescribed motion: see ``PrescribedMotion``; empty if contact is found."""
+        return self.constraint.corrections if isinstance(self.constraint, PrescribedMotion) else {}
+
+    @property
+    def dofs(self) -> int:
+        """Number of unknowns of the modelled part."""
+        return self.elements.dofs
+
+    def answer(self, asked: Request) -> Solution:
+        """Solve for each motion of the movement, with one set-up, and return forces and checks; collective.
+
+        An error estimate also solves in elements of one degree more, for ``bars`` and ``decrements``; the latter may
+        be negative in mixed elements.
+
+        Raises:
+            SolveError: if the elements do not support the law, the solver does not converge, or the solution fails a
+                check; a ContactError, if contact is not found.
+        """
+        self._law, self.finer_state = asked.law, None
+        law = asked.law
+        with recorded() as times, ExitStack() as stack:
+            found = self.constraint.solve(asked, stack)
+            front, tip = self._released(self.elements, found.columns, law, found.movement)
+            self.elements.show(found.columns)
+            stored = found.solver.stored
+            solution = Solution(
+                response=found.response,
+                load_response=found.load_response,
+                contact=found.contact,
+                largest=self._values.largest(law, self._conditions.front),
+                dofs=self.elements.whole_dofs,
+                cells=self._body.cells,
+                iterations=found.iterations,
+                times=times,
+                front=front,
+                tip=tip,
+                stored=None if stored is None else 2.0 ** len(self._body.mirrored) * stored,
+            )
+            if asked.estimate:
+                solution = self._estimated(solution, found, asked)
+            if asked.course is not None:
+                solution = self._followed(solution, found, asked, stack)
+            self.elements.show(found.columns)
+        return solution
+
+    def _followed(self, solution: Solution, found: Equilibrium, asked: Request, stack: ExitStack) -> Solution:
+        """Return the ``solution`` with the history of the course; collective.
+
+        Raises:
+            LargeError: if the time steps do not reach its end.
+        """
+        assert asked.course is not None
+        self.elements.set_law(asked.law)
+
+        def begin() -> TimeSteps:
+            pressed = self.constraint.in_time(asked, found, stack)
+            return TimeSteps(asked.law, pressed, found.movement.amounts[0], stack, mirrored=self._body.mirrored)
+
+        history, iterations = follow(begin, asked.course)
+        return replace(solution, history=history, iterations=solution.iterations + iterations)
+
+    @stage("error bar")
+    def _estimated(self, solution: Solution, found: Equilibrium, asked: Request) -> Solution:
+        """Return the last ``solution`` with its error bars; collective."""
+        elements, columns, movement, law = self.elements, found.columns, found.movement, asked.law
+        whole = 2.0 ** len(self._body.mirrored)
+        with ExitStack() as stack:
+            finer = found.solver.hierarchical_estimate(
+                columns, movement, stack, keep=asked.keep or self._conditions.front is not None
+            )
+            if asked.keep and finer.columns:
+                finer.elements.show(finer.columns, [column.amount for column in columns])
+                self.finer_state = finer.elements.state(law)
+            form = _form(solution.response, solution.load_response)
+            if finer.decrements is None:
+                products = finer.elements.products(law, finer.columns, checked=False)
+                decrements = form - _form(*respond(products, finer.columns, law, movement))
+            else:
+                decrements = whole * finer.decrements
+            released = self._released(finer.elements, finer.columns, law, movement) if finer.columns else (None, None)
+        plain = plain_share(self._body)
+        unseen = None if finer.unseen is None else shares(np.diag(whole * finer.unseen), form)
+        relative = finer.relative
+        if relative is None:
+            rests = np.zeros(len(form)) if unseen is None else unseen
+            relative = np.array(
+                [
+                    error_bar(share, elements.degree, elements.element, plain=plain, unseen=rest)
+                    for share, rest in zip(shares(decrements, form), rests, strict=True)
+                ]
+            )
+        solution = solution.with_bars(
+            decrements, stiffness_bars(form, relative), elements.element, apart=movement.apart
+        )
+        front, tip = (
+            advance and above and advance.with_finer(above, elements.degree, solution.energy_bar)
+            for advance, above in zip((solution.front, solution.tip), released, strict=True)
+        )
+        return replace(
+            solution,
+            contact=found.contact and _with_bars(found.contact, finer),
+            plain=plain,
+            is_solved=finer.is_solved,
+            unseen=None if unseen is None else unseen[: len(movement.motions)],
+            front=front,
+            tip=tip,
+        )
+
+    @stage("energy release")
+    def _released(
+        self, elements: Elements, columns: Sequence[Column], law: MaterialLaw, movement: Movement
+    ) -> tuple[Advance | None, Advance | None]:
+        """Return the energy (J/m) that a slit's front, and the blade's tip, release in the whole body."""
+
+        def of(line: Front | None) -> Advance | None:
+            if line is None:
+                return None
+            release = elements.release(law, line)
+            found = release.matrix(len(columns), lambda amounts: elements.show(columns, list(amounts)))
+            amounts = np.array([*movement.amounts, *([] if movement.loads is None else [1.0])])
+            if (loads := movement.loads) is not None:
+                works = elements.works(columns, release.of_forces(lambda: elements.displacements.applied(loads).forces))
+                found[:, -1] += works / 2
+                found[-1, :] += works / 2
+            return Advance(2.0 ** len(self._body.mirrored) * found, amounts, len(movement.motions))
+
+        return of(self._conditions.front), of(self._conditions.tip)
+
+    @contextmanager
+    def solver(self, law: MaterialLaw, method: str = "auto") -> Iterator[LinearSolver]:
+        """Lend a solver for a material, of displacement elements; collective.
+
+        Raises:
+            SolveError: if it cannot be set up.
+        """
+        elements = self.elements
+        assert isinstance(elements, DisplacementElements)
+        found = elements.solver(law, direct=elements.is_direct(method))
+        try:
+            yield found.linear
+        finally:
+            found.close()
+
+    def state(self) -> State:
+        """Return a copy of the last solution's fields, which outlives the problem; collective."""
+        assert self._law is not None
+        return self.elements.state(self._law)
+
+    def largest(self, law: MaterialLaw, displacement: PETSc.Vec) -> dict[str, Any]:
+        """Return the cell maxima of ``displacement`` by name; collective."""
+        self.elements.displacements.set_displacement(displacement)
+        return self._values.largest(law, self._conditions.front)
+
+
+def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:
+    """Return the stiffness, with one more row and column for loads."""
+    return response.stiffness if load_response is None else load_response.form
+
+
+def _with_bars(contact: Contact, finer: HierarchicalEstimate) -> Contact:
+    found = replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)
+    if contact.rubbing is None or finer.relative is None:
+        return found
+    of_slip, of_force = contact.rubbing.bars(contact.area, float(finer.relative[0]), finer.area_bar)
+    return replace(found, slip_area_bar=of_slip, friction_force_bar=of_force)

@@ -1,0 +1,266 @@
+"""Displacement spaces of one mesh, shared by all solvers on it: prescribed dofs, forms, operators.
+
+The operator is K = λ A_λ + μ A_μ, with prescribed dofs eliminated symmetrically.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from epsmesh import compat
+from epsmesh.arrays import FloatArray, Int32Array
+from epsmesh.mesh.distribute import BodyMesh
+from epsmesh.scene.model import FIXED, MIRROR, PROBE
+from epsmesh.solve import SolveError
+from epsmesh.solve.compiled import assemble, fill, vector_space
+from epsmesh.solve.conditions import Conditions, Front
+from epsmesh.solve.forms import ElasticForms
+from epsmesh.solve.kernels.assembly import StraightStiffness, cell_kernel
+from epsmesh.solve.kernels.cells import StraightMaps
+from epsmesh.solve.kernels.product import DEGREES, CellStiffness
+from epsmesh.solve.loads import Applied, apply_loads
+from epsmesh.solve.measures import curved_cells, has_curved_cells
+from epsmesh.solve.movement import Loads, Motion
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.stages import stage
+
+_ORIGIN = np.zeros((1, 3))
+_NO_DOFS = np.empty(0, dtype=np.int32)
+# The layout of a matrix is kept for the next law up to this size.
+_KEPT_BYTES = 100_000_000
+
+
+class ElasticSpace:
+    """Displacements of one degree on a mesh: prescribed dofs, forms, and operators.
+
+    ``prescribed`` are local dofs (unrolled, owned and ghosts). Arrays named ``…_owned`` index owned dofs;
+    ``probe_owned`` and ``fixed_owned`` index owned blocks of three dofs. ``owned`` and ``size`` count the dofs of this
+    rank, and of all ranks. ``space`` and ``dirichlet`` are dolfinx objects.
+    """
+
+    @stage("spaces, forms")
+    def __init__(self, body: BodyMesh, degree: int, conditions: Conditions, maps: StraightMaps | None = None):
+        """Make the space; ``maps`` are those that the spaces of a mesh share; collective.
+
+        Raises:
+            SolveError: if footprint and support share a point.
+        """
+        self.body, self.comm, self.degree, self.conditions = body, body.comm, degree, conditions
+        self._maps = maps
+        self.space = space = vector_space(body.mesh, degree)
+        index_map = space.dofmap.index_map
+        self.owned, self.size = 3 * index_map.size_local, 3 * index_map.size_global
+        probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
+        # Candidates for unilateral contact may be on the support: the active set leaves them out.
+        if not conditions.unilateral and self.comm.allreduce(len(np.intersect1d(probe, fixed))):
+            raise SolveError("the probe's footprint touches the fixed face: no displacement satisfies both conditions")
+        mirrors = list(zip(body.mirrored, _planes(space, body), strict=True))
+        single = [(3 * probe + axis, axis) for axis in conditions.components]
+        single += [(3 * plane + axis, axis) for axis, plane in mirrors]
+        zero = np.zeros((), dtype=PETSc.ScalarType)
+        self.dirichlet = [compat.dirichletbc(np.zeros(3, dtype=PETSc.ScalarType), fixed, space)]
+        self.dirichlet += [compat.dirichletbc(zero, dofs, space.sub(axis)) for dofs, axis in single]
+        self._probe, self._fixed, self._sides = probe, fixed, self._sides_of(probe)
+        self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * fixed + c for c in range(3))]))
+        self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
+        self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
+        self.forms = ElasticForms(space, body.regions, cell_kernel)
+
+    @property
+    def whole_dofs(self) -> int:
+        """Number of unknowns of the whole body, of which a half or a quarter may be modelled; collective."""
+        return 3 * whole_points(self.space, self.body)
+
+    def held(self, motion: Motion) -> FloatArray:
+        """Return the displacement (m) that a unit of ``motion`` prescribes, zero elsewhere; local, with ghosts."""
+        index_map = self.space.dofmap.index_map
+        values = np.zeros(3 * (index_map.size_local + index_map.num_ghosts))
+        points = np.asarray(self.space.tabulate_dof_coordinates())[self._probe] if motion.is_rotation else _ORIGIN
+        displacement = np.broadcast_to(motion.at(points, self._sides), (len(self._probe), 3))
+        for component in self.conditions.components:
+            values[3 * self._probe + component] = displacement[:, component]
+        if motion.far is not None:
+            places = np.asarray(self.space.tabulate_dof_coordinates())[self._fixed]
+            values.reshape(-1, 3)[self._fixed] = motion.share * motion.far.at(places)
+        return values
+
+    # ---- operators -------------------------------------------------------------------------------------
+
+    @contextmanager
+    def lend(self, law: MaterialLaw, *, whole: bool = False, entries: bool = True) -> Iterator[PETSc.Mat]:
+        """Lend K, which the borrower may change; collective.
+
+        With ``entries``, or in degree 1, it has type aij, with the first region's μ on the diagonal of prescribed dofs.
+        With ``whole`` it has no conditions. Without entries it is matrix-free, with identity rows at prescribed dofs.
+        """
+        matrix = self._assemble(law, whole=whole) if entries or self.degree == 1 else self._product(law)
+        try:
+            yield matrix
+        finally:
+            matrix.destroy()
+
+    @cached_property
+    def cells(self) -> CellStiffness:
+        """The cells in the layout of products, made at first use; for degree 2 or more; collective."""
+        curved = curved_cells(self.body.mesh)
+        return CellStiffness(self.space, curved, self.prescribed, self.body.regions, self._maps)
+
+    @cached_property
+    def _straight(self) -> StraightStiffness:
+        return StraightStiffness(self.space, curved_cells(self.body.mesh), self.body.regions)
+
+    @stage("assembly")
+    def _product(self, law: MaterialLaw) -> PETSc.Mat:
+        return self.cells.operator(law).matrix()
+
+    @stage("assembly")
+    def _assemble(self, law: MaterialLaw, *, whole: bool) -> PETSc.Mat:
+        self.forms.set_law(law)
+        dirichlet, diagonal = [] if whole else self.dirichlet, law.lame_mu[0]
+        matrix = self._straight.matrix(law, _NO_DOFS if whole else self.prescribed, diagonal)
+        if self.comm.allreduce(self._straight.nbytes, op=MPI.MAX) > _KEPT_BYTES:
+            del self._straight
+        if has_curved_cells(self.body.mesh):
+            compat.add_matrix(matrix, self.forms.curved_stiffness, dirichlet, diagonal)
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        return matrix
+
+    @stage("residuals")
+    def apply(self, result: PETSc.Vec, law: MaterialLaw, *, checked: bool = True) -> None:
+        """Write K u (N), with the unmodified operator and the forms' displacement, into ``result``; collective.
+
+        With ``checked`` the code is other than that of the solver, so that each verifies the other.
+        """
+        if checked or self.degree not in DEGREES:
+            self.forms.set_law(law)
+            assemble(self.forms.action, result)
+        else:
+            result.array[:] = self.cells.operator(law).whole(self.forms.displacement.x.array[: self.owned])
+
+    def residual_of(self, other: "ElasticSpace", law: MaterialLaw, result: PETSc.Vec) -> None:
+        """Write -K u (N), zero at prescribed dofs, for the displacement u of an ``other`` space, into ``result``.
+
+        Collective. The displacement of the own forms is then u.
+        """
+        self.forms.displacement.interpolate(other.forms.displacement)
+        self.apply(result, law, checked=False)
+        result.scale(-1.0)
+        result.array[self.prescribed_owned] = 0.0
+
+    def lift(self, rhs: PETSc.Vec, held: FloatArray, law: MaterialLaw, *, checked: bool = True) -> None:
+        """Write the right-hand side of the prescribed displacements ``held`` into ``rhs``; collective.
+
+        The unknown is zero at prescribed dofs, and so is its right-hand side: the solver's norms then measure the
+        energy of the error alone, in any unit of length.
+        """
+        self.forms.displacement.x.array[:] = held
+        self.apply(rhs, law, checked=checked)
+        rhs.scale(-1.0)
+        rhs.array[self.prescribed_owned] = 0.0
+
+    @stage("loads")
+    def applied(self, loads: Loads) -> Applied:
+        """Return dead loads on the dofs of the space; collective.
+
+        Raises:
+            SolveError: if no facet has a traction.
+        """
+        return apply_loads(loads, self.body, self.space)
+
+    def put(self, rhs: PETSc.Vec, applied: Applied, factor: float = 1.0) -> None:
+        """Add ``factor`` times loads to ``rhs``, except at prescribed dofs."""
+        rhs.array[:] += factor * applied.forces
+        rhs.array[self.prescribed_owned] = 0.0
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """The displacement that is the place x (m) itself, owned dofs."""
+        function = fem.Function(self.space)
+        function.interpolate(lambda x: x)
+        return np.array(function.x.array[: self.owned])
+
+    def set_displacement(self, values: PETSc.Vec) -> None:
+        """Set the displacement of the forms; collective."""
+        fill(self.forms.displacement, values)
+
+    def _sides_of(self, probe: Int32Array) -> FloatArray | None:
+        """Return the side of the slit of each point of the footprint, 1 or -1; None without a slit; collective."""
+        if self.conditions.front is None:
+            return None
+        sides = np.full(len(probe), -1.0)
+        sides[np.isin(probe, _points_beyond(self.space, self.body, self.conditions.front))] = 1.0
+        return sides
+
+
+class Spaces:
+    """Displacement spaces of a mesh, one per degree, each made at first use; a context manager."""
+
+    def __init__(self, body: BodyMesh):
+        self.body = body
+        self._conditions: Conditions | None = None
+        self._made: dict[int, ElasticSpace] = {}
+        self._maps = self._new_maps()
+
+    def _new_maps(self) -> StraightMaps:
+        return StraightMaps(self.body.mesh, curved_cells(self.body.mesh))
+
+    def __enter__(self) -> "Spaces":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def get(self, degree: int, conditions: Conditions) -> ElasticSpace:
+        """Return the space of ``degree`` with ``conditions``; spaces of other conditions are closed; collective.
+
+        Raises:
+            SolveError: if footprint and support share a point: no displacement satisfies both.
+        """
+        if conditions != self._conditions:
+            self.close()
+            self._conditions = conditions
+        if degree not in self._made:
+            self._made[degree] = ElasticSpace(self.body, degree, conditions, self._maps)
+        return self._made[degree]
+
+    def close(self) -> None:
+        """Free the operators of all spaces."""
+        self._maps = self._new_maps()
+        while self._made:
+            self._made.popitem()
+
+
+def whole_points(space: Any, body: BodyMesh) -> int:
+    """Return the number of points of ``space`` on the whole body: mirror images count, points in planes once."""
+    images = np.full(space.dofmap.index_map.size_local, 2.0 ** len(body.mirrored))
+    for plane in _planes(space, body):
+        images[plane[plane < len(images)]] /= 2
+    return round(body.comm.allreduce(float(images.sum()), op=MPI.SUM))
+
+
+def _planes(space: Any, body: BodyMesh) -> list[Int32Array]:
+    """Local points of ``space`` in each of the planes of symmetry that bound the mesh."""
+    names = [MIRROR["xy"[axis]] for axis in body.mirrored]
+    return [_points(space, body, name) for name in names]
+
+
+def _points_beyond(space: Any, body: BodyMesh, front: Front) -> Int32Array:
+    """Return the points of the footprint's facets whose cells are on the positive side of a slit; collective."""
+    mesh, facets = body.mesh, body.facets[PROBE]
+    tdim = mesh.topology.dim
+    of_facet = mesh.topology.connectivity(tdim - 1, tdim)
+    cells = np.array([of_facet.links(facet)[0] for facet in facets], dtype=np.int64)
+    corners = mesh.geometry.x[compat.geometry_dofs(mesh)[cells, : tdim + 1]].reshape(-1, tdim + 1, 3)
+    beyond = (corners.mean(axis=1) - np.array(front.point)) @ np.array(front.normal) > 0
+    return np.asarray(fem.locate_dofs_topological(space, tdim - 1, facets[beyond]))
+
+
+def _points(space: Any, body: BodyMesh, group: str) -> Int32Array:
+    return np.asarray(fem.locate_dofs_topological(space, body.mesh.topology.dim - 1, body.facets[group]))

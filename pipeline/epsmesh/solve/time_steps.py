@@ -1,0 +1,319 @@
+"""Time steps of relaxing tissue, each solved by Newton's method: see :mod:`epsmesh.solve.relaxing`.
+
+What presses is a footprint whose displacement is prescribed, or a tool whose contact is found at each time.
+
+The elastic stress is taken to be linear in time over a step. Its error falls with the square of the step. A second set
+of history variables follows every other time: the work of the difference of both stresses in the displacement gives
+what that changes of the force, about four times the error.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from epsmesh.arrays import FloatArray
+from epsmesh.solve.balance import sums
+from epsmesh.solve.compiled import global_sum
+from epsmesh.solve.elements.base import Elements, Linearised
+from epsmesh.solve.elements.tangent import Prestress
+from epsmesh.solve.ended import ended
+from epsmesh.solve.history import Course, History, between
+from epsmesh.solve.movement import Movement
+from epsmesh.solve.newton import HyperelasticBody, LargeError
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.relaxing import HistoryVariables, Points
+from epsmesh.solve.response import whole_force
+from epsmesh.stages import stage
+
+# Largest step as a share of the movement, and the smallest part of a step.
+_LONGEST, _SMALLEST = 1 / 3, 1 / 64
+# How often all steps are halved for an accuracy.
+_MOST_REFINEMENTS = 3
+# Of the difference between steps and double steps, a third is the error of the steps; the bar is twice that.
+_OF_DIFFERENCE = 2 / 3
+
+
+@dataclass
+class _Place:
+    """How far the steps have come: time (s), share of the movement, its last change, and energies (J)."""
+
+    time: float = 0.0
+    share: float = 0.0
+    changed: float = 0.0
+    rate: float = 0.0  # work per share
+    work: float = 0.0
+    has_moved: bool = False
+
+
+class Body(Protocol):
+    """A body whose energy is that of its law, changed by a prestress. Methods are collective on ``comm``.
+
+    ``unit`` (J) is that of stress times the volumes of the ``points``; ``iterations`` counts linear solves.
+    """
+
+    iterations: int
+
+    @property
+    def comm(self) -> MPI.Comm: ...  # noqa: D102
+    @property
+    def unit(self) -> float: ...  # noqa: D102
+    @property
+    def points(self) -> Points: ...  # noqa: D102
+
+    def state(self) -> AbstractContextManager[PETSc.Vec]:
+        """Lend a zero state."""
+
+    def impose(self, prestress: Prestress | None, factors: tuple[float, ...] = ()) -> None:
+        """Change the energy from now on; None leaves only ``factors``, by region."""
+
+    def stresses(self, state: PETSc.Vec) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Return stress (of the unchanged energy, in the law's unit) and strain at the points."""
+
+    def force_of(self, stress: list[FloatArray], state: PETSc.Vec, direction: FloatArray) -> float:
+        """Return the work (J) that a change of the prestress by ``stress`` does in a ``direction``."""
+
+    def energy(self, state: PETSc.Vec) -> float:
+        """Return the energy (J)."""
+
+
+class Pressed(ABC):
+    """A relaxing ``body`` and what presses it, at the equilibrium at a share of the movement. Methods are collective.
+
+    ``force`` (3), N, is that of the tool on the modelled part, ``rate`` (J) the work per share, and ``area`` (m²) the
+    contact of the whole body, NaN unless it ``is_found``. ``rough`` is the relative error of the force by the distance
+    of nodes at the edge of contact, where that of the mesh does not have it.
+    """
+
+    is_found: ClassVar[bool]
+
+    body: Body
+    force: FloatArray
+    rate: float
+    area: float = np.nan
+    rough: float = 0.0
+
+    @abstractmethod
+    def equilibrate(self, state: PETSc.Vec, share: float) -> None:
+        """Find the equilibrium at a ``share`` from an initial guess, ``state``.
+
+        Raises:
+            LargeError: if Newton's method does not converge; ``state`` is then undefined.
+        """
+
+    @abstractmethod
+    def guess(self, state: PETSc.Vec) -> FloatArray | None:
+        """Return the change of a state per share by the tangent there, None if there is no such guess."""
+
+    @abstractmethod
+    def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
+        """Return the displacement, a state, per metre of the tool in which stresses do the work of the force."""
+
+
+class PressedFootprint(Pressed):
+    """A body whose footprint has a prescribed ``movement``."""
+
+    is_found = False
+    body: HyperelasticBody
+
+    def __init__(
+        self, elements: Elements, law: MaterialLaw, linearised: Linearised, movement: Movement, stack: ExitStack
+    ):
+        """Set up; what is made is freed with the ``stack``."""
+        self._space, self._amount = elements.displacements, movement.amounts[0]
+        self.body = HyperelasticBody(elements, law, linearised.preconditioner, prestressed=True)
+        stack.callback(self.body.close)
+        self._forces, self._unit = (stack.enter_context(self.body.state()) for _ in range(2))
+        owned = self._space.owned
+        for motion, amount in zip(movement.motions, movement.amounts, strict=True):
+            self._unit.array[:owned] += amount * self._space.held(motion)[:owned]
+        self.force, self.rate = np.zeros(3), 0.0
+
+    def equilibrate(self, state: PETSc.Vec, share: float) -> None:
+        """Find the equilibrium at a share."""
+        held = share * self.body.held_of(self._unit)
+        state.array[self._space.prescribed_owned] = held
+        self.body.equilibrate(state, held)
+        self.body.forces(state, self._forces)
+        residual = self._forces.array[: self._space.owned]
+        (self.force,) = sums(self._space, [residual], [self._unit.array[: self._space.owned]]).on_probe
+        self.rate = float(self._forces.dot(self._unit))
+
+    def guess(self, state: PETSc.Vec) -> FloatArray:
+        """Return the change of a state per share by the tangent there."""
+        with self.body.state() as rate:
+            self.body.move(state, self._unit, rate)
+            return np.array(rate.array)
+
+    def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
+        """Return the displacement per metre, as a secant."""
+        return np.asarray(state.array_r / (share * self._amount))
+
+
+def follow(begin: Callable[[], "TimeSteps"], course: Course) -> tuple[History, int]:
+    """Return the history of a ``course``, in steps that are halved for its accuracy, and the iterations of all.
+
+    ``begin`` returns a body at rest.
+
+    Raises:
+        LargeError: see :meth:`TimeSteps.follow`.
+    """
+    iterations = 0
+    for refinements in range(_MOST_REFINEMENTS + 1):
+        steps = begin()
+        found = steps.follow(course)
+        iterations += steps.iterations
+        if found.bar <= course.accuracy or refinements == _MOST_REFINEMENTS:
+            break
+        course = course.refined()
+    return found, iterations
+
+
+class TimeSteps:
+    """Time steps of a body of a ``law`` whose regions may relax, to a ``depth`` (m). Methods are collective."""
+
+    def __init__(
+        self,
+        law: MaterialLaw,
+        pressed: Pressed,
+        depth: float,
+        stack: ExitStack,
+        *,
+        mirrored: Sequence[int] = (),
+        has_own_mesh: bool = False,
+    ):
+        """Set up; what is made is freed with the ``stack``.
+
+        The body is ``mirrored`` at planes normal to these axes. ``has_own_mesh``: the study does not choose the mesh.
+        """
+        self._law, self._depth, self._mirrored, self._has_own_mesh = law, depth, mirrored, has_own_mesh
+        self._place, self._pressed, self._body = _Place(), pressed, pressed.body
+        self._variables = HistoryVariables(self._body.points, [each.relaxation for each in law.parameters])
+        self._state, self._before = (stack.enter_context(self._body.state()) for _ in range(2))
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the linear solver so far."""
+        return self._body.iterations
+
+    @stage("time steps")
+    def follow(self, course: Course) -> History:
+        """Return the history of a course.
+
+        Raises:
+            LargeError: if Newton's method does not converge; it has the depth and the force that were reached.
+        """
+        halves, errors = course.halves(), dict[int, float]()
+        forces, heat, imbalance, areas, rough = [], [], [], [], []
+        for number, (time, share) in enumerate(zip(course.times, course.shares, strict=True)):
+            self._reach(time, share, course)
+            if number in halves:
+                errors[number] = self._step_error()
+            forces.append(self._force())
+            dissipated, stored = self._energies()
+            heat.append(dissipated)
+            imbalance.append(self._place.work - stored - dissipated)
+            areas.append(self._pressed.area)
+            rough.append(self._pressed.rough * abs(forces[-1][2]))
+        whole = 2.0 ** len(self._mirrored)
+        return History(
+            times=np.array(course.times),
+            forces=np.array(forces),
+            bars=_OF_DIFFERENCE * whole * between(errors, len(forces)) + np.maximum.accumulate(rough),
+            dissipated=whole * np.array(heat),
+            imbalance=whole * np.array(imbalance),
+            areas=np.array(areas),
+        )
+
+    def _reach(self, time: float, share: float, course: Course) -> None:
+        """Continue to a time and a share of the movement; a step is halved where Newton's method does not converge."""
+        place = self._place
+        while place.time < time or place.share != share:
+            rise = abs(share - place.share)
+            part = 1.0 if rise <= _LONGEST * (1 + 1e-9) else _LONGEST / rise
+            while True:
+                is_last = part == 1.0
+                then = time if is_last else place.time + part * (time - place.time)
+                there = share if is_last else place.share + part * (share - place.share)
+                try:
+                    self._step(then, there)
+                    break
+                except LargeError as error:
+                    part /= 2
+                    place.changed = 0.0  # the tangent is a better guess than the last step
+                    if part < _SMALLEST:
+                        raise self._stopped(course, error) from error
+
+    def _step(self, time: float, share: float) -> None:
+        """Find the equilibrium at a later time (s) and share of the movement.
+
+        Raises:
+            LargeError: if Newton's method does not converge.
+        """
+        place, body = self._place, self._body
+        step, change = time - place.time, share - place.share
+        if not (place.has_moved or share):  # at rest
+            place.time = time
+            return
+        self._body.impose(self._variables.prestress(step))
+        with body.state() as trial:
+            trial.array[:] = self._state.array
+            if change and (rate := self._rate()) is not None:
+                trial.array[:] += change * rate
+            self._pressed.equilibrate(trial, share)
+            self._before.array[:] = self._state.array
+            self._state.array[:] = trial.array
+        rate_of_work = self._pressed.rate
+        place.work += change * (place.rate + rate_of_work) / 2
+        self._variables.advance(step, *body.stresses(self._state))
+        place.time, place.share, place.rate, place.has_moved = time, share, rate_of_work, True
+        place.changed = change or place.changed
+        if not change:
+            self._before.array[:] = self._state.array
+            place.changed = 0.0
+
+    def _rate(self) -> FloatArray | None:
+        """Return the change of the state per share of the movement: that of the last step, or by the tangent."""
+        if self._place.changed:
+            return np.asarray((self._state.array - self._before.array) / self._place.changed)
+        return self._pressed.guess(self._state)
+
+    def _step_error(self) -> float:
+        """Return the change (N) of the modelled part's force along the first motion by steps of twice the length."""
+        stress = self._variables.advance_coarse()
+        if not self._place.share:
+            return 0.0
+        return abs(self._body.force_of(stress, self._state, self._pressed.unit(self._state, self._place.share)))
+
+    def _force(self) -> FloatArray:
+        """Return the force (N) of the tissue on the probe, of the whole body."""
+        return -whole_force(self._pressed.force, self._mirrored)
+
+    def _energies(self) -> tuple[float, float]:
+        """Return what is dissipated and what is stored (J) of the modelled part."""
+        if not self._place.has_moved:
+            return 0.0, 0.0
+        self._body.impose(None, self._variables.rest)
+        elastic = self._body.energy(self._state)
+        own = np.array([self._variables.heat, self._variables.stored])
+        heat, stored = self._body.unit * global_sum(self._body.comm, own)
+        return float(heat), elastic + float(stored)
+
+    def _stopped(self, course: Course, why: LargeError) -> LargeError:
+        """Return the error of steps that end before the end of the course."""
+        place, (*_, force) = self._place, self._force()
+        reached, times = (place.share * self._depth, float(force)), (place.time, course.times[-1])
+        return ended(
+            why,
+            self._law,
+            reached,
+            self._depth,
+            is_found=self._pressed.is_found,
+            times=times,
+            has_own_mesh=self._has_own_mesh,
+        )

@@ -1,0 +1,230 @@
+"""Features of a scene: what a study sets, and what follows from it, each with the key that sets it.
+
+:mod:`.refusals` and :mod:`.obstacles` name features by their keys in ``FEATURES``.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import Any, Protocol
+
+from epsmesh.shapes.body import Body, Layered
+from epsmesh.shapes.contact import first_touch, is_flat, is_level
+from epsmesh.shapes.from_file import FromFile
+from epsmesh.shapes.insertion import Inserted
+from epsmesh.shapes.probe import STICK, Probe
+from epsmesh.shapes.section import in_mm
+from epsmesh.study.loads import Load
+from epsmesh.study.schema import Material, Mesh
+from epsmesh.viscoelastic import Terms
+
+# Poisson's ratio beyond which displacement elements of degree 2, which find a body's own far field, lock.
+MOST_OF_GREEN = 0.49
+# Tolerance within which a frictionless slit must be along x or y.
+_ALIGNED = 1e-9
+
+
+class Scene(Protocol):
+    """The sections on which features depend: a case has all of them."""
+
+    @property
+    def body(self) -> Body: ...  # noqa: D102
+    @property
+    def material(self) -> Material: ...  # noqa: D102
+    @property
+    def probe(self) -> Probe: ...  # noqa: D102
+    @property
+    def mesh(self) -> Mesh: ...  # noqa: D102
+    @property
+    def load(self) -> Load: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A feature: the ``key`` of a study that sets it, whether a scene has it, and how its value is written.
+
+    ``also`` are other sections on which the feature depends.
+    """
+
+    key: str
+    holds: Callable[[Scene], bool]
+    also: tuple[str, ...] = ()
+    write: Callable[[Any], Any] = lambda value: value if isinstance(value, str | float) else None
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The sections of a scene on which the feature depends."""
+        return self.key.partition(".")[0], *self.also
+
+    def value(self, scene: Scene) -> Any:
+        """Return the value of the key, as a message quotes it; None if no value is worth quoting."""
+        section, _, key = self.key.partition(".")
+        return self.write(getattr(getattr(scene, section), key, None))
+
+
+# Sections that fit together in pairs only: the probe is somewhere on the body.
+PLACE = ("body", "probe")
+
+
+def _is_ball(scene: Scene) -> bool:
+    return scene.mesh.is_closed and scene.mesh.epsilon < scene.body.farthest(scene.probe.frame_on(scene.body))
+
+
+def _is_column(scene: Scene) -> bool:
+    return not scene.mesh.is_closed and isfinite(scene.mesh.column(scene.body.reach(scene.probe.frame_on(scene.body))))
+
+
+def _touches_beside(scene: Scene) -> bool:
+    x, y, _ = first_touch(scene.body, scene.probe, scene.probe.frame_on(scene.body))
+    return not scene.probe.is_flat and (x, y) != (0.0, 0.0)
+
+
+def _is_level(scene: Scene) -> bool:
+    return is_level(scene.body, scene.probe.frame_on(scene.body))
+
+
+def _is_oblique(scene: Scene) -> bool:
+    along = scene.probe.frame_on(scene.body).along
+    return scene.probe.slit is not None and max(map(abs, along)) < 1 - _ALIGNED
+
+
+def _is_flat(scene: Scene) -> bool:
+    return is_flat(scene.body, scene.probe, scene.probe.frame_on(scene.body))
+
+
+def _has_edge(scene: Scene) -> bool:
+    return getattr(scene.probe, "edge", 0.0) != 0
+
+
+def _relaxations(scene: Scene) -> set[Terms]:
+    """Return the different relaxations of a body's regions."""
+    body, main = scene.body, scene.body.main(scene.material)
+    return {main.prony, *(body.completed(region, main).prony for region in body.regions)}
+
+
+def _is_large(scene: Scene) -> bool:
+    return scene.body.main(scene.material).is_large
+
+
+def _coefficient(friction: float) -> float | str:
+    return STICK if friction == inf else friction
+
+
+def _is_inserted(scene: Scene, cuts: str | None = None) -> bool:
+    found = scene.probe if isinstance(scene.probe, Inserted) and scene.probe.insertion else None
+    return found is not None and cuts in (None, found.CUTS)
+
+
+def _may_cut_a_ring(scene: Scene) -> bool:
+    return _is_inserted(scene) and getattr(scene.probe, "crack_shape", "plane") != "plane"
+
+
+def _is_loaded(scene: Scene) -> bool:
+    return scene.load.acts or bool(scene.body.pressures)
+
+
+def _wants_exact(scene: Scene) -> bool:
+    solve = getattr(scene, "solve", None)
+    return solve is not None and bool(solve.wants_exact(scene.mesh))
+
+
+def needs_time_steps(scene: Scene) -> bool:
+    """Return whether the force over time is no elastic force times a function of time."""
+    return scene.probe.history is not None and (_is_large(scene) or len(_relaxations(scene)) > 1)
+
+
+def _is_off_axis(scene: Scene) -> bool:
+    return scene.body.half_plane() is None or any(scene.probe.at)
+
+
+def _is_in_space(scene: Scene) -> bool:
+    """Return whether a scene is certainly no axisymmetric one; of others, the plan knows."""
+    return _is_off_axis(scene) or not scene.probe.is_round or scene.mesh.model == "3d"
+
+
+FEATURES: dict[str, Feature] = {
+    "layers": Feature("body.layer", lambda s: isinstance(s.body, Layered) and bool(s.body.layer)),
+    "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
+    "region": Feature("body.region", lambda s: "region" in s.body.pieces),
+    "curved body": Feature("body.shape", lambda s: not isinstance(s.body, Layered)),
+    "large displacements": Feature("material.law", _is_large, ("body",)),
+    "relaxation": Feature("material.relaxation", lambda s: any(_relaxations(s)), ("body",)),
+    "static relaxing tissue": Feature(
+        "probe.history", lambda s: any(_relaxations(s)) and s.probe.history is None, ("body", "material")
+    ),
+    "time steps": Feature("probe.history", needs_time_steps, ("body", "material")),
+    "time steps in three dimensions": Feature(
+        "probe.history", lambda s: needs_time_steps(s) and _is_in_space(s), ("body", "material", "mesh")
+    ),
+    "fibres": Feature("material.law", lambda s: any(t.has_fibres for t in (s.material, *s.body.regions)), ("body",)),
+    # Of regions, those of layers that fill the body included, the study's check of laws reports it.
+    "ν < 0.2": Feature(
+        "material.poisson",
+        lambda s: not s.body.is_filled and s.material.poisson < Material.LEAST_OF_LARGE,
+        ("body",),
+    ),
+    "ν > 0.49": Feature("material.poisson", lambda s: s.material.poisson > MOST_OF_GREEN),
+    "tool that is not flat": Feature("probe.shape", lambda s: not s.probe.is_flat),
+    "unilateral contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
+    "flat tool that may lift off": Feature("probe.contact", lambda s: s.probe.is_unilateral and s.probe.is_flat),
+    "frictionless contact": Feature("probe.contact", lambda s: s.probe.contact == "frictionless"),
+    "rounded edge": Feature("probe.edge", _has_edge, write=in_mm),
+    "rounded edge of a prescribed footprint": Feature(
+        "probe.contact", lambda s: _has_edge(s) and not s.probe.is_unilateral
+    ),
+    "friction": Feature("probe.friction", lambda s: s.probe.friction > 0, write=_coefficient),
+    "inclined touch of a linear law": Feature(
+        "probe.axis", lambda s: _touches_beside(s) and not _is_large(s), ("body", "material"), list
+    ),
+    "given force": Feature("probe.force", lambda s: s.probe.force is not None, write=lambda force: f"{force:.6g} N"),
+    "history": Feature("probe.history", lambda s: s.probe.history is not None),
+    "bent surface of a linear law": Feature(
+        "load",
+        lambda s: _is_loaded(s) and s.probe.is_unilateral and not _is_large(s),
+        ("body", "probe", "material"),
+    ),
+    "bent surface": Feature("load", lambda s: _is_loaded(s) and s.probe.is_unilateral, ("body", "probe")),
+    "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),
+    "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),
+    "open slit": Feature("probe.ends", lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
+    "oblique slit": Feature("probe.direction", _is_oblique, ("body",), list),
+    "insertion": Feature("probe.insertion", _is_inserted, write=lambda one: in_mm(one.to)),
+    "inserted blade": Feature("probe.insertion", lambda s: _is_inserted(s, "slit")),
+    "inserted needle": Feature("probe.insertion", lambda s: _is_inserted(s, "crack")),
+    "ring crack": Feature("probe.crack_shape", _may_cut_a_ring),
+    "needle that cuts": Feature("probe.toughness", lambda s: s.probe.crack is not None),
+    "linear law": Feature("material.law", lambda s: not _is_large(s), ("body",)),
+    "model in three dimensions": Feature("mesh.model", lambda s: s.mesh.model == "3d"),
+    "no round scene": Feature("probe.at", _is_off_axis, PLACE, list),
+    "six motions": Feature("probe.motion", lambda s: s.probe.motion == "all"),
+    "range of depths": Feature(
+        "probe.depth_range",
+        lambda s: bool(getattr(s.probe, "depth_range", None)),
+        write=lambda depths: [in_mm(depth) for depth in depths],
+    ),
+    "curved or inclined surface": Feature("probe.axis", lambda s: not _is_flat(s), ("body",)),
+    "no flat top": Feature("body.shape", lambda s: not (isinstance(s.body, Layered) and _is_level(s)), ("probe",)),
+    "surface or image": Feature("body.shape", lambda s: isinstance(s.body, FromFile) and not s.body.HAS_NAMES),
+    "fixed sides": Feature("body.fixed", lambda s: s.body.support.gap(0.0) == 0.0),
+    "only sides fixed": Feature("body.fixed", lambda s: not s.body.support.holds_column()),
+    "free column": Feature("mesh.outside", lambda s: s.mesh.outside == "free" and isfinite(s.mesh.epsilon)),
+    "column": Feature("mesh.outside", _is_column, PLACE),
+    "fixed column": Feature("mesh.outside", lambda s: s.mesh.outside == "fixed" and _is_column(s), PLACE),
+    "half ball": Feature("mesh.outside", _is_ball, PLACE),
+    "Green's function": Feature("mesh.outside", lambda s: s.mesh.outside == "green" and _is_ball(s), PLACE),
+    "fine and coarse parts": Feature("mesh.epsilon", lambda s: s.mesh.keeps_all and isfinite(s.mesh.epsilon)),
+    "linear outside": Feature("mesh.outside", lambda s: s.mesh.outside == "linear" and isfinite(s.mesh.epsilon)),
+    "truncated body": Feature("mesh.outside", lambda s: not s.mesh.keeps_all and isfinite(s.mesh.epsilon)),
+    "degree 1": Feature("mesh.degree", lambda s: s.mesh.degree == 1, write=int),
+    "mixed elements": Feature("mesh.element", lambda s: s.mesh.element == "mixed"),
+    "accuracy": Feature("mesh.accuracy", lambda s: s.mesh.accuracy is not None),
+    "loads": Feature("load", _is_loaded, ("body",)),
+    # Of a case: the sections of a scene have none.
+    "outputs": Feature("output", lambda s: bool(getattr(s, "outputs", ()))),
+    "F_exact": Feature("solve.exact", _wants_exact, ("mesh",)),
+}
+
+
+def features_of(scene: Scene) -> frozenset[str]:
+    """Return the names of the features that a scene has."""
+    return frozenset(name for name, feature in FEATURES.items() if feature.holds(scene))

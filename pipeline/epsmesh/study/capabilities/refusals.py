@@ -1,0 +1,268 @@
+"""Pairs of features that a study must not have together, each with the reason: of mechanics, or what was not built."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from types import SimpleNamespace
+from typing import Any, cast
+
+from epsmesh.shapes.body import Body
+from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.section import Section
+from epsmesh.study.capabilities.features import FEATURES, MOST_OF_GREEN, PLACE, Scene
+from epsmesh.study.problems import Problems
+from epsmesh.study.schema import Material
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Two features that exclude each other. The message has the key of the first."""
+
+    first: str
+    second: str
+    reason: str
+
+
+_COARSE = 'use outside = "coarse" here'
+_ONE_MATERIAL = f"the far field is known only for one material: {_COARSE}"
+_PRESSES = f"the far field is known only for a tool that presses: {_COARSE}"
+_HOLDS = 'a tool that slides along the tissue has no lateral stiffness: use contact = "bonded"'
+_STATIC = "omit [probe.history] and relaxation"
+_IN_STEPS = "with this law or relaxation the force over time is computed in time steps"
+STEPS_IN_SPACE = (
+    f"{_IN_STEPS}, which meshes for an accuracy cover only where the scene is solved in two dimensions: give sizes, or "
+    "use a round tool on the axis of a round body"
+)
+_NO_LOADS = "omit [load], and pressure in hollow regions"
+_LINEAR = "needs linear elasticity: omit it with a law of large displacements"
+_OF_LAW = "with a law of large displacements"
+
+REFUSALS: tuple[Refusal, ...] = (
+    # What the shapes have no keys for: the schema refuses it.
+    Refusal("layers", "curved body", "layers need the flat top of a box or a cylinder"),
+    Refusal("tool that is not flat", "frictionless contact", "the area in contact is computed, not prescribed"),
+    # A half ball that a far field closes.
+    Refusal("half ball", "accuracy", "the far field adds an error that accuracy does not cover: omit accuracy"),
+    Refusal("degree 1", "half ball", "is too low for a half ball, since elements are straight: use 2 or 3"),
+    Refusal(
+        "half ball",
+        "no flat top",
+        f"the far field is known only for a tool that presses straight down on a box or a cylinder: {_COARSE}",
+    ),
+    Refusal("half ball", "layers", _ONE_MATERIAL),
+    Refusal("half ball", "inclusion", _ONE_MATERIAL),
+    Refusal("half ball", "region", _ONE_MATERIAL),
+    Refusal("half ball", "slice", _PRESSES),
+    Refusal("half ball", "slit", _PRESSES),
+    Refusal("half ball", "six motions", _PRESSES),
+    Refusal(
+        "ν > 0.49",
+        "Green's function",
+        f'is too near to 0.5 for outside = "green": must be at most {MOST_OF_GREEN}; "halfspace" allows all values',
+    ),
+    # A column that is kept of the body.
+    Refusal(
+        "column",
+        "surface or image",
+        f"a column cannot be cut out of triangles: {_COARSE}",
+    ),
+    Refusal("column", "region", f"a column cannot be cut out of a body with regions of triangles: {_COARSE}"),
+    Refusal("fixed column", "open slit", 'would stop the open slit at the side of the column: use ends = "blade"'),
+    Refusal(
+        "free column",
+        "only sides fixed",
+        "the column around the tool does not touch the fixed sides, and would float: "
+        'use `outside = "coarse"` or "fixed", or fix the bottom',
+    ),
+    Refusal("open slit", "fixed sides", 'the slit would cut through the sides, which are fixed: use ends = "blade"'),
+    # Degrees of elements.
+    Refusal(
+        "degree 1",
+        "unilateral contact",
+        "is too low for unilateral contact, since elements are straight: use 2 or 3",
+    ),
+    Refusal("degree 1", "inclusion", "is too low for inclusions, since elements are straight: use 2 or 3"),
+    Refusal("degree 1", "region", "is too low for regions of any shape, since elements are straight: use 2 or 3"),
+    Refusal("degree 1", "curved or inclined surface", "is too low for a curved surface, or a tilted tool: use 2 or 3"),
+    Refusal("degree 1", "slit", "is too low for a slit, whose front needs quarter-point elements: use 2 or 3"),
+    Refusal("mixed elements", "degree 1", "there is no stable mixed element of degree 1: use 2 or 3"),
+    # Tools and how they touch.
+    Refusal(
+        "rounded edge",
+        "rounded edge of a prescribed footprint",
+        'has no meaning where the footprint is prescribed, and ends at a sharp edge: use contact = "unilateral", or '
+        "omit edge",
+    ),
+    Refusal("six motions", "unilateral contact", _HOLDS),
+    Refusal("six motions", "frictionless contact", _HOLDS),
+    Refusal("six motions", "slit", "a blade in a slit only presses and slides: omit it"),
+    Refusal(
+        "unilateral contact",
+        "slice",
+        'only tissue that is bonded to the blade is carried along by a slice: use contact = "bonded"',
+    ),
+    Refusal(
+        "unilateral contact",
+        "slit",
+        'tissue does not lift off a blade in a slit: use contact = "bonded" or "frictionless"',
+    ),
+    Refusal(
+        "slice",
+        "frictionless contact",
+        'a frictionless blade slides without force: use contact = "bonded"',
+    ),
+    Refusal("friction", "half ball", f"the far field is known only for forces along the tool's axis: {_COARSE}"),
+    Refusal(
+        "friction",
+        "bent surface of a linear law",
+        "friction of linear laws is followed from the unloaded surface on: use a law of large displacements, or omit "
+        "[load] or friction",
+    ),
+    Refusal(
+        "friction",
+        "history",
+        f"friction depends on the path, and F is not the elastic force times a function of time: {_STATIC}",
+    ),
+    Refusal(
+        "friction",
+        "inclined touch of a linear law",
+        "the tool touches beside its axis, where its surface is inclined, and with a linear law friction is across the "
+        "axis: turn the axis to the surface's normal, use a law of large displacements, or omit friction",
+    ),
+    Refusal("slit", "region", "slits in a body with regions of triangles are not computed: use an inclusion"),
+    Refusal("slit", "no flat top", "a slit needs the flat top of a box or a cylinder, and goes straight down"),
+    Refusal(
+        "oblique slit",
+        "frictionless contact",
+        "a frictionless slit must be along x or y: turn the body, or use contact = 'bonded'",
+    ),
+    Refusal(
+        "range of depths",
+        "accuracy",
+        "needs given element sizes: with `accuracy`, each depth has a mesh of its own. Omit one of the two",
+    ),
+    # A given force, whose depth is found.
+    Refusal("given force", "loads", f"loads press on the tool at depth 0 already: {_NO_LOADS}, or give a depth"),
+    Refusal("given force", "history", "a history has depths of its own: omit [probe.history], or give a depth"),
+    Refusal("given force", "slit", "the opening of a slit presses on the blade at depth 0 already: give a depth"),
+    Refusal("given force", "slice", "the travel of a slice presses on the blade at depth 0 already: give a depth"),
+    Refusal("given force", "insertion", "an insertion has depths of its own: omit [probe.insertion], or `force`"),
+    # A tool that is inserted.
+    Refusal("slit", "insertion", "a blade that is inserted makes its own slit: omit `incision`"),
+    Refusal("slice", "insertion", "a blade that is inserted moves along its axis: omit it"),
+    Refusal("history", "insertion", "an insertion has no time: omit one of the two"),
+    Refusal("rounded edge", "inserted blade", "the blade of an insertion has sharp edges: omit it"),
+    Refusal(
+        "insertion", "no flat top", "needs the flat top of a box or a cylinder, and a blade that goes straight down"
+    ),
+    Refusal("inserted blade", "large displacements", f"{_LINEAR}: a blade's cut is that of small strains"),
+    Refusal("inserted needle", "linear law", "needs a law of large displacements: strains are above 1"),
+    Refusal("inserted needle", "fibres", "its crack is computed in isotropic tissue: use another law"),
+    Refusal("ring crack", "layers", 'ends in one material: use crack_shape = "plane", or omit the layers'),
+    Refusal("ring crack", "column", 'is computed in the whole body: use crack_shape = "plane", or omit epsilon'),
+    Refusal(
+        "inserted needle",
+        "fine and coarse parts",
+        'is computed on the meridian, on meshes of its own: cut the body at epsilon, outside = "free", or omit epsilon',
+    ),
+    Refusal(
+        "inserted needle",
+        "fixed column",
+        'would hold the tissue that the shaft pushes aside: use outside = "free"',
+    ),
+    Refusal("inserted needle", "range of depths", "its depths have meshes of their own: omit it"),
+    Refusal("inserted needle", "model in three dimensions", "is computed on the meridian: omit model"),
+    Refusal("inserted needle", "no round scene", "needs a cylinder, and the needle on its axis"),
+    Refusal("insertion", "inclusion", "needs a body of layers: cuts through inclusions are not computed"),
+    Refusal("insertion", "region", "needs a body of layers: cuts through regions are not computed"),
+    Refusal("insertion", "loads", f"cuts in tissue under loads are not computed: {_NO_LOADS}"),
+    # Loads.
+    Refusal(
+        "truncated body",
+        "loads",
+        'loads act on the whole body, so no part of it may be cut away: use outside = "coarse"',
+    ),
+    # Relaxation, and histories of the depth.
+    Refusal(
+        "static relaxing tissue",
+        "relaxation",
+        "is required with relaxation, since F depends on how long ago the tool moved: write [probe.history], with "
+        'ramp = "1 s" and hold = "10 s", or omit relaxation',
+    ),
+    Refusal(
+        "history",
+        "bent surface",
+        f"loads bend the surface on which contact is found, and the force is no power of the depth: {_STATIC}",
+    ),
+    Refusal(
+        "history",
+        "slit",
+        f"the opening of the slit has no history, and the energy release rate depends on the front's speed: {_STATIC}",
+    ),
+    Refusal("time steps", "six motions", f'{_IN_STEPS}, of one movement: use motion = "press"'),
+    Refusal("time steps", "loads", f"{_IN_STEPS}, and the tissue has crept under the loads before: {_NO_LOADS}"),
+    Refusal("time steps in three dimensions", "accuracy", STEPS_IN_SPACE),
+    Refusal("time steps", "half ball", f"{_IN_STEPS}, and the far field has none: {_COARSE}"),
+    # Large strains.
+    Refusal(
+        "ν < 0.2",
+        "large displacements",
+        f"must be at least {Material.LEAST_OF_LARGE} {_OF_LAW}: below, F depends on the elements at the tool's edge",
+    ),
+    Refusal(
+        "flat tool that may lift off",
+        "large displacements",
+        f'must be "bonded" {_OF_LAW}, or give the tool a rounded edge, such as edge = "0.2 mm": at a sharp one the '
+        "direction of the contact force has no limit",
+    ),
+    Refusal(
+        "frictionless contact",
+        "large displacements",
+        f'must be "bonded" {_OF_LAW}, or "unilateral" with a rounded edge, such as edge = "0.2 mm": a sharp edge that '
+        "slides has no direction of force",
+    ),
+    Refusal("six motions", "large displacements", f'must be "press" {_OF_LAW}: there is no single stiffness'),
+    Refusal("slit", "large displacements", _LINEAR),
+    Refusal("slice", "large displacements", f"must be 0 mm {_OF_LAW}: the blade only presses"),
+    Refusal(
+        "linear outside",
+        "fibres",
+        f"fibres resist tension at any strain, and the linear law beyond epsilon is isotropic: {_COARSE}",
+    ),
+    Refusal("half ball", "large displacements", f'must be "coarse", "linear", "free" or "fixed" {_OF_LAW}'),
+)
+
+_PARTS = ("body", "material", "probe", "mesh", "load")
+
+
+def check_features(
+    sections: Mapping[str, Sequence[Section]], placed: Sequence[tuple[Body, Probe]], problems: Problems
+) -> None:
+    """Report every pair of features that exclude each other; ``placed`` are the bodies and probes that fit together."""
+
+    @cache
+    def occurs(name: str) -> bool:
+        feature = FEATURES[name]
+        return any(map(feature.holds, _scenes(feature.parts, sections, placed)))
+
+    for refusal in REFUSALS:
+        if not (occurs(refusal.first) and occurs(refusal.second)):
+            continue
+        first, second = FEATURES[refusal.first], FEATURES[refusal.second]
+        for scene in _scenes((*first.parts, *second.parts), sections, placed):
+            if first.holds(scene) and second.holds(scene):
+                with problems.about(**vars(scene)):
+                    problems.error(first.key, first.value(scene), refusal.reason)
+
+
+def _scenes(
+    parts: Sequence[str], sections: Mapping[str, Sequence[Section]], placed: Sequence[tuple[Body, Probe]]
+) -> Iterator[Scene]:
+    """Yield the combinations of these sections; of bodies and probes, those that fit together."""
+    is_placed = {*PLACE} <= {*parts}
+    names = [name for name in _PARTS if name in parts and not (is_placed and name in PLACE)]
+    others: list[Sequence[Any]] = [sections[name] for name in names]
+    for pair, *rest in product(placed if is_placed else ((),), *others):
+        scene = SimpleNamespace(**dict(zip(PLACE, pair, strict=False)), **dict(zip(names, rest, strict=True)))
+        yield cast(Scene, scene)

@@ -1,0 +1,309 @@
+"""A case: one scene with one mesh setting, and what its sections together imply."""
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from functools import wraps
+from math import inf
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+from epsmesh.shapes.body import Body
+from epsmesh.shapes.contact import curvature_below, is_level
+from epsmesh.shapes.frame import Frame, Vector
+from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.tissue import Tissue
+from epsmesh.study.axis import Axis
+from epsmesh.study.capabilities.features import features_of, needs_time_steps
+from epsmesh.study.capabilities.obstacles import obstacle
+from epsmesh.study.closure import FarRegion
+from epsmesh.study.loads import Load
+from epsmesh.study.output import Output
+from epsmesh.study.place import CLEAR, is_clear, place_error
+from epsmesh.study.schema import Material, Mesh, Solving
+from epsmesh.viscoelastic import Terms
+
+Rest = ParamSpec("Rest")
+Value = TypeVar("Value")
+
+# Thickness over reach up to which a body without support below the probe is a plate (docs/accuracy.md).
+_PLATE = 0.1
+# Depth, in units of the footprint's half width, up to which quarter-point elements do not fold at large displacements.
+_SHALLOW = 0.1
+
+
+def of_scene(find: "Callable[Concatenate[Case, Rest], Value]") -> "Callable[Concatenate[Case, Rest], Value]":
+    """Let the cases of one scene share what ``find`` returns for one of them and further, hashable arguments.
+
+    The result must not depend on the mesh, the solver or the index of the case.
+    """
+
+    name = find.__qualname__
+
+    @wraps(find)
+    def found(case: "Case", *rest: Rest.args, **named: Rest.kwargs) -> Value:
+        known, key = case.shared, (name, *rest, *named.items()) if rest or named else name
+        if key not in known:
+            known[key] = find(case, *rest, **named)
+        result: Value = known[key]
+        return result
+
+    return found
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What results are proportional to: F to stress (Pa) × length (m), energies to that × length, strains to length."""
+
+    stress: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One scene with one mesh setting: yields one force.
+
+    ``far_region`` is set where the body's far field is found on a mesh that many places share; None if on its own.
+    ``shared`` has what is known of the scene (:func:`of_scene`): all meshes of a study's scene have one; a case that
+    was changed begins anew.
+    """
+
+    index: tuple[int, ...]
+    axes: tuple[Axis, ...]
+    body: Body
+    material: Material
+    probe: Probe
+    mesh: Mesh
+    solve: Solving
+    load: Load = field(default_factory=Load)
+    far_region: FarRegion | None = None
+    outputs: tuple[Output, ...] = ()
+    shared: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    @property
+    def labels(self) -> tuple[tuple[str, float | int | str], ...]:
+        """Names and values of what is swept."""
+        return tuple((axis.name, axis.labels[i]) for axis, i in zip(self.axes, self.index, strict=True))
+
+    @property
+    def words(self) -> dict[str, str]:
+        """Names of what is swept, and values as people read them."""
+        return {axis.name: axis.write(axis.labels[i]) for axis, i in zip(self.axes, self.index, strict=True)}
+
+    @property
+    @of_scene
+    def frame(self) -> Frame:
+        """Where the probe meets the body."""
+        return self.probe.frame_on(self.body)
+
+    @property
+    @of_scene
+    def expected(self) -> Probe:
+        """The probe; if contact is found, as it is expected to end on a surface that is curved below it."""
+        probe = self.probe
+        if probe.is_flat:
+            return probe
+        bump = curvature_below(self.body, probe, self.frame)
+        return probe.on_bump(bump) if bump else probe
+
+    @property
+    def features(self) -> frozenset[str]:
+        """What it has of the features that :mod:`epsmesh.study.capabilities` names."""
+        return features_of(self)
+
+    @property
+    @of_scene
+    def lost_contact(self) -> str:
+        """Why there is no contact at this place of a path that may leave the body; "" if there is."""
+        if not any(axis.off == "lost" for axis in self.axes):
+            return ""
+        error = place_error(self.body, self.probe)
+        return "" if error is None else CLEAR if is_clear(self.body, self.probe) else f"the tool does not fit: {error}"
+
+    @property
+    @of_scene
+    def travel(self) -> Vector:
+        """Prescribed displacement (m) of the footprint."""
+        return self.probe.travel(self.frame)
+
+    @property
+    def movements(self) -> int:
+        """How many solutions there are: press, slide, opening of a slit, far field, or all six motions; and loads."""
+        slides = self.travel != tuple(self.probe.depth * a for a in self.frame.axis)
+        opens = self.probe.slit is not None and self.probe.contact == "bonded"
+        motions = 6 if self.probe.motion == "all" else 1 + slides + opens + self.is_closed
+        return motions + self.load.acts
+
+    @property
+    @of_scene
+    def tissues(self) -> tuple[Tissue, ...]:
+        """What the regions of the body are made of, in the order of their numbers in meshes.
+
+        Where layers fill the body, no cell has number 0; it is then as the first layer.
+        """
+        return self.material, *self.body.regions
+
+    @property
+    def region_names(self) -> tuple[str, ...]:
+        """Names of the regions of the mesh, in the order of their numbers: those of tissues, then of linear parts."""
+        names = self.body.region_names
+        return (*names, *(f"{name}, linear" for name in names)) if self.is_linear_beyond else names
+
+    @property
+    @of_scene
+    def relaxations(self) -> tuple[Terms, ...]:
+        """Terms of the relaxation of the regions of the body, in the order of their numbers."""
+        return tuple(tissue.prony for tissue in self.tissues)
+
+    @property
+    @of_scene
+    def is_stepped(self) -> bool:
+        """Whether its history is computed in time steps."""
+        return needs_time_steps(self)
+
+    @property
+    @of_scene
+    def densities(self) -> tuple[float | None, ...]:
+        """Densities (kg/m³) of the regions of the body, in the order of their numbers; None where there is none."""
+        return tuple(tissue.density for tissue in self.tissues)
+
+    @property
+    @of_scene
+    def poisson(self) -> float:
+        """The largest Poisson's ratio of all regions."""
+        return max(tissue.poisson for tissue in self.tissues)
+
+    @property
+    def proportional_to(self) -> tuple[str, ...]:
+        """The keys that F is proportional to, those of one section, or of all materials, changing together."""
+        if obstacle("scaling", self):
+            return ()
+        first = ("young of all materials together",) if self.body.regions else self.material.PROPORTIONAL_TO
+        return *first, *self.moves_in_proportion
+
+    @property
+    def moves_in_proportion(self) -> tuple[str, ...]:
+        """The keys of the probe that F is proportional to: none where displacements are large."""
+        return () if self.material.is_large or self.is_stepped else self.probe.proportional_to
+
+    @property
+    @of_scene
+    def scale(self) -> Scale:
+        """The units in which its results do not depend on what they are proportional to."""
+        if self.is_bent:
+            return Scale(1.0, 1.0)
+        return Scale(self.material.young, self.probe.scale if self.moves_in_proportion else 1.0)
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether loads bend the surface on which contact is found: F is then proportional to nothing."""
+        return self.load.acts and self.probe.is_unilateral
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the probe's edge rules the error of F: what is pressed is even, and no plate."""
+        return self.is_even and not self.is_plate
+
+    @property
+    @of_scene
+    def is_even(self) -> bool:
+        """Whether a body of one material is pressed straight down on a plane face."""
+        return not self.body.pieces and self.probe.slit is None and is_level(self.body, self.frame)
+
+    @property
+    @of_scene
+    def is_plate(self) -> bool:
+        """Whether the body has no support below the probe, and is so thin that it bends."""
+        thickness = self.body.thickness(self.frame)
+        return not self.body.support.holds_column() and thickness < _PLATE * self.reach
+
+    @property
+    @of_scene
+    def farthest(self) -> float:
+        """Distance (m) from the point of contact to the farthest point of the body."""
+        return self.body.farthest(self.frame)
+
+    @property
+    @of_scene
+    def reach(self) -> float:
+        """Largest distance (m) of the body from the probe's axis."""
+        return self.body.reach(self.frame)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the mesh is fine everywhere: ε is "full", or reaches past the whole body."""
+        return self.mesh.epsilon == inf or self.mesh.epsilon >= self.farthest
+
+    @property
+    def has_quarter_points(self) -> bool:
+        """Whether elements at a singular edge of the probe have quarter points; deep in tissue they would fold."""
+        if not (self.material.is_large and self.probe.has_singular_edge):
+            return True
+        return self.probe.depth <= _SHALLOW * self.probe.half_width
+
+    @property
+    def column(self) -> float:
+        """Radius (m) of the piece of the body that is kept round the probe's axis or, if closed, the contact.
+
+        Infinite if all of it is kept.
+        """
+        return self.mesh.column(self.reach)
+
+    @property
+    def is_truncated(self) -> bool:
+        """Whether only a column of the body is kept."""
+        return self.column < inf
+
+    @property
+    def is_linear_beyond(self) -> bool:
+        """Whether tissue beyond ε is linear elastic, and not that within."""
+        return self.mesh.outside == "linear" and not self.is_full
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether only a half ball of the body is kept, which a far field closes."""
+        return self.mesh.is_closed and not self.is_full
+
+    @property
+    def has_own_far_field(self) -> bool:
+        """Whether what closes it is the Green's function of its body, and not that of a half-space."""
+        return self.is_closed and self.mesh.outside == "green"
+
+    @property
+    def element(self) -> str:
+        """The element that solves it: displacement or mixed."""
+        return self.mesh.element_for(self.poisson, is_large=self.material.is_large)
+
+    @property
+    def formulation(self) -> str:
+        """What is solved: the element, at large displacements the names of the laws, and -mixed if the element is."""
+        if not self.material.is_large:
+            return self.element
+        beyond = ["linear"] if self.is_linear_beyond else []
+        names = "+".join(sorted({*(str(tissue.law) for tissue in self.tissues), *beyond}))
+        return names + ("-mixed" if self.element == "mixed" else "")
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether a depth is reached over smaller ones: contact is found, or displacements are large."""
+        return self.probe.is_unilateral or self.material.is_large
+
+    @property
+    def has_load_steps(self) -> bool:
+        """Whether its law, friction or history makes steps necessary, which the meridian follows, too."""
+        return self.material.is_large or self.probe.friction > 0 or self.is_stepped
+
+    @property
+    def is_factorised(self) -> bool:
+        """Whether it is solved by a factorisation, whatever its size: friction on a linear body."""
+        return self.probe.friction > 0 and not self.material.is_large
+
+    @property
+    def whole(self) -> str:
+        """Its name in the dataset: that of all of its stages."""
+        return _named({axis.name: self.words[axis.name] for axis in self.axes if not axis.is_stage})
+
+    def __str__(self) -> str:
+        return _named(self.words)
+
+
+def _named(words: dict[str, str]) -> str:
+    return ", ".join(f"{name} = {text}" for name, text in words.items()) or "the one case"

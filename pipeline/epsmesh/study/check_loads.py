@@ -1,0 +1,115 @@
+"""Physical sense of loads: whether they fit the body and the probe."""
+
+from collections.abc import Sequence
+from itertools import product
+from math import dist
+from typing import cast
+
+from epsmesh.shapes.body import Body
+from epsmesh.shapes.frame import PlaceError
+from epsmesh.shapes.from_file import FromFile
+from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.section import Section, in_mm
+from epsmesh.shapes.support import Faces, NamedFace
+from epsmesh.study.axis import Axis
+from epsmesh.study.loads import FREE, Cap, Load, Traction
+from epsmesh.study.problems import Problems, nearest
+from epsmesh.study.regions import tissues_of
+from epsmesh.study.schema import Material
+
+# Largest distance of a centre from the surface, in units of the cap's radius.
+_FARTHEST_OFF = 0.5
+
+
+def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
+    """Check every load on every body, under every probe, and on every mesh."""
+    loads = [load for load in cast(Sequence[Load], sections["load"]) if _makes_sense(load, problems)]
+    acting = [load for load in loads if load.acts]
+    bodies, probes = cast(Sequence[Body], sections["body"]), cast(Sequence[Probe], sections["probe"])
+    materials = cast(Sequence[Material], sections["material"])
+    for axis in axes:
+        if axis.section == "load" and axis.piece and not axis.owner:
+            problems.error(axis.path, None, "is swept: give its table a `name`")
+    if not acting:
+        return
+    if any(any(load.gravity) for load in acting):
+        problems.each(_check_densities, body=bodies, material=materials)
+    for body, load in product(bodies, acting):
+        for number, traction in enumerate(load.traction, start=1):
+            with problems.about(body=body):
+                _check_traction(body, probes, traction, f"load.traction[{number}].on", problems)
+
+
+def _check_traction(body: Body, probes: Sequence[Probe], traction: Traction, key: str, problems: Problems) -> None:
+    if _check_place(body, traction, key, problems) and isinstance(cap := traction.on, Cap):
+        problems.each(lambda probe, _: _check_beside(body, probe, cap, key, problems), probe=probes)
+
+
+def _makes_sense(load: Load, problems: Problems) -> bool:
+    sane = True
+    for number, traction in enumerate(load.traction, start=1):
+        if (traction.pressure is None) == (traction.traction is None):
+            problems.error(
+                f"load.traction[{number}]",
+                None,
+                "needs either `pressure` (against the outward normal) or `traction` (a vector)",
+            )
+            sane = False
+    return sane
+
+
+def _check_densities(body: Body, material: Material, problems: Problems) -> None:
+    if not body.is_filled and material.density is None:
+        problems.error("material.density", None, 'is required for gravity: density = "1060 kg/m^3"')
+    if body.is_filled:
+        for key, tissue in tissues_of(body, material):
+            if tissue.density is None:
+                problems.error(f"{key}.density", None, 'is required for gravity: density = "1060 kg/m^3"')
+
+
+def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -> bool:
+    """Report a part of the boundary that does not exist, and return whether it does."""
+    on, names = traction.on, sorted([*body.surfaces(), *body.cavities])
+    if isinstance(on, Cap):
+        found = [in_mm(c) for c in on.around]
+        try:
+            off = dist(body.frame(on.around).point, on.around)
+        except PlaceError as error:
+            problems.error(key, found, str(error))
+            return False
+        if off > _FARTHEST_OFF * on.radius:
+            problems.error(
+                key,
+                found,
+                f"is {in_mm(off)} off the surface of the body: must be at most half the radius of the cap, "
+                f"{in_mm(_FARTHEST_OFF * on.radius)}",
+            )
+            return False
+        return True
+    if on != FREE and on not in body.cavities and isinstance(body, FromFile) and body.HAS_NAMES:
+        problems.error(key, on, 'faces of a CAD file have no tractions by name: use a cap around a point, or "free"')
+        return False
+    if on != FREE and on not in names:
+        problems.error(key, on, f"the {body.shape} has no such face; {nearest(on, [*names, FREE])}")
+        return False
+    support = body.support
+    held = support.names if isinstance(support, Faces) else (support.face,) if isinstance(support, NamedFace) else ()
+    if on in held:
+        problems.error(key, on, "is fixed: a traction there acts on the support alone")
+        return False
+    return True
+
+
+def _check_beside(body: Body, probe: Probe, cap: Cap, key: str, problems: Problems) -> None:
+    """Report a cap that may reach under the probe."""
+    try:
+        gap = dist(probe.frame_on(body).point, cap.around) - cap.radius - probe.circumradius
+    except PlaceError:
+        return
+    if gap < 0:
+        problems.error(
+            key,
+            [in_mm(c) for c in cap.around],
+            f"the cap overlaps the tool by {in_mm(-gap)}; the tool reaches {in_mm(probe.circumradius)} from its axis: "
+            "move the cap, or make it smaller",
+        )

@@ -1,0 +1,133 @@
+"""Loads on the body: gravity, and tractions on parts of its boundary."""
+
+from collections.abc import Mapping
+from math import hypot
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+from epsmesh.shapes.frame import Vector
+from epsmesh.shapes.section import OptionalName, Section, Words
+from epsmesh.units import Acceleration, Coordinate, Length, Stress
+
+# All of the boundary without support and probe.
+FREE = "free"
+# A component of a unit vector, or a coordinate in units of a cap's radius, that is smaller is none.
+_NONE = 1e-12
+_COORDINATES = 3
+
+
+class Cap(BaseModel):
+    """A cap: the part of the boundary within a ball whose normal is on the same side as at the centre."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
+    around: tuple[Coordinate, Coordinate, Coordinate]
+    radius: Length
+
+
+def _on(value: Any) -> Any:
+    if isinstance(value, dict):
+        around = value.get("around")
+        if set(value) != {"around", "radius"} or not isinstance(around, tuple) or len(around) != _COORDINATES:
+            raise PydanticCustomError(
+                "not_supported",
+                'a cap has the keys around and radius: {around = ["10 mm", "0 mm", "0 mm"], radius = "4 mm"}',
+            )
+        return Cap(**value)
+    if not isinstance(value, str):
+        raise PydanticCustomError(
+            "not_supported", 'must be a face by name, "free", or {around = ["10 mm", "0 mm", "0 mm"], radius = "4 mm"}'
+        )
+    return value
+
+
+class Traction(Section):
+    """A traction on part of the boundary: a vector, or a pressure against the outward normal."""
+
+    name: Annotated[
+        OptionalName,
+        Words(
+            "Name of the traction: letters, digits, _ and -. The dimension of a sweep begins with it: "
+            "retractor_pressure.",
+            '"retractor"',
+            default="none: nothing of it is swept",
+        ),
+    ] = ""
+    on: Annotated[
+        str | Cap,
+        BeforeValidator(_on),
+        Words(
+            'Part of the boundary: a face of the body ("top", "sides", "bottom"; not of a CAD file), a hollow '
+            "region by its name, "
+            'a cap around a point of the surface, or "free", all of the boundary without support and '
+            "tool.",
+            '"sides"',
+        ),
+    ]
+    pressure: Annotated[
+        Stress | None,
+        Field(json_schema_extra={"unit": "Pa"}),
+        Words("Pressure, against the outward normal. Negative values pull.", '"1 kPa"', default="none: it is a vector"),
+    ] = None
+    traction: Annotated[
+        tuple[Stress, Stress, Stress] | None,
+        Words(
+            "Traction vector: force per area along x, y and z.",
+            '["1 kPa", "0 Pa", "0 Pa"]',
+            default="none: it is a pressure",
+        ),
+    ] = None
+
+    @property
+    def acts(self) -> bool:
+        """Whether it is not zero."""
+        return bool(self.pressure) or any(self.traction or ())
+
+
+class Load(Section):
+    """Loads on the body besides the probe."""
+
+    gravity: Annotated[
+        tuple[Acceleration, Acceleration, Acceleration],
+        Words(
+            "Acceleration along x, y and z. Every material then needs a density.",
+            '["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]',
+            default="none",
+        ),
+    ] = (0.0, 0.0, 0.0)
+    traction: Annotated[
+        tuple[Traction, ...], Words("Tractions on parts of the boundary.", "[[load.traction]]", default="none")
+    ] = ()
+
+    def with_pressures(self, pressures: Mapping[str, float]) -> "Load":
+        """Return the load with ``pressures`` (Pa) in hollow regions, by name, as tractions on their walls."""
+        if not pressures:
+            return self
+        inner = (Traction.model_construct(on=name, pressure=pressure) for name, pressure in pressures.items())
+        return self.model_copy(update={"traction": (*self.traction, *inner)})
+
+    @property
+    def acts(self) -> bool:
+        """Whether there is any load."""
+        return any(self.gravity) or any(traction.acts for traction in self.traction)
+
+    def is_mirrored(self, normal: Vector) -> bool:
+        """Tell whether it is its own image in the plane through the origin with that unit normal, as the body is.
+
+        This is so for a named face, and for a cap whose centre is in the plane. Pairs of caps are not considered.
+        """
+        if abs(_along(self.gravity, normal)) > _NONE * hypot(*self.gravity):
+            return False
+        for traction in (traction for traction in self.traction if traction.acts):
+            vector = traction.traction or (0.0, 0.0, 0.0)
+            if abs(_along(vector, normal)) > _NONE * hypot(*vector):
+                return False
+            cap = traction.on
+            if isinstance(cap, Cap) and abs(_along(cap.around, normal)) > _NONE * cap.radius:
+                return False
+        return True
+
+
+def _along(vector: Vector, normal: Vector) -> float:
+    return sum(a * b for a, b in zip(vector, normal, strict=True))

@@ -1,0 +1,329 @@
+"""The sections of a study file that have no shape, and the table of all sections.
+
+One value a key: sweeps are taken apart before a section gets here. Bodies and probes are in :mod:`epsmesh.shapes`.
+"""
+
+from collections.abc import Mapping
+from math import inf
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BaseModel, BeforeValidator, Field
+from pydantic_core import PydanticCustomError
+
+from epsmesh.shapes.body import Body
+from epsmesh.shapes.history import History
+from epsmesh.shapes.insertion import Insertion
+from epsmesh.shapes.regions import Inclusion, Layer
+from epsmesh.shapes.registry import BODIES, PROBES
+from epsmesh.shapes.section import Section, Words
+from epsmesh.shapes.segment import Segment
+from epsmesh.shapes.tissue import LAWS, Fibres, Relaxation, Term, Tissue
+from epsmesh.study.columns import Columns, ColumnUnits, Sign
+from epsmesh.study.loads import Load, Traction
+from epsmesh.study.measurement import Identify, Measurement, Sensitivity
+from epsmesh.study.output import Output
+from epsmesh.study.path import Path
+from epsmesh.study.vocabulary import FIGURES, REDUCTIONS
+from epsmesh.units import Length, Pressure, Share, parse_quantity
+
+# ---- material ---------------------------------------------------------------------------------------
+
+
+class Material(Tissue):
+    """Elasticity: linear, or a law of large displacements."""
+
+    young: Annotated[Pressure, Words("Young's modulus. F is proportional to it.", '"10 kPa"', is_used=True)]
+    poisson: Annotated[
+        float,
+        Field(ge=0, le=0.5),
+        Words(
+            "Poisson's ratio. 0.5 is incompressible. Elements of degree 1 allow values up to 0.45.",
+            "[0.30, 0.45]",
+            is_used=True,
+        ),
+    ]
+
+    law: Annotated[
+        Literal[tuple(LAWS)],  # type: ignore[valid-type]
+        Words(
+            "Law of the material. linear: linear elasticity. All others are for large displacements, and agree with "
+            "linear elasticity at small depths. Contact is bonded, or found at the deformed place. Poisson's ratios "
+            "are 0.2 to 0.5.",
+            '["linear", "neo-hookean"]',
+        ),
+    ] = "linear"
+
+    # Keys that F is proportional to, if all of them change together.
+    PROPORTIONAL_TO: ClassVar[tuple[str, ...]] = ("young",)
+    # Least Poisson's ratio at large displacements: below, F depends on the elements at the probe's edge
+    # (docs/accuracy.md).
+    LEAST_OF_LARGE: ClassVar[float] = 0.2
+
+
+def main_material(body: Body, material: Material) -> Material:
+    """Return the material of a body's region 0: where layers fill the body, and there is none, the first layer's."""
+    return material_of(body.regions[0]) if body.is_filled else material
+
+
+def material_of(tissue: Tissue) -> Material:
+    """Return the material of a layer or an inclusion."""
+    own = {key: getattr(tissue, key) for key in ("young", "poisson", "density", "relaxation", *tissue.given)}
+    return Material.model_construct(**own, law=tissue.law or "linear")
+
+
+# ---- mesh and solver --------------------------------------------------------------------------------
+
+
+def _epsilon(value: Any) -> float:
+    if value == "full":
+        return inf
+    try:
+        return parse_quantity(value, "m")
+    except PydanticCustomError as error:
+        allowed = error.message().replace('such as "10 mm"', 'such as "10 mm", or "full"', 1)
+        raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed}) from None
+
+
+def _degree(value: Any) -> Any:
+    if isinstance(value, bool):  # which would be 1
+        raise PydanticCustomError("not_supported", "must be 1, 2 or 3")
+    return value
+
+
+Epsilon = Annotated[float, BeforeValidator(_epsilon), Field(gt=0, json_schema_extra={"unit": "m"})]
+
+
+_REQUIRED = "required without `accuracy`"
+
+
+class Mesh(Section):
+    """Element sizes and elements; ``epsilon`` is infinite for the full-order mesh.
+
+    With an ``accuracy``, the largest relative error bar of F, sizes that are not given are chosen.
+    """
+
+    accuracy: Annotated[
+        Share | None,
+        Field(ge=1e-4, le=0.2),
+        Words(
+            "Largest error bar of F in each case, relative to F. Omitted sizes and degree are chosen for it. "
+            "A case with a larger error bar fails. The effect of `outside` on F is not included: see `epsmesh "
+            "guide --accuracy`.",
+            '"1 %"',
+            default="none: the given sizes are used",
+        ),
+    ] = None
+    epsilon: Annotated[
+        Epsilon,
+        Words(
+            "Radius of the fine mesh around the contact. full: the mesh is fine everywhere, which gives F_max.",
+            '["4 mm", "7 mm", "10 mm", "15 mm", "full"]',
+            default=_REQUIRED,
+            is_used=True,
+        ),
+    ] = inf
+    fine: Annotated[Length, Words("Element size within epsilon.", '"2 mm"', default=_REQUIRED, is_used=True)] = inf
+    coarse: Annotated[
+        Length, Words("Element size far from the contact.", '"8 mm"', default=_REQUIRED, is_used=True)
+    ] = inf
+    rim: Annotated[
+        Length | None,
+        Field(json_schema_extra={"unit": "m"}),
+        Words(
+            "Element size at the tool's edge. Stresses are singular there, so F_max depends on it "
+            "more than on any other size. A round tool has at least twelve elements along its edge.",
+            '"0.2 mm"',
+            default="a tenth of the probe's half width, at most fine",
+        ),
+    ] = None
+    growth: Annotated[
+        float,
+        Field(ge=1e-6, le=2),
+        Words("Growth of the element size with the distance from the edge: size added per unit of distance.", "0.5"),
+    ] = 0.5
+    outside: Annotated[
+        Literal["coarse", "linear", "free", "fixed", "halfspace", "green"],
+        Words(
+            "Treatment of the body beyond epsilon. coarse: a coarse mesh. linear: a coarse mesh, with linear "
+            "elasticity there, and the law within epsilon. free, fixed: cut away; a "
+            "column remains, whose side has no traction or no displacement. halfspace, green: cut "
+            "away; a half ball remains, coupled to the far field of a half-space or to the Green's "
+            "function of the body.",
+            '["coarse", "free"]',
+            is_used=True,
+        ),
+    ] = "coarse"
+    degree: Annotated[
+        Literal[1, 2, 3], BeforeValidator(_degree), Words("Degree of the polynomials of the displacement.", "2")
+    ] = 2
+    element: Annotated[
+        Literal["auto", "displacement", "mixed"],
+        Words(
+            "Element: displacement alone, or mixed with pressure, which does not lock. auto: mixed "
+            "from poisson = 0.45 on.",
+            '"auto"',
+        ),
+    ] = "auto"
+    model: Annotated[
+        Literal["auto", "3d"],
+        Words(
+            "Dimension of the model. auto: symmetric parts and two dimensions, where possible. 3d: never.",
+            '"auto"',
+        ),
+    ] = "auto"
+
+    # A tenth of the probe's half width puts F within about 1 % on the default elements (docs/accuracy.md).
+    RIM_SHARE: ClassVar[float] = 0.1
+    # From this Poisson's ratio on, mixed elements give a smaller error for the same time (docs/accuracy.md).
+    MIXED_FROM: ClassVar[float] = 0.45
+    # What must be given where no accuracy is.
+    SIZES: ClassVar[tuple[str, ...]] = ("epsilon", "fine", "coarse")
+
+    def rim_size(self, half_width: float) -> float:
+        """Element size at the edge of a probe of that half width (m)."""
+        return self.rim if self.rim is not None else min(self.fine, self.RIM_SHARE * half_width)
+
+    @property
+    def keeps_all(self) -> bool:
+        """Whether the whole body is modelled, for any epsilon."""
+        return self.outside in ("coarse", "linear")
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether what is kept of a body is a half ball, closed by a far field."""
+        return self.outside in ("halfspace", "green")
+
+    def column(self, reach: float) -> float:
+        """Return the radius (m) of what is kept of a body of that ``reach`` from the probe's axis; infinite if all."""
+        return inf if self.keeps_all or self.epsilon >= reach else self.epsilon
+
+    def element_for(self, poisson: float, *, is_large: bool = False) -> Literal["displacement", "mixed"]:
+        """Return the element for a Poisson's ratio; of degree 1 there is no stable mixed one."""
+        if self.element != "auto":
+            return self.element
+        is_mixed = poisson > self.MIXED_FROM or (poisson == self.MIXED_FROM and not is_large)
+        return "mixed" if self.degree > 1 and is_mixed else "displacement"
+
+
+class Solving(Section):
+    """How cases are solved and timed."""
+
+    method: Annotated[
+        Literal["auto", "direct", "iterative"],
+        Words(
+            "Linear solver: factorisation (direct) or conjugate gradients (iterative). auto: the faster one.", '"auto"'
+        ),
+    ] = "auto"
+    energy_tolerance: Annotated[
+        float,
+        Field(ge=1e-14, le=1e-6),  # above, forces do not balance to what every solve must show
+        Words(
+            "Tolerance of the iterative solver: its relative error in the energy norm. The relative error of "
+            "F is its square.",
+            "1e-8",
+        ),
+    ] = 1e-6
+    exact: Annotated[
+        bool,
+        Words(
+            "Computation of F_exact, the force without mesh error, for every scene.",
+            "true",
+            default="true; false with `accuracy`",
+        ),
+    ] = True
+    timing: Annotated[
+        bool,
+        Words("Timing study: every case is computed alone, from the start, to compare times.", "false"),
+    ] = False
+    repeats: Annotated[
+        int,
+        Field(ge=1, le=1000),
+        Words("Runs of each case of a timing study. The dataset has the median of their times.", "3"),
+    ] = 3
+
+    def wants_exact(self, mesh: Mesh) -> bool:
+        """Return whether F_exact is computed beside a ``mesh``; with an accuracy, only if the study says so."""
+        return self.exact and (mesh.accuracy is None or "exact" in self.model_fields_set)
+
+
+class Planning(Section):
+    """What the planner may skip: reductions that are not used, and the end of a sweep over ε."""
+
+    without: Annotated[
+        tuple[Literal[REDUCTIONS], ...],  # type: ignore[valid-type]
+        Words("Reductions that are not used. `epsmesh plan` lists those that apply to a study.", '["symmetry"]'),
+    ] = ()
+    reduced_basis_error: Annotated[
+        float,
+        Field(ge=1e-10, le=1e-2),
+        Words("Largest relative error of F that a reduced basis over many Poisson's ratios may add.", "1e-6"),
+    ] = 1e-6
+    path_error: Annotated[
+        Share | None,
+        Field(ge=1e-4, le=0.1),
+        Words(
+            "Largest relative error of F that interpolation along [probe.path] may add. Places are solved until the "
+            "error bar of the interpolation is below it at all others.",
+            '"1 %"',
+            default="none: every place is solved",
+        ),
+    ] = None
+    stop_near_exact: Annotated[
+        Share | None,
+        Field(gt=0, le=0.5),
+        Words(
+            "Relative distance of F from F_exact that ends a sweep over epsilon. After two such values in a "
+            "row, larger ones are skipped.",
+            '"1 %"',
+            default="none: every epsilon is run",
+        ),
+    ] = None
+
+
+class Drawing(Section):
+    """What the study's main figure shows. Forces do not depend on it."""
+
+    kind: Annotated[
+        Literal["auto", *FIGURES],  # type: ignore[valid-type]
+        Words("Kind of the study's main figure. auto: chosen by what is swept.", '"compliance"'),
+    ] = "auto"
+    paper: Annotated[
+        bool,
+        Words(
+            "Marks of the paper's claims in the figure: 80 % of F_max at 10 mm for free columns, and a speed-up of 50.",
+            "true",
+        ),
+    ] = False
+
+
+SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
+    "body": BODIES,
+    "material": Material,
+    "probe": PROBES,
+    "mesh": Mesh,
+    "solve": Solving,
+    "plan": Planning,
+    "load": Load,
+    "figure": Drawing,
+}
+# Sections on which no force depends: experiments and their parameters, and further numbers of a solution.
+EXPERIMENT: dict[str, type[Section]] = {
+    "measurement": Measurement,
+    "identify": Identify,
+    "sensitivity": Sensitivity,
+    "output": Output,
+}
+# Arrays of tables within a section: pieces of it, each with keys that can be swept.
+NESTED: dict[str, dict[str, type[Section]]] = {
+    "body": {"layer": Layer, "inclusion": Inclusion, "region": Segment},
+    "material": {"relaxation": Relaxation, "terms": Term},
+    "load": {"traction": Traction},
+}
+# Sections that say how, not what: their lists are no sweeps.
+SINGLE = ("solve", "plan", "figure")
+# Tables within a section.
+TABLES: dict[str, dict[str, type[BaseModel]]] = {
+    "probe": {"path": Path, "history": History, "insertion": Insertion},
+    "material": {"fibres": Fibres},
+    "measurement": {"columns": Columns, "units": ColumnUnits, "sign": Sign},
+}

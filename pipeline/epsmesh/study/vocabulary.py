@@ -1,0 +1,21 @@
+"""Names that the command line and study files share."""
+
+REDUCTIONS = (
+    "duplicates",
+    "full",
+    "scaling",
+    "images",
+    "moved",
+    "axisymmetric",
+    "symmetry",
+    "sharing",
+    "reuse",
+    "reduced",
+    "condensed",
+    "path",
+    "stored",
+    "all",
+)
+
+# Each is drawn by the module of its name in pipeline/epsmesh/report/figures.
+FIGURES = ("insertion", "history", "ratio", "error", "force", "map", "compliance")

@@ -1,0 +1,113 @@
+"""Scenes of one material with a known force, in two and in three dimensions."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from mpi4py import MPI
+
+from epsmesh.layered.body import LayeredBody
+from epsmesh.layered.compliance import Layer
+from epsmesh.verify import known
+from epsmesh.verify.boundary import rectangle_stiffness
+from epsmesh.verify.compare import against, against_meridian
+from epsmesh.verify.row import Row
+from epsmesh.verify.sections import Section, blade, cylinder, disc, ellipse, tissue
+
+# A body so many times as large as the probe is a half-space, up to a few 1e-5 of F.
+FAR = 20_000
+_RECTANGLE = "boundary elements (A. E. H. Love 1929)"
+
+_ELLIPSES = (1.5, 3, 8)  # first semi-axis over second
+# Not along the axes, so that the scene has no symmetry.
+_OBLIQUE = [2.0, 1.0, 0.0]
+# Above this ν the two paths are compared with each other: _incompressible.
+_MOST_COMPRESSIBLE = 0.49
+_NEAR_HALF = (0.49, 0.499, 0.4999, 0.5)
+# Relative effect of a side twelve thicknesses away on a disc on a layer on a rigid base, measured.
+_SIDE = 1e-7
+
+
+def scene_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
+    """Yield the rows of all scenes; ``quick`` yields a few of each kind; collective."""
+    for compare in (_half_space, _rectangles, _ellipses, _cylinders, _layers, _incompressible):
+        yield from compare(comm, quick)
+
+
+def _half_space(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    young, a, depth = 10e3, 1e-3, 1e-5
+    for nu in (0.3,) if quick else (0.0, 0.3, 0.45):
+        for contact in ("frictionless", "bonded"):
+            force, source = known.half_space_disc(young, nu, a, depth, contact)
+            scene = _scene(cylinder(FAR, FAR), nu, disc(1, contact=contact))
+            for path in ("2D", "3D"):
+                yield against(comm, f"half-space, disc, {contact}, ν = {nu:g}", path, (force, source, 1e-4), scene)
+
+
+def _rectangles(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    for ratio in (1, 4) if quick else known.RECTANGLE:
+        stiffness, error = rectangle_stiffness(ratio)
+        force = known.rectangle(stiffness, 10e3, 0.3, 1e-3, 1e-5)
+        scene = _scene(cylinder(FAR, FAR), 0.3, blade(ratio, 1, contact="frictionless"))
+        yield against(
+            comm,
+            f"half-space, rectangle {ratio}:1, frictionless, ν = 0.3",
+            "3D",
+            (force, _RECTANGLE, error + 1e-4),
+            scene,
+        )
+
+
+def _ellipses(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    """Ellipses along the axes, and oblique ones."""
+    for ratio in (3,) if quick else _ELLIPSES:
+        force, source = known.half_space_ellipse(10e3, 0.3, (ratio * 1e-3, 1e-3), 1e-5)
+        for name, direction in (("", [1.0, 0.0, 0.0]), (", oblique", _OBLIQUE)):
+            probe = ellipse((ratio, 1), contact="frictionless", direction=direction)
+            yield against(
+                comm,
+                f"half-space, ellipse {ratio:g}:1{name}, frictionless, ν = 0.3",
+                "3D",
+                (force, source, 1e-4),
+                _scene(cylinder(FAR, FAR), 0.3, probe),
+            )
+
+
+def _cylinders(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    for (contact, nu), value in known.CYLINDER.items():
+        if nu > _MOST_COMPRESSIBLE:
+            continue
+        truth = value * 10e3 * 1e-5 * 1e-3, known.CYLINDER_SOURCE, known.CYLINDER_ERROR
+        scene = _scene(known.CYLINDER_BODY, nu, disc(3, contact=contact))
+        for path in ("2D",) if quick else ("2D", "3D"):
+            yield against(comm, f"cylinder R = H = 50 mm, a = 3 mm, {contact}, ν = {nu:g}", path, truth, scene)
+
+
+def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    """One layer on a rigid base; references are a published table and an integral equation."""
+    a = 1.0
+    for ratio in (0.4,) if quick else known.LAYER:
+        thickness = a / ratio
+        published = known.layer(ratio, 10e3, a * 1e-3, 1e-5), known.LAYER_SOURCE, known.LAYER_ERROR
+        force = LayeredBody((Layer(10e3, 0.3, thickness * 1e-3),)).punch(a * 1e-3) * 1e-5
+        scene = _scene(cylinder(a + 12 * thickness, thickness), 0.3, disc(a, contact="frictionless"))
+        name = f"layer on a rigid base, a/h = {ratio:g}, frictionless, ν = 0.3"
+        flat = against(comm, name, "2D", (force, known.LAYERED, _SIDE), scene)
+        reference, source, bar = published
+        yield flat
+        yield replace(flat, reference=reference, source=source, reference_bar=bar)
+        yield against(comm, name, "3D", published, scene)
+
+
+def _incompressible(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    """Both paths near and at ν = ½; two dimensions are the reference."""
+    for nu in (0.5,) if quick else _NEAR_HALF:
+        for contact in ("bonded", "frictionless"):
+            yield against_meridian(
+                comm,
+                f"cylinder R = H = 20 mm, a = 2 mm, {contact}, ν = {nu:g}",
+                _scene(cylinder(20, 20), nu, disc(2, contact=contact)),
+            )
+
+
+def _scene(body: Section, nu: float, probe: Section) -> Section:
+    return {"body": body, "material": tissue(nu), "probe": probe}

@@ -1,0 +1,112 @@
+"""Fields as files that ParaView reads: VTU, or XDMF that holds its own numbers."""
+
+import io
+from pathlib import Path
+from xml.etree import ElementTree as Xml
+
+import meshio
+import numpy as np
+
+from epsmesh import compat
+from epsmesh.files import atomic
+from epsmesh.scene.model import FIXED, PROBE
+from epsmesh.solve.points.derived import von_mises
+from epsmesh.view.fields import Fields
+
+# Names of cells for meshio, and degrees, by the number of nodes.
+_KINDS = {4: "tetra", 10: "tetra10", 20: "VTK_LAGRANGE_TETRAHEDRON"}
+_DEGREES = {4: 1, 10: 2, 20: 3}
+_ZERO = 1e-9
+
+
+def write_fields(fields: Fields, path: Path) -> Path:
+    """Write ``fields`` to ``path``, ``….vtu`` or ``….xdmf``, in place of an earlier file only once it is whole.
+
+    At points: ``displacement`` (m), ``on_probe`` and ``on_support`` (1 or 0). In cells: ``element_size`` (m),
+    ``max_strain`` (largest principal strain by magnitude), ``within_epsilon`` (1 or 0) and ``region``; ``stress``
+    (Pa, nine components, at the cell's centre) and ``von_mises``. A VTU file has cells of the displacement's degree.
+    """
+    points, cells, displacement = fields.points, fields.cells, fields.displacement
+    with atomic(path) as temporary:
+        if path.suffix == ".xdmf":
+            _xdmf(_mesh(fields, points, cells, displacement)).write(temporary)
+            return path
+        if (nodes := fields.nodes) is not None:
+            points, cells, displacement = nodes.points, nodes.cells, nodes.displacement
+        meshio.vtu.write(temporary, _mesh(fields, points, cells, displacement))
+    return path
+
+
+def _mesh(fields: Fields, points: np.ndarray, cells: np.ndarray, displacement: np.ndarray | None) -> meshio.Mesh:
+    """Return the fields on ``cells`` of any degree, in the order of the fields' own, with ``points``."""
+    count = len(fields.cells)
+    at_points = {
+        name: _marked(fields, group, len(points), cells) for name, group in (("on_probe", PROBE), ("on_support", FIXED))
+    }
+    regions = np.zeros(count, np.int32) if fields.regions is None else fields.regions.astype(np.int32)
+    in_cells = {
+        "element_size": fields.sizes,
+        "within_epsilon": fields.within_epsilon.astype(np.int32),
+        "region": regions,
+    }
+    if displacement is not None:
+        at_points["displacement"] = displacement
+    if fields.strain is not None:
+        in_cells["max_strain"] = fields.strain
+    if fields.stress is not None:
+        in_cells |= {"stress": fields.stress.reshape(-1, 9), "von_mises": von_mises(fields.stress)}
+    of_vtk = cells[:, compat.vtk_order(cells.shape[1])]
+    blocks = {name: [values] for name, values in in_cells.items()}
+    return meshio.Mesh(points, [(_KINDS[cells.shape[1]], of_vtk)], point_data=at_points, cell_data=blocks)
+
+
+def _xdmf(mesh: meshio.Mesh) -> Xml.ElementTree:
+    """Return an XDMF document with its numbers as text: meshio's own writer needs h5py, and a second file."""
+    (block,) = mesh.cells
+    root = Xml.Element("Xdmf", Version="3.0")
+    grid = Xml.SubElement(Xml.SubElement(root, "Domain"), "Grid", Name="Grid", GridType="Uniform")
+    Xml.SubElement(grid, "Time", Value="0")  # some readers ask for it
+    kind = {"tetra": "Tetrahedron", "tetra10": "Tetrahedron_10"}[block.type]
+    topology = Xml.SubElement(grid, "Topology", TopologyType=kind, NumberOfElements=str(len(block.data)))
+    _add_numbers(topology, block.data)
+    _add_numbers(Xml.SubElement(grid, "Geometry", GeometryType="XYZ"), mesh.points)
+    in_cells = {name: values for name, (values,) in mesh.cell_data.items()}
+    for centre, data in (("Node", mesh.point_data), ("Cell", in_cells)):
+        for name, values in data.items():
+            shape = {1: "Scalar", 3: "Vector", 9: "Tensor"}[1 if values.ndim == 1 else values.shape[1]]
+            _add_numbers(Xml.SubElement(grid, "Attribute", Name=name, AttributeType=shape, Center=centre), values)
+    return Xml.ElementTree(root)
+
+
+def _add_numbers(parent: Xml.Element, values: np.ndarray) -> None:
+    whole = np.issubdtype(values.dtype, np.integer)
+    item = Xml.SubElement(
+        parent,
+        "DataItem",
+        Dimensions=" ".join(map(str, values.shape)),
+        Format="XML",
+        NumberType="Int" if whole else "Float",
+        Precision=str(values.dtype.itemsize),
+    )
+    text = io.StringIO()
+    np.savetxt(text, values, fmt="%d" if whole else "%.16g")
+    item.text = text.getvalue()
+
+
+def _marked(fields: Fields, group: str, count: int, cells: np.ndarray) -> np.ndarray:
+    """Mark the nodes of ``cells`` on a group of facets, of ``count`` nodes."""
+    marks = np.zeros(count, dtype=np.int32)
+    size, nodes = len(fields.points), compat.equidistant_nodes(_DEGREES[cells.shape[1]])
+    weights = np.column_stack([1 - nodes.sum(axis=1), nodes])
+    known = _keys(fields.facets[group], size)
+    for corner in range(4):
+        facets = np.delete(fields.cells[:, :4], corner, axis=1)
+        chosen = np.isin(_keys(facets, size), known)
+        marks[cells[np.ix_(chosen, np.abs(weights[:, corner]) < _ZERO)]] = 1
+    return marks
+
+
+def _keys(facets: np.ndarray, size: int) -> np.ndarray:
+    """Return a number for each facet of three of ``size`` points."""
+    first, second, third = np.sort(facets, axis=1).T
+    return np.asarray((first * size + second) * size + third)

@@ -1,0 +1,106 @@
+"""The tool as triangles, for pictures and pages."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from epsmesh.arrays import FloatArray, IntArray
+from epsmesh.scene.model import PROBE
+from epsmesh.shapes.contact import first_touch
+from epsmesh.shapes.indenter import Indenter
+from epsmesh.shapes.probe import Probe
+from epsmesh.view.fields import Fields
+
+# Length of the drawn part, in radii of the footprint.
+_LENGTH = 2.5
+# Lines over the surface of a tool that is not flat, and the points of each.
+_LINES, _POINTS = 49, 60
+# Length of these lines, in units of what the tool may touch: of a round tool; of a pyramid, or across a long tool.
+_ROUND, _ACROSS = 4.0, 1.5
+# Bisections of a line for the point at a height.
+_HALVINGS = 40
+
+
+@dataclass(frozen=True)
+class Tool:
+    """Its ``points`` (n, 3) before it is pushed in and their displacements ``moved``, in m; ``triangles`` (k, 3)."""
+
+    points: FloatArray
+    triangles: IntArray
+    moved: FloatArray
+
+
+def tool_of(fields: Fields) -> Tool:
+    """Return the tool of a case: its footprint, extruded, with the footprint's displacement; or its own surface."""
+    case = fields.case
+    length, outward = _LENGTH * case.probe.circumradius, np.array(case.frame.outward)
+    if not case.probe.is_flat:
+        lines = _lines(case.probe, length)
+        # The depth counts from where the tool first touches, which may be beside its axis.
+        *_, first = first_touch(case.body, case.probe, case.frame)
+        points = case.frame.world(lines.reshape(-1, 3)) - first * outward
+        return Tool(points, _between_lines(*lines.shape[:2]), np.tile(case.travel, (len(points), 1)))
+    used, corners = np.unique(fields.facets[PROBE], return_inverse=True)
+    base, below = fields.points[used], corners.reshape(-1, 3)
+    moved = np.zeros_like(base) if fields.displacement is None else fields.displacement[used]
+    count, (first, second) = len(used), _rim(below).T
+    sides = np.column_stack([first, second, first + count]), np.column_stack([first + count, second + count, second])
+    return Tool(
+        points=np.vstack([base, base + length * outward]),
+        triangles=np.vstack([below, below + count, *sides]),
+        moved=np.vstack([moved, moved]),
+    )
+
+
+def _lines(probe: Probe, length: float) -> FloatArray:
+    """Return lines (k, n, 3) over its surface, in m and the probe's own coordinates.
+
+    Those of a round tool or a pyramid go from its axis to its axis, by a shaft with the outline that the tool has at
+    one height; those of a long one are sections, the first and last points.
+    """
+    if (probe.footprint if isinstance(probe, Indenter) else probe).is_round:
+        angles, top = np.linspace(0, 2 * np.pi, _LINES), (0.0, 0.0, length)
+        farthest = (_ROUND if probe.is_round else _ACROSS) * probe.circumradius
+        rays = farthest * np.column_stack([np.cos(angles), np.sin(angles)])
+        edge = _at_height(probe, rays, min(length, float(probe.profile(rays).min())))
+        return np.array([[*_line(probe, np.zeros(2), end, length), top] for end in edge])
+    along, across = probe.outline().max(axis=0)
+    sides = np.array([0.0, _ACROSS * across])
+    starts = (np.array([x, 0.0]) for x in np.linspace(-along, along, _LINES))
+    halves = ((_line(probe, s, -sides, length), _line(probe, s, sides, length)) for s in starts)
+    sections = [[*left[::-1], *right, left[-1]] for left, right in halves]
+    ends = [[section[0]] * len(section) for section in (sections[0], sections[-1])]
+    return np.array([ends[0], *sections, ends[1]])
+
+
+def _at_height(probe: Probe, rays: FloatArray, height: float) -> FloatArray:
+    """Return the points (n, 2) of ``rays`` (n, 2) from the axis up to which the surface is at most at ``height``."""
+    low, high = np.zeros((len(rays), 1)), np.ones((len(rays), 1))
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        is_below = probe.profile(middle * rays)[:, None] <= height
+        low, high = np.where(is_below, middle, low), np.where(is_below, high, middle)
+    return low * rays
+
+
+def _line(probe: Probe, start: FloatArray, along: FloatArray, length: float) -> FloatArray:
+    """Return points (n, 3) from ``start`` on ``along`` the surface; where it ends, or the line, straight up."""
+    ray = start + np.linspace(0.0, 1.0, _POINTS)[:, None] * along
+    heights = probe.profile(ray)
+    last = np.flatnonzero(heights <= length)[-1]
+    ray[last:], heights[last + 1 :] = ray[last], length
+    return np.vstack([np.column_stack([ray, heights]), [*ray[-1], length]])
+
+
+def _between_lines(lines: int, points: int) -> IntArray:
+    """Return the triangles (k, 3) between neighbours of ``lines`` of ``points`` each."""
+    first = np.add.outer(points * np.arange(lines - 1), np.arange(points - 1)).ravel()
+    ends = first + 1, first + points, first + points + 1
+    return np.vstack([np.column_stack([first, ends[0], ends[2]]), np.column_stack([first, ends[2], ends[1]])])
+
+
+def _rim(triangles: IntArray) -> IntArray:
+    """Return the edges (k, 2) that belong to one triangle only."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    return np.asarray(unique[count == 1])
