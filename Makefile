@@ -121,13 +121,13 @@ plain-loop: setup ## compare a plain FEniCSx script of a study with this program
 	$(PYTHON) -m benchmarks.plain_loop $(STUDY) $(LOOP_ARGS)
 
 realtime: setup ## build the real-time evaluator in C; test it in C, C++ and Python, and with sanitizers
-	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic -fPIC -shared realtime/epsmesh.c -o realtime/libepsmesh.so -lm
-	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic realtime/epsmesh.c realtime/latency.c -o realtime/latency -lm
-	$(PYTHON) -m pytest tests/realtime realtime/tests $(PYTEST_ARGS)
+	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic -fPIC -shared pipeline/epsmesh_realtime/c/epsmesh.c -o pipeline/epsmesh_realtime/c/libepsmesh.so -lm
+	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic pipeline/epsmesh_realtime/c/epsmesh.c pipeline/epsmesh_realtime/c/latency.c -o pipeline/epsmesh_realtime/c/latency -lm
+	$(PYTHON) -m pytest tests/realtime $(PYTEST_ARGS)
 
-wasm: ## build the evaluator for the page of `epsmesh touch`, after a change of realtime/ (installs clang and lld)
+wasm: ## build the evaluator for the page of `epsmesh touch`, after a change of its sources (installs clang and lld)
 	@scripts/setup.sh clang lld
-	$(PYTHON) realtime/wasm/build.py
+	$(PYTHON) pipeline/epsmesh_realtime/wasm/build.py
 
 resolution: setup ## the effect of a file's resolution, noise and voxels on F (a quarter of an hour): results/resolution.png
 	$(MPI_ENV) $(PYTHON) -m benchmarks.resolution

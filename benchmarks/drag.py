@@ -2,12 +2,13 @@
 
     python -m benchmarks.drag [--model liver] [--seconds 60] [--places 50] [--minutes 60] [--output results]
 
-`realtime/drag.c` moves a mass, coupled to a hand by a spring and a damper, along a random smooth path in and out of
-contact. Tools: a disc, a ball, and a cone of 70 degrees. For each: the largest change of the force in a millisecond,
-and that which the path's speed and the model's gradient allow; the least energy that a touch takes from the hand, and
-the energy that is left in the tissue out of contact, as a share of the largest; the time of a query. ``--places`` of
-the path, with their depths, are solved in full. Solved ones are kept in results/realtime/. After --minutes of processor
-time no more are solved. It prints a table, and draws the histogram of times into OUTPUT/drag.png.
+`drag.c`, beside the evaluator, moves a mass, coupled to a hand by a spring and a damper, along a random smooth path in
+and out of contact. Tools: a disc, a ball, and a cone of 70 degrees. For each: the largest change of the force in a
+millisecond, and that which the path's speed and the model's gradient allow; the least energy that a touch takes from
+the hand, and the energy that is left in the tissue out of contact, as a share of the largest; the time of a query.
+``--places`` of the path, with their depths, are solved in full. Solved ones are kept in results/realtime/. After
+--minutes of processor time no more are solved. It prints a table, and draws the histogram of times into
+OUTPUT/drag.png.
 """
 
 import argparse
@@ -26,12 +27,12 @@ from benchmarks.realtime import model_of
 from benchmarks.tables import markdown
 from benchmarks.touches import groups_of, keep
 from epsmesh.arrays import FloatArray
-from epsmesh.export.checks import Check, solved
-from epsmesh.export.full import Solver, Tool
 from epsmesh.report.figures.style import COLOURS
+from epsmesh_realtime.export.checks import Check, solved
+from epsmesh_realtime.export.full import Solver, Tool
 from epsmesh_realtime.model import Model
 
-_FOLDER, _SOURCES = Path("results/realtime"), Path(__file__).parents[1] / "realtime"
+_FOLDER, _SOURCES = Path("results/realtime"), Path(__file__).parents[1] / "pipeline" / "epsmesh_realtime" / "c"
 _CHECKS, _SEED = 12, 7
 # Radius of the tool and its largest depth, in units of the largest contact at the worst place.
 TOOLS = {"disc": (0.55, 0.08), "ball": (1.6, 0.12), "cone": (0.7, 0.1)}

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from epsmesh.touch.page import write_touch_page
 from epsmesh_realtime import read_surface
+from epsmesh_realtime.page.page import write_touch_page
 from epsmesh_realtime.surface import Surface
 from tests.realtime.synthetic import random_surface
 from tests.report.browser import Browser

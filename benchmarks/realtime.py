@@ -24,14 +24,14 @@ import numpy as np
 from benchmarks.tables import markdown
 from benchmarks.touches import NAMES, add_groups, flat_kinds, groups_of
 from epsmesh.arrays import FloatArray
-from epsmesh.export.checks import TOOLS, Check, with_bar
-from epsmesh.export.disc import Disc
-from epsmesh.export.export import export, write
-from epsmesh.export.full import Solver
-from epsmesh.export.scope import Scope, scope_of
-from epsmesh.export.tabulate import shares
 from epsmesh.study.read import read_study
 from epsmesh_realtime import read
+from epsmesh_realtime.export.checks import TOOLS, Check, with_bar
+from epsmesh_realtime.export.disc import Disc
+from epsmesh_realtime.export.export import export, write
+from epsmesh_realtime.export.full import Solver
+from epsmesh_realtime.export.scope import Scope, scope_of
+from epsmesh_realtime.export.tabulate import shares
 from epsmesh_realtime.model import Model
 
 _FOLDER = Path("results/realtime")
@@ -253,7 +253,7 @@ def _percent(value: float) -> str:
 def _latency(path: Path, seconds: float) -> str:
     """Return the time of queries in C and from Python, and the late ticks of a loop at 1 kHz."""
     program = _FOLDER / "latency"
-    sources = ["realtime/epsmesh.c", "realtime/latency.c"]
+    sources = ["pipeline/epsmesh_realtime/c/epsmesh.c", "pipeline/epsmesh_realtime/c/latency.c"]
     subprocess.run(["cc", "-std=c99", "-O2", *sources, "-o", str(program), "-lm"], check=True)
     arguments = [str(program), str(path), "20000", f"{seconds:g}"]
     in_c = subprocess.run(arguments, check=True, capture_output=True, text=True).stdout

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from epsmesh.export.checks import TOOLS, Check, random_place, random_touch, solved, with_bar
-from epsmesh.export.full import Solver, Tool
+from epsmesh_realtime.export.checks import TOOLS, Check, random_place, random_touch, solved, with_bar
+from epsmesh_realtime.export.full import Solver, Tool
 from epsmesh_realtime.model import Model
 
 # Seed of groups; number of Poisson's ratios in one, each from a quarter of the range.

@@ -20,9 +20,9 @@ import numpy as np
 
 from benchmarks.realtime import model_of
 from benchmarks.two_discs import Disc, forces, meshed
-from epsmesh.export.checks import random_place
-from epsmesh.export.scope import Scope
 from epsmesh.shapes.body import Layered
+from epsmesh_realtime.export.checks import random_place
+from epsmesh_realtime.export.scope import Scope
 from epsmesh_realtime.model import Model
 
 _FOLDER = Path("results/two_tools")

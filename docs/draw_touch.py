@@ -11,8 +11,8 @@ import tempfile
 from pathlib import Path
 from types import MappingProxyType
 
-from epsmesh.touch.page import write_touch_page
 from epsmesh_realtime import read_surface
+from epsmesh_realtime.page.page import write_touch_page
 from tests.report.browser import Browser
 
 FIGURES = Path(__file__).parent / "figures"

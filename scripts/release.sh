@@ -12,7 +12,7 @@ quiet=(--quiet --disable-pip-version-check --no-input)
 # Building leaves files beside the sources; and what is not theirs must not get in.
 mkdir "$work/source"
 tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --exclude='*.egg-info' \
-    --exclude=./realtime/libepsmesh.so --exclude=./realtime/latency --exclude=./realtime/.built --exclude=./realtime/build --exclude='*.so' --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
+    --exclude=libepsmesh.so --exclude=latency --exclude=.built --exclude=./build --exclude='*.so' --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
     tar -xf - -C "$work/source"
 
 # ---- build: the wheel is made from the sdist, and has what that has ------------------------------------
@@ -21,7 +21,7 @@ tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --
 rm -rf dist
 "$work/build/bin/python" -m build --outdir dist "$work/source" >"$work/log" 2>&1 || { tail -n 30 "$work/log" >&2; fail "cannot be built"; }
 version=$(sed -nE 's/^__version__ = "(.*)"$/\1/p' pipeline/epsmesh/__init__.py)
-[[ -f dist/epsmesh-$version.tar.gz && -f dist/epsmesh-$version-py3-none-any.whl ]] || fail "dist/ has $(ls dist), not version $version"
+[[ -f dist/epsmesh-$version.tar.gz ]] && compgen -G "dist/epsmesh-$version-py3-none-*.whl" >/dev/null || fail "dist/ has $(ls dist), not version $version"
 
 # Templates, C sources, studies to begin with: all that a package folder holds.
 "$python" - "$work/source" dist/epsmesh-*.whl dist/epsmesh-*.tar.gz <<'PYTHON'
@@ -34,9 +34,13 @@ source, wheel, sdist = Path(sys.argv[1]), *sys.argv[2:]
 held = set(zipfile.ZipFile(wheel).namelist())
 sent = {name.split("/", 1)[-1] for name in tarfile.open(sdist).getnames()}
 files = {path.relative_to(source) for path in source.rglob("*") if path.is_file()}
-links = {"studies": "epsmesh/study/examples", "meshes": "epsmesh/study/meshes"}
-linked = {Path(links[path.parts[0]], *path.parts[1:]) for path in files if path.parts[0] in links}
-package = {str(path.relative_to("pipeline")) for path in files if path.parts[0] == "pipeline"} | set(map(str, linked))
+copied = {"studies": "epsmesh/study/examples", "meshes": "epsmesh/study/meshes"}
+examples = {Path(copied[path.parts[0]], *path.parts[1:]) for path in files if path.parts[0] in copied}
+# What builds the evaluator alone is not installed.
+own = {Path(name) for name in ("setup.py", "pyproject.toml", "MANIFEST.in", "README.md", "LICENSE")}
+packages = {path.relative_to("pipeline") for path in files if path.parts[0] == "pipeline"}
+packages -= {path for path in packages if path.parts[1] == "wasm" or path.relative_to(path.parts[0]) in own}
+package = {str(path) for path in packages | examples}
 if missing := sorted(package - held):
     sys.exit(f"release: the wheel lacks {', '.join(missing)}")
 if missing := sorted({str(path) for path in files} - sent):
@@ -44,7 +48,7 @@ if missing := sorted({str(path) for path in files} - sent):
 print(f"release: {len(held)} files in the wheel, {len(sent)} in the sdist")
 PYTHON
 # Its own distribution, for the same machine as the one that builds it.
-"$work/build/bin/python" -m build --outdir dist "$work/source/realtime" >"$work/log" 2>&1 || { tail -n 30 "$work/log" >&2; fail "realtime/ cannot be built"; }
+"$work/build/bin/python" -m build --outdir dist "$work/source/pipeline/epsmesh_realtime" >"$work/log" 2>&1 || { tail -n 30 "$work/log" >&2; fail "the evaluator cannot be built"; }
 
 # ---- install -------------------------------------------------------------------------------------------
 "$python" -m venv --system-site-packages "$work/venv"
@@ -75,8 +79,8 @@ print(f"release: {dataset['status'].size} cases, F = {float(dataset['force'].max
 PYTHON
     )
 }
-"${install[@]}" dist/epsmesh_realtime-*.whl dist/epsmesh-*.whl
+"${install[@]}" dist/epsmesh-*.whl
 try wheel
-"${install[@]}" --force-reinstall --no-deps dist/epsmesh_realtime-*.tar.gz dist/epsmesh-*.tar.gz
+"${install[@]}" --force-reinstall --no-deps dist/epsmesh-*.tar.gz
 try sdist
 echo "release: dist/epsmesh-$version.tar.gz and .whl install and run on Debian $(cat /etc/debian_version)"

@@ -69,7 +69,7 @@ fi
 # ---- venv ---------------------------------------------------------------------------------------------
 # The stamp records the project file, interpreter and folder of the last complete setup. The other mark exists while the
 # venv is being changed: after a killed setup the venv is made anew, because pip takes half a package for a whole one.
-state=$({ cat pyproject.toml realtime/pyproject.toml realtime/setup.py scripts/setup.sh scripts/constraints.py; readlink -f "$python"; pwd; echo "$extras"; } | sha256sum)
+state=$({ cat pyproject.toml setup.py pipeline/epsmesh_realtime/setup.py scripts/setup.sh scripts/constraints.py; readlink -f "$python"; pwd; echo "$extras"; } | sha256sum)
 unfinished=$venv/.epsmesh-unfinished
 [[ -f $stamp && $(<"$stamp") == "$state" && -x $venv/bin/epsmesh && ! -e $unfinished ]] && exit 0
 
@@ -92,7 +92,6 @@ install() { # $1: a name for messages; the rest: pip's arguments. A failed pip r
     ((status > 128)) || rm -f "$unfinished"
     fail "pip could not install $1"
 }
-install "the evaluator of real-time models" -c "$constraints" -e ./realtime
 install "the project" -c "$constraints" -e ".[$extras]"
 # This package contains the program mmgs, the remesher of surfaces. Its Python part is not used, so its dependencies (a
 # newer numpy than Debian 12's) are not installed.

@@ -17,15 +17,14 @@ def installed(tmp_path_factory):
     pytest.importorskip("setuptools", reason="nothing here to build a wheel with")
     folder = tmp_path_factory.mktemp("installed")
     # Building leaves files beside the sources.
-    ignored = shutil.ignore_patterns("__pycache__", "cache")
+    ignored = shutil.ignore_patterns("__pycache__", "cache", ".built", "build", "*.so", "*.egg-info")
     shutil.copytree(ROOT / "pipeline", folder / "src" / "pipeline", ignore=ignored)
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+    for name in ("studies", "meshes"):
+        shutil.copytree(ROOT / name, folder / "src" / name, ignore=ignored)
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, folder / "src" / name)
-    ignored = shutil.ignore_patterns("__pycache__", ".built", "build", "*.so")
-    shutil.copytree(ROOT / "realtime", folder / "realtime", ignore=ignored)
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
-    for source in (folder / "realtime", folder / "src"):
-        subprocess.run([*pip, "--target", folder / "site", source], check=True, capture_output=True, timeout=300)
+    subprocess.run([*pip, "--target", folder / "site", folder / "src"], check=True, capture_output=True, timeout=300)
     (folder / "away").mkdir()
 
     def run(*arguments):

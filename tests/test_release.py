@@ -11,7 +11,7 @@ def test_one_version_everywhere(epsmesh):
     done = epsmesh("--version")
     assert (done.exit_code, done.stdout.strip()) == (0, f"epsmesh {__version__}")
     assert re.fullmatch(r"\d+\.\d+\.\d+", __version__)
-    for folder in (Path(), Path("realtime")):
+    for folder in (Path(), Path("pipeline/epsmesh_realtime")):
         assert tomllib.loads((folder / "pyproject.toml").read_text())["project"]["version"] == __version__
     assert f"\nversion: {__version__}\n" in Path("CITATION.cff").read_text()
     headings = re.findall(r"^## (.*)$", Path("CHANGELOG.md").read_text(), re.MULTILINE)

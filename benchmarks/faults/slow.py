@@ -20,12 +20,12 @@ from tempfile import TemporaryDirectory
 import psutil
 
 from benchmarks.faults.moment import Scene
-from epsmesh.export.kept import Kept
-from epsmesh.export.scope import scope_of
 from epsmesh.report.read import read_file
 from epsmesh.run.begun import store_done
 from epsmesh.run.store import Store
 from epsmesh.study.read import read_study
+from epsmesh_realtime.export.kept import Kept
+from epsmesh_realtime.export.scope import scope_of
 from tests.studies import small_text
 
 ROOT = Path(__file__).parents[2]

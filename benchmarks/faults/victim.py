@@ -50,7 +50,7 @@ def tell_done(path: Path, command: str) -> None:
     from epsmesh.run.attempts import Attempts
 
     if command == "export":
-        from epsmesh.export.kept import Kept
+        from epsmesh_realtime.export.kept import Kept
 
         told(Kept, "put", lambda kept, _, work, __: f"array {kept._key(work)}")
         return  # its solves have no store

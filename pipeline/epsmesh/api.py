@@ -208,7 +208,7 @@ def open_dataset(path: str | Path, output: str | Path = "results") -> "xr.Datase
         DatasetError: if there is none, or if it is not a study's; ModelError: if it is no real-time model.
     """
     if Path(path).suffix == MODEL_ENDING:
-        from epsmesh.export.file import open_model  # noqa: PLC0415 (xarray is slow to load)
+        from epsmesh_realtime.export.file import open_model  # noqa: PLC0415 (xarray is slow to load)
 
         return open_model(Path(path))
     from epsmesh.report import accessor  # noqa: F401, PLC0415 (registers dataset.epsmesh)

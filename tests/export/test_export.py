@@ -10,18 +10,18 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
-from epsmesh.export.checks import check_touches, margin, narrowest, random_touches, with_bar, with_full
-from epsmesh.export.compliance import coarse_mesh, compliances
-from epsmesh.export.curved import curved_model, upright
-from epsmesh.export.forecast import Export, too_large
-from epsmesh.export.full import Full, Solver, Tool
-from epsmesh.export.ranks import Ranks
-from epsmesh.export.region import Region
-from epsmesh.export.scope import ExportError, scope_of
-from epsmesh.export.tabulate import tabulate
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.study.read import parse
 from epsmesh.verify.compare import solve
+from epsmesh_realtime.export.checks import check_touches, margin, narrowest, random_touches, with_bar, with_full
+from epsmesh_realtime.export.compliance import coarse_mesh, compliances
+from epsmesh_realtime.export.curved import curved_model, upright
+from epsmesh_realtime.export.forecast import Export, too_large
+from epsmesh_realtime.export.full import Full, Solver, Tool
+from epsmesh_realtime.export.ranks import Ranks
+from epsmesh_realtime.export.region import Region
+from epsmesh_realtime.export.scope import ExportError, scope_of
+from epsmesh_realtime.export.tabulate import tabulate
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Table
 from tests.commands import epsmesh

@@ -12,9 +12,9 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 import pytest
 
-from epsmesh.export.file import write_model
-from epsmesh.export.fmu import STATUSES, library_place, write_fmu
 from epsmesh_realtime import History
+from epsmesh_realtime.export.file import write_model
+from epsmesh_realtime.export.fmu import STATUSES, library_place, write_fmu
 from tests.realtime.synthetic import random_model, write_random
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install epsmesh[fmi]")

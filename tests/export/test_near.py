@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from epsmesh.export.checks import Check
-from epsmesh.export.full import Solver, Tool
-from epsmesh.export.near import calibrated, near_field, needed_room
-from epsmesh.export.ranks import ALONE
-from epsmesh.export.scope import ExportError, scope_of
 from epsmesh.study.read import parse
+from epsmesh_realtime.export.checks import Check
+from epsmesh_realtime.export.full import Solver, Tool
+from epsmesh_realtime.export.near import calibrated, near_field, needed_room
+from epsmesh_realtime.export.ranks import ALONE
+from epsmesh_realtime.export.scope import ExportError, scope_of
 from epsmesh_realtime.table import Near
 from tests.realtime.synthetic import of_place
 

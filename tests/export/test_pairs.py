@@ -5,15 +5,15 @@ import pytest
 from mpi4py import MPI
 
 from benchmarks.two_discs import forces, meshed
-from epsmesh.export import far, tabulate
-from epsmesh.export.compliance import compliances
-from epsmesh.export.curved import curved_model
-from epsmesh.export.far import FarFields, far_fields
-from epsmesh.export.pairs import tabulate_pairs
-from epsmesh.export.scope import scope_of
-from epsmesh.export.surface_body import surface_body
 from epsmesh.run.case_solution import CaseSolution
 from epsmesh.run.solved import solve_alone, solve_fields
+from epsmesh_realtime.export import far, tabulate
+from epsmesh_realtime.export.compliance import compliances
+from epsmesh_realtime.export.curved import curved_model
+from epsmesh_realtime.export.far import FarFields, far_fields
+from epsmesh_realtime.export.pairs import tabulate_pairs
+from epsmesh_realtime.export.scope import scope_of
+from epsmesh_realtime.export.surface_body import surface_body
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Table
 from tests.export.test_export import BOX, CYLINDER, DISC, DOME, SKIN, Known, study

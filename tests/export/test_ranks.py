@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from epsmesh.export import curved, far, tabulate
-from epsmesh.export.curved import curved_model
-from epsmesh.export.export import export
-from epsmesh.export.kept import Kept
-from epsmesh.export.ranks import ALONE, Ranks
-from epsmesh.export.scope import scope_of
+from epsmesh_realtime.export import curved, far, tabulate
+from epsmesh_realtime.export.curved import curved_model
+from epsmesh_realtime.export.export import export
+from epsmesh_realtime.export.kept import Kept
+from epsmesh_realtime.export.ranks import ALONE, Ranks
+from epsmesh_realtime.export.scope import scope_of
 from tests.export.test_export import CYLINDER, DOME, SOFT, Known, study
 
 pytestmark = pytest.mark.mpi

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from epsmesh.compat import geometry_dofs
-from epsmesh.export import compliance, far, tabulate
-from epsmesh.export.compliance import compliances
-from epsmesh.export.curved import curved_model
-from epsmesh.export.far import far_fields
-from epsmesh.export.placed_force import PlacedForce
-from epsmesh.export.scope import scope_of
-from epsmesh.export.surface import tabulate_surface
-from epsmesh.export.surface_body import surface_body
 from epsmesh.mesh.curve import EDGES
+from epsmesh_realtime.export import compliance, far, tabulate
+from epsmesh_realtime.export.compliance import compliances
+from epsmesh_realtime.export.curved import curved_model
+from epsmesh_realtime.export.far import far_fields
+from epsmesh_realtime.export.placed_force import PlacedForce
+from epsmesh_realtime.export.scope import scope_of
+from epsmesh_realtime.export.surface import tabulate_surface
+from epsmesh_realtime.export.surface_body import surface_body
 from epsmesh_realtime.surface import SurfaceTable
 from tests.export.test_export import CYLINDER, DISC, DOME, SKIN, Known, study
 from tests.realtime.synthetic import point_force

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from epsmesh.experiment.read import read_curve
 from epsmesh.experiment.reading import ExperimentError, Reading
-from epsmesh.export.file import open_model
 from epsmesh.plan.plan import make_plan
 from epsmesh.run.reading import known_of, open_to_read, read_rows
 from epsmesh.run.record import Record
@@ -23,6 +22,7 @@ from epsmesh.shapes.files.step import entities_of, named_faces, unit_of
 from epsmesh.shapes.triangles import SurfaceError
 from epsmesh_realtime import ModelError
 from epsmesh_realtime import read as read_model
+from epsmesh_realtime.export.file import open_model
 from tests.cases import study
 from tests.experiment.curves import cycle, write
 from tests.fuzz.profile import thrown

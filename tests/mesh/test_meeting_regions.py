@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from epsmesh.export.scope import ExportError, scope_of
 from epsmesh.mesh.of_case import mesh_arrays
 from epsmesh.run import meshing
 from epsmesh.shapes.files.labels import LabelMap
 from epsmesh.study.problems import StudyError
+from epsmesh_realtime.export.scope import ExportError, scope_of
 from tests.cases import solve, study
 from tests.complexes import scene
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from epsmesh.export.file import write_model
+from epsmesh_realtime.export.file import write_model
 from epsmesh_realtime.model import Model, read
 from epsmesh_realtime.surface import Surface, SurfaceTable, read_surface
 from epsmesh_realtime.table import Face, Pairs, Table

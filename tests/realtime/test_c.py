@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from epsmesh.export.file import write_model
 from epsmesh_realtime import BuildError, Query
 from epsmesh_realtime import library as built
+from epsmesh_realtime.export.file import write_model
 from epsmesh_realtime.table import Near
 from tests.realtime.synthetic import random_model, random_surface
 
-SOURCES = Path(__file__).parents[2] / "realtime"
+SOURCES = Path(__file__).parents[2] / "pipeline" / "epsmesh_realtime" / "c"
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror")
 PARTS = sorted(SOURCES.glob("src/*.c"))
 _TIPS = """
@@ -123,8 +123,8 @@ def test_a_damaged_file_breaks_nothing(tmp_path, program, kind, near):
 
 @pytest.mark.parametrize(("compiler", "words"), [("", "there is no C compiler"), ("false", "does not compile")])
 def test_without_a_compiler_a_sentence_says_what_to_install(tmp_path, monkeypatch, compiler, words):
-    shutil.copy(SOURCES / "epsmesh.c", tmp_path)
-    monkeypatch.setattr(built, "_CHECKOUT", tmp_path)
+    monkeypatch.setattr(built, "_PACKAGE", tmp_path)
+    (tmp_path / "pyproject.toml").touch()
     monkeypatch.setattr(built, "_COMPILERS", ())
     monkeypatch.delenv("CC", raising=False)
     if compiler:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import epsmesh
-from epsmesh.export.file import write_model
 from epsmesh.viscoelastic import Motion, follow, respond
 from epsmesh_realtime import History, ModelError, read
+from epsmesh_realtime.export.file import write_model
 from tests.realtime.synthetic import random_model
 
 TERMS = ((0.4, 2.0), (0.2, 30.0))

@@ -6,8 +6,8 @@ from math import pi, tan
 import numpy as np
 import pytest
 
-from epsmesh.export.file import write_model
 from epsmesh_realtime import ModelError, Surface, read
+from epsmesh_realtime.export.file import write_model
 from epsmesh_realtime.surface import SurfaceTable, surface_of
 from tests.realtime.synthetic import of_place, point_force, random_surface, write_random, write_surface
 

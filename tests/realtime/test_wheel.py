@@ -37,7 +37,7 @@ def run(*words: object) -> str:
 def test_a_wheel_answers_without_dolfinx(tmp_path):
     surface = write_surface(tmp_path / "box.epsm")
     shutil.copytree(
-        SOURCES, tmp_path / "source", ignore=shutil.ignore_patterns(".built", "build", "*.so", "__pycache__")
+        SOURCES.parent, tmp_path / "source", ignore=shutil.ignore_patterns(".built", "build", "*.so", "__pycache__")
     )
     offline = ("--no-deps", "--no-index", "--disable-pip-version-check", "--quiet")
     pip = (sys.executable, "-m", "pip")

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from epsmesh.export.file import write_model
-from epsmesh.touch.page import render, write_touch_page
-from epsmesh.touch.server import HOST, PageServer
 from epsmesh_realtime import ModelError, read_surface
+from epsmesh_realtime.export.file import write_model
+from epsmesh_realtime.page.page import render, write_touch_page
+from epsmesh_realtime.page.server import HOST, PageServer
 from epsmesh_realtime.query import Query
 from tests.realtime.synthetic import random_surface, write_random, write_surface
 from tests.report.browser import CHROMIUM, Browser

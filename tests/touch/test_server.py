@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from epsmesh.touch.server import HOST, PageServer
+from epsmesh_realtime.page.server import HOST, PageServer
 
 TEXT = "<canvas></canvas>"
 

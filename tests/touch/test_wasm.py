@@ -3,9 +3,9 @@
 import runpy
 from pathlib import Path
 
-from epsmesh.touch.page import EVALUATOR
+from epsmesh_realtime.page.page import EVALUATOR
 
-BUILD = runpy.run_path(str(Path(__file__).parents[2] / "realtime" / "wasm" / "build.py"))
+BUILD = runpy.run_path(str(Path(__file__).parents[2] / "pipeline" / "epsmesh_realtime" / "wasm" / "build.py"))
 
 
 def test_the_page_has_the_evaluator_of_these_sources():

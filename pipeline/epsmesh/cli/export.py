@@ -14,8 +14,8 @@ from epsmesh.files import MODEL_ENDING, write_new
 from epsmesh.printable import counted
 
 if TYPE_CHECKING:
-    from epsmesh.export.export import Exported
-    from epsmesh.export.scope import Scope
+    from epsmesh_realtime.export.export import Exported
+    from epsmesh_realtime.export.scope import Scope
 
 _BEFORE = (
     "Ctrl-C ends the export at once; what is solved is kept beside the model, and the next export goes on from there"
@@ -101,7 +101,7 @@ def export(
             packed, line = _pack(file, fmu)
             say(packed, *line)
             return
-    from epsmesh.export.scope import ExportError, scope_of
+    from epsmesh_realtime.export.scope import ExportError, scope_of
 
     wanted = _share(accuracy)
     file = by_name(file)
@@ -127,13 +127,13 @@ def _make(
     from epsmesh import workflow
 
     workflow.load_solvers()
-    from epsmesh.export.export import export as make_model
-    from epsmesh.export.export import write
-    from epsmesh.export.kept import Kept
-    from epsmesh.export.ranks import Ranks
-    from epsmesh.export.scope import ExportError
     from epsmesh.mesh.generate import MeshError
     from epsmesh.solve import SolveError
+    from epsmesh_realtime.export.export import export as make_model
+    from epsmesh_realtime.export.export import write
+    from epsmesh_realtime.export.kept import Kept
+    from epsmesh_realtime.export.ranks import Ranks
+    from epsmesh_realtime.export.scope import ExportError
 
     comm = workflow.world()
     tell = (lambda text: print(text, file=sys.stderr, flush=True)) if comm.rank == 0 else lambda _: None
@@ -203,7 +203,7 @@ def _print_result(exported: "Exported", wanted: float, path: Path, packed: tuple
 
 def _check_unit(unit: Path) -> None:
     """Exit, before any computation, if no unit can be written to a file, or compiled."""
-    from epsmesh.export.fmu import NoCompilerError, compiler, library_place
+    from epsmesh_realtime.export.fmu import NoCompilerError, compiler, library_place
 
     check_output(unit)
     try:
@@ -217,8 +217,8 @@ def _pack(model: Path, unit: Path | None) -> tuple[dict[str, str], list[str]]:
     """Write the co-simulation ``unit`` of a model, or exit; return what to print, as JSON and as lines."""
     if unit is None:
         return {}, []
-    from epsmesh.export.fmu import NoCompilerError, write_fmu
     from epsmesh_realtime import ModelError
+    from epsmesh_realtime.export.fmu import NoCompilerError, write_fmu
 
     try:
         write_fmu(model, unit, __version__)

@@ -43,8 +43,8 @@ def told(found: dict[str, Any]) -> str:
 
 def of_export(study: "Study", cost: "CostModel") -> dict[str, Any]:
     """Return about what `epsmesh export` costs, without options; or the reason, ``refused``, why there is no model."""
-    from epsmesh.export.forecast import Export
-    from epsmesh.export.scope import ExportError, scope_of
+    from epsmesh_realtime.export.forecast import Export
+    from epsmesh_realtime.export.scope import ExportError, scope_of
 
     try:
         return vars(Export(scope_of(study), cost=cost).forecast())
@@ -54,7 +54,7 @@ def of_export(study: "Study", cost: "CostModel") -> dict[str, Any]:
 
 def told_of_export(found: dict[str, Any], ranks: int) -> str:
     """Write it as a line."""
-    from epsmesh.export.forecast import Forecast
+    from epsmesh_realtime.export.forecast import Forecast
 
     if reason := found.get("refused"):
         return f"  export: no real-time model: {reason}"

@@ -46,8 +46,8 @@ def touch(
 
     Example: epsmesh touch results/quick.epsm -o quick.html
     """
-    from epsmesh.touch.page import render, write_touch_page
     from epsmesh_realtime import BuildError, ModelError, read_surface
+    from epsmesh_realtime.page.page import render, write_touch_page
 
     if output is not None:
         check_output(output)
@@ -83,7 +83,7 @@ def _serve(text: str, *, open_it: bool) -> None:
     """Serve the page until Ctrl-C."""
     import webbrowser
 
-    from epsmesh.touch.server import PageServer
+    from epsmesh_realtime.page.server import PageServer
 
     with PageServer(text) as server:
         say({"address": server.address}, f"{server.address} (Ctrl-C stops the server)")

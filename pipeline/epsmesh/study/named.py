@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-# The studies of the checkout, which are installed with the package.
-EXAMPLES = Path(__file__).parent / "examples"
+# The studies that are installed with the package; in a checkout, its own.
+_INSTALLED, _CHECKOUT = Path(__file__).parent / "examples", Path(__file__).resolve().parents[3]
+EXAMPLES = _INSTALLED if _INSTALLED.is_dir() else _CHECKOUT / "studies"
 
 
 # Examples of at most 30 lines that run within a minute; the first one is what `epsmesh new NAME` writes.

@@ -1,0 +1,45 @@
+"""Forces over time on a tool in relaxing tissue: `c/src/relaxation.c` derives them."""
+
+import ctypes
+from dataclasses import dataclass, field
+from typing import Any, NoReturn
+
+from epsmesh_realtime.evaluator import touch_of
+from epsmesh_realtime.library import library, size_of
+from epsmesh_realtime.model import Model
+from epsmesh_realtime.query import Query
+from epsmesh_realtime.touch import Touch
+
+
+@dataclass(eq=False)
+class History:
+    """What the tissue below one tool remembers, at first at rest. Every thread and tool needs its own object.
+
+    The depth is linear in time from call to call; a tool that was above tissue at rest touches it from the call before
+    on. Place, tool, E and ν stay the same until the tissue is at rest again.
+    A disc or a blade may move up and down, and leave the tissue. The contact of a sphere or a cone may grow, and then
+    shrink, once. All else has the status "past". ``room`` is the largest number of calls in which such a contact grows.
+    """
+
+    model: Model
+    room: int = 10_000
+    _memory: Any = field(init=False, repr=False)
+    _moments: Any = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._memory = ctypes.create_string_buffer(size_of(4))
+        self._moments = ctypes.create_string_buffer(size_of(5) * self.room)
+        library().epsmesh_memory_begin(self._memory, self._moments, self.room)
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse a copy: C's memory points to its moments."""
+        raise TypeError("a History cannot be copied: begin a new one, and repeat the queries")
+
+    def query(self, step: float, tool: str, **asked: Any) -> Touch:
+        """Return the force on a ``tool``, ``step`` (s) after the last call; ``asked`` as in ``Model.query``.
+
+        ``stiffness`` is that of a sudden motion.
+        """
+        model = self.model
+        packed = Query(tool, **asked).packed(model.young, model.poisson)
+        return touch_of(library().epsmesh_touch_after(model.evaluator.pointer, packed, step, self._memory))
