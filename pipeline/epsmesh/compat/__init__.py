@@ -1,8 +1,9 @@
-"""The one place that knows that versions of dolfinx and gmsh differ (0.5.2 to 0.10; 4.8 to 4.13).
+"""The one place that knows that versions of dolfinx and gmsh differ (0.5.2 to 0.11; 4.8 to 4.15).
 
 Everything is decided by what a library offers, never by its version number.
 """
 
+from epsmesh import mpi  # noqa: I001, F401 (first of all)
 import dolfinx
 import gmsh
 from petsc4py import PETSc

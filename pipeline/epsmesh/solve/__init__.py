@@ -1,5 +1,7 @@
 """Elasticity: operators, solvers, reaction force, checks. Knows nothing of study files."""
 
+from epsmesh import mpi  # noqa: F401 (before the modules of this package, which bind to it)
+
 
 class CompilerError(Exception):
     """No working C compiler was found; raised on every rank."""

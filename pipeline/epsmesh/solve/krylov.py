@@ -49,6 +49,15 @@ SOLVERS: dict[str, dict[str, Any]] = {
         "pc_hypre_boomeramg_relax_type_up": "backward-SOR/Jacobi",
     },
 }
+# Where PETSc has no hypre, as in the wheels: aggregation, the same on any number of ranks (docs/solvers.md).
+_WITHOUT_HYPRE = {
+    "pc_type": "gamg",
+    "pc_gamg_threshold": 0.02,
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": 2,
+    "mg_levels_ksp_chebyshev_esteig_steps": 10,
+    "mg_levels_pc_type": "jacobi",
+}
 # On several ranks a sweep uses old values of other ranks. Where the material jumps this amplifies errors, and the
 # preconditioner becomes indefinite. Adding the magnitudes of off-rank entries to the diagonal prevents it
 # (A. H. Baker, R. D. Falgout, T. V. Kolev and U. M. Yang, SIAM J. Sci. Comput. 33, 2864, 2011).
@@ -155,10 +164,13 @@ def factorised(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:
 
 
 def algebraic(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.PC:
-    """Return hypre's algebraic multigrid for a ``matrix`` of degree 1, freed with the ``stack``; collective."""
+    """Return algebraic multigrid for a ``matrix`` of degree 1, freed with the ``stack``; collective."""
     pc = keep(stack, PETSc.PC().create(matrix.comm))
     pc.setOperators(matrix)
-    configure(pc, SOLVERS["degree 1"] | (_ON_RANKS if matrix.comm.size > 1 else {}))
+    if PETSc.Sys.hasExternalPackage("hypre"):
+        configure(pc, SOLVERS["degree 1"] | (_ON_RANKS if matrix.comm.size > 1 else {}))
+    else:
+        configure(pc, _WITHOUT_HYPRE)
     pc.setUp()
     return pc
 
