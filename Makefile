@@ -37,7 +37,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's mpirun: another one on PATH does not match Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release slurm-test verify benchmark peers plain-loop realtime wasm resolution stress coverage pairs same fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release slurm-test verify benchmark peers plain-loop realtime wasm vendored resolution stress coverage pairs same fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -128,6 +128,9 @@ realtime: setup ## build the real-time evaluator in C; test it in C, C++ and Pyt
 wasm: ## build the evaluator for the page of `epsmesh touch`, after a change of its sources (installs clang and lld)
 	@scripts/setup.sh clang lld
 	$(PYTHON) pipeline/epsmesh_realtime/wasm/build.py
+
+vendored: setup ## fetch the JavaScript of others again, with npm, as scripts/vendored.toml records it
+	$(PYTHON) scripts/vendored.py
 
 resolution: setup ## the effect of a file's resolution, noise and voxels on F (a quarter of an hour): results/resolution.png
 	$(MPI_ENV) $(PYTHON) -m benchmarks.resolution

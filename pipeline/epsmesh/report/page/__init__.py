@@ -1,7 +1,6 @@
 """The report of a study: one HTML page that holds all it needs, made from the dataset alone."""
 
 import re
-from importlib.resources import files
 from pathlib import Path
 from shlex import quote as shell
 from typing import Any
@@ -39,8 +38,8 @@ _TOLD = "speed-ups"
 # What the curves show first.
 _MAIN = ("force_ratio", "force_exact_ratio", "force")
 _TEMPLATES, _VENDOR = Path(__file__).parent / "templates", Path(__file__).parent / "vendor"
-_BUNDLE = Path(str(files("itables"))) / "html" / "dt_bundle.js"
-_EXPORT = re.compile(r"export\s*\{[^}]*?([\w$]+) as default[^}]*\};?")
+# jQuery, which DataTables needs, comes before it.
+_SCRIPTS = (_VENDOR / "jquery.slim.min.js", _VENDOR / "dataTables.min.js", _TEMPLATES / "page.js")
 _SCRIPT = re.compile(r"'sha256-[A-Za-z0-9+/=]+'")
 
 
@@ -65,12 +64,12 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
     plotly = joined(_VENDOR / "plotly-basic.min.js")
     return render_page(
         _TEMPLATES / "page.html.j2",
-        f"{_data_tables()}\n{joined(_TEMPLATES / 'page.js')}",
+        joined(*_SCRIPTS),
         plotly=plotly,
         plotly_hash=hash_of(plotly),
         title=dataset.attrs.get("title", name),
         name=name,
-        style=joined(_BUNDLE.with_suffix(".css"), _TEMPLATES / "page.css"),
+        style=joined(_VENDOR / "dataTables.min.css", _TEMPLATES / "page.css"),
         scene=scene,
         scene_scripts=_SCRIPT.findall(scene)[:2],
         facts=[fact for fact in facts(dataset) if not (guide and fact[0] == _TOLD)],
@@ -94,11 +93,6 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         commands=reproduce(dataset, name),
         turn=f"epsmesh report {shell(f'results/{name}.nc')} --scene answer",
     )
-
-
-def _data_tables() -> str:
-    """Return the script of DataTables, from itables, as a part of a module: it exports nothing."""
-    return _EXPORT.sub(r"const DataTable=\1;", joined(_BUNDLE))
 
 
 def _figures(dataset: xr.Dataset) -> list[dict[str, Any]]:
