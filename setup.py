@@ -18,9 +18,10 @@ class BuildPackages(realtime["BuildPackages"]):
         super().run()
         if getattr(self, "editable_mode", False):
             return
+        others = shutil.ignore_patterns("cache", ".*", "*.schema.json")
         for folder, copied in (("studies", "examples"), ("meshes", "meshes")):
             place = Path(self.build_lib, "epsmesh", "study", copied)
-            shutil.copytree(folder, place, ignore=shutil.ignore_patterns("cache", ".*"), dirs_exist_ok=True)
+            shutil.copytree(folder, place, ignore=others, dirs_exist_ok=True)
 
 
 setup(

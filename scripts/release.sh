@@ -12,7 +12,7 @@ quiet=(--quiet --disable-pip-version-check --no-input)
 # Building leaves files beside the sources; and what is not theirs must not get in.
 mkdir "$work/source"
 tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --exclude='*.egg-info' \
-    --exclude=libepsmesh.so --exclude=latency --exclude=.built --exclude=./build --exclude='*.so' --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
+    --exclude=libepsmesh.so --exclude=latency --exclude=.built --exclude=./build --exclude='*.so' --exclude=./studies/study.schema.json --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
     tar -xf - -C "$work/source"
 
 # ---- build: the wheel is made from the sdist, and has what that has ------------------------------------

@@ -108,6 +108,7 @@ import epsmesh_realtime.library  # noqa: E402
 
 epsmesh_realtime.library.library()  # compiles the checkout's sources
 PYTHON
+"$venv/bin/python" -m epsmesh.study.json_schema || fail "the schema of study files, for editors, could not be written"
 multiarch=$("$python" -c 'import sysconfig; print(sysconfig.get_config_var("MULTIARCH"))')
 for library in libblas.so.3 liblapack.so.3; do
     [[ $(readlink -f "/usr/lib/$multiarch/$library") == *openblas* ]] ||

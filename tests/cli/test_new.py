@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from epsmesh.plan.plan import make_plan
+from epsmesh.study.json_schema import schema_text
 from epsmesh.study.keys import SECTION_TEXTS, all_sections, keys_of, shapes_of, words_of
 from epsmesh.study.named import SCHEMA, SHORT, examples
 from epsmesh.study.read import parse, read_study
@@ -102,12 +103,12 @@ def test_like_copies_the_studies_that_come_with_the_program(elsewhere, name):
 
 
 def test_the_schema_for_editors_is_beside_every_study_and_up_to_date(elsewhere):
-    schema = elsewhere / "deep" / SCHEMA.name
+    schema = elsewhere / "deep" / SCHEMA
     new("deep/first.toml")
-    assert schema.read_text() == SCHEMA.read_text()
+    assert schema.read_text() == schema_text()
     schema.write_text("{}")
     new("deep/second.toml", "--like", "deep/first.toml")
-    assert schema.read_text() == SCHEMA.read_text()
+    assert schema.read_text() == schema_text()
     assert (elsewhere / "deep" / "second.toml").read_text().count("#:schema") == 1
 
 

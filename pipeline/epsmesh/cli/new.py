@@ -126,12 +126,14 @@ def _converted(old: Path) -> tuple[str, Path, dict[str, str]]:
 
 def _with_schema(text: str) -> str:
     """Return the text of a study with the line by which editors find the schema of its keys."""
-    return text if text.startswith("#:schema") else f"#:schema ./{SCHEMA.name}\n{text}"
+    return text if text.startswith("#:schema") else f"#:schema ./{SCHEMA}\n{text}"
 
 
 def _write_schema(folder: Path) -> None:
-    """Copy the schema of study files into a folder, or bring the copy there up to date."""
-    text, there = SCHEMA.read_text(encoding="utf-8"), folder / SCHEMA.name
+    """Write the schema of study files into a folder, or bring the one there up to date."""
+    from epsmesh.study.json_schema import schema_text
+
+    text, there = schema_text(), folder / SCHEMA
     if not there.exists() or there.read_text(encoding="utf-8") != text:
         write_whole(there, text)
 

@@ -1,13 +1,16 @@
 """The JSON schema of a study file, from the models: for editors, for the reference, and for what each key takes.
 
-``python -m epsmesh.study.json_schema`` writes it to ``studies/study.schema.json``, which `epsmesh new` copies.
+`epsmesh new` writes it beside a study, `make setup` beside those of a checkout.
+``python -m epsmesh.study.json_schema FILE`` writes it to a file, ``studies/study.schema.json`` by default.
 """
 
 import json
+import sys
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from itertools import chain, product
 from math import isinf
+from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import BaseModel
@@ -17,7 +20,7 @@ from epsmesh.shapes.history import History, Sine
 from epsmesh.shapes.section import Section, words_of
 from epsmesh.study.identified import WORDS as IDENTIFIED
 from epsmesh.study.measurement import Identify, Sensitivity
-from epsmesh.study.named import SCHEMA
+from epsmesh.study.named import EXAMPLES, SCHEMA
 from epsmesh.study.ranges import KEYS
 from epsmesh.study.schema import EXPERIMENT, NESTED, SECTIONS, SINGLE, TABLES
 
@@ -241,4 +244,4 @@ def schema_text() -> str:
 
 
 if __name__ == "__main__":
-    SCHEMA.write_text(schema_text(), encoding="utf-8")
+    Path(*sys.argv[1:2] or (EXAMPLES / SCHEMA,)).write_text(schema_text(), encoding="utf-8")

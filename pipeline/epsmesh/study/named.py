@@ -9,8 +9,8 @@ EXAMPLES = _INSTALLED if _INSTALLED.is_dir() else _CHECKOUT / "studies"
 
 # Examples of at most 30 lines that run within a minute; the first one is what `epsmesh new NAME` writes.
 SHORT = ("pad", "layers", "organ", "tumour", "needle", "cut")
-# The JSON schema of study files, for editors.
-SCHEMA = EXAMPLES / "study.schema.json"
+# The JSON schema of study files, for editors, beside them.
+SCHEMA = "study.schema.json"
 
 # Allowed names, in words. Results have the name, with a few letters more, and at most 255 bytes.
 NAME = "letters, digits, - and _, at most 200 bytes, since results have that name, too"
