@@ -1,5 +1,6 @@
 #!/bin/bash
-# Build sdist and wheel into dist/, install both into a fresh venv, and run a study from there, away from the checkout.
+# Make a release in dist/: sdist and wheel of the program and of the evaluator alone, the notebooks, the JSON schema of study
+# files, and a list of checksums. Sdist and wheel are installed into a fresh venv, and run a study away from the checkout.
 # dolfinx, PETSc and gmsh are Debian's (scripts/setup.sh): the venv sees them, and pip leaves them alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -14,6 +15,7 @@ mkdir "$work/source"
 tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --exclude='*.egg-info' \
     --exclude=libepsmesh.so --exclude=latency --exclude=.built --exclude=./build --exclude='*.so' --exclude=./studies/study.schema.json --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
     tar -xf - -C "$work/source"
+(cd "$work/source" && find . -type f -printf '%P\n') >"$work/files" # before the build adds its own
 
 # ---- build: the wheel is made from the sdist, and has what that has ------------------------------------
 "$python" -m venv "$work/build"
@@ -24,16 +26,16 @@ version=$(sed -nE 's/^__version__ = "(.*)"$/\1/p' pipeline/epsmesh/__init__.py)
 [[ -f dist/epsmesh-$version.tar.gz ]] && compgen -G "dist/epsmesh-$version-py3-none-*.whl" >/dev/null || fail "dist/ has $(ls dist), not version $version"
 
 # Templates, C sources, studies to begin with: all that a package folder holds.
-"$python" - "$work/source" dist/epsmesh-*.whl dist/epsmesh-*.tar.gz <<'PYTHON'
+"$python" - "$work/files" dist/epsmesh-*.whl dist/epsmesh-*.tar.gz <<'PYTHON'
 import sys
 import tarfile
 import zipfile
 from pathlib import Path
 
-source, wheel, sdist = Path(sys.argv[1]), *sys.argv[2:]
+listed, wheel, sdist = sys.argv[1:]
 held = set(zipfile.ZipFile(wheel).namelist())
 sent = {name.split("/", 1)[-1] for name in tarfile.open(sdist).getnames()}
-files = {path.relative_to(source) for path in source.rglob("*") if path.is_file()}
+files = {Path(name) for name in Path(listed).read_text().splitlines()}
 copied = {"studies": "epsmesh/study/examples", "meshes": "epsmesh/study/meshes"}
 examples = {Path(copied[path.parts[0]], *path.parts[1:]) for path in files if path.parts[0] in copied}
 # What builds the evaluator alone is not installed.
@@ -83,4 +85,9 @@ PYTHON
 try wheel
 "${install[@]}" --force-reinstall --no-deps dist/epsmesh-*.tar.gz
 try sdist
-echo "release: dist/epsmesh-$version.tar.gz and .whl install and run on Debian $(cat /etc/debian_version)"
+
+# ---- what is not installed, and the list ----------------------------------------------------------------
+cp notebooks/*.ipynb dist/
+"$work/venv/bin/python" -c 'from epsmesh.study.json_schema import schema_text; print(schema_text(), end="")' >dist/study.schema.json
+(cd dist && sha256sum -- * >SHA256SUMS && sha256sum --check --quiet SHA256SUMS && cat SHA256SUMS)
+echo "release: dist/ is complete; epsmesh-$version.tar.gz and .whl install and run on Debian $(cat /etc/debian_version)"
