@@ -37,7 +37,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's mpirun: another one on PATH does not match Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release slurm-test verify benchmark peers plain-loop realtime wasm vendored resolution stress coverage pairs same fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release wheel-road slurm-test verify benchmark peers plain-loop realtime wasm vendored resolution stress coverage pairs same fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -86,6 +86,9 @@ docker-steps: ## run the Dockerfile's RUN lines and a small study in a chroot of
 release: ## build sdist and wheel into dist/, install both, and run a study with each
 	@scripts/setup.sh
 	@scripts/release.sh
+
+wheel-road: ## install and run without root and Debian's packages, from the wheel alone (skipped without Python >= 3.12; WHEEL_PYTHON=...)
+	@scripts/wheel-road.sh
 
 slurm-test: setup ## install and start a Slurm of two virtual nodes here, and run the job scripts on it (needs root)
 	$(PYTHON) -m pytest -m slurm $(PYTEST_ARGS) </dev/null

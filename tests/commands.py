@@ -14,11 +14,14 @@ from epsmesh.cli import app, main
 
 ROOT = Path(__file__).parents[1]
 # Under pytest, mpi4py may have marked this process's environment as a running MPI job.
-ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))} | {
+ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PMI_", "PRTE_"))} | {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMP_NUM_THREADS": "1",
 }
+# The launcher of the MPI in use: that of the wheels (MPICH) is beside Python, else Debian's (Open MPI).
+_BESIDE = Path(sys.executable).parent / "mpiexec"
+MPIRUN = [str(_BESIDE), "-n"] if _BESIDE.exists() else ["mpirun", "--oversubscribe", "-n"]
 
 
 def epsmesh(*arguments: object) -> Result:
@@ -43,7 +46,7 @@ def talk(*arguments: object, encoding: str = "utf-8") -> tuple[int, str, str]:
 
 def command(*arguments: object, ranks: int = 1) -> list[str]:
     """Return what starts ``epsmesh`` in a process of its own, on one rank or on several."""
-    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    launcher = [*MPIRUN, str(ranks)] if ranks > 1 else []
     return [*launcher, sys.executable, "-m", "epsmesh", *map(str, arguments)]
 
 
@@ -57,7 +60,7 @@ def spawn(*arguments: object, ranks: int = 1) -> subprocess.CompletedProcess[str
 
 def run_script(script: str, *arguments: object, ranks: int = 1) -> subprocess.CompletedProcess[str]:
     """Run a script of Python in a process of its own, to its end, with the command line ``arguments``."""
-    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    launcher = [*MPIRUN, str(ranks)] if ranks > 1 else []
     return subprocess.run(
         [*launcher, sys.executable, "-c", script, *map(str, arguments)], cwd=ROOT, text=True, capture_output=True,
         env=ENVIRONMENT | {"PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL, check=False, timeout=300,

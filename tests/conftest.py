@@ -19,7 +19,7 @@ def pytest_ignore_collect(collection_path):
 
     MPI is not started for this: processes that start later would take themselves for ranks.
     """
-    ranks = int(os.environ.get("OMPI_COMM_WORLD_SIZE", "1"))
+    ranks = int(os.environ.get("OMPI_COMM_WORLD_SIZE") or os.environ.get("PMI_SIZE") or 1)
     is_test = collection_path.name.startswith("test_") and collection_path.suffix == ".py"
     return True if is_test and ranks > 1 and "mark.mpi" not in collection_path.read_text() else None
 

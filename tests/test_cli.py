@@ -12,7 +12,7 @@ import xarray as xr
 
 from epsmesh.report.read import read_file
 from epsmesh.run.reading import open_to_read
-from tests.commands import ENVIRONMENT, ROOT, command
+from tests.commands import ENVIRONMENT, MPIRUN, ROOT, command
 from tests.compare import assert_same
 from tests.conftest import SMALL
 
@@ -102,7 +102,7 @@ def test_a_rank_that_alone_knows_a_reason_tells_it(small, tmp_path):
     bad.write_text(SMALL.replace('"2 mm"', "2"))
     script = 'file=$1; shift; if [ "$OMPI_COMM_WORLD_RANK" = 0 ]; then file=$1; sleep 2; fi; shift; exec "$@" "$file"'
     run = [sys.executable, "-m", "epsmesh", "run", "--output", str(tmp_path / "out")]
-    ranks = ["mpirun", "--oversubscribe", "-n", "2", "sh", "-c", script, "sh", str(bad), str(small), *run]
+    ranks = [*MPIRUN, "2", "sh", "-c", script, "sh", str(bad), str(small), *run]
     done = subprocess.run(ranks, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=100, cwd=ROOT)
     assert done.returncode == 2
     assert done.stderr.count("probe.radius = 2") == 1

@@ -30,7 +30,7 @@ def main() -> None:
             if listens:
                 signal.signal(signal.SIGINT, _leave)
                 interrupts.forget()
-    except ModuleNotFoundError as missing:
+    except ImportError as missing:
         from epsmesh.libraries import sentence_on  # noqa: PLC0415
 
         if not (sentence := sentence_on(missing)):

@@ -9,10 +9,10 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
-from mpi4py import MPI
-
+from epsmesh.alone import Alone
+from epsmesh.launcher import is_launched
 from epsmesh.plan.cost import CostModel
 from epsmesh.plan.plan import Plan, leave_out_stored, make_plan
 from epsmesh.plan.shard import Shard
@@ -34,6 +34,7 @@ from epsmesh.study.sweep import Study
 
 if TYPE_CHECKING:
     import xarray as xr
+    from mpi4py import MPI
 
 Show = Callable[[Plan], Terminal]
 
@@ -66,14 +67,26 @@ class Outcome:
     interrupted: bool
 
 
-def world() -> MPI.Comm:
-    """Return the communicator of all ranks: what a run is given, unless its caller says otherwise."""
+def world() -> "MPI.Comm":
+    """Return the communicator of all ranks: what a run is given, unless its caller says otherwise.
+
+    Without MPI, what needs no solver goes on alone.
+
+    Raises:
+        ModuleNotFoundError: if there are several ranks, and no MPI.
+    """
+    try:
+        from epsmesh.mpi import MPI  # noqa: PLC0415 (it starts as it is imported)
+    except ModuleNotFoundError:
+        if is_launched():
+            raise
+        return cast("MPI.Comm", Alone())
     return MPI.COMM_WORLD
 
 
 def prepare(
     study: Study,
-    comm: MPI.Comm,
+    comm: "MPI.Comm",
     store_path: Path,
     *,
     fresh: bool = False,
@@ -122,7 +135,7 @@ def prepare(
     return replace(leave_out_stored(declared, stored, without), cost=cost), opened
 
 
-def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, show: Show | None = None) -> Outcome:
+def run(plan: Plan, opened: Opened, comm: "MPI.Comm", output: Path, show: Show | None = None) -> Outcome:
     """Carry out ``plan`` and write ``<study>.nc`` and its figure into ``output``, unless it is a shard's; collective.
 
     What insertions and interpolated paths need besides is planned once their first solves are known; ``show`` makes the
@@ -155,7 +168,7 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, show: Show | N
     return Outcome(counts, failures(plan, opened.records), results, interrupted)
 
 
-def solve(study: Study, comm: MPI.Comm, store: Path, progress: Terminal | None = None) -> "xr.Dataset":
+def solve(study: Study, comm: "MPI.Comm", store: Path, progress: Terminal | None = None) -> "xr.Dataset":
     """Return the dataset of a study on every rank, without writing it: of forces that another result is made of.
 
     Cases are read from the store, and kept in it, as those of a run; collective.
@@ -193,7 +206,7 @@ def load_solvers() -> None:
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
-def end_ranks(comm: MPI.Comm, status: int) -> None:
+def end_ranks(comm: "MPI.Comm", status: int) -> None:
     """End every rank of an interrupted run: some may wait in a call that will never be answered."""
     if comm.size > 1:
         if comm.rank != 0:
@@ -202,7 +215,7 @@ def end_ranks(comm: MPI.Comm, status: int) -> None:
 
 
 @contextmanager
-def abort_on_exception(comm: MPI.Comm, *agreed: type[Exception]) -> Iterator[None]:
+def abort_on_exception(comm: "MPI.Comm", *agreed: type[Exception]) -> Iterator[None]:
     """End all ranks when one of them meets an error that nobody handles: the others would wait for ever.
 
     Exceptions that are ``agreed`` are those that every rank raises.
@@ -234,7 +247,7 @@ def ended_soon() -> Iterator[None]:
         yield
 
 
-def _compute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None) -> bool:
+def _compute(plan: Plan, opened: Opened, comm: "MPI.Comm", progress: Terminal | None) -> bool:
     """Carry out ``plan``, and return whether it was interrupted; collective."""
     if plan.solves:
         load_solvers()  # before signals are handled
@@ -248,7 +261,7 @@ def _compute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
     return False
 
 
-def _lacking(plan: Plan, opened: Opened, comm: MPI.Comm) -> Plan | None:
+def _lacking(plan: Plan, opened: Opened, comm: "MPI.Comm") -> Plan | None:
     """Return the plan of what is needed besides ``plan`` and what is not stored; collective: see ``complete``.
 
     Each rank makes it from the same records: a body with search trees cannot be sent.
@@ -267,7 +280,7 @@ def _lacking(plan: Plan, opened: Opened, comm: MPI.Comm) -> Plan | None:
     return complete(plan, opened.records if comm.rank == 0 else known, get)
 
 
-def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None, signals: list[int]) -> None:
+def _execute(plan: Plan, opened: Opened, comm: "MPI.Comm", progress: Terminal | None, signals: list[int]) -> None:
     registered = Registered(opened.store.path, plan, progress or Progress()) if opened.store else None
     if not plan.solves:
         with registered or nullcontext():

@@ -8,7 +8,8 @@ import time
 
 import pytest
 
-from tests.commands import ENVIRONMENT, ROOT, epsmesh
+from epsmesh.libraries import SOLVER, System, solver_on
+from tests.commands import ENVIRONMENT, MPIRUN, ROOT, epsmesh, spawn
 
 # The command, which says when what answers Ctrl-C is in place: as it begins to load the rest.
 COMMAND = """
@@ -112,14 +113,14 @@ _end_ranks()
 
 
 def test_a_rank_that_is_interrupted_while_mpi_loads_ends_the_others():
-    words = ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-c", ONE_RANK_LEAVES]
+    words = [*MPIRUN, "2", sys.executable, "-c", ONE_RANK_LEAVES]
     done = subprocess.run(words, cwd=ROOT, env=ENVIRONMENT, capture_output=True, check=False, timeout=60)
     assert done.returncode == 130
 
 
 WITHOUT = """
 import sys
-sys.modules[sys.argv.pop(1)] = None  # as if it were not installed
+sys.modules |= dict.fromkeys(sys.argv.pop(1).split(","))  # as if they were not installed
 from epsmesh.__main__ import main
 main()
 """
@@ -139,7 +140,7 @@ def without(library, *words, **environment):
 @pytest.mark.parametrize(
     ("library", "words", "remedy"),
     [
-        ("gmsh", ("run", "STUDY"), "environment.yml"),
+        ("gmsh", ("run", "STUDY"), solver_on(System.here())),
         ("pydantic", ("plan", "STUDY"), "`pip install '.'`"),
         ("nibabel", ("plan", "docs/scenes/image.toml"), "`pip install '.[organs]'`"),
     ],
@@ -149,10 +150,24 @@ def test_a_library_that_is_missing_is_named_with_what_installs_it(small, tmp_pat
     done = without(library, *words, "--output", tmp_path / "results", EPSMESH_CACHE=str(tmp_path / "cache"))
     assert done.returncode == 2, done.stderr
     assert f"the Python library {library} is missing" in done.stderr
-    assert "make setup" in done.stderr and remedy in done.stderr
+    assert remedy in done.stderr
     assert "Traceback" not in done.stderr
 
 
 def test_a_missing_library_is_data_for_a_script(small, tmp_path):
     done = without("gmsh", "run", small, "--json", "--output", tmp_path / "results")
     assert (done.returncode, json.loads(done.stdout)["status"]) == (2, 2)
+
+
+def test_what_solves_nothing_needs_no_solver(small, tmp_path):
+    folder, missing = tmp_path / "results", ",".join(SOLVER)
+    solved = spawn("run", small, "--output", folder)
+    assert solved.returncode == 0, solved.stderr
+    stored = ("run", small, "--output", folder)
+    for words in (("plan", small), stored, ("report", small, "--output", folder), ("--version", "--verbose")):
+        done = without(missing, *words)
+        assert done.returncode == 0, done.stderr
+    assert "dolfinx" not in done.stdout
+    done = without(missing, "run", small, "--output", tmp_path / "other")
+    assert (done.returncode, "Traceback" in done.stderr) == (2, False)
+    assert solver_on(System.here()) in done.stderr

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from epsmesh.solve.kernels import native
 from tests import commands
 from tests.cases import BLADE
 
@@ -82,10 +83,22 @@ def test_no_case_compiles_anything(tmp_path):
     assert found["large"][0] > found["mixed"][0] > found["displacement"][0] > found["meridian"][0] > 0
 
 
-def test_a_command_without_a_compiler_ends_with_a_sentence(spawn, small, monkeypatch, tmp_path):
-    without = {"XDG_CACHE_HOME": str(tmp_path), "EPSMESH_CACHE": "", "CC": "/no/compiler"}
+@pytest.mark.parametrize(
+    ("compiler", "sentence"),
+    [
+        ("/no/compiler", "no C compiler: /no/compiler is not on PATH"),
+        ("false", "the C code of epsmesh does not compile"),
+    ],
+)
+def test_a_command_without_a_compiler_ends_with_a_sentence(spawn, small, monkeypatch, tmp_path, compiler, sentence):
+    without = {"XDG_CACHE_HOME": str(tmp_path), "EPSMESH_CACHE": "", "CC": compiler}
     monkeypatch.setattr(commands, "ENVIRONMENT", commands.ENVIRONMENT | without)
     done = spawn("run", small, "--output", tmp_path / "results", ranks=2)
     assert done.returncode != 0
-    assert done.stderr.count("the C code of epsmesh does not compile") == 1
+    assert done.stderr.count(sentence) == 1
     assert "Traceback" not in done.stderr
+
+
+def test_a_python_without_headers_is_told_with_the_package_of_them(monkeypatch, tmp_path):
+    monkeypatch.setattr(native.sysconfig, "get_path", lambda _: str(tmp_path))
+    assert "Python.h is not in" in (said := native._why_not(OSError())) and "-dev" in said

@@ -22,7 +22,7 @@ from epsmesh.solve import SolveError
 from epsmesh.solve.balance import BALANCE_LIMIT
 from epsmesh.stages import Times, recharge
 from tests.cases import BLADE, solve, study
-from tests.commands import ENVIRONMENT
+from tests.commands import ENVIRONMENT, MPIRUN
 
 WORLD = MPI.COMM_WORLD
 SCENE = {"probe": BLADE, "material": {"poisson": [0.3, 0.49]}, "mesh": {"rim": "0.5 mm", "fine": "4 mm"}}
@@ -43,7 +43,7 @@ for method in ("iterative", "direct"):
 @pytest.mark.skipif(WORLD.size > 1, reason="starts mpirun itself")
 def test_one_and_three_ranks_agree():
     """What two ranks compute, the tests with the mark mpi hold against one."""
-    command = ["mpirun", "--oversubscribe", "-n", "3", sys.executable, "-c", SCRIPT]
+    command = [*MPIRUN, "3", sys.executable, "-c", SCRIPT]
     done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr
     three = [(float(force), int(cells)) for force, cells in re.findall(r"force (\S+) (\d+)", done.stdout)]

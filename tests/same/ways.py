@@ -11,10 +11,11 @@ from pathlib import Path
 
 from epsmesh.api import open_dataset
 from epsmesh.study.toml import to_toml
+from tests.commands import MPIRUN
 from tests.pairs import Study
 from tests.same.outcome import Outcome, of_dataset
 
-_RANKS = ["mpirun", "--oversubscribe", "-n", "2"]
+_RANKS = [*MPIRUN, "2"]
 _ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 _LIMIT = 300  # seconds
 

@@ -81,6 +81,8 @@ class Commands(TyperGroup):
             raise
         except (Exception, KeyboardInterrupt) as wrong:
             plain = isinstance(wrong, typer.Exit) or not is_interrupt(wrong)
+            if plain and isinstance(wrong, ImportError) and (sentence := sentence_on(wrong)):
+                fail(sentence)
             ended = wrong if plain else KeyboardInterrupt()
             _print_error(ended, self.words)
             if isinstance(ended, KeyboardInterrupt):

@@ -163,12 +163,14 @@ def _scene_at_hand(dataset: "xr.Dataset") -> str:
         return ""
     if case.lost_contact:
         return ""
-    from mpi4py import MPI
-
     from epsmesh import workflow
 
-    workflow.load_solvers()
+    try:
+        workflow.load_solvers()
+    except ModuleNotFoundError:
+        return ""
     from epsmesh.mesh.generate import MeshError
+    from epsmesh.mpi import MPI
     from epsmesh.run.mesh_cache import MeshCache
     from epsmesh.run.problem import CaseFailure
     from epsmesh.run.solved import solve_alone

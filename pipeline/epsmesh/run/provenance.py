@@ -5,12 +5,17 @@ import subprocess
 from functools import cache
 from pathlib import Path
 
-from epsmesh import __version__, compat
+from epsmesh import __version__
 
 
 def provenance(ranks: int) -> dict[str, str | int]:
-    """Return versions, git commit, host and ranks."""
-    versions = {f"version_{name}": version for name, version in compat.versions().items()}
+    """Return versions, git commit, host and ranks; without solver no versions of it."""
+    try:
+        from epsmesh import compat  # noqa: PLC0415 (what needs no solver has an origin, too)
+    except ModuleNotFoundError:
+        versions = {}
+    else:
+        versions = {f"version_{name}": version for name, version in compat.versions().items()}
     return {
         **versions,
         "version_epsmesh": __version__,

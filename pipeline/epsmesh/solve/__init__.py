@@ -1,6 +1,9 @@
 """Elasticity: operators, solvers, reaction force, checks. Knows nothing of study files."""
 
-from epsmesh import mpi  # noqa: F401 (before the modules of this package, which bind to it)
+from contextlib import suppress
+
+with suppress(ModuleNotFoundError):  # without it, the errors below are all that can be imported
+    from epsmesh import mpi  # noqa: F401 (before the modules of this package, which bind to it)
 
 
 class CompilerError(Exception):

@@ -5,6 +5,10 @@ The compiler is that of dolfinx's forms; the library is cached beside them.
 
 import hashlib
 import importlib.util
+import os
+import shlex
+import shutil
+import sys
 import sysconfig
 from functools import cache
 from pathlib import Path
@@ -118,8 +122,23 @@ def _compile(name: str, path: Path, header: Path, sources: list[Path]) -> None:
         try:
             made = Path(builder.compile(tmpdir=folder))
         except Exception as error:  # distutils raises many kinds
-            raise CompilerError(
-                f"the C code of epsmesh does not compile ({error}): dolfinx needs a working C compiler, too; "
-                "install one, or set CC"
-            ) from error
+            raise CompilerError(_why_not(error)) from error
         made.replace(path)
+
+
+def _why_not(error: Exception) -> str:
+    """Say why nothing compiles here, and the way out: kernels and forms are compiled when first used."""
+    compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")[0]
+    if shutil.which(compiler) is None:
+        return (
+            f"no C compiler: {compiler} is not on PATH, and solvers are compiled at their first use; "
+            "install gcc (Debian: `apt-get install gcc`; conda: `conda install compilers`), or set CC"
+        )
+    include = Path(sysconfig.get_path("include"))
+    if not (include / "Python.h").exists():
+        version = f"python{sys.version_info.major}.{sys.version_info.minor}-dev"
+        return f"Python.h is not in {include}, and solvers are compiled at their first use; install {version}"
+    return (
+        f"the C code of epsmesh does not compile ({error}): dolfinx needs a working C compiler, too; "
+        "install one, or set CC"
+    )
