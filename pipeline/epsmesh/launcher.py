@@ -43,6 +43,19 @@ def is_first_rank() -> bool:
     return next((rank for rank in ranks if rank is not None), "0") == "0"
 
 
+def has_first_rank_ended() -> bool:
+    """Tell whether the first rank is known to have ended: MPICH's launcher then lets ranks go on that joined no MPI."""
+    parent = Path("/proc", str(os.getppid()))
+    ranks, here = (os.environ.get(name) for name in ("PMI_SIZE", "MPI_LOCALNRANKS"))
+    try:
+        if not ranks or ranks != here or not (parent / "comm").read_text().startswith("hydra"):
+            return False
+        beside = (parent / "task" / parent.name / "children").read_text().split()
+        return not any(b"PMI_RANK=0" in Path("/proc", one, "environ").read_bytes().split(b"\0") for one in beside)
+    except OSError:
+        return False
+
+
 def is_interrupt(error: BaseException) -> bool:
     """Tell whether it is Ctrl-C that an import, or a library, has made another exception of."""
     if interrupts.is_raised():
