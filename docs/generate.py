@@ -8,7 +8,6 @@ from typing import Any
 import typer
 
 from epsmesh.cli import app
-from epsmesh.identify.dataset import WORDS
 from epsmesh.plan.plan import make_plan
 from epsmesh.quantities import RUN, attributes
 from epsmesh.report.dataset import build
@@ -16,9 +15,10 @@ from epsmesh.study.capabilities.features import FEATURES
 from epsmesh.study.capabilities.obstacles import OBSTACLES
 from epsmesh.study.capabilities.refusals import REFUSALS
 from epsmesh.study.json_schema import schema_text
-from epsmesh.study.keys import SECTION_TEXTS, all_sections, heading, keys_of
+from epsmesh.study.keys import all_sections, heading, keys_of, text_of
 from epsmesh.study.read import parse
 from epsmesh.study.starter import starter
+from epsmesh_identify.estimation.dataset import WORDS
 
 # Studies that together have every variable: changes of the one that `epsmesh new` writes.
 _VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
@@ -84,7 +84,7 @@ def study_page() -> str:
             "",
             f"## `{heading(section)}`",
             "",
-            SECTION_TEXTS[section],
+            text_of(section),
             "",
             *_table(("key", "takes", "default", "meaning")),
         ]

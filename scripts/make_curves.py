@@ -1,8 +1,9 @@
 """Make the force curves of studies/identify-*.toml: python scripts/make_curves.py [FOLDER]
 
-Round frictionless tools on layers that are endless sidewards, by the integral equation of `epsmesh.layered`, with what
-a testing machine adds: a contact point anywhere, air before it, a baseline, a load frame that yields, correlated noise.
-The same files every time. What they were made with is in TRUTH, for the tests and the documentation.
+Round frictionless tools on layers that are endless sidewards, by the integral equation of
+`epsmesh_identify.layered`, with what a testing machine adds: a contact point anywhere, air before it, a baseline, a
+load frame that yields, correlated noise. The same files every time. What they were made with is in TRUTH, for the tests
+and the documentation.
 """
 
 import sys
@@ -12,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import lfilter
 
-from epsmesh.layered.body import RIGID, LayeredBody
-from epsmesh.layered.compliance import Layer
-from epsmesh.layered.contact import Profile
+from epsmesh_identify.layered.body import RIGID, LayeredBody
+from epsmesh_identify.layered.compliance import Layer
+from epsmesh_identify.layered.contact import Profile
 
 CURVES = Path(__file__).resolve().parents[1] / "studies" / "curves"
 

@@ -71,6 +71,8 @@ try() { # from the file $1: version, a new study, its run, its report
         "$epsmesh" new mine --like quick >/dev/null
         "$epsmesh" run studies/mine.toml --quiet
         "$epsmesh" report studies/mine.toml >/dev/null
+        "$epsmesh" new punch --like identify-punch >/dev/null
+        "$epsmesh" identify studies/curves/*.csv >/dev/null
         "$work/venv/bin/python" - <<'PYTHON'
 import epsmesh
 

@@ -6,8 +6,10 @@ import sys
 from contextlib import redirect_stderr, redirect_stdout
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
+from typer.main import get_command
 from typer.testing import CliRunner, Result
 
 from epsmesh.cli import app, main
@@ -22,6 +24,12 @@ ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_",
 # The launcher of the MPI in use: that of the wheels (MPICH) is beside Python, else Debian's (Open MPI).
 _BESIDE = Path(sys.executable).parent / "mpiexec"
 MPIRUN = [str(_BESIDE), "-n"] if _BESIDE.exists() else ["mpirun", "--oversubscribe", "-n"]
+
+
+def names() -> list[str]:
+    """Return the names of all commands."""
+    group: Any = get_command(app)
+    return sorted(group.commands)
 
 
 def epsmesh(*arguments: object) -> Result:

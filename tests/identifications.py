@@ -3,8 +3,8 @@
 import numpy as np
 import xarray as xr
 
-from epsmesh.identify.dataset import dataset_of
-from epsmesh.identify.parts import CurveFit, Estimate, NoiseFound, Profile, Unknown, Window
+from epsmesh_identify.estimation.dataset import dataset_of
+from epsmesh_identify.estimation.parts import CurveFit, Estimate, NoiseFound, Profile, Unknown, Window
 
 STUDY = '[material]\nyoung = "1 kPa"\nlaw = "linear"\n'
 UNKNOWNS = (

@@ -18,7 +18,7 @@ FILE = ROOT / "tests" / "physics.txt"
 # Folders and files of pipeline/epsmesh/ between a case and its record.
 SOURCES = (
     *("shapes", "scene", "mesh", "solve", "insertion", "compat", "viscoelastic.py", "units.py"),
-    *(f"study/{name}.py" for name in ("case", "closure", "loads", "output", "own_lengths", "slit", "stages", "sweep")),
+    *(f"study/{name}.py" for name in ("case", "closure", "loads", "output", "slit", "stages", "sweep")),
     *(f"plan/{name}.py" for name in ("far_fields", "ladders", "recipe", "reductions", "refinement", "symmetry")),
     *(f"run/{name}.py" for name in ("attempts", "basis", "far_field", "loads", "measure", "meshing", "outputs")),
     *(f"run/{name}.py" for name in ("problem", "record", "runner", "samples", "solved")),

@@ -39,7 +39,7 @@ def installed(tmp_path_factory):
     return run
 
 
-@pytest.mark.parametrize("command", ["verify", "new", "view", "export", "status", "run"])
+@pytest.mark.parametrize("command", ["verify", "new", "view", "export", "status", "run", "identify", "sensitivity"])
 def test_every_command_loads(installed, command):
     done = installed("-m", "epsmesh", command, "--help")
     assert done.returncode == 0, done.stderr
@@ -66,8 +66,9 @@ def test_the_command_is_installed_beside_its_packages(installed):
 def test_examples_and_templates_come_along(installed):
     done = installed("-m", "epsmesh", "new", "mine", "--like", "quick")
     assert done.returncode == 0, done.stderr
-    script = "from pathlib import Path; import epsmesh.report.page as p; print(*Path(p.__file__).parent.rglob('*.j2'))"
-    assert "page.html.j2" in installed("-c", script).stdout
+    script = "from pathlib import Path; import {0} as p; print(*Path(p.__file__).parent.rglob('*.j2'))"
+    for module, template in (("epsmesh.report.page", "page.html.j2"), ("epsmesh_identify", "identification.html.j2")):
+        assert template in installed("-c", script.format(module)).stdout
     for example, file in (("organ", "meshes/liver.stl"), ("identify-punch", "curves/ball.csv")):
         made = installed("-m", "epsmesh", "new", f"my-{example}", "--like", example)
         assert f"{file}: copied with the study" in made.stdout

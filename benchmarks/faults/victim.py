@@ -55,7 +55,7 @@ def tell_done(path: Path, command: str) -> None:
         told(Kept, "put", lambda kept, _, work, __: f"array {kept._key(work)}")
         return  # its solves have no store
     if command == "identify":
-        from epsmesh.identify.kept import Kept as Fitted
+        from epsmesh_identify.estimation.kept import Kept as Fitted
 
         told(Fitted, "write", lambda kept, _, specimen, __: f"file {kept._path(specimen).name}")
     told(Attempts, "judge", lambda _, record, *__: f"case {record.key}" if record is not None else "")

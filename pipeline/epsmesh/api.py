@@ -1,13 +1,14 @@
 """The program from Python: a study that plans and runs itself. What `import epsmesh` offers; see docs/python.md."""
 
 import warnings
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from epsmesh.files import MODEL_ENDING, STORE_NAME
-from epsmesh.launcher import is_first_rank
+from epsmesh.extensions import found
+from epsmesh.files import STORE_NAME
 from epsmesh.plan.describe import summary
 from epsmesh.plan.plan import Plan, make_plan
 from epsmesh.run.progress import Terminal
@@ -170,47 +171,25 @@ class RunnableStudy:
             warnings.warn(f"{case}: {solved.record.message}", RuntimeWarning, stacklevel=2)
         return CaseSolution(solved)
 
-    def identify(self, *, output: str | Path = "results", store: str | Path | None = None) -> "xr.Dataset":
-        """Find the parameters of the study from its measured curves, and return the dataset of what was found.
-
-        Writes ``<study>.nc`` and its figure into ``output``; forces are cases of ``store`` (``cases.sqlite`` in
-        ``output``), computed once.
-
-        Raises:
-            ValueError: if the study has no measurements.
-            FileExistsError: if the dataset of a run would be replaced.
-            ExperimentError: if a file is no force curve.
-            StudyError: if the scene of a measurement cannot be run.
-            SurrogateError: if a case that the forces need has none.
-        """
-        from epsmesh.identify.dataset import write  # noqa: PLC0415 (MPI starts as it is imported)
-        from epsmesh.identify.run import identification  # noqa: PLC0415
-        from epsmesh.report.figures.identification import draw  # noqa: PLC0415
-        from epsmesh.report.read import check_kind  # noqa: PLC0415
-
-        if not self.declared.measurements:
-            raise ValueError(f"{self.declared.file}: has no [[measurement]]")
-        path = Path(output) / f"{self.name}.nc"
-        check_kind(path, identified=True)
-        dataset = identification(self.declared, Path(output), Path(store or Path(output) / STORE_NAME), lambda _: None)
-        if is_first_rank():
-            write(dataset, path)
-            draw(dataset, path.with_suffix(""))
-        return dataset
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        """Return a method that another package adds: see :mod:`epsmesh.extensions`."""
+        if name.startswith("_") or name not in (added := found("methods")):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return partial(added[name].load(), self)
 
 
 def open_dataset(path: str | Path, output: str | Path = "results") -> "xr.Dataset":
     """Return the dataset at ``path``, or that of a study file in ``output``, in memory and with ``dataset.epsmesh``.
 
-    The file of a real-time model becomes a dataset of its arrays.
+    A file of another package, such as a real-time model, becomes a dataset of its arrays.
 
     Raises:
-        DatasetError: if there is none, or if it is not a study's; ModelError: if it is no real-time model.
+        DatasetError: if there is none, or if it is not a study's; what the other package raises, such as ModelError.
     """
-    if Path(path).suffix == MODEL_ENDING:
-        from epsmesh_realtime.export.file import open_model  # noqa: PLC0415 (xarray is slow to load)
-
-        return open_model(Path(path))
+    ending = Path(path).suffix
+    if ending not in ("", ".nc", ".toml") and (opens := found("files").get(ending.removeprefix("."))):
+        opened: xr.Dataset = opens.load()(Path(path))
+        return opened
     from epsmesh.report import accessor  # noqa: F401, PLC0415 (registers dataset.epsmesh)
     from epsmesh.report.read import read  # noqa: PLC0415 (xarray is slow to read_file)
 

@@ -18,11 +18,11 @@ except ImportError:  # setuptools before 70.1
 class BuildLibrary(build_ext):
     """A library without Python's entry point, and with a name that is the same for every Python."""
 
-    def get_ext_filename(self, fullname):
+    def get_ext_filename(self, fullname: str) -> str:
         """Return the path of the library, relative to the folder of packages."""
         return str(Path(*fullname.split(".")).with_suffix(".so"))
 
-    def get_export_symbols(self, ext):
+    def get_export_symbols(self, ext: Extension) -> list[str]:
         """Return no names: linkers of some systems refuse PyInit_ where there is none."""
         return ext.export_symbols
 
@@ -30,7 +30,7 @@ class BuildLibrary(build_ext):
 class BuildPackages(build_py):
     """The packages without this script."""
 
-    def find_package_modules(self, package, package_dir):
+    def find_package_modules(self, package: str, package_dir: str) -> list[tuple[str, str, str]]:
         """Return the modules of a package."""
         modules = super().find_package_modules(package, package_dir)
         return [one for one in modules if (package, one[1]) != ("epsmesh_realtime", "setup")]
@@ -39,17 +39,17 @@ class BuildPackages(build_py):
 class Wheel(bdist_wheel):
     """A wheel of one system and any Python 3."""
 
-    def finalize_options(self):
+    def finalize_options(self) -> None:
         """Tell that it contains a library."""
         super().finalize_options()
         self.root_is_pure = False
 
-    def get_tag(self):
+    def get_tag(self) -> tuple[str, str, str]:
         """Return the tag of the system alone."""
         return "py3", "none", super().get_tag()[2]
 
 
-def library(folder="."):
+def library(folder: str | Path = ".") -> Extension:
     """Return what setuptools builds from the sources in ``folder``."""
     # Where there is no compiler, the package is installed without it, and says so when a model is read.
     flags = ["-std=c99", "-O2"]

@@ -17,7 +17,7 @@ from epsmesh.cli import app
 from epsmesh.cli.console import paint, print_json
 from epsmesh.report.figures import KINDS
 from epsmesh.report.read import read_file
-from tests.commands import ENVIRONMENT, ROOT, talk
+from tests.commands import ENVIRONMENT, ROOT, names, talk
 from tests.conftest import SMALL
 from tests.studies import small_text
 
@@ -27,7 +27,7 @@ def strict(text: str):
     return json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
 
 
-COMMANDS = sorted(command.name or command.callback.__name__ for command in app.registered_commands)
+COMMANDS = names()
 
 
 def on_terminal(*arguments: str, **environment: str) -> str:

@@ -5,18 +5,17 @@ import shutil
 
 import pytest
 
-from epsmesh.cli import app
 from epsmesh.report.dataset import write
 from epsmesh.report.guide import USUAL_ACCURACY, guide, guide_if_any
 from epsmesh.report.guide_text import settings, text
 from epsmesh.run.record import Record
 from epsmesh.run.store import Store
 from epsmesh.shapes.probes.blade import Blade
-from tests.commands import ROOT
+from tests.commands import ROOT, names
 from tests.report.chosen import TEXT, dataset
 
 SCALPEL = TEXT[TEXT.rindex("[[probe]]") : TEXT.index("[mesh]")]
-NAMES = sorted(command.callback.__name__ for command in app.registered_commands)
+NAMES = names()
 
 
 def failed(done, status=2):

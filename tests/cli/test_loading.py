@@ -54,7 +54,8 @@ def study(tmp_path):
 def test_help_loads_no_study_no_plan_and_no_shape():
     modules = loaded("--help")
     assert not libraries(modules) & (_SLOW | _ELSEWHERE | {"pydantic", "psutil", "hashlib", "tomllib"})
-    assert {m for m in modules if m.startswith(("epsmesh.study.", "epsmesh.plan", "epsmesh.shapes"))} <= {
+    rooms = ("epsmesh.study.", "epsmesh.plan", "epsmesh.shapes", "epsmesh_identify.sections")
+    assert {m for m in modules if m.startswith(rooms)} <= {
         "epsmesh.study.vocabulary", "epsmesh.study.named",
     }  # fmt: skip
 
@@ -65,6 +66,7 @@ def test_a_study_loads_the_shapes_that_it_names_alone(command, study, tmp_path):
     assert not libraries(modules) & (_SLOW | _ELSEWHERE - ({"sqlite3"} if command == "status" else set()))
     # An export, which a plan tells the cost of, presses blades, too.
     assert shapes(modules) == {"box", "disc"} | ({"blade"} if command == "plan" else set())
+    assert "epsmesh_identify" not in modules
     assert "psutil" not in modules or command == "plan"
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from epsmesh.plan.plan import make_plan
 from epsmesh.study.json_schema import schema_text
-from epsmesh.study.keys import SECTION_TEXTS, all_sections, keys_of, shapes_of, words_of
+from epsmesh.study.keys import all_sections, keys_of, shapes_of, text_of, words_of
 from epsmesh.study.named import SCHEMA, SHORT, examples
 from epsmesh.study.read import parse, read_study
 from epsmesh.study.renamed import RENAMED
@@ -34,7 +34,7 @@ def new(*arguments):
 
 def test_every_key_of_the_schema_has_words_and_an_example():
     for section in all_sections():
-        assert SECTION_TEXTS[section]
+        assert text_of(section)
         for key in keys_of(section):
             assert key.words.text, f"nothing is said of {section}.{key.name}"
             assert key.words.example, f"there is no example of {section}.{key.name}"

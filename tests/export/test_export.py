@@ -205,7 +205,7 @@ def test_a_plan_tells_what_an_export_costs_or_why_there_is_none(tmp_path):
         file.write_text(small_text(body=CYLINDER, probe=ball, material=SOFT))
         found = epsmesh("plan", file)
         assert told in found.stdout.replace("\n", " ")
-        data = json.loads(epsmesh("plan", file, "--json").stdout)["export"]
+        (data,) = json.loads(epsmesh("plan", file, "--json").stdout)["forecasts"]
         assert ("refused" in data) == (friction > 0) and ("most_seconds" in data) == (friction == 0)
     small = SOFT | {"poisson": 0.4}
     file.write_text(small_text(body=CYLINDER, probe=DISC | {"radius": "9 mm"}, material=small))

@@ -10,8 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from epsmesh.experiment.read import read_curve
-from epsmesh.experiment.reading import ExperimentError, Reading
 from epsmesh.plan.plan import make_plan
 from epsmesh.run.reading import known_of, open_to_read, read_rows
 from epsmesh.run.record import Record
@@ -20,12 +18,14 @@ from epsmesh.shapes.files.image import read_image
 from epsmesh.shapes.files.read import read_surface
 from epsmesh.shapes.files.step import entities_of, named_faces, unit_of
 from epsmesh.shapes.triangles import SurfaceError
+from epsmesh_identify.experiment.read import read_curve
+from epsmesh_identify.experiment.reading import ExperimentError, Reading
 from epsmesh_realtime import ModelError
 from epsmesh_realtime import read as read_model
 from epsmesh_realtime.export.file import open_model
 from tests.cases import study
-from tests.experiment.curves import cycle, write
 from tests.fuzz.profile import thrown
+from tests.identify.experiment.curves import cycle, write
 from tests.organs import box, write_stl
 from tests.realtime.synthetic import write_random
 from tests.shapes.files import dicoms

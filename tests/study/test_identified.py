@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from epsmesh.identify.dataset import joined, write
-from epsmesh.identify.parts import Unknown
 from epsmesh.plan.plan import make_plan
-from epsmesh.report.identified import material
 from epsmesh.report.uncertainty import tissue
 from epsmesh.study.identified import NOTHING
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import read_mapping, read_text
+from epsmesh_identify.estimation.dataset import joined, write
+from epsmesh_identify.estimation.parts import Unknown
+from epsmesh_identify.report.identified import material
 from tests import identifications
 from tests.cases import raw
 from tests.identifications import VALUES, identification

@@ -7,7 +7,6 @@ import nibabel
 import numpy as np
 import pytest
 
-from epsmesh.identify.dataset import write
 from epsmesh.plan.plan import make_plan
 from epsmesh.report.dataset import build
 from epsmesh.report.uncertainty import IMAGE, NAME, force_image_uncertainty, unknowns
@@ -16,6 +15,7 @@ from epsmesh.shapes.files.read import read_surface
 from epsmesh.shapes.triangles import SurfaceError
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import read_mapping
+from epsmesh_identify.estimation.dataset import write
 from tests.cases import raw, study
 from tests.identifications import identification
 from tests.organs import box, write_stl

@@ -8,10 +8,10 @@ from epsmesh.plan.key import case_key, mesh_key
 from epsmesh.plan.plan import make_plan
 from epsmesh.plan.symmetry import model_planes
 from epsmesh.shapes.tissue import LAWS, NUMBERS_OF_LAWS
-from epsmesh.study.parameters import parameters_of
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
 from epsmesh.study.swept import placed
+from epsmesh_identify.sections.parameters import parameters_of
 from tests.cases import raw, study
 
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}

@@ -10,16 +10,12 @@ import typer
 from epsmesh import __version__
 from epsmesh.cli import (
     compare,
-    export,
     guide,
-    identify,
     new,
     plan,
     report,
     run,
-    sensitivity,
     status,
-    touch,
     verify,
     view,
 )
@@ -53,12 +49,8 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
     status.status,
     report.report,
     guide.guide,
-    identify.identify,
     compare.compare,
-    sensitivity.sensitivity,
     view.view,
-    export.export,
-    touch.touch,
     verify.verify,
 )
 for _command in _COMMANDS:

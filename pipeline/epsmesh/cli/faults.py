@@ -16,7 +16,6 @@ from epsmesh.printable import printable
 if TYPE_CHECKING:
     from epsmesh.report.publish import ResultsError
     from epsmesh.study.problems import StudyError
-    from epsmesh.study.sweep import Study
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 _PATIENCE = 5.0  # seconds
@@ -108,28 +107,6 @@ def refusing(
         yield
     except errors as wrong:
         fail(Fault(str(wrong), file=str(file), howto=howto), on_all_ranks=on_all_ranks)
-
-
-@contextmanager
-def refusing_cases(study: "Study", store: Path, howto: str | None = None) -> Iterator[None]:
-    """Exit, on all ranks, if the cases that a command needs cannot be run, have no force, or the ``store`` is bad.
-
-    If one rank alone meets another error, all end.
-    """
-    from epsmesh.run.store import StoreError
-    from epsmesh.study.problems import StudyError
-    from epsmesh.surrogate.cases import SurrogateError
-    from epsmesh.workflow import abort_on_exception, world
-
-    try:
-        with abort_on_exception(world(), StoreError, StudyError, SurrogateError, typer.Exit):
-            yield
-    except StudyError as wrong:
-        fail(*of_study(wrong), on_all_ranks=True)
-    except StoreError as wrong:
-        fail(Fault(str(wrong), file=str(store)), on_all_ranks=True)
-    except SurrogateError as wrong:
-        fail(Fault(str(wrong), file=study.file, howto=howto), status=SOME_FAILED, on_all_ranks=True)
 
 
 def print_faults(faults: Iterable[Fault]) -> None:

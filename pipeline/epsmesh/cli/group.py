@@ -3,7 +3,7 @@
 import errno
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from typing import Any
 
 import typer
@@ -20,6 +20,7 @@ from epsmesh.cli.faults import (
     of_file,
     of_unwritten,
 )
+from epsmesh.extensions import commands
 from epsmesh.files import NOT_UTF8, is_utf8
 from epsmesh.launcher import is_first_rank, is_interrupt, is_launched
 from epsmesh.libraries import sentence_on
@@ -40,10 +41,60 @@ _NOW = {
 }
 
 
+class Added(MutableMapping[str, Any]):
+    """Commands by name: a package's ``own``, and those of other packages, which are loaded when they are asked for."""
+
+    def __init__(self, own: Mapping[str, Any]) -> None:
+        self._known, self._own = dict(own), tuple(own)
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a command."""
+        if name not in self._known:
+            self._known[name] = _command(name, commands()[name][0].load())
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield the names in the order of the help: an added command comes after the one that it names as its place."""
+        order = list(self._own)
+        rest = {name: place for name, (_, place) in commands().items() if name not in order}
+        while rest:
+            for name in [name for name, place in rest.items() if place in order] or list(rest):
+                place = rest.pop(name)
+                order.insert(order.index(place) + 1 if place in order else len(order), name)
+        yield from order
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(list(iter(self)))
+
+    def __setitem__(self, name: str, command: Any) -> None:
+        """Set an own command."""
+        self._known[name] = command
+
+    def __delitem__(self, name: str) -> None:
+        """Take a command away."""
+        del self._known[name]
+
+
+def _command(name: str, function: Callable[..., Any]) -> Any:
+    """Return a command as typer makes it of a function."""
+    alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+    alone.command(name)(function)
+    return typer.main.get_command(alone)
+
+
 class Commands(TyperGroup):
-    """A group of commands that finds --json before any command starts."""
+    """A group of commands that finds --json before any command starts, and commands of other packages."""
 
     words: Sequence[str] = ()
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.commands = Added(self.commands)
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of the commands, without loading those of other packages."""
+        return list(self.commands)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words of the command line."""

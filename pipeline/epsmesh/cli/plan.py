@@ -8,7 +8,6 @@ import typer
 from epsmesh.cli.cases import find_case
 from epsmesh.cli.console import is_json_wanted, say, warning
 from epsmesh.cli.faults import BAD_INPUT, DONE, SOME_FAILED, as_data, fail, of_study, print_faults, refusing
-from epsmesh.cli.forecast import forecasts, of_export, told, told_of_export
 from epsmesh.cli.words import (
     DEFAULT_OUTPUT,
     File,
@@ -26,11 +25,13 @@ from epsmesh.cli.words import (
     read_all,
     warn,
 )
+from epsmesh.extensions import further_forecasts
 from epsmesh.files import STORE_NAME
 from epsmesh.printable import counted
 from epsmesh.run.remaining import format_seconds
 
 if TYPE_CHECKING:
+    from epsmesh.extensions import Forecast
     from epsmesh.plan.cost import CostModel
     from epsmesh.plan.plan import Plan
     from epsmesh.run.record import Record
@@ -101,9 +102,9 @@ def plan(
     most = MEMORY_SHARE * room
     found |= {"memory_available": room, "too_large": sum(step["memory"] > most for step in found["steps"])}
     found["besides"] = _besides(made, records, ranks)
-    found["forecasts"] = _forecasts(study, made.cost)
-    found["export"] = of_export(study, made.cost)
-    _show(study, found, quiet=quiet, verbose=verbose)
+    forecasts = [*_forecasts(study, made.cost), *further_forecasts(study, made.cost, ranks)]
+    found["forecasts"] = [one.data for one in forecasts]
+    _show(study, found, forecasts, quiet=quiet, verbose=verbose)
     # Where all cases are too large, that of F_exact may still be solved: for nothing.
     asked = [step for step in found["steps"] if not step["exact"]] or found["steps"]
     nothing_fits = bool(asked) and all(step["memory"] > most for step in asked)
@@ -146,31 +147,33 @@ def _check(files: list[Path]) -> NoReturn:
         report.append({"file": str(file), "errors": [], "warnings": list(study.warnings), "cases": cases})
         if not is_json_wanted():
             warn(study)
-            what = "for `epsmesh identify`" if study.lacking else f"{counted(cases, 'case')}{axes_of(study)}"
+            what = f"for `{study.does}`" if study.lacking else f"{counted(cases, 'case')}{axes_of(study)}"
             print(f"{file}: fine; {what}")
     say(report)
     raise typer.Exit(BAD_INPUT if any(one["errors"] for one in report) else DONE)
 
 
-def _forecasts(study: "Study", cost: "CostModel") -> list[dict[str, Any]]:
-    """Return about what the tables of forces of a study cost; exit if there can be none."""
-    from epsmesh.experiment.reading import ExperimentError
+def _forecasts(study: "Study", cost: "CostModel") -> "list[Forecast]":
+    """Return about what work besides the cases of a study costs; exit if it cannot be done."""
+    from epsmesh.extensions import RefusedError
     from epsmesh.study.problems import StudyError
+    from epsmesh.study.schema import added_to
 
     try:
-        with refusing(ExperimentError, file=study.file):
-            return forecasts(study, cost)
+        with refusing(RefusedError, file=study.file):
+            return [found for one in added_to(study.raw) for found in one.forecast(study, cost)]
     except StudyError as wrong:
         fail(*of_study(wrong))
 
 
 def _show_forecasts(study: "Study") -> NoReturn:
-    """Print what `epsmesh identify` costs for a study that has no cases besides, and exit."""
+    """Print what the work costs for a study that has no cases besides, and exit."""
     from epsmesh.plan.cost import CostModel
 
     warn(study)
     found = _forecasts(study, CostModel())
-    say({"study": study.file, "forecasts": found}, study.title, *map(told, found))
+    data, lines = [one.data for one in found], (one.line for one in found)
+    say({"study": study.file, "forecasts": data}, study.title, *lines)
     raise typer.Exit(DONE)
 
 
@@ -188,8 +191,8 @@ def _planned(study: "Study", path: Path, without: tuple[str, ...]) -> "tuple[Pla
         return plan_the_rest(study, path, without)
 
 
-def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool) -> None:
-    """Print the summary of a plan."""
+def _show(study: "Study", found: dict[str, Any], forecasts: "list[Forecast]", *, quiet: bool, verbose: bool) -> None:
+    """Print the summary of a plan, and what work there is besides."""
     if is_json_wanted():
         say(found)
         return
@@ -223,9 +226,8 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool) 
     if rest := found["besides"]:
         most, seconds = counted(rest["solves"], "solve"), format_seconds(rest["seconds"])
         print(f"  besides: up to {most}, {seconds} {on}: which are needed is found on the way")
-    for forecast in found["forecasts"]:
-        print(told(forecast))
-    print(told_of_export(found["export"], found["ranks"]))
+    for forecast in forecasts:
+        print(forecast.line)
 
 
 def _list_steps(steps: list[dict[str, Any]], most: int | None) -> None:

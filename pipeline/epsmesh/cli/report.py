@@ -76,13 +76,13 @@ def report(
 
     Example: epsmesh report studies/figure3.toml --figures --kind error --kind force
     """
-    from epsmesh.report.identified import is_identification
+    from epsmesh.report.read import other_kind
 
     if not figures and (kind or rest):
         fail("--kind and --rest say which figures are drawn: give --figures, too")
     path, dataset = read_dataset(file, output, any_kind=True)
-    if is_identification(dataset):
-        _write_identification(path, dataset, figures=figures)
+    if other := other_kind(dataset):
+        _write_other(path, dataset, other, figures=figures)
         return
     if figures:
         _draw(path, dataset, kind, rest=rest)
@@ -98,14 +98,14 @@ def report(
     say({"file": str(path), "page": str(page)}, str(page))
 
 
-def _write_identification(path: Path, dataset: "xr.Dataset", *, figures: bool) -> None:
-    """Write the page of an identification beside its dataset, or its figure."""
-    from epsmesh.report.figures.identification import draw
-    from epsmesh.report.page.identification import write_page
+def _write_other(path: Path, dataset: "xr.Dataset", name: str, *, figures: bool) -> None:
+    """Write the page of a dataset of another kind beside it, or its figure."""
+    from epsmesh.extensions import kind
 
+    own = kind(name)
     stem = path.with_suffix("")
     check_output(*(stem.with_suffix(f".{ending}") for ending in (FIGURE_FORMATS if figures else ("html",))))
-    written = draw(dataset, stem) if figures else [write_page(dataset, path.with_suffix(".html"))]
+    written = own.draw(dataset, stem) if figures else [own.write_page(dataset, path.with_suffix(".html"))]
     say({"file": str(path), **({"files": list(map(str, written))} if figures else {"page": str(written[0])})},
         *map(str, written))  # fmt: skip
 

@@ -91,7 +91,7 @@ def run(
     check_output(folder=None if meshes == DEFAULT_MESHES else meshes)
     for study in () if part else studies:
         check_output(*result_files(output, study.name))
-    _check_measured(studies, output)
+    _check_left_out(studies, output)
     check_machine()
     from epsmesh import workflow
     from epsmesh.plan.shard import stores_of
@@ -143,11 +143,14 @@ def run(
     raise typer.Exit(ended)
 
 
-def _check_measured(studies: "list[Study]", output: Path) -> None:
-    """Say that measurements are left out; exit if results would replace an identification's."""
-    for study in (study for study in studies if study.measurements):
-        check_kind(output / f"{study.name}.nc", identified=False)
-        warning(f"{study.file}: its measurements are for `epsmesh identify`: only its cases are run")
+def _check_left_out(studies: "list[Study]", output: Path) -> None:
+    """Say what a run leaves out of sections of other packages; exit if it would replace results of another kind."""
+    from epsmesh.study.schema import added_to
+
+    for study in studies:
+        for left_out in filter(None, (one.left_out(study) for one in added_to(study.raw))):
+            check_kind(output / f"{study.name}.nc")
+            warning(f"{study.file}: {left_out}")
 
 
 def _progress(first: "Plan", plan: "Plan", *, is_told: bool, verbose: bool) -> "Terminal":

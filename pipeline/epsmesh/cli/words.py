@@ -83,7 +83,7 @@ Without = Annotated[
 def read_all(files: list[Path], *, have_cases: bool = True) -> "list[Study]":
     """Read studies, or exit with every problem of every file; on several ranks only the first one prints.
 
-    Studies of measured curves may lack what cases need, unless they must ``have_cases``.
+    Studies with sections of other packages may lack what cases need, unless they must ``have_cases``.
     """
     from epsmesh.study.problems import StudyError
     from epsmesh.study.read import read_study
@@ -123,7 +123,7 @@ def meant(file: Path) -> str:
 def read_dataset(file: Path, output: Path, *, any_kind: bool = False) -> "tuple[Path, xr.Dataset]":
     """Return the path of the dataset that ``file`` names, and the dataset in memory; exit if there is none.
 
-    It is a study's, or with ``any_kind`` that of an identification, too.
+    It is that of a study's cases, or with ``any_kind`` one of another kind.
     """
     from epsmesh.report.read import dataset_path, read, read_any
     from epsmesh.report.table import DatasetError
@@ -171,14 +171,14 @@ def or_elsewhere(why: str, option: str = "--output FOLDER") -> str:
     return f"{why}; `{option}` writes elsewhere" if is_closed else why
 
 
-def check_kind(file: Path, *, identified: bool) -> None:
-    """Exit, before any computation, if an identification (``identified``) would replace a run's dataset, or it that."""
+def check_kind(file: Path, own: str = "") -> None:
+    """Exit, before any computation, if a dataset of its ``own`` kind, or of a run, would replace one of another."""
     if not file.exists():
         return
     from epsmesh.report.read import check_kind as check
 
     with refusing(FileExistsError, file=file):
-        check(file, identified=identified)
+        check(file, own)
 
 
 def check_machine() -> None:

@@ -57,7 +57,7 @@ def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, 
         from epsmesh.report.dataset import build, write  # noqa: PLC0415 (xarray is slow to load, and no shard needs it)
         from epsmesh.report.read import check_kind  # noqa: PLC0415
 
-        check_kind(files[0], identified=False)
+        check_kind(files[0])
         dataset = build(plan, records, attributes)
         write(dataset, files[0])
         from epsmesh.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)

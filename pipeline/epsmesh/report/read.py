@@ -10,8 +10,8 @@ from shlex import quote
 import numpy as np
 import xarray as xr
 
+from epsmesh.extensions import kind, kind_of
 from epsmesh.printable import printable, printable_lines
-from epsmesh.report.identified import is_identification
 from epsmesh.report.table import DatasetError, warnings_of
 from epsmesh.report.values import with_words
 from epsmesh.study.identified import FROM
@@ -35,6 +35,8 @@ _NEEDED = (
     "reductions",
     "study",
 )
+# By these it is told from other kinds.
+_OF_CASES = ("force", "force_ratio", "force_exact")
 # Twice what the most cases that a study may have take.
 _LARGEST = 1_000_000_000  # bytes
 _POINTER = 8  # to a text
@@ -58,21 +60,28 @@ def dataset_path(file: str | Path, output: str | Path = "results") -> Path:
     return path
 
 
-def check_kind(path: Path, *, identified: bool) -> None:
+def other_kind(dataset: xr.Dataset) -> str:
+    """Return the kind of a dataset that is not of a study's cases: its name, "" if it is none that is known."""
+    return "" if {*_OF_CASES} <= {*dataset.data_vars} else kind_of(dataset)
+
+
+def check_kind(path: Path, own: str = "") -> None:
     """Check that a dataset may be written to ``path``: in place of none, of a damaged one, or of one of its own kind.
 
+    Its ``own`` kind is "" for that of a study's cases.
+
     Raises:
-        FileExistsError: if an identification (``identified``) would replace a study's dataset, or the reverse.
+        FileExistsError: if it would replace a dataset of another kind.
     """
     if not path.is_file():
         return
     try:
         with xr.open_dataset(path) as dataset:
-            known = is_identification(dataset)
+            known = other_kind(dataset)
     except (OSError, ValueError, RuntimeError):  # damaged
         return
-    if known != identified:
-        what = "identification of curves" if known else "dataset of a study's cases"
+    if known != own:
+        what = kind(known).content if known else "dataset of a study's cases"
         raise FileExistsError(f"{path}: is the {what}, and is not replaced by the other: give another output folder")
 
 
@@ -85,22 +94,22 @@ def read(file: str | Path, output: str | Path = "results", warn: Callable[[str],
         DatasetError: if there is none, or if it is not a study's.
     """
     dataset = read_any(file, output, warn)
-    if is_identification(dataset):
-        raise DatasetError(f"{file}: is an identification, not a study's dataset: `epsmesh report` shows it")
+    if other := other_kind(dataset):
+        raise DatasetError(f"{file}: is {kind(other).title}, not a study's dataset: `epsmesh report` shows it")
     return dataset
 
 
 def read_any(
     file: str | Path, output: str | Path = "results", warn: Callable[[str], None] = warnings.warn
 ) -> xr.Dataset:
-    """Return the dataset of a study, see :func:`read`, or that of an identification.
+    """Return the dataset of a study, see :func:`read`, or one of another kind.
 
     Raises:
-        DatasetError: if there is none, or if it is neither.
+        DatasetError: if there is none, or if it is of no kind.
     """
     path = dataset_path(file, output)
     dataset = _shown(read_file(path))
-    if is_identification(dataset):
+    if other_kind(dataset):
         return dataset
     if missing := [name for name in _NEEDED if name not in {*dataset.data_vars, *dataset.attrs}]:
         raise DatasetError(f"{path}: not a study's dataset: it has no {', '.join(missing)}")

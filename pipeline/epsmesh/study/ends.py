@@ -10,7 +10,7 @@ from epsmesh.shapes.triangles import SurfaceError
 from epsmesh.study.identified import NOTHING
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
-from epsmesh.study.schema import EXPERIMENT
+from epsmesh.study.schema import SECTIONS
 from epsmesh.study.sweep import Study
 from epsmesh.study.text import toml_of
 
@@ -84,7 +84,8 @@ def ends_of_bars(study: Study) -> tuple[Ends, ...]:
 
 def _moved(study: Study, number: int, value: float) -> Study | None:
     """Return the study with another value of one identified parameter, without F_exact; None if it makes no sense."""
-    raw: dict[str, Any] = {key: v for key, v in toml_of(study.text, study.file).items() if key not in EXPERIMENT}
+    own = (*SECTIONS, "title", "identified")
+    raw: dict[str, Any] = {key: v for key, v in toml_of(study.text, study.file).items() if key in own}
     raw["identified"]["estimate"][number] = value
     raw["solve"] = raw.get("solve", {}) | {"exact": False, "timing": False}
     raw["plan"] = {key: kept for key, kept in raw.get("plan", {}).items() if key != "stop_near_exact"}

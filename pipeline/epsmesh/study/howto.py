@@ -1,6 +1,9 @@
 """Pages of the documentation, by key: messages about errors name them."""
 
 import re
+from collections.abc import Mapping
+
+from epsmesh import extensions
 
 # The first entry with which a key begins is used. Numbers of tables in arrays are removed.
 _PAGES = {
@@ -37,8 +40,6 @@ _PAGES = {
     "plan": "skipping",
     "figure": "report",
     "mesh.accuracy": "accuracy",
-    "measurement": "howto/curves",
-    "identify": "howto/identify",
     "material.from": "howto/identify",
 }
 # The page about all keys.
@@ -52,10 +53,18 @@ def page_of(key: str) -> str:
     plain = re.sub(r"\[\d*\]", "", key.partition(":")[0]).strip("[]")
     if plain in _NONE:
         return ""
-    found = (page for start, page in _PAGES.items() if plain == start or plain.startswith(f"{start}."))
-    return f"docs/{next(found, _ALL)}.md"
+    page = _first(plain, _PAGES) or next(
+        (_first(plain, one.pages) for one in extensions.sections_of([plain.partition(".")[0]])), ""
+    )
+    return f"docs/{page or _ALL}.md"
+
+
+def _first(key: str, pages: Mapping[str, str]) -> str:
+    """Return the page of the first entry with which a key begins; "" if there is none."""
+    return next((page for start, page in pages.items() if key == start or key.startswith(f"{start}.")), "")
 
 
 def pages() -> tuple[str, ...]:
     """Return all pages that messages name."""
-    return tuple(dict.fromkeys(f"docs/{page}.md" for page in (*_PAGES.values(), _ALL)))
+    added = (page for one in extensions.all_sections() for page in one.pages.values())
+    return tuple(dict.fromkeys(f"docs/{page}.md" for page in (*_PAGES.values(), *added, _ALL)))

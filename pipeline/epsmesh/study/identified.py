@@ -79,7 +79,7 @@ _ANY = {"young": "1 kPa", "poisson": 0.3}
 
 
 def with_identified(
-    raw: dict[str, Any], text: str, file: str, problems: Problems
+    raw: Mapping[str, Any], text: str, file: str, problems: Problems
 ) -> tuple[dict[str, Any], str, Identified]:
     """Return a study with the values that ``material.from`` names filled in, its text, and what was read."""
     own = raw.get("identified")

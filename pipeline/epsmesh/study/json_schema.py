@@ -6,7 +6,7 @@
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import lru_cache
 from itertools import chain, product
 from math import isinf
@@ -16,13 +16,13 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
+from epsmesh import extensions
 from epsmesh.shapes.history import History, Sine
 from epsmesh.shapes.section import Section, words_of
 from epsmesh.study.identified import WORDS as IDENTIFIED
-from epsmesh.study.measurement import Identify, Sensitivity
 from epsmesh.study.named import EXAMPLES, SCHEMA
 from epsmesh.study.ranges import KEYS
-from epsmesh.study.schema import EXPERIMENT, NESTED, SECTIONS, SINGLE, TABLES
+from epsmesh.study.schema import FURTHER, NESTED, SECTIONS, SINGLE, TABLES, further
 
 Schema = dict[str, Any]
 
@@ -44,19 +44,6 @@ _QUANTITIES = {
 _NAMES = {name for name, _ in _QUANTITIES.values()}
 # A range of values: see ranges.py. Its keys are no properties, or editors would complete them alone.
 _RANGE: Schema = {"propertyNames": {"enum": [*KEYS]}, "required": [*KEYS]}
-# An unknown of [identify]: a range, or a value with its error.
-_PLAIN_VALUE: Schema = {"type": ["string", "number"]}
-_SOUGHT: Schema = {
-    "anyOf": [
-        {"type": "array", "items": _PLAIN_VALUE, "minItems": 2, "maxItems": 2},
-        {
-            "type": "object",
-            "properties": {"value": _PLAIN_VALUE, "error": _PLAIN_VALUE},
-            "required": ["value", "error"],
-            "additionalProperties": False,
-        },
-    ]
-}
 # Arrays of tables, and tables, within sections.
 _INNER = (*chain.from_iterable(NESTED.values()), *chain.from_iterable(TABLES.values()))
 _PLAIN = {"boolean": "true | false", "integer": "whole number", "string": "text"}
@@ -77,11 +64,13 @@ def study_schema() -> Schema:
 
     It has few ``anyOf``: there, editors do not name the key that is wrong, and repeat each completion.
     """
-    sections = {name: _models(name) for name in (*SECTIONS, *EXPERIMENT)}
-    tables = [model for inner in TABLES.values() for model in inner.values()]
+    added = extensions.all_sections()
+    sections = {name: _models(name) for name in (*SECTIONS, *further())}
+    every_table = TABLES | {name: inner for one in added for name, inner in one.tables.items()}
+    tables = [model for inner in every_table.values() for model in inner.values()]
     _, schema = models_json_schema([(m, "validation") for m in (*chain(*sections.values()), *tables)])
     definitions: Schema = schema["$defs"]
-    for section, inner in TABLES.items():
+    for section, inner in every_table.items():
         for owner, (key, model) in product(sections[section], inner.items()):
             if key not in owner.model_fields and any(key in other.model_fields for other in sections[section]):
                 continue  # a table of other shapes
@@ -95,16 +84,18 @@ def study_schema() -> Schema:
         properties = definition.get("properties", {})
         for key, value in properties.items():
             properties[key] = _described(_in_file(value, name in swept, key), words.get(name), key)
-    for model in (Identify, Sensitivity):
-        definitions[model.__name__]["additionalProperties"] = _SOUGHT
+    for section, schema_of_others in ((name, other) for one in added for name, other in one.others.items()):
+        (model,) = sections[section]
+        definitions[model.__name__]["additionalProperties"] = schema_of_others
     material = definitions["Material"]
     material["properties"]["from"] = {"description": IDENTIFIED.text, "type": "string"}
-    del material["required"]  # `from` and [identify] have them, too
+    del material["required"]  # `from` has them, too, and other packages do without
     for name in ("Layer", "Inclusion"):
         definitions[name]["required"] = [k for k in definitions[name]["required"] if k not in ("young", "poisson")]
-    for probe in _models("probe"):  # measured curves have depths
+    for probe in _models("probe"):  # forces and histories have depths
         definitions[probe.__name__]["required"].remove("depth")
-    found = {name: _section(name, models, definitions) for name, models in sections.items()}
+    arrays = {*FURTHER, *(name for one in added for name in one.arrays)}
+    found = {name: _section(name, models, definitions, arrays) for name, models in sections.items()}
     title = {"description": "Title of the study, in figures and reports.", "type": "string"}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -116,8 +107,8 @@ def study_schema() -> Schema:
     }
 
 
-def _section(name: str, models: tuple[type[Section], ...], definitions: Schema) -> Schema:
-    """Return the schema of a section: a table, or an array of tables where it can be swept."""
+def _section(name: str, models: tuple[type[Section], ...], definitions: Schema, arrays: Collection[str]) -> Schema:
+    """Return the schema of a section: a table, or an array of tables where it can be swept, or is one of ``arrays``."""
     table: Schema = {"$ref": f"#/$defs/{models[0].__name__}"}
     if len(models) > 1:
         # All keys of all shapes, for editors to complete; what each shape allows is said under its condition.
@@ -143,9 +134,9 @@ def _section(name: str, models: tuple[type[Section], ...], definitions: Schema) 
         table = {"$ref": f"#/$defs/{name.capitalize()}"}
     for model in models:  # of what is no table, a section says it
         definitions[model.__name__].pop("type", None)
-    if name in ("measurement", "output"):
+    if name in arrays:
         return {"type": "array", "minItems": 1, "items": {"type": "object", "allOf": [table]}}
-    if name in (*SINGLE, *EXPERIMENT):
+    if name in SINGLE or name not in SECTIONS:
         return {"type": "object", "allOf": [table]}
     return {"type": ["object", "array"], "allOf": [table], "minItems": 1, "items": {"type": "object", "allOf": [table]}}
 
@@ -161,7 +152,7 @@ def _schema_of(model: type[BaseModel]) -> Schema:
 
 
 def _models(section: str) -> tuple[type[Section], ...]:
-    models = (SECTIONS | EXPERIMENT)[section]
+    models = SECTIONS[section] if section in SECTIONS else further()[section]
     return tuple(models.values()) if isinstance(models, Mapping) else (models,)
 
 

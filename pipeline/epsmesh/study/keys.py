@@ -11,10 +11,11 @@ from math import isinf
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from epsmesh import extensions
 from epsmesh.shapes.section import Words, words_of
 from epsmesh.study.identified import WORDS as IDENTIFIED
 from epsmesh.study.json_schema import takes_of
-from epsmesh.study.schema import EXPERIMENT, NESTED, SECTIONS, TABLES
+from epsmesh.study.schema import FURTHER, NESTED, SECTIONS, further, tables_of
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Key:
     words: Words
 
 
-SECTION_TEXTS = {
+_TEXTS = {
     "body": "The tissue, in its own coordinates. z points out of the top face, and the tissue is at z <= 0.",
     "body.layer": "Horizontal layers of other materials below a flat top, one table each, from the top down. "
     "Optional; every value can be swept.",
@@ -62,24 +63,16 @@ SECTION_TEXTS = {
     "named traction can be swept.",
     "plan": "Work that may be skipped. Optional; its lists are no sweeps.",
     "figure": "Main figure of the study. Forces do not depend on it. Optional; its lists are no sweeps.",
-    "measurement": "Measured force curves, one table each, for `epsmesh identify`. Forces do not depend on them. "
-    "Optional; their lists are no sweeps.",
-    "measurement.columns": "Columns of the file, by header or by number from 1. A header's unit is read: `depth / nm`, "
-    "`load (µN)`, `Z [mm]`. Optional; columns that are not named are found where unmistakable, and told.",
-    "measurement.units": "Units of columns whose headers have none. Optional; a unit that contradicts the header is "
-    "an error.",
-    "measurement.sign": "Signs of recorded values. Optional; a sign that is not given is found, and told.",
-    "identify": "Unknowns that `epsmesh identify` finds from the measurements. Besides the keys below, the name of a "
-    "parameter is a key: `young`, `poisson`, `thickness`, `radius`, `friction`, `skin_young`, `skin_thickness`, a "
-    "parameter of the law, `contact_point` (larger is deeper), `baseline`, `drift`, `machine_stiffness`, "
-    "`relaxation_share_1`, `relaxation_time_1`. It has a range, or a value with its error (95 %). What is not named is "
-    "known. Optional; its lists are no sweeps.",
-    "sensitivity": "Parameters whose effect on the force `epsmesh sensitivity` compares. Besides the key below, the "
-    "name of a parameter is a key, as in [identify], and `depth`: it has a range, or a value with its error "
-    "(95 %). Forces do not depend on this section. Optional; its lists are no sweeps.",
     "output": "Further numbers of each case, one table each: variables of the dataset with error bars, at a point, "
     "over a region, or of a function of your own. Forces do not depend on them. Optional; their lists are no sweeps.",
 }
+
+
+def text_of(section: str) -> str:
+    """Return what a section is, for the author of a study."""
+    if section in _TEXTS:
+        return _TEXTS[section]
+    return next((one.texts[section] for one in extensions.all_sections() if section in one.texts), "")
 
 
 def keys_of(section: str) -> tuple[Key, ...]:
@@ -87,7 +80,7 @@ def keys_of(section: str) -> tuple[Key, ...]:
     models = shapes_of(section)
     found: dict[str, dict[str, list[str]]] = {}
     # A section's name labels it; a piece's is a key like others.
-    hidden = {*NESTED.get(section, ()), *TABLES.get(section, ()), *(() if section in _labelled() else ("name",))}
+    hidden = {*_inner(section), *(() if section in _labelled() else ("name",))}
     for shape, model in models.items():
         for name in model.model_fields:
             if name not in hidden:
@@ -108,7 +101,7 @@ def keys_of(section: str) -> tuple[Key, ...]:
 
 def all_sections() -> tuple[str, ...]:
     """Return the names of all sections, those of arrays of tables within one after it."""
-    sections = (*SECTIONS, *EXPERIMENT)
+    sections = (*SECTIONS, *further())
     return tuple(name for section in sections for name in (section, *(f"{section}.{key}" for key in _inner(section))))
 
 
@@ -119,18 +112,19 @@ def heading(section: str) -> str:
 
 def _inner(section: str) -> dict[str, type[BaseModel]]:
     """Return the models of the tables within a section."""
-    return NESTED.get(section, {}) | TABLES.get(section, {})
+    return {**NESTED.get(section, {}), **tables_of(section)}
 
 
 def _labelled() -> set[str]:
-    """Return the arrays of tables whose tables have names: those within sections, measurements, and outputs."""
-    return {"measurement", "output", *(f"{section}.{key}" for section, pieces in NESTED.items() for key in pieces)}
+    """Return the arrays of tables whose tables have names: those within sections, and those that are no sweep."""
+    added = (name for one in extensions.all_sections() for name in one.arrays)
+    return {*added, *FURTHER, *(f"{section}.{key}" for section, pieces in NESTED.items() for key in pieces)}
 
 
 def shapes_of(section: str) -> dict[str, type[BaseModel]]:
     """Return the models of a section by shape. A section without shapes has the single shape ''."""
     outer, _, piece = section.partition(".")
-    model = _inner(outer)[piece] if piece else (SECTIONS | EXPERIMENT)[section]
+    model = _inner(outer)[piece] if piece else (SECTIONS | further())[section]
     return dict(model) if isinstance(model, Mapping) else {"": model}
 
 

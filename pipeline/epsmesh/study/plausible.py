@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.section import in_mm
-from epsmesh.study.measured import SHALLOW
 from epsmesh.study.problems import Problems
 from epsmesh.study.regions import tissues_of
 from epsmesh.study.schema import Material
@@ -18,7 +17,9 @@ _SOFTEST, _STIFFEST, _BONE = 100.0, 1e6, 30e9
 _SHALLOW, _TIP = 1e-6, 50e-6
 # Radius (m) of the thickest trocars. Largest extent (m) of a body.
 _NEEDLE, _LARGEST = 7.5e-3, 1.0
-_NOTHING = parse_quantity(SHALLOW, "m")
+# The depth that stands for one which a study need not have: of it nobody is warned.
+UNSAID = "1 nm"
+_NOTHING = parse_quantity(UNSAID, "m")
 
 
 def check_moduli(body: Body, material: Material, problems: Problems) -> None:

@@ -2,41 +2,32 @@
 
 import difflib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
 from math import prod
 from pathlib import Path
 from typing import Any
 
 from epsmesh.class_maps import CLASS_MAPS
-from epsmesh.shapes.body import Body
-from epsmesh.shapes.probe import Probe
+from epsmesh.extensions import Filled, Reading
 from epsmesh.shapes.section import Section
 from epsmesh.study.axis import Axis
 from epsmesh.study.check import check_sense, check_steps
 from epsmesh.study.check_loads import check_loads
 from epsmesh.study.expected_depth import with_expected_depths
-from epsmesh.study.identification import Identification, check_shared, read_identify, read_measurements
 from epsmesh.study.identified import with_identified
 from epsmesh.study.insertion_stages import has_insertion, with_steps
 from epsmesh.study.loads import Load
 from epsmesh.study.meant import OTHER_SECTIONS
-from epsmesh.study.measured import MESH, OF_MEASUREMENTS, borrowed, completed, of_measurement
-from epsmesh.study.measurement import Measurement
 from epsmesh.study.output import Output, check_outputs, read_outputs
-from epsmesh.study.own_lengths import own_errors
-from epsmesh.study.parameters import DEPTH, Parameter, parameters_of
 from epsmesh.study.problems import Problem, Problems, StudyError, nearest
 from epsmesh.study.regions import check_regions, material_without_section
-from epsmesh.study.scenes import scene_mapping
-from epsmesh.study.schema import EXPERIMENT, NESTED, SECTIONS, Material, Mesh
-from epsmesh.study.sensitivity import Spread, read_sensitivity
+from epsmesh.study.schema import FURTHER, NESTED, SECTIONS, Mesh, added_to, further, is_added
 from epsmesh.study.stages import with_stages
 from epsmesh.study.sweep import Study
 from epsmesh.study.tables import MOST_CASES, read_section
 from epsmesh.study.text import check_text, read_toml, toml_of
 from epsmesh.study.toml import to_toml
-
-# Sections that are of one force of a case.
-_OF_ONE_FORCE = {"measurement", "identify", "sensitivity"}
 
 
 def read_study(path: str | Path) -> Study:
@@ -74,24 +65,24 @@ def read_text(text: str, file: str) -> Study:
     return parse(toml_of(text, file), file=file, text=text)
 
 
-def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene: bool = False) -> Study:
+def parse(raw: Mapping[str, Any], *, file: str = "study", text: str = "", filled: Filled | None = None) -> Study:
     """Turn a study, read from TOML into ``raw``, into a :class:`Study`.
 
-    ``file`` is for messages, and the files of bodies are looked for from its folder. ``is_scene`` tells the scene of a
-    measurement, which may lack a mesh.
+    ``file`` is for messages, and the files of bodies are looked for from its folder. ``filled`` is ``raw`` with what it
+    need not say, of a scene that a further section has made.
     """
     problems = Problems(tables=_names_of(raw))
-    given, text, identified = with_identified(raw, text, file, problems)
-    own = borrowed(given)
-    whole, lacking = completed(given | own, is_scene=is_scene)
-    lacking = (*(Problem(f"[{section}]", None, OF_MEASUREMENTS) for section in own), *lacking)
-    given, _ = completed(given, is_scene=is_scene)
-    raw = _beside(whole if "mesh" in whole or not lacking else whole | {"mesh": MESH}, Path(file).parent)
-    _check_top(raw, problems)
+    own, text, identified = with_identified(raw, text, file, problems)
+    further_ones = () if filled else added_to(own)
+    filled = filled or Filled(own, own)
+    for one in further_ones:
+        filled = one.fill(filled)
+    given, whole = filled.given, _beside(dict(filled.whole), Path(file).parent)
+    _check_top(whole, problems)
     axes: list[Axis] = []
     sections: dict[str, tuple[Section, ...]] = {}
-    for name in [*(n for n in raw if n in SECTIONS), *(n for n in SECTIONS if n not in raw)]:
-        own_axes, variants = read_section(name, raw.get(name, {}), problems)
+    for name in [*(n for n in whole if n in SECTIONS), *(n for n in SECTIONS if n not in whole)]:
+        own_axes, variants = read_section(name, whole.get(name, {}), problems)
         axes += own_axes
         sections[name] = variants
     cases = prod(map(len, axes))
@@ -102,18 +93,13 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene:
         )
     if all(problem.key != "study" for problem in problems.errors):
         _check_together(sections, tuple(axes), problems)
-    if has_insertion(sections["probe"]) and (is_scene or _OF_ONE_FORCE & given.keys()):
-        told = "has no place in [[measurement]], [identify] and [sensitivity], which are of one force: omit it, or them"
-        problems.error("probe.insertion", None, told)
-    if any(getattr(probe, "force", None) for probe in sections["probe"]) and (
-        is_scene or identified.values or _OF_ONE_FORCE & given.keys()
-    ):
-        told = "has no place in [[measurement]], [identify] and [sensitivity], nor with what was identified: "
-        problems.error("probe.force", None, f"{told}give a depth")
-    measurements, identification = _read_experiment(given, sections, file, problems)
-    outputs = _read_outputs(given, sections, axes, Path(file).parent, problems)
-    spread = _read_spread(given, sections, outputs, problems)
-    problems.errors[:] = of_measurement(problems.errors, own)
+    _check_one_force(sections, filled.of_one_force, bool(identified.values), problems)
+    outputs = cache(lambda: _read_outputs(given, sections, axes, Path(file).parent, problems))
+    reading, extra = Reading(given, sections, file, problems, outputs), dict[str, Any]()
+    for one in further_ones:
+        extra |= one.read(reading)
+    outputs()
+    problems.errors[:] = [_at_home(problem, filled.borrowed) for problem in problems.errors]
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))
     sections, every_axis = with_steps(*with_stages(sections, tuple(axes)))
@@ -121,74 +107,33 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", is_scene:
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))
     warnings = tuple(f"{file}: {warning}" for warning in problems.told_once())
-    title = str(raw.get("title", Path(file).stem))
-    experiment = (given, measurements, identification, identified, spread)
-    return Study(file, Path(file).stem, title, text, every_axis, sections, warnings, *experiment, outputs, lacking)
+    title = str(whole.get("title", Path(file).stem))
+    return Study(
+        file, Path(file).stem, title, text, every_axis, sections, warnings, given, extra, identified, outputs(),
+        filled.lacking, filled.does,
+    )  # fmt: skip
 
 
-def scene_of(study: Study, measurement: Measurement) -> Study:
-    """Return the study of one scene that a measurement of ``study`` was made on, without its experiments.
-
-    Raises:
-        StudyError: if a value is swept that the scene depends on: there must be one, or it must be an unknown.
-    """
-    where, problems = f"measurement[{study.measurements.index(measurement) + 1}]", Problems()
-    scene = _scene(study.raw, measurement, where, study.file, problems)
-    unknown = {one.parameter.name for one in study.identification.sought}
-    for axis in scene.axes if scene else ():
-        if axis.section != "mesh" and axis.name not in (*unknown, "depth"):
-            problems.error(axis.path, None, f"is swept: {where} needs one value, or `{axis.name}` in [identify]")
-    if problems.errors or scene is None:
-        raise StudyError(study.file, problems.errors)
-    return scene
+def _check_one_force(
+    sections: Mapping[str, tuple[Section, ...]], others: str, is_identified: bool, problems: Problems
+) -> None:
+    """Report insertions and given forces beside what is of one force of a case, at a depth: ``others``, in words."""
+    if has_insertion(sections["probe"]) and others:
+        told = f"has no place in {others}, which are of one force: omit it, or them"
+        problems.error("probe.insertion", None, told)
+    if any(getattr(probe, "force", None) for probe in sections["probe"]) and (others or is_identified):
+        within = f"in {others}, nor " if others else ""
+        problems.error("probe.force", None, f"has no place {within}with what was identified: give a depth")
 
 
-def _scene(raw: Mapping[str, Any], measurement: Measurement, where: str, file: str, problems: Problems) -> Study | None:
-    """Return the scene of a measurement; None if there are problems, which are reported at its keys."""
-    before = len(problems.errors)
-    content = scene_mapping(raw, measurement, where, problems)
-    if len(problems.errors) > before:
-        return None
-    try:
-        return parse(content, file=file, text=to_toml(content, file), is_scene=True)
-    except StudyError as error:
-        for problem in error.problems:
-            problems.error(f"{where}.{problem.key}", problem.value, problem.allowed)
-        return None
-
-
-def _read_experiment(
-    raw: dict[str, Any], sections: dict[str, tuple[Section, ...]], file: str, problems: Problems
-) -> tuple[tuple[Measurement, ...], Identification]:
-    """Return the measurements of a study, and what is to be found from them."""
-    measurements = read_measurements(raw["measurement"], problems) if "measurement" in raw else ()
-    if problems.errors or not (measurements or "identify" in raw):
-        return measurements, Identification()
-    found = read_identify(raw.get("identify", {}), measurements, _parameters(sections), problems)
-    for number, measurement in enumerate(measurements, start=1):
-        where, known = f"measurement[{number}]", _parameters(sections)
-        if measurement.probe or measurement.body:
-            scene = _scene(raw, measurement, where, file, problems)
-            if scene is None:
-                continue
-            known = _parameters(scene.sections)
-            check_shared(found, measurement, known, problems)
-        found = own_errors(found, measurement, where, known, problems)
-    return measurements, found
-
-
-def _read_spread(
-    raw: dict[str, Any], sections: dict[str, tuple[Section, ...]], outputs: Sequence[Output], problems: Problems
-) -> Spread:
-    """Return the parameters that are varied, and the outputs to explain."""
-    if problems.errors or "sensitivity" not in raw:
-        return Spread()
-    known = {name: one for name, one in _parameters(sections).items() if one.place}
-    return read_sensitivity(raw["sensitivity"], known | {DEPTH.name: DEPTH}, outputs, problems)
+def _at_home(problem: Problem, borrowed: Mapping[str, str]) -> Problem:
+    """Return a problem of a borrowed section with the key of the table that it is of."""
+    where = borrowed.get(problem.key.partition(".")[0])
+    return replace(problem, key=f"{where}.{problem.key}") if where else problem
 
 
 def _read_outputs(
-    raw: dict[str, Any],
+    raw: Mapping[str, Any],
     sections: dict[str, tuple[Section, ...]],
     axes: Sequence[Axis],
     folder: Path,
@@ -201,13 +146,6 @@ def _read_outputs(
     if not problems.errors:
         check_outputs(outputs, sections, axes, problems)
     return outputs
-
-
-def _parameters(sections: dict[str, tuple[Section, ...]]) -> dict[str, Parameter]:
-    """Return the parameters of the first scene, by name."""
-    body, material, probe = (sections[name][0] for name in ("body", "material", "probe"))
-    assert isinstance(body, Body) and isinstance(material, Material) and isinstance(probe, Probe)
-    return parameters_of(body, material, probe)
 
 
 def _check_together(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -226,7 +164,7 @@ def _check_together(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, 
     check_loads(problems.sound(sections), axes, problems)
 
 
-def _names_of(raw: dict[str, Any]) -> dict[str, tuple[str, ...]]:
+def _names_of(raw: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     """Return the names of the tables of each section that is an array; "" for a table without a name."""
     return {
         section: tuple(str(table.get("name", "")) if isinstance(table, dict) else "" for table in tables)
@@ -255,7 +193,7 @@ def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 def _check_top(raw: dict[str, Any], problems: Problems) -> None:
     for key, value in raw.items():
-        if key not in (*SECTIONS, *EXPERIMENT, "title"):
+        if key not in (*SECTIONS, *FURTHER, "title") and not is_added(key):
             problems.error(key, None, f"unknown section; {_meant(key)}")
         elif key == "title" and not isinstance(value, str):
             problems.error(key, value, "must be text")
@@ -282,4 +220,4 @@ def _meant(key: str) -> str:
     pieces = {piece: section for section, inner in NESTED.items() for piece in inner}
     if close := difflib.get_close_matches(key, pieces, n=1, cutoff=0.6):
         return f"it is part of another section: write [[{pieces[close[0]]}.{close[0]}]]"
-    return nearest(key, [*SECTIONS, *EXPERIMENT, "title"])
+    return nearest(key, [*SECTIONS, *further(), "title"])

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, BeforeValidator, Field
 from pydantic_core import PydanticCustomError
 
+from epsmesh import extensions
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.history import History
 from epsmesh.shapes.insertion import Insertion
@@ -18,9 +19,7 @@ from epsmesh.shapes.registry import BODIES, PROBES
 from epsmesh.shapes.section import Section, Words
 from epsmesh.shapes.segment import Segment
 from epsmesh.shapes.tissue import LAWS, Fibres, Relaxation, Term, Tissue
-from epsmesh.study.columns import Columns, ColumnUnits, Sign
 from epsmesh.study.loads import Load, Traction
-from epsmesh.study.measurement import Identify, Measurement, Sensitivity
 from epsmesh.study.output import Output
 from epsmesh.study.path import Path
 from epsmesh.study.vocabulary import FIGURES, REDUCTIONS
@@ -306,13 +305,10 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "load": Load,
     "figure": Drawing,
 }
-# Sections on which no force depends: experiments and their parameters, and further numbers of a solution.
-EXPERIMENT: dict[str, type[Section]] = {
-    "measurement": Measurement,
-    "identify": Identify,
-    "sensitivity": Sensitivity,
-    "output": Output,
-}
+# Sections on which no force depends: further numbers of a solution. Other packages add some: see further().
+FURTHER: dict[str, type[Section]] = {"output": Output}
+# All that a file may have without another package.
+OWN = (*SECTIONS, *FURTHER, "title", "identified")
 # Arrays of tables within a section: pieces of it, each with keys that can be swept.
 NESTED: dict[str, dict[str, type[Section]]] = {
     "body": {"layer": Layer, "inclusion": Inclusion, "region": Segment},
@@ -325,5 +321,25 @@ SINGLE = ("solve", "plan", "figure")
 TABLES: dict[str, dict[str, type[BaseModel]]] = {
     "probe": {"path": Path, "history": History, "insertion": Insertion},
     "material": {"fibres": Fibres},
-    "measurement": {"columns": Columns, "units": ColumnUnits, "sign": Sign},
 }
+
+
+def further() -> dict[str, type[Section]]:
+    """Return all sections on which no force depends, with those that other packages add."""
+    return {name: model for added in extensions.all_sections() for name, model in added.models.items()} | FURTHER
+
+
+def tables_of(section: str) -> Mapping[str, type[BaseModel]]:
+    """Return the models of the tables within a section."""
+    added = () if section in OWN else extensions.sections_of([section])
+    return TABLES.get(section) or next((one.tables.get(section, {}) for one in added), {})
+
+
+def is_added(section: str) -> bool:
+    """Return whether another package adds a section."""
+    return section not in OWN and section in extensions.found("sections")
+
+
+def added_to(study: Mapping[str, Any]) -> tuple[extensions.Sections, ...]:
+    """Return what adds sections to a study."""
+    return extensions.sections_of([name for name in study if name not in OWN])

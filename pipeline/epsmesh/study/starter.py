@@ -3,8 +3,8 @@
 import json
 import textwrap
 
-from epsmesh.study.keys import SECTION_TEXTS, Key, all_sections, heading, keys_of
-from epsmesh.study.schema import EXPERIMENT
+from epsmesh.study.keys import Key, all_sections, heading, keys_of, text_of
+from epsmesh.study.schema import SECTIONS
 
 _WIDTH = 110
 
@@ -17,8 +17,8 @@ def starter(name: str) -> str:
         f"title = {json.dumps(name, ensure_ascii=False)}",
     ]
     for section in all_sections():
-        is_piece = "." in section or section in EXPERIMENT
-        lines += ["", *_comment(SECTION_TEXTS.get(section, "")), f"{'# ' if is_piece else ''}{heading(section)}"]
+        is_piece = section not in SECTIONS
+        lines += ["", *_comment(text_of(section)), f"{'# ' if is_piece else ''}{heading(section)}"]
         keys = keys_of(section)
         chosen = next((json.loads(key.words.example) for key in keys if key.name == "shape"), "")
         for key in sorted(keys, key=lambda key: _shapes_of(key, chosen)):

@@ -15,15 +15,12 @@ from epsmesh.shapes.section import Section
 from epsmesh.study.axis import Axis
 from epsmesh.study.case import Case
 from epsmesh.study.expected_depth import at_depth, expected_depth, gives_force
-from epsmesh.study.identification import Identification
 from epsmesh.study.identified import NOTHING, Identified
 from epsmesh.study.insertion_stages import punctures
 from epsmesh.study.loads import Load
-from epsmesh.study.measurement import Measurement
 from epsmesh.study.output import Output
 from epsmesh.study.problems import Problem
 from epsmesh.study.schema import Drawing, Material, Mesh, Planning, Solving, main_material
-from epsmesh.study.sensitivity import Spread
 
 Value = TypeVar("Value")
 
@@ -40,12 +37,11 @@ class Study:
     sections: dict[str, tuple[Section, ...]]  # every combination of a section's own axes, last axis fastest
     warnings: tuple[str, ...] = ()
     raw: Mapping[str, Any] = field(default_factory=dict, repr=False)  # the file's TOML
-    measurements: tuple[Measurement, ...] = ()
-    identification: Identification = field(default_factory=Identification)
+    extra: Mapping[str, Any] = field(default_factory=dict)  # what sections of other packages say, by their names
     identified: Identified = NOTHING
-    spread: Spread = field(default_factory=Spread)
     outputs: tuple[Output, ...] = ()
-    lacking: tuple[Problem, ...] = ()  # what its cases need, and the study of measured curves does not say
+    lacking: tuple[Problem, ...] = ()  # what its cases need, and need not be said with these sections
+    does: str = ""  # the command that does without what is lacking
     depths: Mapping[tuple[int, ...], float] = field(default_factory=dict)  # of cases with a given force, where known
     seeks: bool = True  # whether depths at given forces are still to be found
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from epsmesh.extensions import found
 from epsmesh.verify.row import Row
 
 if TYPE_CHECKING:
@@ -13,7 +14,6 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     """Yield the comparisons one by one, the same on every rank; ``quick`` yields a few of each kind; collective."""
     from epsmesh.solve.compiled import compiling  # noqa: PLC0415 (importing this package loads no solver)
     from epsmesh.verify.bodies import body_rows  # noqa: PLC0415
-    from epsmesh.verify.compliance import compliance_rows  # noqa: PLC0415
     from epsmesh.verify.contact import contact_rows  # noqa: PLC0415
     from epsmesh.verify.elements import element_rows  # noqa: PLC0415
     from epsmesh.verify.far_fields import far_field_rows  # noqa: PLC0415
@@ -30,15 +30,14 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from epsmesh.verify.slits import slit_rows  # noqa: PLC0415
     from epsmesh.verify.wedges import wedge_rows  # noqa: PLC0415
 
-    found: list[Row] = []
+    checked: list[Row] = []
     if comm.rank == 0:
         with compiling():
-            found = [*element_rows(), *law_rows()]
-    yield from comm.bcast(found)
+            checked = [*element_rows(), *law_rows()]
+    yield from comm.bcast(checked)
     yield from scene_rows(comm, quick=quick)
     yield from region_rows(comm, quick=quick)
     yield from body_rows(comm, quick=quick)
-    yield from compliance_rows(comm, quick=quick)
     yield from contact_rows(comm, quick=quick)
     yield from friction_rows(comm, quick=quick)
     yield from wedge_rows(comm, quick=quick)
@@ -50,3 +49,5 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from load_rows(comm, quick=quick)
     yield from hyperelastic_rows(comm, quick=quick)
     yield from relaxation_rows(comm, quick=quick)
+    for truth in found("truths").values():  # of other packages
+        yield from truth.load()(comm, quick=quick)

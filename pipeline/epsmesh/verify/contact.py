@@ -3,19 +3,15 @@
 from collections.abc import Iterator
 from math import radians
 
-import numpy as np
 from mpi4py import MPI
 
-from epsmesh.layered.body import LayeredBody
-from epsmesh.layered.compliance import Layer
-from epsmesh.layered.contact import Profile
 from epsmesh.run.record import Record
 from epsmesh.shapes.parabola import Parabola
 from epsmesh.shapes.rounded import Rounded
 from epsmesh.verify import known
 from epsmesh.verify.compare import ACCURACY, against_meridian, force_row, solve, solved
 from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, cylinder, layers
+from epsmesh.verify.sections import Section, cylinder
 
 _YOUNG, _POISSON = 10e3, 0.3
 # A body so many times as large as the contact radius is a half-space, up to a few 1e-5 of F.
@@ -24,9 +20,6 @@ _FAR = 20_000
 # with elements of degree 5, independent of this program.
 _FINITE, _FINITE_ERROR = 3.97e-3, 3e-5
 _BALL, _ANGLE = 50.0, 60.0  # mm, degrees
-_LAYERS = (3.0, 1.0, 1 / 3)  # thickness over the radius of contact
-# Thickness (mm), Young's modulus (kPa) and Poisson's ratio, from the top down.
-_STACK = ((0.3, 60.0, 0.45), (0.7, 5.0, 0.3), (0.5, 20.0, 0.48))
 # Relative difference of F between roundings along a circle, as the tool has it, and a parabola.
 _PARABOLA = 1e-4
 # Tools on a body of six contact radii, in three dimensions.
@@ -44,20 +37,14 @@ _SAME = 1e-7
 _THIN = {0.1: 2e-3, 0.25: 1.8e-2}
 # Relative error of F of a pyramid for contact that is a square: F is 0.9 % less, on four meshes and three bodies.
 _SQUARE = 1.2e-2
-_LAYER_SOURCE = "integral equation (N. N. Lebedev, Ya. S. Ufliand 1958)"
 
 
 def contact_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
-    """Yield the rows of unilateral contact; ``quick`` yields a layer; collective."""
-    if not quick:
-        yield from _half_space(comm)
-        yield from _pyramid(comm)
-        yield from _rounded_punch(comm)
-        yield from _finite(comm)
-        yield from _flat(comm)
-        yield from _solid(comm)
-        yield from _thin_layers(comm)
-    yield from _layers(comm, quick)
+    """Yield the rows of unilateral contact, none of them ``quick``; collective."""
+    if quick:
+        return
+    for compare in (_half_space, _pyramid, _rounded_punch, _finite, _flat, _solid, _thin_layers):
+        yield from compare(comm)
 
 
 def _half_space(comm: MPI.Comm) -> Iterator[Row]:
@@ -166,33 +153,6 @@ def _scene(body: Section, tool: Section, poisson: float) -> Section:
         "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
         "probe": {"contact": "unilateral"} | tool,
     }
-
-
-def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """Layers on a rigid base, from three times as thick as contact is in radius to a third of that."""
-    ball = Profile(Rounded(0.0, _BALL * 1e-3).slope, limit=_BALL * 1e-3)
-    for nu in (_POISSON,) if quick else (_POISSON, 0.45, 0.5):
-        for thick in _LAYERS[-1:] if quick else _LAYERS:
-            touched = LayeredBody((Layer(_YOUNG, nu, thick * 1e-3),)).touch(ball, np.array([1e-3]))
-            depth, force = float(touched.depth[0]), float(touched.force[0])
-            body = cylinder(1 + 20 * max(thick, 0.5), thick)
-            record = _solved(comm, "2D", body, {"shape": "sphere", "radius": f"{_BALL} mm"}, depth, nu)
-            name = f"layer on a rigid base, sphere, a/h = {1 / thick:.2g}, ν = {nu:g}"
-            yield _row(name, "2D", force * _YOUNG / (1 - nu**2), _LAYER_SOURCE, record, 1e-6)
-    if not quick:
-        yield from _stacks(comm, ball)
-
-
-def _stacks(comm: MPI.Comm, ball: Profile) -> Iterator[Row]:
-    """Three layers, of which the first is the stiffest or the softest, as thick together as contact is wide."""
-    for stack in (_STACK, _STACK[::-1]):
-        body = LayeredBody(tuple(Layer(1e3 * young, nu, 1e-3 * thickness) for thickness, young, nu in stack))
-        touched = body.touch(ball, np.array([1e-3]))
-        height = sum(thickness for thickness, *_ in stack)
-        scene = cylinder(1 + 20 * height, height) | {"layer": layers(stack)}
-        record = _solved(comm, "2D", scene, {"shape": "sphere", "radius": f"{_BALL} mm"}, float(touched.depth[0]))
-        name = f"three layers on a rigid base, sphere, the first of {stack[0][1]:g} kPa"
-        yield _row(name, "2D", body.top.plane * float(touched.force[0]), known.LAYERED, record, 1e-6)
 
 
 def _row(name: str, path: str, force: float, source: str, record: Record, reference_bar: float) -> Row:

@@ -1,12 +1,9 @@
 """Scenes of one material with a known force, in two and in three dimensions."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from mpi4py import MPI
 
-from epsmesh.layered.body import LayeredBody
-from epsmesh.layered.compliance import Layer
 from epsmesh.verify import known
 from epsmesh.verify.boundary import rectangle_stiffness
 from epsmesh.verify.compare import against, against_meridian
@@ -23,13 +20,11 @@ _OBLIQUE = [2.0, 1.0, 0.0]
 # Above this ν the two paths are compared with each other: _incompressible.
 _MOST_COMPRESSIBLE = 0.49
 _NEAR_HALF = (0.49, 0.499, 0.4999, 0.5)
-# Relative effect of a side twelve thicknesses away on a disc on a layer on a rigid base, measured.
-_SIDE = 1e-7
 
 
 def scene_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows of all scenes; ``quick`` yields a few of each kind; collective."""
-    for compare in (_half_space, _rectangles, _ellipses, _cylinders, _layers, _incompressible):
+    for compare in (_half_space, _rectangles, _ellipses, _cylinders, _incompressible):
         yield from compare(comm, quick)
 
 
@@ -80,22 +75,6 @@ def _cylinders(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
         scene = _scene(known.CYLINDER_BODY, nu, disc(3, contact=contact))
         for path in ("2D",) if quick else ("2D", "3D"):
             yield against(comm, f"cylinder R = H = 50 mm, a = 3 mm, {contact}, ν = {nu:g}", path, truth, scene)
-
-
-def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """One layer on a rigid base; references are a published table and an integral equation."""
-    a = 1.0
-    for ratio in (0.4,) if quick else known.LAYER:
-        thickness = a / ratio
-        published = known.layer(ratio, 10e3, a * 1e-3, 1e-5), known.LAYER_SOURCE, known.LAYER_ERROR
-        force = LayeredBody((Layer(10e3, 0.3, thickness * 1e-3),)).punch(a * 1e-3) * 1e-5
-        scene = _scene(cylinder(a + 12 * thickness, thickness), 0.3, disc(a, contact="frictionless"))
-        name = f"layer on a rigid base, a/h = {ratio:g}, frictionless, ν = 0.3"
-        flat = against(comm, name, "2D", (force, known.LAYERED, _SIDE), scene)
-        reference, source, bar = published
-        yield flat
-        yield replace(flat, reference=reference, source=source, reference_bar=bar)
-        yield against(comm, name, "3D", published, scene)
 
 
 def _incompressible(comm: MPI.Comm, quick: bool) -> Iterator[Row]:

@@ -35,7 +35,7 @@ LAYER = {0.2: 1.207, 0.4: 1.472, 0.6: 1.784, 0.8: 2.124, 1.0: 2.480}
 LAYER_ERROR = 2e-3  # of three digits
 LAYER_SOURCE = "W. C. Hayes et al., J. Biomech. 5, 541 (1972)"
 
-# Forces of round frictionless tools on layers are those of epsmesh.layered, which shares nothing with the solvers.
+# Forces of round frictionless tools on layers are those of an integral equation, which shares nothing with the solvers.
 LAYERED = "integral equation (D. M. Burmister 1945, I. N. Sneddon 1966)"
 
 # c = F / (E* W d) of a frictionless rectangle of length L and width W on a half-space, by L / W: published.
@@ -172,7 +172,7 @@ def layer(ratio: float, young: float, radius: float, depth: float) -> float:
 def thin_layer(young: float, radius: float, depth: float, thickness: float) -> float:
     """Return F (N) of a ball on an incompressible layer bonded to a rigid base: a series in χ = √(R d)/h.
 
-    E. K. Dimitriadis et al., eq. 12. For R = 10 h, the integral equation of :mod:`epsmesh.layered.contact` is
+    E. K. Dimitriadis et al., eq. 12. For R = 10 h, an integral equation of layered bodies is
     higher by 0.2 % at χ = 0.1, 1.8 % at 0.25 and 8 to 19 % at 0.5 to 1: the series is for small χ.
     """
     chi = sqrt(radius * depth) / thickness

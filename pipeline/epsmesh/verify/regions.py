@@ -5,11 +5,7 @@ from math import pi
 
 from mpi4py import MPI
 
-from epsmesh.layered.body import LayeredBody
-from epsmesh.layered.compliance import Layer, Solid
-from epsmesh.verify import known
-from epsmesh.verify.compare import against, against_meridian, solve
-from epsmesh.verify.forces import FAR
+from epsmesh.verify.compare import against_meridian, solve
 from epsmesh.verify.row import Row
 from epsmesh.verify.sections import Section, cylinder, disc, layers, tissue
 
@@ -20,38 +16,12 @@ _INCOMPRESSIBLE_SKIN = ((1.0, 60.0, 0.49), (9.0, 5.0, 0.3))
 # Radii of a wide punch in units of the stack's height; after extrapolation the edge's part of F is below 0.2 %.
 _WIDE, _LEFT = (2.5, 5.0, 10.0), 0.002
 _DEPTH = 1e-5
-# A layer, and the tissue below: thickness in units of the disc's radius, kPa, ν.
-_HALF_SPACES = {
-    "stiff on soft, h = a": ((1.0, 100.0, 0.3), (10.0, 0.3)),
-    "soft on stiff, h = a": ((1.0, 1.0, 0.3), (10.0, 0.3)),
-    "skin on fat, h = a / 2": ((0.5, 60.0, 0.48), (2.0, 0.49)),
-}
-# Relative error of the correction for the finite size of a body FAR wide, measured.
-_SIZE = 1e-6
 
 
 def region_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows of layers and inclusions; ``quick`` yields a few of each kind; collective."""
-    for compare in (_half_spaces, _springs, _meridians, _layered, _of_one_material):
+    for compare in (_springs, _meridians, _layered, _of_one_material):
         yield from compare(comm, quick)
-
-
-def _half_spaces(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """A layer on a half-space, by an integral equation."""
-    for name, (layer, below) in [*_HALF_SPACES.items()][: 1 if quick else None]:
-        (thickness, young, nu), (young_below, nu_below) = layer, below
-        base = Solid(1e3 * young_below, nu_below)
-        body = LayeredBody((Layer(1e3 * young, nu, 1e-3 * thickness),), base)
-        force = known.in_cylinder(body.punch(1e-3) * _DEPTH, base.young, nu_below, 1e-3 * FAR, _DEPTH)
-        scene = {
-            "body": cylinder(FAR, FAR) | {"layer": layers([layer])},
-            "material": tissue(nu_below, young_below),
-            "probe": disc(1, contact="frictionless"),
-        }
-        for path in ("2D", "3D"):
-            yield against(
-                comm, f"layer on a half-space, {name}, frictionless", path, (force, known.LAYERED, _SIZE), scene
-            )
 
 
 def _springs(comm: MPI.Comm, quick: bool) -> Iterator[Row]:

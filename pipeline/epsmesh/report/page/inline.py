@@ -2,6 +2,7 @@
 
 import re
 from io import StringIO
+from pathlib import Path
 
 import matplotlib as mpl
 from markupsafe import Markup
@@ -9,6 +10,8 @@ from matplotlib.figure import Figure
 
 from epsmesh.report.figures.style import CLAIM, COLOURS, FAILED, GRID, LINE, PAPER, QUIET, STYLE
 
+# Styles of every report.
+PAGE_CSS = Path(__file__).parent / "templates" / "page.css"
 # The page's variable for each colour: what is dark on paper must be light on a dark screen.
 _THEME = {colour: f"var(--curve-{i})" for i, colour in enumerate(COLOURS, start=1)} | {
     CLAIM: "var(--claim)",

@@ -1,0 +1,1 @@
+"""How right identifications are: synthetic and measured force curves."""

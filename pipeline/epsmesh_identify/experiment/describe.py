@@ -1,0 +1,178 @@
+"""What is in the file of a force curve, in words, and the part of a study file that reads it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from epsmesh_identify.experiment.columns import Recorded
+from epsmesh_identify.experiment.header import is_unit_of
+from epsmesh_identify.experiment.read import read_curve, whole_curve
+from epsmesh_identify.experiment.reading import UNITS, ExperimentError, Reading
+from epsmesh_identify.experiment.segments import cycles_of
+from epsmesh_identify.experiment.signs import signed, signs_of
+from epsmesh_identify.experiment.table import Table, table_of
+from epsmesh_identify.experiment.text import read_lines
+from epsmesh_identify.experiment.words import is_called, is_other
+
+_SEPARATORS = {" ": "spaces", "\t": "tabs", ",": "commas", ";": "semicolons", "|": "bars"}
+# Units that people read, from the largest on: the first of which there is one at least.
+_READ = {
+    "depth": ((1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")),
+    "force": ((1.0, "N"), (1e-3, "mN"), (1e-6, "µN"), (1e-9, "nN")),
+    "time": ((1.0, "s"), (1e-3, "ms")),
+}
+
+
+def describe(path: Path, reading: Reading | None = None) -> str:
+    """Return what a file has: its table, columns, segments, what was found, and a ``[[measurement]]`` to paste.
+
+    A curve that cannot be read without the user's choice is described as far as it is known, with the reason.
+
+    Raises:
+        ExperimentError: if it has no table of numbers.
+    """
+    reading = reading or Reading()
+    table = table_of(read_lines(path), str(path))
+    lines = [_of_table(table, path.name), *_of_columns(table)]
+    try:
+        whole = whole_curve(path, reading)
+        curve = read_curve(path, reading)
+    except ExperimentError as error:
+        return "\n".join([*lines, "", f"not read yet: {error}", "", *_to_choose(table, path.name)])
+    lines += ["", *_of_segments(signed(whole, reading)), *(f"- {told}" for told in curve.told)]
+    return "\n".join([*lines, "", *_block(whole, path.name, signs_of(whole, reading)), *_to_add(table)])
+
+
+def _of_table(table: Table, name: str) -> str:
+    separator = _SEPARATORS[table.layout.separator]
+    return (
+        f"{name}: {len(table.lines)} rows of {table.layout.width} columns in lines {table.lines[0]} to "
+        f"{table.lines[-1]}, separated by {separator}, decimal {'commas' if table.layout.decimal == ',' else 'points'}"
+    )
+
+
+def _of_columns(table: Table) -> list[str]:
+    """Return a line for each column: number, header, and range of values."""
+    rows = []
+    for number, header in enumerate(table.headers):
+        values = table.values[:, number]
+        values = values[~np.isnan(values)]
+        extent = f"{values.min():.10g} to {values.max():.10g}" if values.size else "no values"
+        text = f', and text: "{table.strange[number][1]}"' if number in table.strange else ""
+        rows.append((str(number + 1), header.text or "(no header)", f"{extent}{text}"))
+    widths = [max(len(row[place]) for row in rows) for place in (0, 1)]
+    return [f"  {number:>{widths[0]}}  {header:<{widths[1]}}  {extent}" for number, header, extent in rows]
+
+
+def _of_segments(found: Recorded) -> list[str]:
+    """Return a line for each cycle: what its segments are."""
+    lines = []
+    cycles = cycles_of(found.depth, found.time)
+    for number, cycle in enumerate(cycles, start=1):
+        parts = []
+        for segment in ("approach", "hold", "retract"):
+            rows = cycle.rows(segment)
+            if rows.stop > rows.start:
+                parts.append(f"{segment} {_of_part(found.part(rows))}")
+        lines.append(f"{f'cycle {number}: ' if len(cycles) > 1 else ''}{'; '.join(parts)}")
+    return lines
+
+
+def _of_part(found: Recorded) -> str:
+    """Say how many rows a part has, and over which depths, forces and times."""
+    values = {"depth": found.depth, "force": found.force, "time": found.time}
+    extents = []
+    for kind, column in values.items():
+        if column is not None:
+            extent = float(np.ptp(column))
+            factor, unit = next((one for one in _READ[kind] if extent >= one[0]), _READ[kind][-1])
+            extents.append(f"{extent / factor:.4g} {unit}")
+    return f"of {len(found.depth)} rows over {', '.join(extents)}"
+
+
+def _block(found: Recorded, name: str, signs: tuple[int, int]) -> list[str]:
+    """Return the table of a study that reads the file so."""
+    columns = ", ".join(
+        f"{kind} = {header if header.isdecimal() else _text(header)}" for kind, header in found.names.items()
+    )
+    return [
+        *_heading(name),
+        f"columns = {{{columns}}}",
+        *([f"sign = {{depth = {signs[0]}, force = {signs[1]}}}"] if min(signs) < 0 else []),
+    ]
+
+
+def _to_choose(table: Table, name: str) -> list[str]:
+    """Return the table of a study in which columns are to be chosen: the likely ones are written."""
+    if spring := _of_spring(table):
+        return [*_heading(name), f"columns = {{{', '.join(spring)}}} # check"]
+    chosen: dict[str, int] = {}
+    for kind in ("depth", "force", "time"):
+        if (number := _likely(table, kind, set(chosen.values()))) is not None:
+            chosen[kind] = number
+    columns = [f"{kind} = {_of_column(table, number)}" for kind, number in chosen.items()]
+    lacking = [f"{kind} = …" for kind in ("depth", "force") if kind not in chosen]
+    units = [
+        f'{kind} = "{ {"m": "mm", "N": "N", "s": "s"}[UNITS[kind]] }"'
+        for kind, number in chosen.items()
+        if not table.headers[number].unit
+    ]
+    hint = f"; no column has the name and unit of {' and '.join(one.split()[0] for one in lacking)}" if lacking else ""
+    return [
+        *_heading(name),
+        *([f"columns = {{{', '.join(columns)}}} # check: header or number of each column{hint}"] if columns else []),
+        *([f"# columns = {{{', '.join(lacking)}}}{hint}"] if not columns else []),
+        *([f"units = {{{', '.join(units)}}} # check"] if units else []),
+        *_to_add(table),
+    ]
+
+
+def _likely(table: Table, kind: str, taken: set[int]) -> int | None:
+    """Return the column that is likely a depth, force or time: by name, unit or place; None if none can be."""
+    free = [n for n in range(len(table.headers)) if n not in taken and not np.isnan(table.values[:, n]).all()]
+    free = [n for n in free if n not in table.strange]
+    of_kind = [n for n in free if is_unit_of(table.headers[n].unit, UNITS[kind])]
+    without = [n for n in free if not table.headers[n].unit and not is_other(table.headers[n].name)]
+    called = [n for n in (*of_kind, *without) if is_called(table.headers[n].name, kind)]
+    place = ("time", "depth", "force").index(kind)
+    unnamed = [n for n in without if n == place and not table.headers[n].text and kind != "time"]
+    return next(iter((*called, *of_kind, *unnamed)), None)
+
+
+def _of_spring(table: Table) -> list[str]:
+    """Return the keys of the way of a piezo, and the deflection of a spring; none if the table has no deflection."""
+    lengths = [n for n, header in enumerate(table.headers) if is_unit_of(header.unit, "m")]
+    bent = [n for n in lengths if is_called(table.headers[n].name, "deflection")]
+    ways = [n for n in lengths if n not in bent]
+    if not (bent and ways):
+        return []
+    chosen = {"piezo": ways[0], "deflection": bent[0]}
+    return [
+        *(f"{kind} = {_of_column(table, number)}" for kind, number in chosen.items()),
+        f"spring = {_text(table.spring or '0.05 N/m')}",
+    ]
+
+
+def _of_column(table: Table, number: int) -> str:
+    text = table.headers[number].text
+    return _text(text) if text else f"{number + 1}"
+
+
+def _to_add(table: Table) -> list[str]:
+    """Return the lines that a machine which yields needs."""
+    if table.spring:
+        return [f"machine_stiffness = {_text(table.spring)} # of the spring, if the depth is the way of the piezo"]
+    return ['# machine_stiffness = "60 N/mm" # of machine and load cell; or a range, or "unknown"; rigid without it']
+
+
+def _heading(name: str) -> list[str]:
+    return [
+        "[[measurement]]",
+        f"name = {_text(Path(name).stem)}",
+        f"file = {_text(name)} # path from the study's folder",
+    ]
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

@@ -1,0 +1,1 @@
+"""What was found, in words, figures and on a page. Knows nothing of dolfinx."""

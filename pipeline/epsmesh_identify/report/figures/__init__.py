@@ -1,0 +1,1 @@
+"""Figures of an identification, and of Sobol's indices, drawn from their dataset alone."""

@@ -1,0 +1,199 @@
+"""Figures of an identification: curves with their fit, residuals, and how well each unknown is known."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from epsmesh.files import FIGURE_FORMATS
+from epsmesh.report.figures.style import COLOURS, FAILED, LINE, QUIET, STYLE, finish, new_figure, save
+from epsmesh.study.identified import FITS
+from epsmesh_identify.report.identified import answer, bar, engineering, hidden_words, title, wanted
+
+_WIDTH, _CURVES, _RESIDUALS, _PROFILES, _BESIDE = 7.6, 2.4, 1.2, 1.9, 1.4  # inches
+# Curves and unknowns that are shown; all are in the dataset.
+_MOST_CURVES, _MOST_PROFILES = 3, 4
+_MEASURED, _FIT, _HIDDEN = COLOURS[1], COLOURS[4], COLOURS[3]
+_MOST_POINTS = 400
+_LINES = 300  # points of lines beside one another that fill a figure
+_HELD = 0.02  # share of the depth within which a tool is held
+_NORMAL = 3.84  # fall of the likelihood at the ends of a 95 % interval
+_HIGHEST = 6.0
+_NEAR = 1.3  # error bars, on both sides of the estimate, that a profile shows
+
+
+def identification(dataset: xr.Dataset, name: str, *, answered: bool = True) -> Figure:
+    """Measured forces, their fit, what is left, and profiles of the unknowns; the caption has the answer, too."""
+    lines = answer(dataset) if answered else []
+    return _of_files(dataset, name, lines) if "file" in dataset.dims else _of_curves(dataset, name, lines)
+
+
+def draw(dataset: xr.Dataset, stem: Path, formats: Sequence[str] = FIGURE_FORMATS) -> list[Path]:
+    """Draw the figure of an identification to ``<stem>.png`` and ``.svg``; return the files written."""
+    with mpl.rc_context(STYLE):
+        drawn = identification(dataset, str(dataset.attrs.get("title", "")).replace("$", r"\$"))
+        return [save(drawn, stem.with_name(f"{stem.name}.{ending}")) for ending in formats]
+
+
+def _of_curves(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
+    shown = wanted(dataset)[:_MOST_PROFILES]
+    shown = [one for one in shown if bool(np.isfinite(dataset["low"].sel(unknown=one)))]
+    count = min(dataset.sizes["measurement"], _MOST_CURVES)
+    heights = [_CURVES + _RESIDUALS, *([_PROFILES] if shown else [])]
+    figure = new_figure(_WIDTH, sum(heights) + _BESIDE)
+    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    curves = grid[0].subgridspec(2, count, height_ratios=(_CURVES, _RESIDUALS))
+    for number in range(count):
+        one = dataset.isel(measurement=number)
+        upper = figure.add_subplot(curves[0, number])
+        lower = figure.add_subplot(curves[1, number], sharex=upper)
+        _draw_curve(upper, lower, one, is_first=number == 0, fits=dataset.attrs["verdict"] == FITS)
+        if count > 1:
+            upper.set_title(str(one["measurement"].values))
+    if shown:
+        row = grid[1].subgridspec(1, len(shown))
+        for number, unknown in enumerate(shown):
+            _draw_profile(figure.add_subplot(row[number]), dataset, unknown, is_first=number == 0)
+    finish(figure, name, _caption(dataset, lines, count, bool(shown)), legend=False)
+    figure.axes[0].legend(loc="best", frameon=False)
+    return figure
+
+
+def _draw_curve(upper: Axes, lower: Axes, one: xr.Dataset, *, is_first: bool, fits: bool) -> None:
+    """Draw a curve and its fit in the ``upper`` axes, what is left in the ``lower``; over time if the tool holds."""
+    known = np.flatnonzero(np.isfinite(one["force"].values))
+    known = known[:: max(1, len(known) // _MOST_POINTS)]
+    one = one.isel(sample=known)
+    over_time = _holds(one)
+    along, of_along = _scaled(one["time" if over_time else "depth"].values, "s" if over_time else "m")
+    largest, of_force = _scaled(one["force"].values, "N")
+    factor = float(largest[-1] / one["force"].values[-1]) if one["force"].values[-1] else 1.0
+    fit, band, residual = (factor * one[key].values for key in ("fit", "band", "residual"))
+    order = np.argsort(along)
+    upper.plot(along, largest, ".", color=_MEASURED, markersize=3, label="measured")
+    upper.plot(along[order], fit[order], color=_FIT, label="fit")
+    if fits:
+        ends = (along[order], (fit - band)[order], (fit + band)[order])
+        upper.fill_between(*ends, color=_FIT, alpha=0.25, linewidth=0, label="its 95 %")
+    upper.tick_params(labelbottom=False)
+    lower.plot(along, residual, ".", color=_MEASURED, markersize=2)
+    lower.axhline(0, color=_FIT)
+    lower.set_xlabel(f"time, {of_along}" if over_time else f"depth of the tool, {of_along}")
+    if is_first:
+        upper.set_ylabel(f"force, {of_force}")
+        lower.set_ylabel(f"residual, {of_force}")
+
+
+def _holds(one: xr.Dataset) -> bool:
+    """Tell whether the tool is at its largest depth for a quarter of the time."""
+    if "time" not in one or not bool(one["time"].notnull().all()):
+        return False
+    time, depth = one["time"].values, one["depth"].values
+    at_end = time[depth > depth.max() - _HELD * np.ptp(depth)]
+    return bool(np.ptp(at_end) > np.ptp(time) / 4)
+
+
+def _draw_profile(ax: Axes, dataset: xr.Dataset, unknown: str, *, is_first: bool) -> None:
+    """Draw how much worse the fit is at other values of an unknown, with both error bars as far as they are near."""
+    one, unit = dataset.sel(unknown=unknown), str(dataset["unit"].sel(unknown=unknown).values)
+    estimate, low, high = (float(one[name]) for name in ("estimate", "low", "high"))
+    values, fall = _profile(one)
+    factor = _factor(np.array([low, high]), unit)
+    for end, colour in (("_hidden", _HIDDEN), ("", _MEASURED)):
+        ends = [factor * float(one[f"{side}{end}"]) for side in ("low", "high")]
+        if np.isfinite(ends).all():
+            ax.axvspan(ends[0], ends[1], color=colour, alpha=0.25, linewidth=0)
+    ax.plot(factor * values, fall, color=LINE)
+    ax.axhline(_NORMAL, color=QUIET, linestyle=":")
+    ax.axvline(factor * estimate, color=_FIT)
+    ax.set_xlim(factor * (estimate - _NEAR * (estimate - low)), factor * (estimate + _NEAR * (high - estimate)))
+    ax.set_ylim(0, _HIGHEST)
+    word = _scaled(np.array([low, high]), unit)[1]
+    ax.set_xlabel(f"{title(unknown)}{f', {word}' if word else ''}")
+    ax.set_title(_bars(dataset, unknown))
+    ax.locator_params(axis="x", nbins=4)
+    if is_first:
+        ax.set_ylabel("misfit, −2 ln L/L_max")
+    else:
+        ax.tick_params(labelleft=False)
+
+
+def _profile(one: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Return values of an unknown and the fall of the likelihood there: without a profile, that of its error bar."""
+    if "profile" in one and bool(one["profile"].notnull().any()):
+        known = np.isfinite(one["profile"].values)
+        return one["profile_value"].values[known], one["profile"].values[known]
+    estimate, low, high = (float(one[name]) for name in ("estimate", "low", "high"))
+    shares = np.linspace(-_NEAR, _NEAR, 101)
+    return estimate + np.where(shares < 0, estimate - low, high - estimate) * shares, _NORMAL * shares**2
+
+
+def _bars(dataset: xr.Dataset, unknown: str) -> str:
+    """Write both error bars, one below the other."""
+    if not bool(dataset["seen"].sel(unknown=unknown)):
+        return "not in the curves"
+    first, second = bar(dataset, unknown), bar(dataset, unknown, hidden=True)
+    return f"{first}\nmay hide: {second}" if second and second != first else first
+
+
+def _caption(dataset: xr.Dataset, lines: Sequence[str], count: int, has_profiles: bool) -> str:
+    """Return the answer, and what the panels show."""
+    parts = [*lines[:2]]
+    more = dataset.sizes["measurement"] - count
+    parts += [f"The first {count} of {dataset.sizes['measurement']} curves are shown."] if more else []
+    if has_profiles:
+        hidden = hidden_words(dataset)
+        bars = "inner band: its 95 % error bar if the body is as declared"
+        bars += f"; outer band: if it may hide {hidden}" if hidden else ""
+        parts.append(f"Below: how much worse the best fit is at other values of an unknown ({bars}).")
+    return " ".join(parts)
+
+
+def _of_files(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
+    """Draw each unknown of each file, in the order of their values, with both error bars."""
+    shown = wanted(dataset)[:_MOST_PROFILES]
+    figure = new_figure(_WIDTH, 2.4 * len(shown) + _BESIDE)
+    axes = figure.subplots(len(shown), 1, squeeze=False, sharex=True)[:, 0]
+    fits = (dataset["verdict"] == FITS).values
+    order = np.argsort(dataset["estimate"].sel(unknown=shown[0]).values)
+    place = np.arange(1, len(order) + 1)
+    thick = float(np.clip(_LINES / len(order), 0.8, 2.5))
+    for ax, unknown in zip(axes, shown, strict=True):
+        one = dataset.sel(unknown=unknown).isel(file=order)
+        good = fits[order]
+        values, unit = _scaled(one["estimate"].values, str(one["unit"].values))
+        factor = _factor(one["estimate"].values, str(one["unit"].values))
+        for end, colour in (("_hidden", _HIDDEN), ("", _MEASURED)):
+            low, high = (factor * one[f"{side}{end}"].values for side in ("low", "high"))
+            ax.vlines(place[good], low[good], high[good], color=colour, linewidth=thick * (0.6 if end else 1.0))
+        ax.plot(place[good], values[good], ".", color=LINE, markersize=1.2 * thick)
+        ax.plot(place[~good], values[~good], "x", color=FAILED)
+        ax.set_ylabel(f"{title(unknown)}{f', {unit}' if unit else ''}")
+    axes[-1].set_xlabel(f"files, in the order of {title(shown[0])}")
+    hidden = hidden_words(dataset)
+    bars = "Thick lines: 95 % error bars if the body is as declared"
+    bars += f"; thin ones: if it may hide {hidden}." if hidden else "."
+    failed = " Crosses: the law does not fit." if not fits.all() else ""
+    finish(figure, name, " ".join([*lines[:1], f"{bars}{failed}"]), legend=False)
+    return figure
+
+
+def _factor(values: np.ndarray, unit: str) -> float:
+    """Return the factor from SI to the unit with a prefix that suits the largest value."""
+    if unit in ("", "1"):
+        return 1.0
+    largest = float(np.nanmax(np.abs(values)))
+    word = engineering(largest, unit, 12).split(" ")[0]
+    return float(word) / largest if largest else 1.0
+
+
+def _scaled(values: np.ndarray, unit: str) -> tuple[np.ndarray, str]:
+    """Return values in that unit, and its name."""
+    if unit in ("", "1"):
+        return values, ""
+    word = engineering(float(np.nanmax(np.abs(values))), unit).split(" ")[1]
+    return _factor(values, unit) * values, word

@@ -1,0 +1,86 @@
+"""The report of an identification: one HTML page with the answer, its figure, all values, and the study."""
+
+from pathlib import Path
+from shlex import quote
+from typing import Any
+
+import matplotlib as mpl
+import xarray as xr
+
+from epsmesh.files import write_whole
+from epsmesh.pages import joined, render_page
+from epsmesh.report.figures.style import STYLE, stack
+from epsmesh.report.page.facts import provenance, study_path
+from epsmesh.report.page.inline import PAGE_CSS, inline_svg
+from epsmesh.study.identified import FITS
+from epsmesh_identify.report.figures.identification import identification
+from epsmesh_identify.report.identified import answer, bar, hidden_words, material, parts, title, wanted, written
+
+_TEMPLATES = Path(__file__).parent / "templates"
+
+
+def write_page(dataset: xr.Dataset, path: Path) -> Path:
+    """Write the report of an identification to ``path``, in place of an earlier one only once it is whole."""
+    return write_whole(path, render(dataset, path.stem))
+
+
+def render(dataset: xr.Dataset, name: str) -> str:
+    """Return the report of an identification as HTML; ``name`` is the study's, for files and commands."""
+    is_one = "file" not in dataset.dims
+    fits = not is_one or dataset.attrs["verdict"] == FITS
+    columns, rows = _of_one(dataset) if is_one else _of_files(dataset)
+    return render_page(
+        _TEMPLATES / "identification.html.j2",
+        "",
+        title=dataset.attrs.get("title", name),
+        name=name,
+        style=joined(PAGE_CSS),
+        answer=answer(dataset),
+        fits=fits,
+        figure=_figure(dataset),
+        columns=columns,
+        rows=rows,
+        parts=[parts(dataset, one) for one in wanted(dataset)] if is_one and fits else [],
+        material=material(dataset),
+        study=str(dataset.attrs.get("study", "")),
+        commands=[f"epsmesh identify {study_path(dataset, name)}", f"epsmesh report {quote(f'results/{name}.nc')}"],
+        provenance=provenance(dataset),
+    )
+
+
+def _figure(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the figure as SVG, for a wide page and for a phone."""
+    with mpl.rc_context(STYLE):
+        drawn = identification(dataset, "", answered=False)
+        caption = drawn.get_label()
+        svg, width = inline_svg(drawn, "identification")
+        phone, _ = inline_svg(stack(drawn), "identification-phone")
+    return {"kind": "identification", "caption": caption, "svg": svg, "width": width, "phone": phone}
+
+
+def _of_one(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
+    """Return the table of all unknowns: heads, and rows of words."""
+    names = [*wanted(dataset), *(one for one in map(str, dataset["unknown"].values) if one not in wanted(dataset))]
+    rows = []
+    for name in names:
+        value = written(dataset, name, float(dataset["estimate"].sel(unknown=name)))
+        seen = bool(dataset["seen"].sel(unknown=name))
+        unseen = "not in the curves" if name in wanted(dataset) else "as known before"
+        bars = [bar(dataset, name), bar(dataset, name, hidden=True)] if seen else [unseen, ""]
+        rows.append([title(name), value, *bars])
+    return ["", "value", "if the body is as declared", f"if it may hide {hidden_words(dataset) or 'nothing'}"], rows
+
+
+def _of_files(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
+    """Return the table of all files: heads, and rows of words."""
+    names, rows = wanted(dataset), []
+    for number, file in enumerate(dataset["file"].values):
+        one = dataset.isel(file=number)
+        verdict = str(one["verdict"].values) or f"failed: {one['message'].values}"
+        cells = [str(file)]
+        for name in names:
+            value = written(one, name, float(one["estimate"].sel(unknown=name))) if str(one["verdict"].values) else ""
+            cells += [value, bar(one, name), bar(one, name, hidden=True)] if verdict == FITS else [value, "", ""]
+        rows.append([*cells, verdict])
+    heads = [head for name in names for head in (title(name), "as declared", "may hide")]
+    return ["file", *heads, "law"], rows
