@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import epsmesh
+import epsmesh as package
 from epsmesh.files import STORE_NAME
 from epsmesh.insertion.friction import reaction
 from epsmesh.insertion.steps import PHASES
@@ -77,7 +77,7 @@ def test_a_second_run_reads_what_was_solved(ran, epsmesh):
     assert (again["cases"], again["ok"], again["stored"]) == (1, 1, 1)
     assert again["unchanged"] == files and [Path(file).stat().st_mtime_ns for file in files] == before
     assert f"wrote {', '.join(files)};" in first.stdout
-    read = epsmesh.read(folder / "pad.toml").run(output=folder)
+    read = package.read(folder / "pad.toml").run(output=folder)
     assert round(1e3 * float(read["puncture_depth"]), 5) == depth
 
 
@@ -96,7 +96,7 @@ def test_states_that_were_not_solved_leave_the_case_pending(epsmesh, tmp_path, r
     shutil.copy(folder / "pad.toml", tmp_path)
     shutil.copy(folder / STORE_NAME, tmp_path)
     with sqlite3.connect(tmp_path / STORE_NAME) as store:
-        study = epsmesh.read(folder / "pad.toml").declared
+        study = package.read(folder / "pad.toml").declared
         (lost,) = [key for key, case in zip(make_plan(study).keys, study.cases(), strict=True) if case.index == (2,)]
         assert store.execute("DELETE FROM records WHERE key = ?", (lost,)).rowcount == 1
     counted = json.loads(epsmesh("status", tmp_path / "pad.toml", "--output", tmp_path, "--json").stdout)
@@ -117,7 +117,7 @@ def test_drag_presses_the_flanks_as_those_of_a_slit_that_sticks(tmp_path):
     blade = {key: STUDY["probe"][key] for key in ("shape", "length", "width")}
     slit = {"contact": "bonded", "incision": "2.8 mm", "ahead": "0.8 mm", "depth": ["0.02 mm", "0.4 mm"]}
     study = STUDY | {"probe": blade | slit, "solve": {"exact": False}}
-    force = epsmesh.read(study).run(output=tmp_path)["force"]
+    force = package.read(study).run(output=tmp_path)["force"]
     along = float(force.diff("depth").item() / force["depth"].diff("depth").item())
     opened = float(force[0]) - along * 0.02e-3
     assert 2 * opened / (0.8e-3 * along) == pytest.approx(reaction(2e-3, 6e-3), rel=0.1)
@@ -150,7 +150,7 @@ def test_two_layers_have_two_punctures_and_a_withdrawal_by_solves(tmp_path):
     insertion = {"to": "4 mm", "steps": 8, "withdraw": True}
     scene = {"body": STUDY["body"] | {"layer": [layer]}, "probe": STUDY["probe"] | {"insertion": insertion}}
     scene["probe"] |= {"toughness": "6 J/m^2"}
-    found = epsmesh.read(STUDY | scene).run(output=tmp_path)
+    found = package.read(STUDY | scene).run(output=tmp_path)
     depths, forces = (found[f"puncture_{name}"].values for name in ("depth", "force"))
     assert depths[0] < 2e-3 < depths[1] and forces[1] > 1.5 * forces[0]
     assert float(abs(found["energy_balance"]).max()) < 0.02

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import epsmesh
+import epsmesh as package
 from epsmesh.study.problems import StudyError
 from epsmesh_identify.estimation.estimate import identify
 from scripts.make_curves import TRUTH, main, write, write_punch
@@ -178,7 +178,7 @@ def test_what_curves_and_ranges_give_is_needed_for_cases(folder, epsmesh, comman
     for key in ("[mesh]", "probe.depth", "[material]"):
         assert f"{key}: " in result.stderr
     with pytest.raises(StudyError, match="is required for the study's cases"):
-        epsmesh.read(folder / "punch.toml").plan()
+        package.read(folder / "punch.toml").plan()
 
 
 def test_the_error_of_a_radius_widens_the_bar(folder, epsmesh, found):
@@ -221,7 +221,7 @@ def test_what_was_found_does_not_replace_the_dataset_of_a_run_nor_the_reverse(fo
     result = epsmesh("identify", folder / "punch.toml", "--output", ran)
     assert (result.exit_code, "is the dataset of a study's cases" in result.stderr) == (2, True)
     with pytest.raises(FileExistsError, match="give another output folder"):
-        epsmesh.read(folder / "punch.toml").identify(output=ran)
+        package.read(folder / "punch.toml").identify(output=ran)
     assert (ran / "punch.nc").read_bytes() == before
     (ran / "small.nc").write_bytes((folder / "results" / "punch.nc").read_bytes())
     result = epsmesh("run", small, "--output", ran)
@@ -249,7 +249,7 @@ def test_a_rank_that_fails_alone_ends_all(folder):
 
 
 def test_python_gets_the_dataset(folder, found):
-    dataset = epsmesh.read(folder / "punch.toml").identify(output=folder / "results")
+    dataset = package.read(folder / "punch.toml").identify(output=folder / "results")
     xr.testing.assert_equal(dataset, xr.load_dataset(folder / "results" / "punch.nc"))
 
 
