@@ -83,8 +83,47 @@ print(f"release: {dataset['status'].size} cases, F = {float(dataset['force'].max
 PYTHON
     )
 }
+
+try_packages() { # identification, and a real-time query with and without the study program
+    "$python" -m venv "$work/bare"
+    "$work/bare/bin/python" -m pip install "${quiet[@]}" dist/epsmesh_realtime-*.whl
+    (
+        cd "$work/away"
+        export EPSMESH_CACHE="$work/cache" OMP_NUM_THREADS=1
+        "$work/venv/bin/epsmesh" new punch --like identify-punch >/dev/null
+        "$work/venv/bin/epsmesh" identify studies/punch.toml >identified
+        grep -q "if the body is as declared" identified || fail "identify says $(cat identified)"
+        cat >studies/touched.toml <<'TOML'
+[body]
+shape = "cylinder"
+radius = "20 mm"
+height = "20 mm"
+fixed = "bottom"
+
+[material]
+young = "10 kPa"
+poisson = 0.45
+
+[probe]
+shape = "disc"
+radius = "2 mm"
+depth = "0.1 mm"
+contact = "frictionless"
+
+[mesh]
+accuracy = "5 %"
+TOML
+        "$work/venv/bin/epsmesh" export studies/touched.toml --accuracy 5% -o body.epsm >exported 2>&1 || fail "export says $(cat exported)"
+        ask='touch = realtime.read("body.epsm").query("disc", radius=2e-3, at=(0.0, 0.0, 0.0), depth=1e-4); print(touch.status, *touch.force)'
+        with=$("$work/venv/bin/python" -c "import epsmesh; realtime = epsmesh.realtime; $ask")
+        without=$("$work/bare/bin/python" -c "import epsmesh_realtime as realtime; $ask")
+        [[ $with == ok* && $with == "$without" ]] || fail "real time: $with with epsmesh, $without without"
+        echo "release: identify and export run; a query with and without epsmesh: $with"
+    )
+}
 "${install[@]}" dist/epsmesh-*.whl
 try wheel
+try_packages
 "${install[@]}" --force-reinstall --no-deps dist/epsmesh-*.tar.gz
 try sdist
 
