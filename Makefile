@@ -6,6 +6,7 @@ STUDY ?= studies/figure3.toml
 NP ?= 1
 PYTEST_ARGS ?=
 SUITE ?= trixie
+STAGE ?= epsmesh
 GOALS ?= setup
 PEERS_ARGS ?=
 FUZZ ?= 5000
@@ -80,8 +81,8 @@ test-debian13: ## run the tests on Debian 13, in a chroot (needs root)
 debian: ## run other targets on another Debian, in a chroot (needs root): make debian SUITE=sid GOALS=realtime
 	@DEBIAN_SUITE=$(SUITE) GOALS="$(GOALS)" scripts/test-debian13.sh
 
-docker-steps: ## run the Dockerfile's RUN lines and a small study in a chroot of Debian 12 (needs root)
-	@DEBIAN_SUITE=bookworm STEPS=Dockerfile scripts/test-debian13.sh
+docker-steps: ## run the Dockerfile's lines and a small study in a chroot (needs root); STAGE=lab with JupyterLab
+	@STEPS=Dockerfile STAGE=$(STAGE) scripts/test-debian13.sh
 
 release: ## build sdist and wheel into dist/, install both, and run a study with each
 	@scripts/setup.sh

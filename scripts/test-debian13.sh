@@ -4,7 +4,8 @@
 #   GOALS=…            run these targets of make instead of `test`
 #   DEBIAN_SUITE=…     use this Debian instead of 13: bookworm, sid
 #   DEBIAN13_ROOT=DIR  folder of the chroot, for checkouts that share one
-#   STEPS=Dockerfile   run the RUN lines of this file, and a small study, instead of make's targets
+#   STEPS=Dockerfile   run the lines of this file, in a new root, and a small study, instead of make's targets
+#   STAGE=lab          those of this stage of it
 set -euo pipefail
 cd "$(dirname "$0")/.."
 ((EUID == 0)) || { echo "test-debian13: needs root: a Debian 13 root is made, mounted and entered" >&2; exit 1; }
@@ -13,6 +14,8 @@ cd "$(dirname "$0")/.."
 
 suite=${DEBIAN_SUITE:-trixie} goals=${GOALS:-test}
 [[ $suite == trixie ]] && name=debian13 || name=$suite
+programs=ca-certificates,make,git,bash
+[[ -z ${STEPS:-} ]] || name=image programs=ca-certificates
 root=${DEBIAN13_ROOT:-$PWD/.cache/$name}
 mkdir -p "$(dirname "$root")"
 exec 9>"$root.lock"
@@ -24,8 +27,14 @@ if [[ ! -f $root/.complete ]]; then
     echo "test-debian13: making a root of Debian $suite in ${root#"$PWD"/} (some minutes, 3 GB)"
     # A mirror's index may be past its validity date.
     mmdebstrap --aptopt='Acquire::Check-Valid-Until "false"' --variant=minbase \
-        --include=ca-certificates,make,git,bash "$suite" "$root"
+        --include="$programs" "$suite" "$root"
     touch "$root/.complete"
+fi
+# An image begins with Debian alone, each time.
+if [[ -n ${STEPS:-} ]]; then
+    rm -rf "$root.steps"
+    cp -a --reflink=auto "$root" "$root.steps"
+    root+=.steps
 fi
 # The chroot uses this machine's proxies, certificates and package mirrors.
 for file in /etc/resolv.conf /etc/pip.conf; do
@@ -50,6 +59,10 @@ for name in http_proxy https_proxy no_proxy HTTP_PROXY HTTPS_PROXY NO_PROXY PIP_
 done
 command=(make -C /src/epsmesh $goals PYTEST_ARGS="${PYTEST_ARGS:-}")
 if [[ -n ${STEPS:-} ]]; then
-    command=(bash -exc "cd /src/epsmesh; $(sed -n 's/^RUN \(.*\)/\1;/p' "$STEPS") make study STUDY=studies/quick.toml")
+    goal='epsmesh new mine --like quick && epsmesh run studies/mine.toml'
+    [[ ${STAGE:-} != lab ]] || goal='jupyter execute start.ipynb && jupyter lab --version'
+    python3 scripts/docker_steps.py "$STEPS" "${STAGE:-epsmesh}" /src/epsmesh >"$root/steps"
+    echo "echo 'as the user: $goal' >&2; runuser -u \"\$user\" -- sh -c '$goal'" >>"$root/steps"
+    command=(bash /steps)
 fi
 chroot "$root" env -i "${environment[@]}" "${command[@]}" </dev/null 2>&1 | tee "$root.log"
