@@ -12,6 +12,8 @@ from pathlib import Path
 import nbformat
 import pytest
 
+from epsmesh.libraries import _DRAWING
+
 ROOT = Path(__file__).parents[1]
 STEPS = runpy.run_path(str(ROOT / "scripts" / "docker_steps.py"))
 DOCKERFILE = (ROOT / "Dockerfile").read_text()
@@ -82,6 +84,7 @@ def system_libraries(text):
 
 def test_every_road_of_the_wheels_installs_the_libraries_of_gmsh():
     wanted = {"libgl1", "libglu1-mesa", "libxcursor1", "libxft2", "libxinerama1"}
+    assert system_libraries(_DRAWING) == wanted
     for path in (ROOT / "Dockerfile", ROOT / ".github" / "workflows" / "tests.yml", NOTEBOOK):
         assert system_libraries(path.read_text()) == wanted, path
 

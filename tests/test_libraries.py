@@ -43,6 +43,8 @@ def test_each_system_has_its_line(system, remedy):
         (ModuleNotFoundError("", name="pymeshfix"), "[repair]"),
         (ModuleNotFoundError("", name="epsmesh.nothing"), ""),
         (ImportError("cannot import name 'x'", name="numpy"), ""),
+        (OSError("libGL.so.1: cannot open shared object file: No such file or directory"), "no libGL.so.1: "),
+        (OSError("libepsmesh.so: cannot open shared object file: No such file or directory"), ""),
     ],
 )
 def test_each_fault_has_its_sentence(wrong, remedy):

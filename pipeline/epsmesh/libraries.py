@@ -24,6 +24,8 @@ _NEEDS = "glibc ≥ {}.{}, Python ≥ {}.{}, {}".format(*_GLIBC, *_PYTHON, _MACH
 # Without these in one environment, the wheel's PETSc is the only one.
 _SECOND = ("petsc", "petsc4py", "slepc", "slepc4py")
 _WHEEL = "dolfinx-solver-real"
+# What the wheel of gmsh links to, in Debian's and Ubuntu's names.
+_DRAWING = "libgl1 libglu1-mesa libgomp1 libxcursor1 libxft2 libxinerama1"
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,10 @@ def solver_on(system: System) -> str:
     return f"its wheels need Python ≥ 3.12, and this is {found}: make a virtual environment of a newer one, or {other}"
 
 
-def sentence_on(wrong: ImportError) -> str:
+def sentence_on(wrong: ImportError | OSError) -> str:
     """Return a sentence on a library that is missing or does not load, "" if it is none, or no fault of one."""
+    if isinstance(wrong, OSError):
+        return _on_drawing(str(wrong))
     library, _, _ = (wrong.name or "").partition(".")
     if library == "epsmesh" or (not library and isinstance(wrong, ModuleNotFoundError)):
         return ""
@@ -99,6 +103,16 @@ def sentence_on(wrong: ImportError) -> str:
             return f"the Python library {library} is missing: {solver_on(system)}"
         return f"the Python library {library} is missing: {system.pip(extra)} installs it"
     return _on_unloaded(str(wrong), library, system)
+
+
+def _on_drawing(message: str) -> str:
+    """Return a sentence on a system's library that gmsh links to, and that is missing; "" if it is none."""
+    missing = re.match(r"(lib(?:GL|X|OpenGL|fontconfig|freetype|gomp)\S*): cannot open shared object file", message)
+    if missing is None:
+        return ""
+    debian = f"an administrator installs it and others by `apt-get install {_DRAWING}`"
+    other = f"install it, or use {_CONDA} in the project's folder, without root"
+    return f"gmsh does not load, since the system has no {missing[1]}: {debian if shutil.which('apt-get') else other}"
 
 
 def _on_unloaded(message: str, library: str, system: System) -> str:

@@ -126,6 +126,8 @@ class Commands(TyperGroup):
         except OSError as wrong:
             if wrong.errno in _UNWRITABLE:
                 fail(of_unwritten(wrong))
+            if sentence := sentence_on(wrong):
+                fail(sentence)
             if wrong.strerror and wrong.filename is not None:
                 fail(of_file(wrong.filename, f"cannot be used: {wrong.strerror}"))
             _print_error(wrong, self.words)
