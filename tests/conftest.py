@@ -1,5 +1,6 @@
 """What tests of the command line share: `epsmesh` in this process, `spawn` in one of its own, and a small study."""
 
+import importlib.util
 import os
 from math import inf
 
@@ -10,6 +11,9 @@ from epsmesh.shapes.files import checked
 from epsmesh.study import case
 from tests import commands
 from tests.studies import small_text
+
+if importlib.util.find_spec("dolfinx_solver") is not None:  # the wheels' dolfinx loads only after MPI
+    from epsmesh import mpi  # noqa: F401
 
 SMALL = small_text(material={"poisson": [0.3, 0.4]}, mesh={"outside": ["coarse", "free"]})
 

@@ -20,6 +20,7 @@ from tests.solve.test_mixed import make_mesh
 
 _EVERY_MODULE = """
 import importlib, pkgutil, sys
+from epsmesh import mpi
 import dolfinx, dolfinx.fem.petsc, dolfinx.io, dolfinx.jit, dolfinx.mesh, dolfinx.nls
 
 modules = {name: module for name, module in sys.modules.items() if name.split(".")[0] in ("dolfinx", "ffcx")}

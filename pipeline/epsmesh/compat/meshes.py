@@ -115,7 +115,8 @@ def partition(cells: np.ndarray, parts: int) -> np.ndarray:
 
 def geometry_dofs(mesh: Any) -> np.ndarray:
     """Return the geometry nodes of each local cell (owned and ghosts), shape (cells, nodes per cell)."""
-    dofmap = mesh.geometry.dofmap if hasattr(mesh.geometry, "dofmap") else mesh.geometry.dofmaps[0]
+    several = isinstance(getattr(type(mesh.geometry), "dofmaps", None), property)  # since 0.11
+    dofmap = mesh.geometry.dofmaps[0] if several else mesh.geometry.dofmap
     if not hasattr(dofmap, "array"):
         return np.asarray(dofmap)
     # A rank may have no cells: their number does not tell that of their nodes.

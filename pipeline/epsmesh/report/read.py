@@ -136,7 +136,7 @@ def read_file(path: Path) -> xr.Dataset:
             raise DatasetError(f"{path}: would take {size / 1e9:.3g} GB: no study's dataset has more than 1")
         # One that xarray has written again has no groups.
         parts = [xr.load_dataset(path, group=group) for group in (None, *({"run"} & groups))]
-        return with_words(xr.merge(parts, combine_attrs="override"))
+        return with_words(xr.merge(parts, join="outer", compat="no_conflicts", combine_attrs="override"))
     except DatasetError:
         raise
     except Exception as error:  # of a damaged file the libraries raise many kinds

@@ -122,7 +122,9 @@ def joined(found: Sequence[xr.Dataset | ExperimentError], files: Sequence[str]) 
     padded = [
         one.assign({name: xr.full_like(every[name], np.nan) for name in every.keys() - one.keys()}) for one in rows
     ]
-    whole = xr.concat(padded, "file", data_vars="all", coords="minimal", compat="override", combine_attrs="drop")
+    whole = xr.concat(
+        padded, "file", data_vars="all", coords="minimal", compat="override", join="outer", combine_attrs="drop"
+    )
     for name, variable in whole.variables.items():
         variable.attrs = next((one[name].attrs for one in good if name in one.variables), {})
     whole = whole.assign({name: good[0][name] for name in ("unit", "wanted")})

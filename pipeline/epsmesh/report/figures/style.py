@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.style.core import STYLE_BLACKLIST
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from epsmesh.files import atomic
@@ -25,8 +24,14 @@ _PHONE, _PHONE_PANEL, _PHONE_LINE, _PHONE_LETTERS = 3.4, 2.2, 0.19, 38
 _LETTERS, _LEGEND_LETTERS = 13, 24
 _DECADES = {"x": 1.4, "y": 2.2}  # from here on a logarithmic axis writes powers of ten alone
 _NARROW = 3.0  # below this ratio of its ends, even steps
+# What is of the program that draws, not of a figure: what matplotlib's own styles leave alone.
+_NO_STYLE = {
+    "backend", "backend_fallback", "date.epoch", "docstring.hardcopy", "figure.max_open_warning",
+    "figure.raise_window", "interactive", "savefig.directory", "timezone", "tk.window_focus", "toolbar",
+    "webagg.address", "webagg.open_in_browser", "webagg.port", "webagg.port_retries",
+}  # fmt: skip
 # A matplotlibrc, of the user or of the current folder, changes nothing: the same dataset gives the same file.
-DEFAULTS = {name: value for name, value in mpl.rcParamsDefault.items() if name not in STYLE_BLACKLIST}
+DEFAULTS = {name: value for name, value in mpl.rcParamsDefault.items() if name not in _NO_STYLE}
 STYLE = DEFAULTS | {
     "font.size": SIZE,
     "axes.titlesize": SIZE,
