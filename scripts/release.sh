@@ -90,8 +90,8 @@ try_packages() { # identification, and a real-time query with and without the st
     (
         cd "$work/away"
         export EPSMESH_CACHE="$work/cache" OMP_NUM_THREADS=1
-        "$work/venv/bin/epsmesh" new punch --like identify-punch >/dev/null
-        "$work/venv/bin/epsmesh" identify studies/punch.toml >identified
+        "$work/venv/bin/epsmesh" new gel --like identify-punch >/dev/null
+        "$work/venv/bin/epsmesh" identify studies/gel.toml >identified
         grep -q "if the body is as declared" identified || fail "identify says $(cat identified)"
         cat >studies/touched.toml <<'TOML'
 [body]
