@@ -1,5 +1,6 @@
 """Surrogates of wide layered bodies by an integral equation: which scenes it has, and what solves say to it."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,7 +13,8 @@ from epsmesh_identify.estimation.forward import forward_of
 from epsmesh_identify.estimation.parts import Unknown
 from epsmesh_identify.layered.body import LayeredBody
 from epsmesh_identify.layered.compliance import Layer
-from epsmesh_identify.surrogate.wide import layered_body, profile_of, solve_wide
+from epsmesh_identify.surrogate.cases import domain_of
+from epsmesh_identify.surrogate.wide import layered_body, profile_of, solve_wide, wide_solve
 from tests.studies import changed
 
 SKIN = {"name": "skin", "young": "50 kPa", "poisson": 0.45, "thickness": "1 mm"}
@@ -135,3 +137,20 @@ def test_contact_too_wide_for_the_equation_is_a_case_without_force():
     assert np.isnan(dataset["force"])
     assert dataset["status"] == "failed"
     assert "too wide" in str(dataset["message"].values)
+
+
+@pytest.mark.parametrize("support", ["bottom", "bottom+sides"])
+def test_without_solver_the_bar_covers_what_the_sides_do(support, tmp_path):
+    def missing(_):
+        raise ModuleNotFoundError(name="dolfinx")
+
+    body = {"layer": [SKIN], "radius": "16 mm", "fixed": support}
+    study = parse(changed(WIDE, body=body, probe=DISC), file="wide.toml")
+    domain = domain_of(study, {}, study.case((0,) * len(study.shape)).probe.depth)
+    equation, differs = wide_solve(domain, missing)
+    found, solved = equation(study), solve(study, MPI.COMM_SELF, tmp_path / "store.nc")
+    off = abs(float(found["force"].squeeze()) / float(solved["force"].squeeze()) - 1)
+    assert differs == 0.0 and 1e-5 < off < float((found["force_error"] / found["force"]).squeeze()) <= 0.02
+    near = parse(changed(WIDE, body=body | {"radius": "8 mm"}, probe=DISC), file="wide.toml")
+    with pytest.raises(ModuleNotFoundError):
+        wide_solve(replace(domain, scene=near), missing)
