@@ -49,12 +49,14 @@ def test_forces_that_do_not_balance_are_a_failure():
 
 def test_what_does_not_converge_is_a_failure():
     """For an indefinite operator no energy is smallest, and conjugate gradients fail."""
-    matrix = PETSc.Mat().createAIJ(2, nnz=2, comm=PETSc.COMM_SELF)
-    matrix.setValues([0, 1], [0, 1], [1.0, 3.0, 3.0, 1.0])
+    matrix = PETSc.Mat().createAIJ(200, nnz=3, comm=PETSc.COMM_SELF)  # more than a coarsest level solves at once
+    for row in range(200):
+        columns = [column for column in (row - 1, row, row + 1) if 0 <= column < 200]
+        matrix.setValues([row], columns, [1.0 if column == row else -1.0 for column in columns])
     matrix.assemble()
     solver = LinearSolver([Level(None, matrix, np.empty(0, np.int32))], direct=False)
     rhs, unknown = matrix.createVecs()
-    rhs.setValues([0, 1], [1.0, -1.0])
+    rhs.setValues(range(200), [1.0, 0.0] * 100)
     rhs.assemble()
     with pytest.raises(SolveError, match="did not converge: diverged_"):
         solver.solve(rhs, unknown, 1e-6)
