@@ -29,6 +29,7 @@ SMALL = {1: ((4, 2), (3, 1), (2, 0.8)), 2: ((10, 3), (8, 1), (5, 0.8)), 3: ((20,
 LARGE = {1: ((1, 0.2), (0.6, 0.2)), 2: ((1.7, 0.2), (1.0, 0.2), (0.63, 0.2)), 3: ((2.6, 0.3), (1.7, 0.2))}
 RATIOS = {"displacement": (0.3, 0.45, 0.49), "mixed": (0.45, 0.49, 0.4999)}
 YOUNG = 10e3
+WITHOUT_HYPRE = "iterative, gamg"
 PRESS = Motion((0.0, 0.0, -1.0))
 # Solves that take longer than this (s) are not repeated: they vary little.
 _ENOUGH = 8.0
@@ -56,11 +57,15 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
 
     from epsmesh.run.memory import PeakMemory
     from epsmesh.run.meshing import mesh_case
+    from epsmesh.solve import krylov
     from epsmesh.solve.conditions import Conditions
     from epsmesh.solve.physics import MaterialLaw
     from epsmesh.solve.quasi_static import QuasiStaticProblem
     from epsmesh.solve.spaces import Spaces
 
+    how = method
+    if method == WITHOUT_HYPRE:
+        krylov.has_hypre, how = (lambda: False), "iterative"
     with threadpool_limits(limits=1), ExitStack() as stack:
         mesh = mesh_case(case_of(degree, size), ("x", "y"), MPI.COMM_SELF)
         base = PeakMemory(MPI.COMM_SELF)
@@ -69,7 +74,7 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
             QuasiStaticProblem(stack.enter_context(Spaces(mesh)), degree, Conditions(), element)
         )
         run = _mixed_run if element == "mixed" else _elastic_run
-        matrix, once = run(problem, MaterialLaw.of_moduli(YOUNG, poisson), method, stack)
+        matrix, once = run(problem, MaterialLaw.of_moduli(YOUNG, poisson), how, stack)
         runs, start = [], time.process_time()
         while len(runs) < repeats and (not runs or time.process_time() - start < _ENOUGH):
             before = _application(matrix)
@@ -199,7 +204,9 @@ def crossovers(rows: list[dict[str, Any]]) -> dict[str, int]:
         for row in rows:
             if (row["element"], row["degree"]) == kind and row["poisson"] == RATIOS[kind[0]][0]:
                 times.setdefault(row["dofs"], {})[row["method"]] = row["total"]
-        both = sorted((d, log(t["direct"] / t["iterative"])) for d, t in times.items() if len(t) == 2)
+        both = sorted(
+            (d, log(t["direct"] / t["iterative"])) for d, t in times.items() if t.keys() >= {"direct", "iterative"}
+        )
         for (low, a), (high, b) in itertools.pairwise(both):
             if a <= 0 < b:
                 found[f"{kind[0]} {kind[1]}"] = round(exp(log(low) + log(high / low) * a / (a - b)))
@@ -217,7 +224,8 @@ def plan(largest: int) -> list[tuple[str, int, float, tuple[float, float], str]]
         for element in ("displacement", "mixed")[: 2 if degree == 2 else 1]:
             for number, size in enumerate(sizes[:largest]):
                 ratios = RATIOS[element] if number < 2 and degree > 1 else RATIOS[element][:1]
-                todo += [(element, degree, poisson, size, "iterative") for poisson in ratios]
+                methods = ("iterative", WITHOUT_HYPRE)[: 2 if number == 0 else 1]
+                todo += [(element, degree, poisson, size, method) for poisson in ratios for method in methods]
     return todo
 
 

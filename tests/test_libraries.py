@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from epsmesh import libraries
+from epsmesh.launcher import LauncherError, check_protocol, check_size
 from epsmesh.libraries import System, sentence_on, solver_on
 
 WHEELS = System("Linux", "x86_64", (3, 12), (2, 36), True, is_debian=False, is_root=False, is_checkout=False)
@@ -56,3 +57,30 @@ def test_a_second_petsc_beside_the_wheels_is_told_with_what_to_uninstall(monkeyp
     monkeypatch.setattr(libraries.importlib.util, "find_spec", lambda _: object())
     said = sentence_on(ImportError("petsc, petsc4py are installed in this environment. Uninstall petsc petsc4py"))
     assert "a second PETSc" in said and "pip uninstall petsc petsc4py slepc slepc4py" in said
+
+
+@pytest.mark.parametrize("environment", [{"OMPI_COMM_WORLD_SIZE": "2", "PMIX_RANK": "0"}, {"PMIX_RANK": "1"}])
+def test_a_launcher_that_aborts_the_mpi_of_the_wheels_is_refused_before_it_is_loaded(environment):
+    with pytest.raises(LauncherError, match="have MPICH: use `"):
+        check_protocol(environment)
+
+
+@pytest.mark.parametrize("environment", [{"PMI_SIZE": "2", "PMI_RANK": "0"}, {"PMIX_RANK": "1"}])
+def test_ranks_that_do_not_see_each_other_are_refused(environment):
+    """MPICH's mpiexec with Debian's Open MPI: each process is alone, and would write the same files."""
+    with pytest.raises(LauncherError, match="takes each for a run of its own"):
+        check_size(1, "Open MPI", environment)
+
+
+@pytest.mark.parametrize(
+    ("size", "environment"),
+    [
+        (1, {}),
+        (1, {"PMI_SIZE": "1", "PMI_RANK": "0"}),
+        (2, {"PMI_SIZE": "2", "PMI_RANK": "1", "MPI_LOCALNRANKS": "2"}),
+        (1, {"SLURM_NTASKS": "4", "SLURM_PROCID": "3"}),
+    ],
+)
+def test_ranks_that_see_each_other_are_not(size, environment):
+    check_protocol(environment)
+    check_size(size, "MPICH", environment)

@@ -14,8 +14,15 @@ _RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 _LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "MPI_LOCALNRANKS")
 # For one process Open MPI need neither start its daemon nor look for a network: half a second, mostly of waiting.
 _ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_pml": "ob1"}
+# Ranks that a launcher has started. With PMIx alone a rank tells that there are as many, and one more.
+_SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
+_PMIX = "PMIX_RANK"
 _NO_SIGNALS = "-no_signal_handler"
 _PREFIXES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_")
+
+
+class LauncherError(ImportError):
+    """The launcher is another MPI's than the one that the solver is linked to."""
 
 
 def is_launched() -> bool:
@@ -54,6 +61,43 @@ def has_first_rank_ended() -> bool:
         return not any(b"PMI_RANK=0" in Path("/proc", one, "environ").read_bytes().split(b"\0") for one in beside)
     except OSError:
         return False
+
+
+def check_protocol(environment: Mapping[str, str] = os.environ) -> None:
+    """Refuse a launcher that the wheels' MPI, MPICH, cannot speak to; before MPI is loaded, which would abort.
+
+    Raises:
+        LauncherError: if it speaks PMIx only, as Open MPI's does.
+    """
+    if _PMIX not in environment or "PMI_RANK" in environment:
+        return
+    if "OMPI_COMM_WORLD_SIZE" in environment:
+        raise LauncherError(f"mpirun is Open MPI's, but the solver's wheels have MPICH: use {_own_launcher()}")
+    raise LauncherError("the launcher speaks PMIx, but the solver's wheels have MPICH: use `srun --mpi=pmi2`")
+
+
+def check_size(size: int, library: str, environment: Mapping[str, str] = os.environ) -> None:
+    """Refuse ranks that do not see each other: each would compute the whole study, and write the same files.
+
+    ``size`` is that of MPI's world, ``library`` the first words of MPI's version.
+
+    Raises:
+        LauncherError: if the launcher has started several ranks, and each believes to be alone.
+    """
+    sizes = [int(environment[name]) for name in _SIZES if environment.get(name, "").isdigit()]
+    rank = environment.get(_PMIX, "")
+    started = max([1, *sizes, int(rank) + 1 if rank.isdigit() else 1])
+    if size == 1 < started:
+        raise LauncherError(
+            f"the launcher started several processes, and {library} takes each for a run of its own: the launcher is "
+            f"another MPI's; use {_own_launcher()}"
+        )
+
+
+def _own_launcher() -> str:
+    """Return the launcher beside this Python, where wheels put it, or else that of the system."""
+    beside = Path(sys.prefix) / "bin" / "mpiexec"
+    return f"`{beside if beside.exists() else '/usr/bin/mpirun'} -n 2 epsmesh …`"
 
 
 def is_interrupt(error: BaseException) -> bool:

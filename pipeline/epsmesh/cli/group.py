@@ -22,7 +22,7 @@ from epsmesh.cli.faults import (
 )
 from epsmesh.extensions import commands
 from epsmesh.files import NOT_UTF8, is_utf8
-from epsmesh.launcher import is_first_rank, is_interrupt, is_launched
+from epsmesh.launcher import LauncherError, is_first_rank, is_interrupt, is_launched
 from epsmesh.libraries import sentence_on
 from epsmesh.printable import printable
 
@@ -134,6 +134,8 @@ class Commands(TyperGroup):
             raise
         except (Exception, KeyboardInterrupt) as wrong:
             plain = isinstance(wrong, typer.Exit) or not is_interrupt(wrong)
+            if isinstance(wrong, LauncherError):
+                fail(str(wrong), on_all_ranks=True)
             if plain and isinstance(wrong, ImportError) and (sentence := sentence_on(wrong)):
                 fail(sentence)
             ended = wrong if plain else KeyboardInterrupt()

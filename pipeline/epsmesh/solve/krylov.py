@@ -49,13 +49,14 @@ SOLVERS: dict[str, dict[str, Any]] = {
         "pc_hypre_boomeramg_relax_type_up": "backward-SOR/Jacobi",
     },
 }
-# Where PETSc has no hypre, as in the wheels: aggregation, the same on any number of ranks (docs/solvers.md).
+# Where PETSc has no hypre, as in the wheels: smoothed aggregation of all neighbours, with rigid-body modes. Without
+# these a thin stiff layer does not converge (docs/solvers.md). Jacobi is the same on any number of ranks.
 _WITHOUT_HYPRE = {
     "pc_type": "gamg",
-    "pc_gamg_threshold": 0.02,
+    "pc_gamg_threshold": 0.0,
+    "pc_gamg_esteig_ksp_max_it": 20,
     "mg_levels_ksp_type": "chebyshev",
     "mg_levels_ksp_max_it": 2,
-    "mg_levels_ksp_chebyshev_esteig_steps": 10,
     "mg_levels_pc_type": "jacobi",
 }
 # On several ranks a sweep uses old values of other ranks. Where the material jumps this amplifies errors, and the
@@ -113,14 +114,19 @@ def check_converged(ksp: PETSc.KSP) -> int:
     return int(ksp.its)
 
 
-def configure(solver: PETSc.KSP | PETSc.PC | PETSc.SNES, options: Mapping[str, Any]) -> None:
-    """Set PETSc ``options`` of a solver under a prefix of its own, and remove them again; collective."""
+def configure(solver: PETSc.KSP | PETSc.PC | PETSc.SNES, options: Mapping[str, Any], *, set_up: bool = False) -> None:
+    """Set PETSc ``options`` of a solver under a prefix of its own, and remove them again; collective.
+
+    With ``set_up`` it is set up between: the levels of a multigrid read their options only when they are made.
+    """
     held, prefix = PETSc.Options(), f"epsmesh{next(_prefixes)}_"
     try:
         solver.setOptionsPrefix(prefix)
         for name, value in options.items():
             held[prefix + name] = value
         solver.setFromOptions()
+        if set_up:
+            solver.setUp()
     finally:
         for name in options:
             held.delValue(prefix + name)
@@ -163,16 +169,33 @@ def factorised(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:
     raise SolveError(f"the factorisation needs more than {WORK_SPACE[-1]} % above its predicted work space")
 
 
-def algebraic(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.PC:
-    """Return algebraic multigrid for a ``matrix`` of degree 1, freed with the ``stack``; collective."""
+def algebraic(matrix: PETSc.Mat, space: Any, stack: ExitStack) -> PETSc.PC:
+    """Return algebraic multigrid for a ``matrix`` on a ``space`` of degree 1, freed with the ``stack``; collective."""
     pc = keep(stack, PETSc.PC().create(matrix.comm))
     pc.setOperators(matrix)
-    if PETSc.Sys.hasExternalPackage("hypre"):
+    if has_hypre():
         configure(pc, SOLVERS["degree 1"] | (_ON_RANKS if matrix.comm.size > 1 else {}))
+        pc.setUp()
     else:
-        configure(pc, _WITHOUT_HYPRE)
-    pc.setUp()
+        if space is not None:
+            _set_rigid_body_modes(matrix, space)
+        configure(pc, _WITHOUT_HYPRE, set_up=True)
     return pc
+
+
+def has_hypre() -> bool:
+    """Return whether PETSc was built with hypre."""
+    return bool(PETSc.Sys.hasExternalPackage("hypre"))
+
+
+def _set_rigid_body_modes(matrix: PETSc.Mat, space: Any) -> None:
+    """Tell a matrix the motions that its coarse levels must contain; collective."""
+    with ExitStack() as made:
+        points = keep(made, matrix.createVecLeft())
+        rows, width = points.getLocalSize(), matrix.getBlockSize()
+        points.array[:] = space.tabulate_dof_coordinates()[: rows // width, :width].ravel()
+        points.setBlockSize(width)
+        matrix.setNearNullSpace(keep(made, PETSc.NullSpace().createRigidBody(points)))
 
 
 def keep(stack: ExitStack, item: Any) -> Any:

@@ -1,7 +1,7 @@
 """The linear solver for elasticity: a factorisation, or conjugate gradients preconditioned by a multigrid cycle.
 
 The cycle coarsens in degree (p, p - 1, …, 1), :mod:`epsmesh.solve.kernels.multigrid`; below degree 1 it is hypre's
-BoomerAMG.
+BoomerAMG, or PETSc's GAMG where PETSc has no hypre.
 """
 
 import itertools
@@ -85,13 +85,13 @@ class LinearSolver:
     def _preconditioner(self, below: "LinearSolver | None") -> "PETSc.PC | Cycle":
         levels = self.levels
         if len(levels) == 1:
-            return algebraic(self.matrix, self._stack)
+            return algebraic(self.matrix, levels[0].space, self._stack)
         below = below if below is not None and below.supports(levels) else None
         known = 1 if below is None else len(levels) - 1
         smoothed = [SmoothedLevel(operator_of(level.matrix), jumps=level.jumps) for level in levels[known:]]
         between = list(map(interpolation, levels[known - 1 :], levels[known:]))
         if below is None:
-            self.cycle = Cycle(smoothed, between, algebraic(levels[0].matrix, self._stack))
+            self.cycle = Cycle(smoothed, between, algebraic(levels[0].matrix, levels[0].space, self._stack))
         elif below.cycle is None:
             self.cycle = Cycle(smoothed, between, below.ksp.pc)
         else:
@@ -173,7 +173,7 @@ class LinearSolver:
         """
         self.levels = levels
         with explained():
-            self._hold(algebraic(levels[0].matrix, self._stack))
+            self._hold(algebraic(levels[0].matrix, levels[0].space, self._stack))
 
     def _hold(self, coarse: PETSc.PC) -> None:
         assert self.cycle is not None
