@@ -55,9 +55,6 @@ def __getattr__(name: str) -> Any:
 
     if name in _ERRORS:
         return getattr(import_module(_ERRORS[name]), name)
-    if name.isidentifier() and not name.startswith("_"):
-        from epsmesh.extensions import found  # noqa: PLC0415
-
-        if name in found("packages"):
-            return found("packages")[name].load()
+    if name == "realtime":
+        return import_module("epsmesh.realtime")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -13,7 +13,7 @@ A distribution declares them, and epsmesh finds them wherever they are installed
 - ``epsmesh.files``: a kind of file by its ending, without the dot: the function of a path that ``epsmesh.open`` calls.
 - ``epsmesh.forecasts``: what else can be made of a study, by any name: a function of a study, a cost model and the
   number of ranks, which returns the :class:`Forecast` of it that `epsmesh plan` tells.
-- ``epsmesh.packages``: a package that ``epsmesh.NAME`` offers.
+- ``epsmesh.packages``: under the name ``realtime``, the package that ``epsmesh.realtime`` is.
 - ``epsmesh.methods``: a method of what ``epsmesh.read`` returns, by its name: a function of the study, an
   :class:`epsmesh.api.RunnableStudy`.
 - ``epsmesh.truths``: known forces, by any name: a function of the communicator and of ``quick`` that yields rows for

@@ -134,14 +134,16 @@ def test_without_a_compiler_a_sentence_says_what_to_install(tmp_path, monkeypatc
         with pytest.raises(BuildError, match=words):
             built.library()
         left = list((tmp_path / ".built" if compiler else tmp_path).iterdir())
-        assert [path.name for path in left] == ([] if compiler else ["epsmesh.c"])
+        assert [path.name for path in left] == ([] if compiler else ["pyproject.toml"])
     finally:
         built.library.cache_clear()
 
 
 def test_libraries_of_earlier_sources_are_removed_after_a_day(tmp_path, monkeypatch):
+    (tmp_path / "pyproject.toml").touch()
     (tmp_path / "epsmesh.c").write_text("int one(void) { return 1; }\n")
-    monkeypatch.setattr(built, "_CHECKOUT", tmp_path)
+    for folder in ("_PACKAGE", "_SOURCES"):
+        monkeypatch.setattr(built, folder, tmp_path)
     first = built._built()
     (tmp_path / "epsmesh.c").write_text("int one(void) { return 2; }\n")
     second = built._built()
