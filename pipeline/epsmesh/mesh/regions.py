@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from epsmesh.arrays import FloatArray
-from epsmesh.plan.estimate import FLATTEST, IN_LAYER
+from epsmesh.plan.estimate import FAR, FLATTEST, IN_LAYER
 from epsmesh.scene.model import Scene
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.frame import Vector
@@ -89,7 +89,8 @@ class LayerSizes:
         """Return the size (m) at points (n, 3)."""
         off = np.maximum(np.maximum(self.bottom - points[:, 2], points[:, 2] - self.top), 0.0)
         away = np.maximum(np.linalg.norm(points - np.array(self.contact), axis=1) - self.reach, 0.0)
-        size = np.minimum(IN_LAYER * self.thickness + self.growth * away, FLATTEST * self.thickness)
+        flattest = FLATTEST * self.thickness * np.maximum(away / (FAR * self.reach), 1.0)
+        size = np.minimum(IN_LAYER * self.thickness + self.growth * away, flattest)
         return np.asarray(size + self.growth * off)
 
     def terms(self, unit: float, kernel: Any) -> Iterator[str]:
@@ -99,7 +100,8 @@ class LayerSizes:
         off = f"Max(Max({bottom:.12g}-z,z-({top:.12g})),0)"
         yield f"{IN_LAYER * (top - bottom):.12g}+{self.growth:.12g}*({off}+{away})"
         if FLATTEST * self.thickness < self.largest:
-            yield f"{FLATTEST * (top - bottom):.12g}+{self.growth:.12g}*{off}"
+            farther = f"Max({away}/{unit * FAR * self.reach:.12g},1)"
+            yield f"{FLATTEST * (top - bottom):.12g}*{farther}+{self.growth:.12g}*{off}"
 
 
 @dataclass(frozen=True, eq=False)

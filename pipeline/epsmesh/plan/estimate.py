@@ -43,6 +43,9 @@ IN_LAYER = 0.5
 # thicknesses (no limit), 20 and 8 take 163, 39 and 25 iterations at ν = .3, and .45 fails without a limit, which takes
 # 82 with 40 and 64 with 20. Without a limit F is 4 % too large, with 20 .2 %.
 FLATTEST = 20.0
+# Distance from the tool beyond which this grows in proportion, in units of what is below the tool: elements there count
+# for little, and a body as large as a half-space would be full of them.
+FAR = 20.0
 # Factor on the number of elements of regions, because element faces follow the interfaces; tetrahedra per triangle of a
 # film.
 _MEETING, _IN_FILM = 1.75, 3
@@ -102,7 +105,7 @@ def _of_regions(case: Case) -> list[float]:
     body, growth = case.body, case.mesh.growth
     found, high = [], body.heights[1]
     for low in body.interfaces:
-        found.append(_of_layer(case, high, low) + _of_film(case, FLATTEST * (high - low)))
+        found.append(_of_layer(case, high, low) + _of_film(case, high, low))
         high = low
     found += [0.0] * (len(body.regions) - len(body.embedded) - len(found))  # the last of layers that fill the body
     for piece in body.embedded:
@@ -114,7 +117,7 @@ def _of_regions(case: Case) -> list[float]:
 
 def _of_layer(case: Case, high: float, low: float) -> float:
     """Return the same of a layer between two heights (m), near the tool."""
-    size, radius = IN_LAYER * (high - low), case.probe.circumradius + case.body.heights[1] - low
+    size, radius = IN_LAYER * (high - low), _below(case, low)
     if size >= case.mesh.fine:
         return 0.0
     within = pi * radius**2 * (high - low) / size**3
@@ -122,15 +125,25 @@ def _of_layer(case: Case, high: float, low: float) -> float:
     return within + rings / (2 * case.mesh.growth * size**2)
 
 
-def _of_film(case: Case, size: float) -> float:
-    """Return the same of a layer and what is below it, far from the tool, where its largest ``size`` (m) counts."""
-    if size >= (case.mesh.fine if case.is_full else case.mesh.coarse):
+def _below(case: Case, low: float) -> float:
+    """Return the radius (m) of what is below the tool, down to a height (m)."""
+    return case.probe.circumradius + case.body.heights[1] - low
+
+
+def _of_film(case: Case, high: float, low: float) -> float:
+    """Return the same of a layer and what is below it, far from the tool, where its largest element size counts."""
+    size, largest = FLATTEST * (high - low), case.mesh.fine if case.is_full else case.mesh.coarse
+    if size >= largest:
         return 0.0
     area = case.body.volume / (case.body.heights[1] - case.body.heights[0])
     if case.is_truncated:
         area = min(area, pi * case.mesh.epsilon**2)
+    # Beyond a distance sizes grow in proportion to it: ∫ 2πr / size² dr, up to the side or the largest size.
+    far = (1 + FAR) * _below(case, low)
+    ratio = min((area / pi) ** 0.5 / far, largest / size)
+    counted = min(area, pi * far**2) + (2 * pi * far**2 * log(ratio) if ratio > 1 else 0.0)
     flat = _IN_FILM * _TETRAHEDRON / (_MEETING * _TRIANGLE)
-    return area / size**2 * (flat + 1 / (2 * case.mesh.growth))
+    return counted / size**2 * (flat + 1 / (2 * case.mesh.growth))
 
 
 def dofs(count: float, degree: int) -> float:
