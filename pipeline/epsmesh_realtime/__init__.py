@@ -1,13 +1,19 @@
-"""Forces of tools on a body from a small file, in microseconds: an evaluator in C, called with numpy alone."""
+"""Forces of tools on a body from a small file, in microseconds: an evaluator in C, called with numpy alone.
 
-from epsmesh_realtime.file import ModelError
-from epsmesh_realtime.history import History
-from epsmesh_realtime.library import BuildError, source_files, sources
-from epsmesh_realtime.model import Model, read
-from epsmesh_realtime.patch import Patch, Tip
-from epsmesh_realtime.query import Query
-from epsmesh_realtime.surface import Surface, read_surface
-from epsmesh_realtime.touch import Touch, Touches
+Nothing is imported before it is needed: the help of a command that this package adds needs no numpy.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from epsmesh_realtime.file import ModelError
+    from epsmesh_realtime.history import History
+    from epsmesh_realtime.library import BuildError, source_files, sources
+    from epsmesh_realtime.model import Model, read
+    from epsmesh_realtime.patch import Patch, Tip
+    from epsmesh_realtime.query import Query
+    from epsmesh_realtime.surface import Surface, read_surface
+    from epsmesh_realtime.touch import Touch, Touches
 
 __all__ = [
     "BuildError",
@@ -25,3 +31,29 @@ __all__ = [
     "source_files",
     "sources",
 ]
+
+_MODULES = {
+    "file": ("ModelError",),
+    "history": ("History",),
+    "library": ("BuildError", "source_files", "sources"),
+    "model": ("Model", "read"),
+    "patch": ("Patch", "Tip"),
+    "query": ("Query",),
+    "surface": ("Surface", "read_surface"),
+    "touch": ("Touch", "Touches"),
+}
+_OWNERS = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Return a public name."""
+    from importlib import import_module  # noqa: PLC0415
+
+    if name not in _OWNERS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_OWNERS[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """Return the public names."""
+    return __all__

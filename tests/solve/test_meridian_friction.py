@@ -103,7 +103,7 @@ def test_a_study_is_solved_on_the_meridian_as_in_three_dimensions(material):
         "mesh": {"rim": "1 mm", "fine": "4 mm", "coarse": "6 mm", "growth": 1.2},
     }
     (plane,), (space,) = (solve(**scene, plan={"without": without}).values() for without in ([], ["axisymmetric"]))
-    assert (plane.status, plane.kind) == ("ok", "meridian large")
+    assert (plane.status, plane.kind) == ("ok", "meridian friction")
     assert plane.force == pytest.approx(space.force, rel=space.force_error + plane.force_error)
     assert plane.contact_area == pytest.approx(space.contact_area, rel=0.1)
     assert 0 < plane.slip_area < plane.contact_area
