@@ -43,7 +43,8 @@ def test_it_is_of_the_order_of_what_is_solved(bounds):
 
 def test_plan_tells_the_forces_of_a_study_with_ranges(epsmesh, tmp_path):
     found = json.loads(epsmesh("plan", "studies/sensitivity.toml", "--output", tmp_path, "--json").stdout)
-    (told,) = found["forecasts"]
+    told, export = found["forecasts"]
     assert told["command"] == "sensitivity" and told["least"] == 3
+    assert export["command"] == "export"
     lines = epsmesh("plan", "studies/sensitivity.toml", "--output", tmp_path).stdout
     assert "sensitivity, forces of the scene: 3 solves" in lines
