@@ -6,9 +6,7 @@ only cases in hand are lost. With ``--ended`` each command is then run to its en
 """
 
 import argparse
-import os
 import random
-import signal
 import sys
 import time
 from collections import Counter
@@ -134,7 +132,7 @@ class Slow(Scene):
         one = bool(ranks) and self.command.ranks > 1 and dice.random() < 0.5
         for victim in [dice.choice(ranks)] if one else alive:
             with suppress(psutil.Error):
-                os.kill(victim.pid, signal.SIGKILL)
+                victim.kill()
         with suppress(Exception):
             process.wait(60.0)
         for left in self._alive():
