@@ -103,6 +103,28 @@ def write(path: Path, heads: tuple[str, ...], columns: np.ndarray, factors: tupl
     path.write_text("\n".join([",".join(heads), *rows]) + "\n", encoding="utf-8")
 
 
+# A study of the curves that `write_punch` makes, in `file`.
+PUNCH = """title = "Punch"
+[body]
+shape = "cylinder"
+radius = "40 mm"
+height = "10 mm"
+fixed = "bottom"
+[material]
+poisson = 0.4
+[probe]
+shape = "disc"
+radius = "2 mm"
+contact = "frictionless"
+[[measurement]]
+name = "punch"
+file = "{file}"
+[identify]
+young = ["1 kPa", "1 MPa"]
+may_hide = {may_hide}
+"""
+
+
 def write_punch(path: Path, young: float, seed: int) -> None:
     """Write the curve of a flat punch of 2 mm on a wide layer of 10 mm, of ``young`` (Pa)."""
     found = pressed(body((young, 0.4, 10e-3)), disc(2e-3), 0.2e-3, Machine(0.5e-3, 1e-3, count=150), seed)

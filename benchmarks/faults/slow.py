@@ -24,6 +24,7 @@ from epsmesh.run.store import Store
 from epsmesh.study.read import read_study
 from epsmesh_realtime.export.kept import Kept
 from epsmesh_realtime.export.scope import scope_of
+from scripts.make_curves import PUNCH, write_punch
 from tests.studies import small_text
 
 ROOT = Path(__file__).parents[2]
@@ -38,24 +39,7 @@ _RUN = small_text(
     solve={"exact": False},
 )
 _PATH = {"needle": "needle-path.toml", "scalpel": "scalpel-path.toml"}
-_CURVES = """title = "Punch"
-[body]
-shape = "cylinder"
-radius = "40 mm"
-height = "10 mm"
-fixed = "bottom"
-[material]
-poisson = 0.4
-[probe]
-shape = "disc"
-radius = "2 mm"
-contact = "frictionless"
-[[measurement]]
-name = "punch"
-file = "curves/*.csv"
-[identify]
-young = ["1 kPa", "1 MPa"]
-"""
+_CURVES = PUNCH.format(file="curves/*.csv", may_hide='["layer", "base", "strain"]')
 _ASKED = {"epsilon": None, "fine": None, "coarse": None, "rim": None, "accuracy": "1 %"}
 _EXPORT = small_text(mesh=_ASKED)
 _BALL = {"shape": "sphere", "radius": "6 mm", "depth": "0.6 mm", "contact": "unilateral"}
@@ -183,8 +167,6 @@ def _rank_of(process: psutil.Process) -> str:
 
 
 def _write_curves(folder: Path) -> None:
-    from scripts.make_curves import write_punch
-
     folder.mkdir()
     for number in range(40):
         write_punch(folder / f"gel_{number}.csv", 20e3 + 500.0 * number, number)

@@ -10,29 +10,10 @@ import xarray as xr
 import epsmesh as package
 from epsmesh.study.problems import StudyError
 from epsmesh_identify.estimation.estimate import identify
-from scripts.make_curves import TRUTH, main, write, write_punch
+from scripts.make_curves import PUNCH, TRUTH, main, write, write_punch
 from tests.commands import run_script
 
 YOUNG = 20e3
-STUDY = """title = "Punch"
-[body]
-shape = "cylinder"
-radius = "40 mm"
-height = "10 mm"
-fixed = "bottom"
-[material]
-poisson = 0.4
-[probe]
-shape = "disc"
-radius = "2 mm"
-contact = "frictionless"
-[[measurement]]
-name = "punch"
-file = "{file}"
-[identify]
-young = ["1 kPa", "1 MPa"]
-may_hide = {may_hide}
-"""
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +23,9 @@ def folder(tmp_path_factory):
     (folder / "curves").mkdir()
     for number, young in enumerate((20e3, 25e3, 30e3), start=8):
         write_punch(folder / "curves" / f"gel_{number}.csv", young, seed=number)
-    (folder / "punch.toml").write_text(STUDY.format(file="curves/gel_8.csv", may_hide='["layer", "base"]'))
-    (folder / "three.toml").write_text(STUDY.format(file="curves/*.csv", may_hide="[]"))
-    (folder / "none.toml").write_text(STUDY.format(file="curves/nothing.csv", may_hide="[]"))
+    (folder / "punch.toml").write_text(PUNCH.format(file="curves/gel_8.csv", may_hide='["layer", "base"]'))
+    (folder / "three.toml").write_text(PUNCH.format(file="curves/*.csv", may_hide="[]"))
+    (folder / "none.toml").write_text(PUNCH.format(file="curves/nothing.csv", may_hide="[]"))
     return folder
 
 
@@ -96,7 +77,7 @@ def test_many_files_are_a_dimension_and_each_is_kept(folder, epsmesh, found, mon
 
 
 def test_an_interrupted_folder_loses_no_more_than_the_curve_in_hand(folder, epsmesh, found, monkeypatch):
-    (folder / "ended.toml").write_text(STUDY.format(file="curves/*.csv", may_hide="[]").replace("Punch", "Ended"))
+    (folder / "ended.toml").write_text(PUNCH.format(file="curves/*.csv", may_hide="[]").replace("Punch", "Ended"))
     fitted = []
 
     def ended(measured, unknowns):
@@ -132,7 +113,7 @@ def test_a_bad_file_is_a_row_and_what_is_told_of_files_is_told_once(folder, epsm
         return identify(measured, unknowns)
 
     monkeypatch.setattr("epsmesh_identify.estimation.many.identify", fitted)
-    (folder / "many.toml").write_text(STUDY.format(file="many/*.csv", may_hide="[]"))
+    (folder / "many.toml").write_text(PUNCH.format(file="many/*.csv", may_hide="[]"))
     result = epsmesh("identify", folder / "many.toml", "--output", folder / "results")
     assert result.exit_code == 1, result.output
     assert result.stdout.rstrip().endswith("many.toml: 3 of 7 files failed")
@@ -156,7 +137,7 @@ def test_a_bad_file_is_a_row_and_what_is_told_of_files_is_told_once(folder, epsm
 
 def test_ranks_share_the_files_and_find_the_same(folder, spawn, found):
     """The files of this study are fitted afresh: its title differs from that of another one."""
-    text = STUDY.format(file="curves/*.csv", may_hide="[]").replace("Punch", "On two ranks")
+    text = PUNCH.format(file="curves/*.csv", may_hide="[]").replace("Punch", "On two ranks")
     (folder / "shared.toml").write_text(text)
     done = spawn("identify", folder / "shared.toml", "--output", folder / "results", ranks=2)
     assert done.returncode == 0, done.stderr
@@ -183,7 +164,7 @@ def test_what_curves_and_ranges_give_is_needed_for_cases(folder, epsmesh, comman
 
 def test_the_error_of_a_radius_widens_the_bar(folder, epsmesh, found):
     """F of a flat punch is proportional to its radius, but for the thickness of the layer."""
-    text = STUDY.format(file="curves/gel_8.csv", may_hide="[]")
+    text = PUNCH.format(file="curves/gel_8.csv", may_hide="[]")
     (folder / "vague.toml").write_text(text.replace("[identify]", 'errors = {radius = "6 %"}\n[identify]'))
     result = epsmesh("identify", folder / "vague.toml", "--output", folder / "results")
     assert result.exit_code == 0, result.output
@@ -256,7 +237,7 @@ def test_python_gets_the_dataset(folder, found):
 def test_forces_are_computed_deeper_for_a_curve_without_air(folder, epsmesh, found):
     rows = np.loadtxt(folder / "curves" / "gel_8.csv", delimiter=",", skiprows=1)
     write(folder / "late.csv", ("depth (mm)", "force (mN)"), rows[90:], (1.0, 1.0))
-    (folder / "late.toml").write_text(STUDY.format(file="late.csv", may_hide="[]"))
+    (folder / "late.toml").write_text(PUNCH.format(file="late.csv", may_hide="[]"))
     result = epsmesh("identify", folder / "late.toml", "--output", folder / "results")
     assert result.exit_code == 0, result.output
     young = xr.load_dataset(folder / "results" / "late.nc").sel(unknown="young")
@@ -282,7 +263,7 @@ def test_a_curve_without_a_study_is_described(folder, epsmesh):
     assert epsmesh("identify", path, folder / "punch.toml").exit_code == 2
     (folder / "evil.csv").write_text(path.read_text().replace("force", "\x1b]0;x\x07force"))
     assert "\x1b" not in epsmesh("identify", folder / "evil.csv").output
-    (folder / "evil.toml").write_text(STUDY.format(file="evil.csv", may_hide="[]"))
+    (folder / "evil.toml").write_text(PUNCH.format(file="evil.csv", may_hide="[]"))
     assert "\x1b" not in epsmesh("identify", folder / "evil.toml", "--output", folder / "results").output
     (folder / "letter.txt").write_text("Dear all,\n")
     result = epsmesh("identify", folder / "letter.txt")
@@ -296,11 +277,11 @@ def test_a_curve_without_a_study_is_described(folder, epsmesh):
 def test_a_wrong_unit_is_told_by_depth_and_modulus(folder, epsmesh, found):
     text = (folder / "curves" / "gel_8.csv").read_text()
     (folder / "tiny.csv").write_text(text.replace("(mN)", "(µN)"))
-    (folder / "tiny.toml").write_text(STUDY.format(file="tiny.csv", may_hide="[]").replace('"1 kPa"', '"1 Pa"'))
+    (folder / "tiny.toml").write_text(PUNCH.format(file="tiny.csv", may_hide="[]").replace('"1 kPa"', '"1 Pa"'))
     result = epsmesh("identify", folder / "tiny.toml", "--output", folder / "results")
     assert result.exit_code == 0, result.output
     assert "a unit is probably wrong" in result.stdout
-    (folder / "tiny.toml").write_text(STUDY.format(file="tiny.csv", may_hide="[]"))
+    (folder / "tiny.toml").write_text(PUNCH.format(file="tiny.csv", may_hide="[]"))
     result = epsmesh("identify", folder / "tiny.toml", "--output", folder / "results")
     assert "is below the" in result.stdout and "mN for µN" in result.stdout
 
@@ -347,7 +328,7 @@ def test_design_needs_neither_curve_nor_mesh_but_a_depth(folder, epsmesh, tmp_pa
 
 
 def test_design_needs_unknowns(folder, epsmesh, tmp_path):
-    text = STUDY.format(file="x.csv", may_hide="[]").partition("[[measurement]]")[0]
+    text = PUNCH.format(file="x.csv", may_hide="[]").partition("[[measurement]]")[0]
     text = text.replace("poisson", 'young = "10 kPa"\npoisson').replace("[probe]", '[probe]\ndepth = "0.2 mm"')
     text += '[mesh]\naccuracy = "1 %"\n'
     (tmp_path / "known.toml").write_text(text)
