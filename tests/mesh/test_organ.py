@@ -127,7 +127,7 @@ def test_the_footprint_is_what_projects_into_the_disc(meshed):
     assert np.hypot(*local[inner, :2].T).max() < 4e-3 * (1 + 1e-12)
     assert skin.distance(mesh.points[inner]).max() < 1e-12
     projected = mesh.points[mesh.facets["probe"]][:, :, :2]
-    double = np.cross(projected[:, 1] - projected[:, 0], projected[:, 2] - projected[:, 0])
+    double = np.linalg.det(projected[:, 1:] - projected[:, :1])
     assert np.abs(double.sum() / 2) == pytest.approx(pi * 16e-6, rel=0.01)
 
 

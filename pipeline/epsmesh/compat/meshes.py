@@ -3,7 +3,7 @@
 import inspect
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import basix
@@ -105,12 +105,13 @@ def partition(cells: np.ndarray, parts: int) -> np.ndarray:
     """Return a part for each tetrahedron (m, 4) of a mesh on this process: few faces between parts of equal size."""
     none, cells = dolfinx.cpp.mesh.GhostMode.none, np.ascontiguousarray(cells, dtype=np.int64)
     make = dolfinx.cpp.mesh.create_cell_partitioner
-    try:
-        kinds = [dolfinx.cpp.mesh.CellType.tetrahedron]
-        found = make(none)(MPI.COMM_SELF, parts, kinds, [cells.reshape(-1)])
-    except TypeError:  # before dolfinx 0.9
-        found = make()(MPI.COMM_SELF, parts, 3, dolfinx.cpp.graph.AdjacencyList_int64(cells), none)
-    return np.array(found.array, dtype=np.int32)
+    by_kind = ([dolfinx.cpp.mesh.CellType.tetrahedron], [cells.reshape(-1)])
+    plain = (3, dolfinx.cpp.graph.AdjacencyList_int64(cells), none)
+    # Since dolfinx 0.10 one tells how many cells a facet has at most; before 0.9 there was one kind of cells.
+    for modes, mesh in (((none, 2), by_kind), ((none,), by_kind), ((), plain)):
+        with suppress(TypeError):
+            return np.array(make(*modes)(MPI.COMM_SELF, parts, *mesh).array, dtype=np.int32)
+    raise TypeError("the partitioner of this dolfinx takes other arguments")
 
 
 def geometry_dofs(mesh: Any) -> np.ndarray:
