@@ -19,13 +19,17 @@ def main() -> None:
     try:
         from epsmesh import interrupts  # noqa: PLC0415
         from epsmesh.cli import main as run  # noqa: PLC0415 (takes time to load)
-        from epsmesh.launcher import prepare_libraries  # noqa: PLC0415
+        from epsmesh.launcher import end_ranks, prepare_libraries  # noqa: PLC0415
 
         prepare_libraries()
         if listens:
             interrupts.listen()
         try:
             run()
+        except SystemExit as ended:
+            if ended.code:
+                end_ranks(int(ended.code))
+            raise
         finally:
             if listens:
                 signal.signal(signal.SIGINT, _leave)

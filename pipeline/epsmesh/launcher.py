@@ -1,9 +1,12 @@
 """What the environment tells of an MPI launcher, before MPI is loaded, and programs that are none of its own."""
 
 import os
+import stat
 import subprocess
 import sys
+import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from epsmesh import interrupts
@@ -17,6 +20,8 @@ _ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_pml": "ob1"}
 # Ranks that a launcher has started. With PMIx alone a rank tells that there are as many, and one more.
 _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")
 _PMIX = "PMIX_RANK"
+# Seconds in which MPICH's launcher passes on what a process has printed: once it ends all ranks, it drops the rest.
+_FORWARD = 0.5
 _NO_SIGNALS = "-no_signal_handler"
 _PREFIXES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_")
 
@@ -50,17 +55,19 @@ def is_first_rank() -> bool:
     return next((rank for rank in ranks if rank is not None), "0") == "0"
 
 
-def has_first_rank_ended() -> bool:
-    """Tell whether the first rank is known to have ended: MPICH's launcher then lets ranks go on that joined no MPI."""
-    parent = Path("/proc", str(os.getppid()))
-    ranks, here = (os.environ.get(name) for name in ("PMI_SIZE", "MPI_LOCALNRANKS"))
-    try:
-        if not ranks or ranks != here or not (parent / "comm").read_text().startswith("hydra"):
-            return False
-        beside = (parent / "task" / parent.name / "children").read_text().split()
-        return not any(b"PMI_RANK=0" in Path("/proc", one, "environ").read_bytes().split(b"\0") for one in beside)
-    except OSError:
-        return False
+def end_ranks(status: int) -> None:
+    """Tell the launcher that this process ends with an error, before MPI has started: the others would wait there.
+
+    Open MPI's ends all ranks by itself. MPICH's does when it is told, by one line of its process manager interface.
+    """
+    mpi = sys.modules.get("mpi4py.MPI")
+    if mpi is not None and mpi.Is_initialized():
+        return
+    with suppress(KeyError, ValueError, OSError):  # no such launcher, or a process that did not get its socket
+        manager = int(os.environ["PMI_FD"])
+        if stat.S_ISSOCK(os.fstat(manager).st_mode):
+            time.sleep(_FORWARD)
+            os.write(manager, b"cmd=abort exitcode=%d\n" % status)
 
 
 def check_protocol(environment: Mapping[str, str] = os.environ) -> None:

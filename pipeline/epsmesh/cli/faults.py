@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from epsmesh.cli.console import error, is_json_wanted, print_json
-from epsmesh.launcher import has_first_rank_ended, is_first_rank
+from epsmesh.launcher import is_first_rank
 from epsmesh.printable import printable
 
 if TYPE_CHECKING:
@@ -65,13 +65,11 @@ def of_study(wrong: "StudyError", hint: str = "") -> list[Fault]:
 def leave_it_to_first_rank() -> None:
     """Wait, on ranks other than the first, until the first one has printed.
 
-    mpirun ends all ranks as soon as one exits with an error. A rank that still runs after the wait found an error that
-    the first rank did not find, and prints it; where mpirun leaves it running, it exits.
+    One rank that exits with an error ends all. A rank that still runs after the wait found an error that the first
+    rank did not find, and prints it.
     """
     if not is_first_rank():
         time.sleep(_PATIENCE)
-        if has_first_rank_ended():
-            raise typer.Exit(BAD_INPUT)
 
 
 def fail(*faults: Fault | str, status: int = BAD_INPUT, on_all_ranks: bool = False) -> NoReturn:

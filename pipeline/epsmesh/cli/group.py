@@ -22,7 +22,7 @@ from epsmesh.cli.faults import (
 )
 from epsmesh.extensions import commands
 from epsmesh.files import NOT_UTF8, is_utf8
-from epsmesh.launcher import LauncherError, is_first_rank, is_interrupt, is_launched
+from epsmesh.launcher import LauncherError, end_ranks, is_first_rank, is_interrupt, is_launched
 from epsmesh.libraries import sentence_on
 from epsmesh.printable import printable
 
@@ -156,6 +156,7 @@ def _end_ranks() -> None:
         mpi.COMM_WORLD.Abort(INTERRUPTED)
     # After an interrupted import there is no module, but MPI would still wait for all ranks when Python exits.
     sys.stdout.flush()
+    end_ranks(INTERRUPTED)
     os._exit(INTERRUPTED)
 
 
