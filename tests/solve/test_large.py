@@ -12,13 +12,15 @@ from epsmesh.plan.plan import make_plan
 from epsmesh.report.dataset import build
 from epsmesh.run.execute import compute
 from epsmesh.run.meshing import mesh_case
+from epsmesh.solve import load_steps
 from epsmesh.solve.compiled import vector_space
 from epsmesh.solve.forms import ElasticForms, HyperelasticForms
 from epsmesh.solve.kernels import multigrid
 from epsmesh.solve.laws import LAWS
 from epsmesh.solve.laws.law import Law
-from epsmesh.solve.load_steps import LoadSteps, check_path
+from epsmesh.solve.load_steps import check_path
 from epsmesh.solve.newton import LargeError
+from epsmesh.solve.path import follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.study.case import Scale
 from tests.cases import force, solve, study
@@ -130,14 +132,15 @@ def test_depths_of_a_sweep_share_one_load_path(monkeypatch):
     """Depths on the load path have the forces of single depths; deeper ones fail, and name the depth reached."""
     depths = {"depth": ["9 mm", "0.4 mm", "8 mm", "0.8 mm"]}
     ends: list[tuple[float, float]] = []
-    step = LoadSteps._step
 
-    def counted(self, *arguments):
-        *_, load_path, _, depth = arguments
-        ends.append((load_path.reached, depth))
-        return step(self, *arguments)
+    def counted(path, solve_at, to, steps):
+        def at(depth):
+            ends.append((path.reached, to))
+            return solve_at(depth)
 
-    monkeypatch.setattr(LoadSteps, "_step", counted)
+        follow(path, at, to, steps)
+
+    monkeypatch.setattr(load_steps, "follow", counted)
     deep, first, far, second = solve(material=LARGE, probe=depths).values()
     shared = sum(depth < 1e-3 for _, depth in ends)
     assert [reached for reached, _ in ends] == sorted(reached for reached, _ in ends)

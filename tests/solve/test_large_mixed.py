@@ -13,13 +13,14 @@ from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.plan.plan import make_plan
 from epsmesh.run.meshing import mesh_case
 from epsmesh.scene.model import FIXED
+from epsmesh.solve import load_steps
 from epsmesh.solve.compiled import form
 from epsmesh.solve.conditions import Conditions
 from epsmesh.solve.elements.mixed import MixedElements
 from epsmesh.solve.laws import LAWS
-from epsmesh.solve.load_steps import LoadSteps
 from epsmesh.solve.measures import dx
 from epsmesh.solve.movement import Movement
+from epsmesh.solve.path import follow
 from epsmesh.solve.physics import MaterialLaw, SplitLaw
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
@@ -184,15 +185,14 @@ def test_direct_and_iterative_solvers_agree():
 
 def test_depths_of_a_sweep_share_one_load_path(monkeypatch):
     ends: list[float] = []
-    step = LoadSteps._step
 
-    def counted(self, *arguments):
-        ends.append(arguments[2].reached)
-        return step(self, *arguments)
+    def counted(path, *arguments):
+        ends.append(path.reached)
+        follow(path, *arguments)
 
-    monkeypatch.setattr(LoadSteps, "_step", counted)
+    monkeypatch.setattr(load_steps, "follow", counted)
     second, first = solve(material=soft(0.5), probe={"depth": ["0.8 mm", "0.4 mm"]}).values()
-    assert ends == sorted(ends)
+    assert ends == [0.0, 0.4e-3]
     for record, depth in ((first, 0.4), (second, 0.8)):
         (alone,) = solve(material=soft(0.5), probe={"depth": f"{depth} mm"}).values()
         assert record.force == pytest.approx(alone.force, rel=1e-7)

@@ -23,14 +23,15 @@ from epsmesh.solve.elements import elements_of
 from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Loads
-from epsmesh.solve.newton import LEFT, ON_THE_WAY, HyperelasticBody, LargeError
+from epsmesh.solve.newton import EASY, LEFT, ON_THE_WAY, HyperelasticBody, LargeError
+from epsmesh.solve.path import Path, Stage, Steps, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import whole_force
 from epsmesh.solve.spaces import Spaces
 from epsmesh.stages import stage
 
-# Smallest load step, as a share of the loads.
-_SMALLEST = 1 / 64
+# Shortest load step, as a share of the loads.
+_SHORTEST = 1 / 64
 # The sag of a tool: most steps of the secant method, most halvings of one, and the change (relative) and the force (in
 # units of the loads) at which it ends.
 _MOST_SECANTS, _HALVINGS, _SMALL, _NO_FORCE = 20, 6, 1e-6, 1e-9
@@ -44,22 +45,21 @@ def load_in_steps(body: HyperelasticBody, applied: Applied, state: PETSc.Vec) ->
     Raises:
         LargeError: if a load step becomes too small.
     """
-    share, step, goal = 0.0, 1.0, body.held_of(state)
-    while share < 1.0:
-        there, before = min(1.0, share + step), state.array.copy()
-        body.carry(applied, there)
-        try:
-            body.equilibrate(state, goal, LEFT if there == 1.0 else ON_THE_WAY)
-            share = there
-        except LargeError as error:
-            state.array[:] = before
-            step /= 2
-            if step < _SMALLEST:
-                message = (
-                    f"the tissue carries {100 * share:.0f} % of its loads, and becomes unstable beyond (Newton's "
-                    f"method: {error}); use smaller loads, or a support that holds more of the body"
-                )
-                raise LargeError(message) from error
+    path, goal = Path(Stage(0.0, state.array.copy())), body.held_of(state)
+
+    def solve_at(share: float) -> tuple[Stage, bool]:
+        state.array[:] = path.last.state
+        body.carry(applied, share)
+        iterations = body.equilibrate(state, goal, LEFT if share == 1.0 else ON_THE_WAY)
+        return Stage(share, state.array.copy()), iterations <= EASY
+
+    try:
+        follow(path, solve_at, 1.0, Steps(_SHORTEST))
+    except LargeError as error:
+        raise LargeError(
+            f"the tissue carries {100 * path.reached:.0f} % of its loads, and becomes unstable beyond (Newton's "
+            f"method: {error}); use smaller loads, or a support that holds more of the body"
+        ) from error
 
 
 @contextmanager

@@ -6,10 +6,9 @@ the steps is compared with the energy.
 The error bar comes from one degree more: :mod:`epsmesh.solve.large_estimate`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from math import inf, prod
 
 import numpy as np
 from petsc4py import PETSc
@@ -25,67 +24,40 @@ from epsmesh.solve.estimate import is_plain
 from epsmesh.solve.large_estimate import Decrements, FinerResiduals, combine, force_again
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Motion, Movement
-from epsmesh.solve.newton import LEFT, ON_THE_WAY, HyperelasticBody, LargeError
+from epsmesh.solve.newton import EASY, LEFT, ON_THE_WAY, HyperelasticBody, LargeError
+from epsmesh.solve.path import Path, Stage, Steps, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import LoadResponse, Response, whole_force
 
-# Fewest load steps, fewest where the check of the work needs more, and the smallest step as a share of the depth.
-_FEWEST, _MANY, _SMALLEST = 3, 12, 1 / 100
-# A step that would leave less than this share of the depth goes to the end.
-_SLIVER = 1e-6
-# States besides the last one that the initial guess continues.
-_CONTINUED = 2
-# The next load step is longer if this one took at most so many Newton iterations.
-_EASY = 4
+# Fewest load steps, fewest where the check of the work needs more, and the shortest step as a share of the depth.
+_FEWEST, _MANY, _SHORTEST = 3, 12, 1 / 100
 # Largest relative difference of work and energy, and rounding of energies where strains are tiny. An element at the
 # edge may fold between its quadrature points: the energy then drops without work.
 _WORK, _ROUNDING = 3e-4, 1e-13
 
 
-@dataclass
-class LoadPath:
-    """A load path: how far a ``motion`` of the probe has proceeded in a body of a ``law``.
+@dataclass(eq=False)
+class LoadPath(Path[Stage]):
+    """A load path: how far a ``motion`` of the probe has proceeded in a body of a ``law``; amounts are depths (m).
 
-    ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part, less that at the ``start``.
-    ``state`` is that of the last step: displacement, and in mixed elements pressure (owned dofs). ``step`` (m) is the
-    longest that Newton's method is expected to reach at once. Under dead loads, ``applied``, the path starts from the
-    body that has sagged, and ``held`` is that with a tool that does not move, once it is known.
+    ``work`` has depth (m), force (N) and energy (J) of each stage, of the modelled part, less that at the start. States
+    have displacement, and in mixed elements pressure (owned dofs). Under dead loads, ``applied``, the path starts from
+    the body that has sagged, and ``held`` is that with a tool that does not move, once it is known.
     """
 
-    law: MaterialLaw
-    motion: Motion
-    start: FloatArray
+    law: MaterialLaw = field(kw_only=True)
+    motion: Motion = field(kw_only=True)
     applied: Applied | None = None
     held: HeldTool | None = None
-    state: FloatArray = field(init=False)
-    path: list[tuple[float, float, float]] = field(default_factory=lambda: [(0.0, 0.0, 0.0)])
-    step: float = inf
-    earlier: list[FloatArray] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.state = self.start
-
-    @property
-    def reached(self) -> float:
-        """The depth (m) of the last step."""
-        return self.path[-1][0]
-
-    def add(self, depth: float, force: float, energy: float, state: FloatArray) -> None:
-        """Add a step at a ``depth`` (m), with its ``force`` (N), ``energy`` (J) and ``state``."""
-        self.earlier = [*self.earlier, self.state][-_CONTINUED:]
-        self.state = state.copy()
-        self.path.append((depth, force, energy))
+        super().__post_init__()
+        self.restart()
 
     def restart(self) -> None:
-        """Go back to the start."""
-        self.state, self.path, self.earlier = self.start, [(0.0, 0.0, 0.0)], []
-
-    def continued(self, depth: float) -> FloatArray:
-        """Return the polynomial through the last states, at a ``depth`` (m)."""
-        states = [*self.earlier, self.state]
-        depths = [at for at, _, _ in self.path[-len(states) :]]
-        weights = [prod((depth - other) / (at - other) for other in depths if other != at) for at in depths]
-        return np.asarray(np.tensordot(weights, states, axes=1))
+        """Return to the start."""
+        self.return_to(self.start)
+        self.work = [(0.0, 0.0, 0.0)]
 
     def can_reach(self, law: MaterialLaw, movement: Movement, applied: Applied | None) -> bool:
         """Return whether this path can be continued to the movement under this law and these loads; collective."""
@@ -135,18 +107,20 @@ class LoadSteps(Solver):
         self.elements.set_law(self._law)
         with self._body.state() as state:
             path = self._checked_path(state, column)
-            self.elements.put(column, self._body.split(state.array - load_path.start, column.unknown), column.amount)
+            self.elements.put(
+                column, self._body.split(state.array - load_path.start.state, column.unknown), column.amount
+            )
             self.stored = float(path[-1, 2])
             if load_path.applied is not None and load_path.held is None:
                 self._put_unit(column, state)
                 slope = float(path[-1, 1]) / column.amount
                 load_path.held = hold_tool(self.elements, self._body, load_path.applied, state, slope)
             for of_loads in loaded:
-                state.array[:] = load_path.start
+                state.array[:] = load_path.start.state
                 self._body.show(state)
                 values = self._space.forms.displacement.x.array
                 of_loads.prescribed[self._space.prescribed] = values[self._space.prescribed]
-                self.elements.put(of_loads, self._body.split(load_path.start, of_loads.unknown))
+                self.elements.put(of_loads, self._body.split(load_path.start.state, of_loads.unknown))
         return self._body.iterations - before
 
     def improve(self, columns: Sequence[Column], share: float) -> int:
@@ -155,7 +129,7 @@ class LoadSteps(Solver):
 
     def products(self, columns: Sequence[Column]) -> Products:
         """Return residual and work of the first column as secants, per unit of the motion."""
-        column, space, start = columns[0], self._space, self._load_path.start
+        column, space, start = columns[0], self._space, self._load_path.start.state
         with self._body.state() as state, self._body.state() as forces, self._body.state() as before:
             state.array[:] = start
             self._body.forces(state, before)
@@ -190,7 +164,7 @@ class LoadSteps(Solver):
         column, held, finer = columns[0], self._load_path.held, self._linear.finer()
         if held is None and is_plain(plain_share(self.elements.body)):
             force = self._force_again(finer, column, movement, stack)
-            decrement = (self._load_path.path[-1][1] - force) / column.amount
+            decrement = (self._load_path.work[-1][1] - force) / column.amount
             return HierarchicalEstimate(finer, [], decrements=np.array([[decrement]]), is_solved=True)
         residuals = FinerResiduals(self.elements, self._body, finer, self._law, movement.loads, stack)
         state, unit, rate = (stack.enter_context(self._body.state()) for _ in range(3))
@@ -203,7 +177,7 @@ class LoadSteps(Solver):
         self._at(column, state)
         found = [*at()]
         if held is not None:
-            state.array[:] = self._load_path.start
+            state.array[:] = self._load_path.start.state
             rate_there, there = at()
             changes = combine(1.0, found[1], -1.0, there), combine(-1.0, rate_there, 1.0, found[0])
             found = [found[0], *changes, there]
@@ -250,7 +224,7 @@ class LoadSteps(Solver):
             self.elements.total(column, parts)
             state.array[:] = np.concatenate([part.array for part in parts])
         state.scale(column.amount)
-        state.array[:] += self._load_path.start
+        state.array[:] += self._load_path.start.state
 
     def _put_unit(self, column: Column, state: PETSc.Vec) -> None:
         """Write the prescribed displacement per unit of the motion into ``state``."""
@@ -259,7 +233,7 @@ class LoadSteps(Solver):
     def _checked_path(self, state: PETSc.Vec, column: Column) -> FloatArray:
         """Continue ``state`` as :meth:`_press`, in many steps if the force of a few does not tell the work."""
         with self._body.state() as start:
-            start.array[:] = self._load_path.start
+            start.array[:] = self._load_path.start.state
             size = max(self._law.lame_mu) * self._volume() + abs(self._body.energy(start))
         path = self._press(state, column, _FEWEST)
         try:
@@ -278,51 +252,33 @@ class LoadSteps(Solver):
         Raises:
             LargeError: if a step becomes too small; the path keeps the steps that converged.
         """
-        load_path, depth = self._load_path, column.amount
-        state.array[:] = load_path.start
-        begun, base = self._body.energy(state), self._body.held_of(state)
-        state.array[:] = load_path.state
-        longest = depth / fewest
-        with self._body.state() as unit, self._body.state() as forces:
+        load_path, depth, body = self._load_path, column.amount, self._body
+        state.array[:] = load_path.start.state
+        begun, base = body.energy(state), body.held_of(state)
+        with body.state() as unit, body.state() as forces:
             self._put_unit(column, unit)
-            held = self._body.held_of(unit)
-            while load_path.reached < depth:
-                asked = min(load_path.step, longest, depth - load_path.reached)
-                there, steps = self._step(state, lambda at: base + at * held, load_path, asked, depth)
-                step = there - load_path.reached
-                self._body.forces(state, forces)
-                load_path.add(there, forces.dot(unit), self._body.energy(state) - begun, state.array)
-                longer = step * (2 if steps <= _EASY else 1)
-                load_path.step = longer if step < (1 - _SLIVER) * asked else max(load_path.step, longer)
-        return np.array(load_path.path)
+            held = body.held_of(unit)
 
-    def _step(
-        self, state: PETSc.Vec, goal: Callable[[float], FloatArray], load_path: LoadPath, step: float, depth: float
-    ) -> tuple[float, int]:
-        """Write the equilibrium a ``step`` (m) farther into ``state``; return its depth and Newton's iterations.
+            def solve_at(there: float) -> tuple[Stage, bool]:
+                state.array[:] = load_path.continued(there)
+                if not np.isfinite(body.energy(state)):
+                    state.array[:] = load_path.last.state  # the first step of Newton's method then brings it there
+                left = LEFT if there == depth else ON_THE_WAY
+                iterations = body.equilibrate(state, base + there * held, left)
+                body.forces(state, forces)
+                load_path.work.append((there, forces.dot(unit), body.energy(state) - begun))
+                return Stage(there, state.array.copy()), iterations <= EASY
 
-        ``goal`` returns the prescribed dofs (m) at a depth; the path ends at ``depth`` (m).
-
-        Raises:
-            LargeError: if the step becomes too small.
-        """
-        left = depth - load_path.reached
-        while True:
-            # No further step for a rounding error.
-            there = depth if step > (1 - _SLIVER) * left else load_path.reached + step
-            state.array[:] = load_path.continued(there)
-            if not np.isfinite(self._body.energy(state)):
-                state.array[:] = load_path.state  # the first step of Newton's method then brings it there
             try:
-                return there, self._body.equilibrate(state, goal(there), LEFT if there == depth else ON_THE_WAY)
+                follow(load_path, solve_at, depth, Steps(_SHORTEST * depth, depth / fewest))
             except LargeError as error:
-                step = min(step, left) / 2
-                if step < _SMALLEST * depth:
-                    raise self._stopped(load_path, depth, error) from error
+                raise self._stopped(load_path, depth, error) from error
+        state.array[:] = load_path.last.state
+        return np.array(load_path.work)
 
     def _stopped(self, load_path: LoadPath, depth: float, why: LargeError) -> LargeError:
         """Return the error of a path that ends before ``depth`` (m)."""
-        reached, force, _ = load_path.path[-1]
+        reached, force, _ = load_path.work[-1]
         whole = 2.0 ** len(self.elements.body.mirrored) * force
         return ended(why, self._law, (reached, whole), depth, is_found=False)
 

@@ -32,6 +32,8 @@ from epsmesh.stages import stage
 LEFT, _MOST = 1e-9, 25
 # The same for load steps before the last: the work of F has fewer digits.
 ON_THE_WAY = 1e-4
+# At most so many Newton iterations of a load step were easy: the next one may be longer.
+EASY = 4
 # A residual has stalled if an iteration leaves this share of it; then rounding of gradients by this may be all of it.
 _STALLS, _ROUNDED = 0.5, float(np.finfo(float).eps) / 2
 # Tolerances of linear solves: the first one and the least, and the share of the gain that is needed to the end.

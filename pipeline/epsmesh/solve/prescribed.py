@@ -21,6 +21,7 @@ from epsmesh.solve.elements.fields import Column, close_far
 from epsmesh.solve.load_steps import LoadPath, LoadSteps
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Motion, Movement
+from epsmesh.solve.path import Stage
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import LoadResponse, Response, load_response_of, reaction
 from epsmesh.solve.solution import Request
@@ -132,7 +133,7 @@ class PrescribedMotion:
             start = np.zeros(self._elements.unknowns)
             if movement.loads is not None:
                 start = start_under_loads(self._elements, law, movement.loads)
-            load_path = LoadPath(law, movement.motions[0], start, applied)
+            load_path = LoadPath(Stage(0.0, start), law=law, motion=movement.motions[0], applied=applied)
         self._load_path = load_path if self._shares_path else None
         return LoadSteps(self._elements, load_path, stack, direct=direct)
 

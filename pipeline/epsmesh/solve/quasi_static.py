@@ -35,7 +35,7 @@ from epsmesh.solve.prescribed import PrescribedMotion, respond
 from epsmesh.solve.response import Contact, LoadResponse, Response, shares
 from epsmesh.solve.solution import Problem, Request, Solution
 from epsmesh.solve.spaces import Spaces
-from epsmesh.solve.time_steps import Pressed, TimeSteps, follow
+from epsmesh.solve.time_steps import Pressed, TimeSteps, follow_course
 from epsmesh.stages import recorded, stage
 
 
@@ -154,7 +154,7 @@ class QuasiStaticProblem(Problem):
             pressed = self.constraint.in_time(asked, found, stack)
             return TimeSteps(asked.law, pressed, found.movement.amounts[0], stack, mirrored=self._body.mirrored)
 
-        history, iterations = follow(begin, asked.course)
+        history, iterations = follow_course(begin, asked.course)
         return replace(solution, history=history, iterations=solution.iterations + iterations)
 
     @stage("error bar")

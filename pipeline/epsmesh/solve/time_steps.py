@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
+from math import inf
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -26,13 +27,14 @@ from epsmesh.solve.ended import ended
 from epsmesh.solve.history import Course, History, between
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.newton import HyperelasticBody, LargeError
+from epsmesh.solve.path import Path, Stage, Steps, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.relaxing import HistoryVariables, Points
 from epsmesh.solve.response import whole_force
 from epsmesh.stages import stage
 
-# Largest step as a share of the movement, and the smallest part of a step.
-_LONGEST, _SMALLEST = 1 / 3, 1 / 64
+# Longest step as a share of the movement, and the shortest part of a step.
+_LONGEST, _SHORTEST = 1 / 3, 1 / 64
 # How often all steps are halved for an accuracy.
 _MOST_REFINEMENTS = 3
 # Of the difference between steps and double steps, a third is the error of the steps; the bar is twice that.
@@ -155,7 +157,7 @@ class PressedFootprint(Pressed):
         return np.asarray(state.array_r / (share * self._amount))
 
 
-def follow(begin: Callable[[], "TimeSteps"], course: Course) -> tuple[History, int]:
+def follow_course(begin: Callable[[], "TimeSteps"], course: Course) -> tuple[History, int]:
     """Return the history of a ``course``, in steps that are halved for its accuracy, and the iterations of all.
 
     ``begin`` returns a body at rest.
@@ -233,21 +235,24 @@ class TimeSteps:
     def _reach(self, time: float, share: float, course: Course) -> None:
         """Continue to a time and a share of the movement; a step is halved where Newton's method does not converge."""
         place = self._place
-        while place.time < time or place.share != share:
-            rise = abs(share - place.share)
-            part = 1.0 if rise <= _LONGEST * (1 + 1e-9) else _LONGEST / rise
-            while True:
-                is_last = part == 1.0
-                then = time if is_last else place.time + part * (time - place.time)
-                there = share if is_last else place.share + part * (share - place.share)
-                try:
-                    self._step(then, there)
-                    break
-                except LargeError as error:
-                    part /= 2
-                    place.changed = 0.0  # the tangent is a better guess than the last step
-                    if part < _SMALLEST:
-                        raise self._stopped(course, error) from error
+        begun, rise = place.time, share - place.share
+        if time == begun and not rise:
+            return
+
+        def solve_at(part: float) -> tuple[Stage, bool]:
+            before = 1 - part
+            try:
+                self._step(time - before * (time - begun), share - before * rise)
+            except LargeError:
+                place.changed = 0.0  # the tangent is a better guess than the last step
+                raise
+            return Stage(part, self._state.array), True
+
+        longest = _LONGEST / abs(rise) if rise else inf
+        try:
+            follow(Path(Stage(0.0, self._state.array)), solve_at, 1.0, Steps(_SHORTEST, longest))
+        except LargeError as error:
+            raise self._stopped(course, error) from error
 
     def _step(self, time: float, share: float) -> None:
         """Find the equilibrium at a later time (s) and share of the movement.

@@ -16,9 +16,10 @@ from epsmesh.solve.contact.coulomb import Neighbours, Slide, most_simplified
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, Tissue, first_set, solve_contact
 from epsmesh.solve.contact.friction_step import FrictionStep, meeting_places
 from epsmesh.solve.newton import LargeError
+from epsmesh.solve.path import Path, Stage, Steps, follow
 
-# Smallest step, as a share of the depth, and a step that leaves less than this share goes to the end.
-_SMALLEST, _SLIVER = 1 / 64, 1e-6
+# Shortest step, as a share of the depth.
+_SHORTEST = 1 / 64
 # Larger steps than this share, without friction, are given up soon.
 _LARGE = 1 / 8
 # Residual and gaps of steps on the way to the depth, without friction.
@@ -34,35 +35,19 @@ _LONGER, _EASY = 1.5, 8
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
-    """Equilibrium at a ``depth`` (m): the tissue's ``state`` and the contact, None without any."""
+class ContactStage(Stage):
+    """Equilibrium at a depth (m) with its contact, None without any."""
 
-    depth: float
-    state: FloatArray
     touched: ContactSolution | None = None
 
 
-@dataclass(eq=False)
-class ContactPath:
-    """The last two equilibria of a load path, and the ``step`` (m) that the next one may have."""
+class ContactPath(Path[ContactStage]):
+    """A load path of contact; amounts are depths (m)."""
 
-    last: Stage
-    before: Stage | None = None
-    step: float = inf
-
-    def __post_init__(self) -> None:
-        self.start = self.last
-
-    def add(self, stage: Stage) -> None:
-        """Go on to a stage."""
-        self.before, self.last = self.last, stage
-
-    def guess(self, depth: float) -> FloatArray | None:
-        """Return the state continued to a ``depth`` (m), None from a single equilibrium."""
-        if self.before is None or self.before.touched is None:
-            return None
-        share = (depth - self.last.depth) / (self.last.depth - self.before.depth)
-        return self.last.state + share * (self.last.state - self.before.state)
+    def guess(self, depth: float) -> FloatArray:
+        """Return the last state, continued linearly to a ``depth`` (m) if there was contact at the stage before."""
+        count = sum(stage.touched is not None for stage in self.stages[-2:])
+        return self.continued(depth, max(count, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,29 +76,28 @@ def press(
     Raises:
         LargeError: if a step becomes too small; the path keeps the steps that converged.
     """
-    iterations, deepest = 0, depth if friction is None else friction.deepest
-    path.start, tissue.state = path.last, path.last.state
-    if path.last.touched is None and path.step == inf and friction is None:
-        path.step = _first_step(tissue, tool_at, path.last.depth, depth)
-    while path.last.depth < depth:
-        left = depth - path.last.depth
-        step = min(path.step, left)
-        there = depth if step > (1 - _SLIVER) * left else path.last.depth + step
+    iterations, deepest, start = 0, depth if friction is None else friction.deepest, path.last
+    tissue.state = start.state
+    if start.touched is None and path.step == inf and friction is None:
+        path.step = _first_step(tissue, tool_at, start.amount, depth)
+
+    def solve_at(there: float) -> tuple[ContactStage, bool]:
+        nonlocal iterations
+        is_patient = friction is not None or there - path.reached <= _LARGE * depth
+        limit = _ON_THE_WAY if friction is None and there < depth else 0.0
         try:
-            is_patient = friction is not None or there - path.last.depth <= _LARGE * depth
-            limit = _ON_THE_WAY if friction is None and there < depth else 0.0
             touched = _step(tissue, tool_at, path, there, friction, is_patient=is_patient, limit=limit)
-            check_outside(tissue, touched, deepest)
         except SolveError as error:
-            path.step = (there - path.last.depth) / 2
-            if path.step < _SMALLEST * depth:
-                _end(tissue, tool_at, path, friction)
-                raise LargeError(str(error)) from error
-            continue
+            raise LargeError(str(error)) from error
+        check_outside(tissue, touched, deepest)
         iterations += touched.iterations
-        step = there - path.last.depth
-        path.add(Stage(there, tissue.state, touched))
-        path.step = step * (_LONGER if touched.iterations <= _EASY else 1.0)
+        return ContactStage(there, tissue.state, touched), touched.iterations <= _EASY
+
+    try:
+        follow(path, solve_at, depth, Steps(_SHORTEST * depth, longer=_LONGER))
+    except LargeError:
+        _end(tissue, tool_at, path, start, friction)
+        raise
     return iterations
 
 
@@ -139,19 +123,25 @@ def _first_step(tissue: Tissue, tool_at: Callable[[float], PlacedTool], start: f
     return step
 
 
-def _end(tissue: Tissue, tool_at: Callable[[float], PlacedTool], path: ContactPath, friction: Friction | None) -> None:
-    """Leave the tissue in equilibrium at the last depth of a ``path`` that goes no farther; collective."""
+def _end(
+    tissue: Tissue,
+    tool_at: Callable[[float], PlacedTool],
+    path: ContactPath,
+    start: ContactStage,
+    friction: Friction | None,
+) -> None:
+    """Leave the tissue in equilibrium at the end of a ``path`` that goes no farther than from ``start``; collective."""
     last = path.last
     tissue.state = last.state
     if last.touched is None or friction is not None:
         return
     try:
-        touched = solve_contact(tissue, tool_at(last.depth), last.touched.active)
+        touched = solve_contact(tissue, tool_at(last.amount), last.touched.active)
     except SolveError:  # settled roughly, but no better
-        path.last, path.before = path.start, None
-        tissue.state = path.last.state
+        path.return_to(start)
+        tissue.state = start.state
         return
-    path.last = Stage(last.depth, tissue.state, touched)
+    path.stages[-1] = ContactStage(last.amount, tissue.state, touched)
 
 
 def press_with_friction(
@@ -177,22 +167,22 @@ def press_with_friction(
             tissue.state = path.last.state
             nothing = np.zeros(len(tissue.fixed), dtype=bool)
             if number < steps and not first_set(tissue, tool_at(there), nothing).any():
-                path.add(Stage(there, path.last.state))
+                path.add(ContactStage(there, path.last.state))
                 continue
         path.step = inf
         try:
             iterations += press(tissue, tool_at, path, there, friction)
         except LargeError:  # few nodes touch, whose state does not settle: contact begins with the next step
-            farthest = max(farthest, path.last, key=lambda stage: stage.depth if stage.touched else 0.0)
+            farthest = max(farthest, path.last, key=lambda stage: stage.amount if stage.touched else 0.0)
             if number > steps // 2:
-                path.last = farthest
+                path.return_to(farthest)
                 raise
-            path.last, path.before = start, None
+            path.return_to(start)
     return iterations
 
 
 def _friction_step(
-    tissue: Tissue, tool_at: Callable[[float], PlacedTool], last: Stage, depth: float, friction: Friction
+    tissue: Tissue, tool_at: Callable[[float], PlacedTool], last: ContactStage, depth: float, friction: Friction
 ) -> FrictionStep:
     """Return the friction of a step from the ``last`` stage to a ``depth`` (m), whose state is predicted."""
     after, guess = tissue.positions(), tissue.state
@@ -203,11 +193,11 @@ def _friction_step(
     def gap(points: FloatArray, there: float) -> FloatArray:
         return tool_at(there).distance(points).gap
 
-    references = meeting_places(gap, (before, after), (last.depth, depth), friction.advance)
+    references = meeting_places(gap, (before, after), (last.amount, depth), friction.advance)
     nothing = np.zeros(len(before), dtype=bool)
     touched = last.touched
     if touched is not None:
-        carried = before + (depth - last.depth) * friction.advance
+        carried = before + (depth - last.amount) * friction.advance
         references = np.where(touched.active[:, None], carried, references)
     normal = np.zeros(len(before)) if touched is None else touched.pressed
     slide = None if touched is None else touched.slide
@@ -235,13 +225,9 @@ def _step(
 ) -> ContactSolution:
     tool, last = tool_at(depth), path.last
     active = np.zeros(len(tissue.fixed), dtype=bool) if last.touched is None else last.touched.active
-    guess = path.guess(depth)
-    if guess is not None:
-        tissue.state = guess
-        if not tissue.is_sound:
-            guess = None
-    if guess is None:
-        tissue.state = path.last.state
+    tissue.state = path.guess(depth)
+    if not tissue.is_sound:
+        tissue.state = last.state
     friction_step = None if friction is None else _friction_step(tissue, tool_at, last, depth, friction)
     return solve_contact(
         tissue, tool, first_set(tissue, tool, active), friction_step, is_patient=is_patient, limit=limit

@@ -19,7 +19,7 @@ from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance, check_work
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.active_set import ContactError, Obstacle
-from epsmesh.solve.contact.contact_steps import ContactPath, Stage, check_outside, press
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, check_outside, press
 from epsmesh.solve.contact.corrections import Corrections
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
 from epsmesh.solve.contact.elements import State
@@ -59,7 +59,7 @@ class LargeContact:
 
     def can_reach(self, asked: Request) -> bool:
         """Return whether the load path can be continued to a request; collective."""
-        loads, reached = asked.movement.loads, 0.0 if self._path is None else self._path.last.depth
+        loads, reached = asked.movement.loads, 0.0 if self._path is None else self._path.reached
         is_same = loads is None
         if self._applied is not None:
             is_same = loads is not None and self._applied.is_same(self._elements.displacements.applied(loads))
@@ -83,7 +83,7 @@ class LargeContact:
             self._sagged = sagged_body(body, self._tool, self._loads)
         tool = self._sagged.placed(self._tool)
         if self._path is None:
-            self._path = ContactPath(Stage(0.0, self._sagged.state))
+            self._path = ContactPath(ContactStage(0.0, self._sagged.state))
         try:
             iterations = press(body, lambda there: placed_tool(body, tool, there), self._path, depth)
         except LargeError as error:
@@ -99,7 +99,7 @@ class LargeContact:
 def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError, friction: float = 0.0) -> LargeError:
     """Return the error of a ``path`` that ends before ``depth`` (m)."""
     last, whole = path.last, 2.0 ** len(body.elements.body.mirrored)
-    reached = last.depth, 0.0 if last.touched is None else -whole * float(last.touched.forces[:, 2].sum())
+    reached = last.amount, 0.0 if last.touched is None else -whole * float(last.touched.forces[:, 2].sum())
     return ended(why, body.law, reached, depth, is_found=True, friction=friction)
 
 
@@ -270,7 +270,7 @@ class LargeContactSolution:
                 touched = solve_contact(body, there, first, is_patient=False, limit=_FOUND_AGAIN)
                 check_outside(body, touched, self.depth)
                 return touched
-        path = ContactPath(Stage(0.0, sagged.state))
+        path = ContactPath(ContactStage(0.0, sagged.state))
         press(body, tool_at, path, self.depth)
         assert path.last.touched is not None
         return path.last.touched

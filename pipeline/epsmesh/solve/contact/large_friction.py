@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from epsmesh.arrays import FloatArray
-from epsmesh.solve.contact.contact_steps import ContactPath, Friction, Stage, press_with_friction
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, Friction, press_with_friction
 from epsmesh.solve.contact.coulomb import Neighbours, rubbing_of
 from epsmesh.solve.contact.deformed import ContactSolution
 from epsmesh.solve.contact.frictional import with_friction
@@ -47,7 +47,7 @@ class LargeFrictionalContact(LargeContact):
         body, depth, state = smooth.body, smooth.depth, smooth.body.state
         friction, touched = friction_of(body, self._tool.friction, depth), []
         for steps in (self.STEPS // 2, self.STEPS):
-            path = ContactPath(Stage(0.0, smooth.sagged.state))
+            path = ContactPath(ContactStage(0.0, smooth.sagged.state))
             try:
                 iterations += press_with_friction(
                     body, lambda there: placed_tool(body, tool, there), path, depth, friction, steps

@@ -27,6 +27,7 @@ from epsmesh.solve.meridian.in_time import RelaxingHalfPlane
 from epsmesh.solve.meridian.problem import Answer, MeridianSolver, best_of, error_bar
 from epsmesh.solve.meridian.system import HalfPlane, System, max_strain, meshes_of
 from epsmesh.solve.newton import LargeError
+from epsmesh.solve.path import Path, Stage, Steps, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.time_steps import Pressed
 from epsmesh.stages import stage
@@ -36,8 +37,8 @@ DEGREE = 4
 GRADINGS = tuple(Grading(floor, 1.0, 4.0) for floor in (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3))
 # Tolerance on the residual, relative to the forces at the probe; most Newton iterations, and halvings of one.
 _LEFT, _MOST_ITERATIONS, _HALVINGS = 1e-9, 14, 6
-# Fewest load steps, and the shortest one as a share of the depth.
-_FEWEST, _SHORTEST = 3, 1 / 50
+# Fewest load steps, the shortest one as a share of the depth, and how many times longer the next one may be.
+_FEWEST, _SHORTEST, _LONGER = 3, 1 / 50, 1.5
 # Steps of a mesh after the first, which must reach the depth with ease, are halved once at most.
 _SHORTEST_OF_FINER = 1 / 7
 # The bar is this many times the difference from the mesh before; or, for the first mesh, that of the degrees.
@@ -69,21 +70,19 @@ class LargeSystem(System):
         Raises:
             LargeError: if a step becomes too short; ``reached`` are the depth and force of the last one.
         """
-        state, path = np.zeros(self.forms.dofs), [(0.0, 0.0, 0.0)]
-        longest = step = depth / _FEWEST
-        while (reached := path[-1][0]) < depth:
-            there = depth if step > 0.99 * (depth - reached) else reached + step
-            try:
-                state = self.equilibrate(state, there)
-            except LargeError as error:
-                step = (there - reached) / 2
-                if step < shortest * depth:
-                    raise LargeError(str(error), path[-1][:2] if reached else None) from error
-                continue
+        path, work = Path(Stage(0.0, np.zeros(self.forms.dofs))), [(0.0, 0.0, 0.0)]
+
+        def solve_at(there: float) -> tuple[Stage, bool]:
+            state = self.equilibrate(path.last.state, there)
             on_probe, _, energy = self.forces(state)
-            path.append((there, -on_probe, energy))
-            step = min(1.5 * step, longest)
-        return state, np.array(path)
+            work.append((there, -on_probe, energy))
+            return Stage(there, state), True
+
+        try:
+            follow(path, solve_at, depth, Steps(shortest * depth, depth / _FEWEST, _LONGER))
+        except LargeError as error:
+            raise LargeError(str(error), work[-1][:2] if path.reached else None) from error
+        return path.last.state, np.array(work)
 
     def equilibrate(self, state: FloatArray, depth: float) -> FloatArray:
         """Return the equilibrium with the probe at a ``depth``, from an initial guess ``state``.

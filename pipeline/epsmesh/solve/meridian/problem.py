@@ -24,7 +24,7 @@ from epsmesh.solve.physics import MaterialLaw, Parameters
 from epsmesh.solve.response import Contact, reaction
 from epsmesh.solve.solution import Problem, Request, Solution
 from epsmesh.solve.time_steps import Pressed as InTime
-from epsmesh.solve.time_steps import TimeSteps, follow
+from epsmesh.solve.time_steps import TimeSteps, follow_course
 from epsmesh.stages import recorded, stage
 from epsmesh.viscoelastic import Terms
 
@@ -118,7 +118,7 @@ class MeridianSolver(Problem):
         with recorded() as times, ExitStack() as stack:
             found = self._answer(law, depth)
             if asked.course is not None and (at_rest := found.in_time) is not None:
-                history, iterations = follow(
+                history, iterations = follow_course(
                     lambda: TimeSteps(law, at_rest(), depth, stack, has_own_mesh=True), asked.course.left(found.error)
                 )
         scale = law.lame_mu[0] * found.unit

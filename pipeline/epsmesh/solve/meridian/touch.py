@@ -19,7 +19,7 @@ from epsmesh.scene.model import FREE, PROBE
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance, check_work
-from epsmesh.solve.contact.contact_steps import ContactPath, Friction, Stage, press, press_with_friction
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, Friction, press, press_with_friction
 from epsmesh.solve.contact.coulomb import Neighbours
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
 from epsmesh.solve.meridian.forms import Meshes
@@ -79,7 +79,7 @@ class MeridianTouch:
 
     def along(self, depths: Sequence[float]) -> Iterator["MeridianTouch"]:
         """Yield the contact without friction at rising ``depths`` (m) of one load path, as far as it goes."""
-        path = ContactPath(Stage(0.0, np.zeros_like(self.tissue.state)))
+        path = ContactPath(ContactStage(0.0, np.zeros_like(self.tissue.state)))
         for depth in depths:
             try:
                 press(self.tissue, self.placed, path, depth / self.unit)
@@ -99,13 +99,13 @@ class MeridianTouch:
         )
 
     def _at_end(self, follow: Callable[[ContactPath, float], int], depth: float) -> "MeridianTouch":
-        path = ContactPath(Stage(0.0, np.zeros_like(self.tissue.state)))
+        path = ContactPath(ContactStage(0.0, np.zeros_like(self.tissue.state)))
         self.tissue.state = path.last.state
         try:
             follow(path, depth / self.unit)
         except LargeError as error:
             there = replace(self, touched=path.last.touched)
-            raise LargeError(str(error), (path.last.depth, there.force) if path.last.touched else None) from error
+            raise LargeError(str(error), (path.reached, there.force) if path.last.touched else None) from error
         return replace(self, touched=path.last.touched)
 
     def raised(self, coarse: "MeridianTouch", depth: float) -> "MeridianTouch":

@@ -17,7 +17,7 @@ from epsmesh.mesh.cracked import ACROSS, AHEAD, FACE, CrackGrading, cracked_quar
 from epsmesh.mesh.meridian import meridian_mesh
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
-from epsmesh.solve.contact.contact_steps import ContactPath, Stage, press
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, press
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool
 from epsmesh.solve.meridian.forms import MeridianForms
 from epsmesh.solve.meridian.system import FreeSystem
@@ -50,7 +50,7 @@ def open_crack(law: MaterialLaw, toughness: float, grading: CrackGrading) -> Ope
     with stage("meshing"):
         mesh = meridian_mesh(cracked_quarter(_EXTENT * _LARGEST, grading))
     tissue = _tissue(mesh, law)
-    path, message = ContactPath(Stage(0.0, np.zeros_like(tissue.state))), ""
+    path, message = ContactPath(ContactStage(0.0, np.zeros_like(tissue.state))), ""
     found: list[_State] = []
     ahead, ratio, balance = tissue.system.forms.on(AHEAD)[0][:, 1], _FIRST, 0.0
     while ratio < _LARGEST:
@@ -83,7 +83,7 @@ def section(law: MaterialLaw, ratio: float) -> tuple[FloatArray, FloatArray]:
     with stage("meshing"):
         mesh = meridian_mesh(cracked_quarter(_SHOWN * max(ratio, 1.0), LEVELS[-1]))
     tissue = _tissue(mesh, law)
-    path = ContactPath(Stage(0.0, np.zeros_like(tissue.state)))
+    path = ContactPath(ContactStage(0.0, np.zeros_like(tissue.state)))
     steps = max(round(np.log(ratio / _FIRST) / np.log(_FACTOR)), 0)
     for each in np.geomspace(min(_FIRST, ratio), ratio, steps + 1):
         _open(tissue, path, float(each))
