@@ -45,6 +45,11 @@ def make_form(expression: Any, mesh: Any, tags: Any, code: Code, kernels: dict[i
     return make(expression, mesh, _marked(tags), code, kernels)
 
 
+def general_form(expression: Any, options: dict[str, Any]) -> Any:
+    """Compile a form of any integrals by dolfinx's own way, which searches the cache each time; collective."""
+    return fem.form(expression, **{"jit_params" if _IS_OLD else "jit_options": options})
+
+
 def function_space(mesh: Any, element: Any, code: Callable[[], Code]) -> Any:
     """Return the space of functions of ``element``; ``code`` is how it is compiled, where dolfinx asks for that."""
     if hasattr(fem, "functionspace"):

@@ -134,3 +134,8 @@ def cell_tags(mesh: Any, values: np.ndarray) -> Any:
     return dolfinx.mesh.meshtags(
         mesh, mesh.topology.dim, np.arange(len(values), dtype=np.int32), values.astype(np.int32)
     )
+
+
+def facet_tags(mesh: Any, facets: np.ndarray) -> Any:
+    """Return tags of value 1 of local ``facets``, ascending."""
+    return dolfinx.mesh.meshtags(mesh, mesh.topology.dim - 1, facets, np.ones(len(facets), dtype=np.int32))

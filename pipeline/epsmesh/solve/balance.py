@@ -127,10 +127,16 @@ class Sums:
         return float(max(work, forces, mutual.max()))
 
 
-def sums(space: ElasticSpace, residuals: Sequence[FloatArray], held: Sequence[FloatArray]) -> Sums:
+def sums(
+    space: ElasticSpace,
+    residuals: Sequence[FloatArray],
+    held: Sequence[FloatArray],
+    on_terms: FloatArray | float = 0.0,
+) -> Sums:
     """Return the sums of the residuals of n motions (owned dofs); ``held`` are the prescribed values; collective.
 
-    With loads, ``residuals`` has one entry more than ``held``: that of the loads.
+    With loads, ``residuals`` has one entry more than ``held``: that of the loads. What terms of the body bear
+    (``on_terms``, N) is no part of the support's.
     """
     prescribed, rows = space.prescribed_owned, []
     for residual in residuals:
@@ -141,7 +147,7 @@ def sums(space: ElasticSpace, residuals: Sequence[FloatArray], held: Sequence[Fl
     crossed = total[-1, 6:] if len(residuals) > count else np.zeros(count)
     return Sums(
         on_probe=total[:, :3],
-        on_support=total[:, 3:6],
+        on_support=total[:, 3:6] - on_terms,
         works=np.diag(total[:count, 6:]).copy(),
         crossed=crossed,
     )

@@ -43,6 +43,13 @@ def form(expression: Any, kernels: dict[int, int] | None = None) -> Any:
     return compat.make_form(expression, mesh, tags.get("cell"), code, kernels or {})
 
 
+def general_form(expression: Any) -> Any:
+    """Return a form of any integrals, over facets too; to be kept, since each call searches the cache; collective."""
+    comm = expression.ufl_domain().ufl_cargo().comm
+    with quiet_compiler(), _sources_stay(comm):
+        return compat.general_form(expression, _options())
+
+
 @dataclass(frozen=True)
 class Kernel:
     """A compiled cell kernel: its ``address``, and the ``coefficients`` (UFL) whose dofs it reads, in this order.
@@ -175,9 +182,8 @@ def _code(comm: MPI.Comm, expression: Any, signature: str) -> compat.Code:
 
     Either all ranks search the cache folder or none does: what they hold in memory may differ.
     """
-    folder = str(form_cache())
-    options = {"cache_dir": folder, "cffi_extra_compile_args": ["-O2", "-march=native"], "timeout": 120}
-    key = folder, signature
+    options = _options()
+    key = options["cache_dir"], signature
     if comm.size > 1 or key not in _known:
         with quiet_compiler(), _sources_stay(comm):
             found = compat.compile_code(comm, expression, options)
@@ -185,6 +191,11 @@ def _code(comm: MPI.Comm, expression: Any, signature: str) -> compat.Code:
             return found
         _known[key] = found
     return _known[key]
+
+
+def _options() -> dict[str, Any]:
+    flags = ["-O2", "-march=native"]
+    return {"cache_dir": str(form_cache()), "cffi_extra_compile_args": flags, "timeout": 120}
 
 
 def form_cache() -> Path:

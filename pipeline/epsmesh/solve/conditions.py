@@ -8,6 +8,7 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.movement import Vector
+from epsmesh.solve.terms import AddedTerm
 
 # The virtual extension v is 1 up to the first of these shares of its radius, and 0 from the second on.
 _INNER, _OUTER = 0.4, 1.0
@@ -52,12 +53,19 @@ class Conditions:
     With ``unilateral`` contact the footprint prescribes nothing: the active set does. The support is fixed. On planes
     of symmetry that bound the mesh the normal displacement is zero. A probe in a slit with that ``front`` touches both
     faces of the slit. Without bond it prescribes their opening only, and its driving force acts at its ``tip``.
+    ``terms`` act on the body besides its law.
     """
 
     bonded: bool = True
     unilateral: bool = False
     front: Front | None = None
     tip: Front | None = None
+    terms: tuple[AddedTerm, ...] = ()
+
+    @property
+    def without_footprint(self) -> "Conditions":
+        """The same without a tool."""
+        return Conditions(bonded=False, unilateral=True, terms=self.terms)
 
     @property
     def components(self) -> tuple[int, ...]:
@@ -79,4 +87,4 @@ class Conditions:
 
 
 # Conditions without a footprint: no tool, or one whose active set alone prescribes displacements.
-WITHOUT_FOOTPRINT = Conditions(bonded=False, unilateral=True)
+WITHOUT_FOOTPRINT = Conditions().without_footprint

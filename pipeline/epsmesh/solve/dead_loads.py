@@ -18,7 +18,6 @@ from petsc4py import PETSc
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.compiled import global_sum
-from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
 from epsmesh.solve.elements import elements_of
 from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.loads import Applied
@@ -37,10 +36,10 @@ _SHORTEST = 1 / 64
 _MOST_SECANTS, _HALVINGS, _SMALL, _NO_FORCE = 20, 6, 1e-6, 1e-9
 
 
-def load_in_steps(body: HyperelasticBody, applied: Applied, state: PETSc.Vec) -> None:
+def load_in_steps(body: HyperelasticBody, applied: Applied | None, state: PETSc.Vec) -> None:
     """Bring ``state`` to the equilibrium under loads, at its prescribed dofs, in as many steps as needed; collective.
 
-    The loads then act on the ``body``.
+    The loads, and all terms, then act on the ``body``.
 
     Raises:
         LargeError: if a load step becomes too small.
@@ -65,15 +64,16 @@ def load_in_steps(body: HyperelasticBody, applied: Applied, state: PETSc.Vec) ->
 @contextmanager
 def without_tool(elements: Elements) -> Iterator[Elements]:
     """Lend the elements of the same mesh, degree and kind on which no tool acts; collective."""
+    conditions = elements.displacements.conditions.without_footprint
     with Spaces(elements.body) as spaces, ExitStack() as stack:
-        found = elements_of(spaces, elements.degree, WITHOUT_FOOTPRINT, elements.element)
+        found = elements_of(spaces, elements.degree, conditions, elements.element)
         stack.callback(found.close)
         yield found
 
 
 @stage("loads")
-def sag(elements: Elements, law: MaterialLaw, loads: Loads, guess: FloatArray | None = None) -> FloatArray:
-    """Return the state (owned dofs) of ``elements`` without a tool under ``loads``; collective.
+def sag(elements: Elements, law: MaterialLaw, loads: Loads | None, guess: FloatArray | None = None) -> FloatArray:
+    """Return the state (owned dofs) of ``elements`` without a tool under ``loads`` and terms; collective.
 
     ``guess`` is an initial guess of it. The forms' fields are then that state.
 
@@ -82,7 +82,7 @@ def sag(elements: Elements, law: MaterialLaw, loads: Loads, guess: FloatArray | 
         SolveError: if the forces on support and body do not balance.
     """
     space = elements.displacements
-    applied = space.applied(loads)
+    applied = None if loads is None else space.applied(loads)
     with ExitStack() as stack:
         linear = elements.linearised(law, stack, direct=elements.is_direct("auto"))
         body = HyperelasticBody(elements, law, linear.preconditioner)
@@ -97,18 +97,22 @@ def sag(elements: Elements, law: MaterialLaw, loads: Loads, guess: FloatArray | 
             body.equilibrate(state, body.held_of(state))
         body.forces(state, forces)
         own = forces.array[: space.owned].reshape(-1, 3)[space.fixed_owned].sum(axis=0)
-        left = whole_force(global_sum(space.comm, own) + applied.resultant, elements.body.mirrored)
-        check_balance(float(np.linalg.norm(left)) / (2.0 ** len(elements.body.mirrored) * applied.size))
-        body.show(state)
+        resultant, size = body.on_terms(state)
+        left = whole_force(global_sum(space.comm, own) - resultant, elements.body.mirrored)
+        check_balance(float(np.linalg.norm(left)) / (2.0 ** len(elements.body.mirrored) * size))
         return np.array(state.array)
 
 
-def start_under_loads(elements: Elements, law: MaterialLaw, loads: Loads) -> FloatArray:
+def start_under_loads(elements: Elements, law: MaterialLaw, loads: Loads | None) -> FloatArray:
     """Return the state (owned dofs) of ``elements`` with a bonded tool at which the tool has no force; collective.
+
+    Without loads, and terms that act like them, it is zero.
 
     Raises:
         SolveError: see :func:`sag`.
     """
+    if loads is None and not elements.displacements.is_loaded:
+        return np.zeros(elements.unknowns)
     with without_tool(elements) as free:
         sag(free, law, loads)
         elements.interpolate(free)

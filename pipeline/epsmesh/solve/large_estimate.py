@@ -27,6 +27,7 @@ from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.movement import Loads
 from epsmesh.solve.newton import HyperelasticBody, LargeError, Preconditioner
 from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.terms import DeadLoads, Term, product
 
 # Residual of the solution in one degree more, relative to the forces at prescribed dofs.
 _AGAIN = 1e-3
@@ -51,7 +52,9 @@ class FinerResiduals:
         self._elements, self._body, self._stack, self._finer = elements, body, stack, finer
         self._forms = finer.large_forms(law)
         finer.set_law(law)
-        self._load = None if loads is None else finer.displacements.applied(loads).forces / finer.unit(law)
+        space, self._unit = finer.displacements, finer.unit(law)
+        loaded = [] if loads is None else [DeadLoads(space.applied(loads).forces, space.forms.displacement)]
+        self._terms: list[Term] = [*space.terms, *loaded]
 
     def at(self, state: PETSc.Vec) -> Fields:
         """Return the residual r of a state.
@@ -60,26 +63,27 @@ class FinerResiduals:
             LargeError: if elements of that degree turn tissue inside out.
         """
         self._show(state)
-        return self._assembled(self._forms.residuals, self._load)
+        return self._assembled(self._forms.residuals, [term.forces() for term in self._terms])
 
     def of_rate(self, state: PETSc.Vec, rate: PETSc.Vec) -> Fields:
         """Return r', the change of the residual of a state with its ``rate``."""
         self._show(rate)
         self._forms.set_directions()
         self._show(state)
-        return self._assembled(self._forms.products)
+        direction = self._forms.directions[0].x.array[: self._finer.displacements.owned]
+        return self._assembled(self._forms.products, [product(term, direction) for term in self._terms])
 
     def _show(self, state: PETSc.Vec) -> None:
         self._body.show(state)
         self._finer.interpolate(self._elements)
 
-    def _assembled(self, of_forms: Sequence[object], load: FloatArray | None = None) -> Fields:
+    def _assembled(self, of_forms: Sequence[object], of_terms: Sequence[FloatArray]) -> Fields:
         finer = self._finer
         found = self._stack.enter_context(finer.fields())
         for each, part in zip(of_forms, found, strict=True):
             assemble(each, part)
-        if load is not None:
-            found[0].array[:] -= load
+        for forces in of_terms:
+            found[0].array[:] += forces / self._unit
         finer.weigh(found)
         for part in found:
             part.scale(-1.0)

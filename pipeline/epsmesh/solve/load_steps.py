@@ -133,15 +133,17 @@ class LoadSteps(Solver):
         with self._body.state() as state, self._body.state() as forces, self._body.state() as before:
             state.array[:] = start
             self._body.forces(state, before)
+            on_terms = self._body.on_terms(state)[0]
             self._at(column, state)
             self._body.forces(state, forces)
+            on_terms = (self._body.on_terms(state)[0] - on_terms) / column.amount
             residual, moved = (
                 self._body.split(part / column.amount, column.unknown)[0]
                 for part in (forces.array - before.array, state.array - start)
             )
         held = space.prescribed_owned
         work = global_sum(space.comm, np.array([residual[held] @ column.prescribed[held]]))
-        return Products(space, [moved], [residual], work[None], work)
+        return Products(space, [moved], [residual], work[None], work, on_terms[None])
 
     def load_response(self, response: Response) -> LoadResponse | None:
         """Return the effect of loads on the whole body, None without loads; ``response`` is that to the motion."""

@@ -6,6 +6,7 @@ Tractions act on the free surface. The edge of a cap crosses facets: these are s
 of the cap.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -98,13 +99,8 @@ def _add_weights(
 def _add_traction(load: SurfaceLoad, body: BodyMesh, space: Any, dofs: Int32Array, nodal: FloatArray) -> list[float]:
     """Add a surface load to ``nodal`` forces; return this rank's integrals: x, y, z, magnitude, area."""
     sums = np.zeros(5)
-    cells, sides = _free_facets(body)
-    geometry = _nodes(body)[cells]
-    corners = geometry[np.arange(len(cells))[:, None], _FACETS[sides]]
-    opposite = geometry[np.arange(len(cells)), sides]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    normals *= np.sign(np.einsum("cx,cx->c", corners[:, 0] - opposite, normals))[:, None]
+    free = boundary_of(body, (FREE,))
+    cells, sides, geometry, corners, normals = free.cells, free.sides, free.geometry, free.corners, free.normals
     halvings = _halvings(load, corners)
     carries = load.on_facets(corners, normals) & (halvings >= 0)
     degree = compat.degree(space) + (0 if geometry.shape[1] == 4 else _CURVED)
@@ -134,18 +130,40 @@ def _add_traction(load: SurfaceLoad, body: BodyMesh, space: Any, dofs: Int32Arra
     return [*map(float, sums)]
 
 
-def _free_facets(body: BodyMesh) -> tuple[Int32Array, Int32Array]:
-    """Return the owned cells with a free facet and the local number of that facet, one entry for each facet."""
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """Local ``facets`` (n) of the boundary: their owned cell, their number in it, and the nodes (m) of that cell.
+
+    ``corners`` (n, 3, 3), in m, and outward unit ``normals`` (n, 3) are those of the facets.
+    """
+
+    facets: Int32Array
+    cells: Int32Array
+    sides: Int32Array
+    geometry: FloatArray
+    corners: FloatArray
+    normals: FloatArray
+
+
+def boundary_of(body: BodyMesh, groups: Sequence[str]) -> Boundary:
+    """Return the facets of boundary ``groups`` of the cells that this rank owns."""
     topology, tdim = body.mesh.topology, body.mesh.topology.dim
     topology.create_connectivity(tdim - 1, tdim)
     topology.create_connectivity(tdim, tdim - 1)
     of_facet, of_cell = topology.connectivity(tdim - 1, tdim), topology.connectivity(tdim, tdim - 1)
-    facets = body.facets.get(FREE, np.empty(0, dtype=np.int32))
+    facets = np.concatenate([body.facets.get(group, np.empty(0, dtype=np.int32)) for group in groups])
     cells = np.array([of_facet.links(facet)[0] for facet in facets], dtype=np.int32)
     owned = cells < body.owned_cells
     cells, facets = cells[owned], facets[owned]
     beside = of_cell.array.reshape(-1, 4)[cells]
-    return cells, np.asarray((beside == facets[:, None]).argmax(axis=1), dtype=np.int32)
+    sides = np.asarray((beside == facets[:, None]).argmax(axis=1), dtype=np.int32)
+    geometry = _nodes(body)[cells]
+    corners = geometry[np.arange(len(cells))[:, None], _FACETS[sides]]
+    opposite = geometry[np.arange(len(cells)), sides]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals *= np.sign(np.einsum("cx,cx->c", corners[:, 0] - opposite, normals))[:, None]
+    return Boundary(facets, cells, sides, geometry, corners, normals)
 
 
 def _halvings(load: SurfaceLoad, corners: FloatArray) -> Int32Array:

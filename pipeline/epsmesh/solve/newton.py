@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
-from epsmesh.solve.compiled import assemble
+from epsmesh.solve.compiled import assemble, global_sum
 from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.elements.fields import Fields
 from epsmesh.solve.elements.tangent import Prestress, Tangent
@@ -26,6 +26,7 @@ from epsmesh.solve.krylov import INDEFINITE, INDEFINITE_MATRIX, explain, solver_
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.spaces import ElasticSpace
+from epsmesh.solve.terms import DeadLoads, Term
 from epsmesh.stages import stage
 
 # Tolerance on the residual, relative to the forces at prescribed dofs, and most Newton iterations.
@@ -66,25 +67,34 @@ class LargeError(SolveError):
 
 
 class Imposed:
-    """The work H : E of a prestress, E Green's strain, or ε in regions of a linear law.
+    """The work H : E of a prestress, E Green's strain, or ε in regions of a linear law: see :class:`.terms.Term`.
 
-    It is ½ (x + u)·K (x + u) − ½ x·K x, with K its part of the tangent; in linear regions the force is K x.
+    It is ½ (x + u)·K (x + u) − ½ x·K x, with K its part of the tangent; in linear regions the force is K x. The tangent
+    has K at its quadrature points.
     """
 
-    def __init__(self, space: ElasticSpace, tangent: Tangent, stress: list[FloatArray]):
-        """Set up; collective. ``moduli`` are its part of the tangent."""
+    def __init__(self, space: ElasticSpace, tangent: Tangent, stress: list[FloatArray], unit: float):
+        """Set up for a ``stress`` in a ``unit`` (Pa); collective. ``moduli`` are its part of the tangent."""
         whole = tangent.cells.geometric(stress)
         self.moduli = tangent.of_large_strain(whole)
-        self._stiffness = tangent.operator(self.moduli)
+        self._stiffness, self._space, self._unit = tangent.operator(self.moduli), space, unit
         self._constant = tangent.operator(whole).whole(space.places)
 
-    def forces(self, u: FloatArray) -> FloatArray:
-        """Return the nodal forces at a displacement u, owned dofs; collective."""
-        return self._constant + self._stiffness.whole(u)
+    @property
+    def _u(self) -> FloatArray:
+        return self._space.forms.displacement.x.array[: self._space.owned]
 
-    def energy(self, u: FloatArray) -> float:
-        """Return this rank's part of the work; collective."""
-        return float(u @ self._constant) + float(u @ self._stiffness.whole(u)) / 2
+    def forces(self) -> FloatArray:
+        """Return the nodal forces (N), owned dofs; collective."""
+        return self._unit * (self._constant + self._stiffness.whole(self._u))
+
+    def energy(self) -> float:
+        """Return this rank's part of the work (J); collective."""
+        u = self._u
+        return self._unit * (float(u @ self._constant) + float(u @ self._stiffness.whole(u)) / 2)
+
+    def operator(self, into: PETSc.Mat | None = None) -> None:
+        """Return None: see above."""
 
 
 class HyperelasticBody:
@@ -109,8 +119,9 @@ class HyperelasticBody:
         self._space, self._unit = elements.displacements, elements.unit(law)
         self._held = self._space.prescribed_owned
         self._forms = elements.large_forms(law, scaled=prestressed)
-        self._imposed: Imposed | None = None
-        self._load: FloatArray | None = None  # in units of the law
+        self._share = 1.0  # of terms and dead loads
+        self._loads: list[Term] = []
+        self._imposed: list[Imposed] = []
         self._stack = ExitStack()
         self._tangent = elements.tangent(law)
         self._stack.callback(self._tangent.close)
@@ -149,16 +160,29 @@ class HyperelasticBody:
         It is the stored one, less the work of dead loads.
         """
         self.show(state)
-        own, u = fem.assemble_scalar(self._forms.energy), state.array_r[: self._space.owned]
-        if self._imposed is not None:
-            own += self._imposed.energy(u)
-        if self._load is not None:
-            own -= float(self._load @ u)
+        own = fem.assemble_scalar(self._forms.energy)
+        for share, term in self._terms:
+            own += share / self._unit * term.energy()
         return self._unit * float(self._space.comm.allreduce(own, op=MPI.SUM))
 
-    def carry(self, applied: Applied, share: float = 1.0) -> None:
-        """Let a ``share`` of dead loads act on the body from now on."""
-        self._load = share / self._unit * applied.forces
+    @property
+    def _terms(self) -> list[tuple[float, Term]]:
+        """All terms besides the law, each with its share."""
+        shared = [(self._share, term) for term in (*self._space.terms, *self._loads)]
+        return [*shared, *((1.0, term) for term in self._imposed)]
+
+    def carry(self, applied: Applied | None, share: float = 1.0) -> None:
+        """Let a ``share`` of dead loads, and of the terms of the space, act on the body from now on."""
+        self._loads = [] if applied is None else [DeadLoads(applied.forces, self._space.forms.displacement)]
+        self._share = self._tangent.share = share
+
+    def on_terms(self, state: PETSc.Vec) -> tuple[FloatArray, float]:
+        """Return the sum (3) of the nodal forces (N) of all terms besides the law, and of their sizes; collective."""
+        self.show(state)
+        forces = [(share * term.forces()).reshape(-1, 3) for share, term in self._terms]
+        own = [np.append(part.sum(axis=0), np.linalg.norm(part, axis=1).sum()) for part in forces]
+        *resultant, size = global_sum(self._space.comm, sum(own, np.zeros(4)))
+        return np.array(resultant), float(size)
 
     def held_of(self, state: PETSc.Vec) -> FloatArray:
         """Return the prescribed dofs (m) of a state."""
@@ -167,10 +191,11 @@ class HyperelasticBody:
     def impose(self, prestress: Prestress | None, factors: tuple[float, ...] = ()) -> None:
         """Change the energy from now on; None leaves only ``factors``, by region; collective."""
         self._forms.set_factors(factors if prestress is None else prestress.factors)
-        self._imposed = None
+        self._imposed = []
         if prestress is not None:
-            self._imposed = Imposed(self._space, self._tangent, prestress.stress)
-            self._tangent.impose(prestress.factors, self._imposed.moduli)
+            imposed = Imposed(self._space, self._tangent, prestress.stress, self._unit)
+            self._imposed = [imposed]
+            self._tangent.impose(prestress.factors, imposed.moduli)
 
     def stresses(self, state: PETSc.Vec) -> tuple[list[FloatArray], list[FloatArray]]:
         """Return stress (of the unchanged energy, in the law's unit) and strain: see ``Tangent``; collective."""
@@ -179,9 +204,10 @@ class HyperelasticBody:
 
     def force_of(self, stress: list[FloatArray], state: PETSc.Vec, direction: FloatArray) -> float:
         """Return the work (J) that a change of the prestress by ``stress`` does in a ``direction``, a state."""
-        owned = self._space.owned
-        forces = Imposed(self._space, self._tangent, stress).forces(state.array_r[:owned])
-        return self._unit * float(self._space.comm.allreduce(float(forces @ direction[:owned]), op=MPI.SUM))
+        self.show(state)
+        forces = Imposed(self._space, self._tangent, stress, self._unit).forces()
+        own = float(forces @ direction[: self._space.owned])
+        return float(self._space.comm.allreduce(own, op=MPI.SUM))
 
     @property
     def comm(self) -> MPI.Comm:
@@ -341,10 +367,8 @@ class HyperelasticBody:
         with self._elements.fields() as parts:
             for residual, part in zip(self._forms.residuals, parts, strict=True):
                 assemble(residual, part)
-            if self._imposed is not None:
-                parts[0].array[:] += self._imposed.forces(state.array_r[: self._space.owned])
-            if self._load is not None:
-                parts[0].array[:] -= self._load
+            for share, term in self._terms:
+                parts[0].array[:] += share / self._unit * term.forces()
             self._elements.weigh(parts)
             result.array[:] = np.concatenate([part.array for part in parts])
 

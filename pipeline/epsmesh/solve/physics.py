@@ -70,9 +70,13 @@ class Parameters:
 
 @dataclass(frozen=True)
 class MaterialLaw:
-    """Laws and ``parameters`` of the regions of the mesh, by region number; a single one applies to all regions."""
+    """Laws and ``parameters`` of the regions of the mesh, by region number; a single one applies to all regions.
+
+    Moduli are in units of ``unit`` (Pa).
+    """
 
     parameters: tuple[Parameters, ...]
+    unit: float = field(default=1.0, compare=False)
 
     @staticmethod
     def of(lame_lambda: float | Sequence[float], lame_mu: float | Sequence[float]) -> "MaterialLaw":
@@ -154,7 +158,7 @@ class SplitLaw:
                 kept = region.lame_lambda / unit - rest
             elastic.append(replace(region, lame_lambda=kept, lame_mu=mu, given_poisson=None))
             compliance.append(0.0 if rest == inf else 1 / rest)
-        return SplitLaw(unit, MaterialLaw(tuple(elastic)), tuple(compliance))
+        return SplitLaw(unit, MaterialLaw(tuple(elastic), unit), tuple(compliance))
 
 
 def strain(u: Any) -> Any:

@@ -126,13 +126,11 @@ class PrescribedMotion:
             SolveError: if it cannot be set up, the elements do not support the law, or do not carry the loads.
         """
         law, movement = asked.law, asked.movement
-        if law.is_linear:
+        if law.is_linear and not self._elements.displacements.terms:
             return self._elements.set_up(law, stack, direct=direct, keep=keep)
         load_path = self._load_path
         if load_path is None or not load_path.can_reach(law, movement, applied):
-            start = np.zeros(self._elements.unknowns)
-            if movement.loads is not None:
-                start = start_under_loads(self._elements, law, movement.loads)
+            start = start_under_loads(self._elements, law, movement.loads)
             load_path = LoadPath(Stage(0.0, start), law=law, motion=movement.motions[0], applied=applied)
         self._load_path = load_path if self._shares_path else None
         return LoadSteps(self._elements, load_path, stack, direct=direct)
@@ -156,7 +154,7 @@ def respond(
         residual if column.applied is None else residual - column.applied.forces
         for residual, column in zip(found.residuals, columns, strict=True)
     ]
-    total = sums(found.space, residuals, [column.prescribed for column in motions])
+    total = sums(found.space, residuals, [column.prescribed for column in motions], found.on_terms)
     beyond = _energy_beyond(movement, law.lame_mu[0], mirrored)
     response = reaction(movement, found.stationary[:count, :count] + beyond, total.on_probe[:count], mirrored)
     balance = total.imbalance(found.energies[:count], movement, mirrored)

@@ -4,7 +4,7 @@ The operator is K = λ A_λ + μ A_μ, with prescribed dofs eliminated symmetric
 """
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -23,11 +23,13 @@ from epsmesh.solve.conditions import Conditions, Front
 from epsmesh.solve.forms import ElasticForms
 from epsmesh.solve.kernels.assembly import StraightStiffness, cell_kernel
 from epsmesh.solve.kernels.cells import StraightMaps
-from epsmesh.solve.kernels.product import DEGREES, CellStiffness
+from epsmesh.solve.kernels.product import DEGREES, CellStiffness, SparsePart
+from epsmesh.solve.krylov import keep
 from epsmesh.solve.loads import Applied, apply_loads
 from epsmesh.solve.measures import curved_cells, has_curved_cells
 from epsmesh.solve.movement import Loads, Motion
 from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.terms import Term
 from epsmesh.stages import stage
 
 _ORIGIN = np.zeros((1, 3))
@@ -41,7 +43,7 @@ class ElasticSpace:
 
     ``prescribed`` are local dofs (unrolled, owned and ghosts). Arrays named ``…_owned`` index owned dofs;
     ``probe_owned`` and ``fixed_owned`` index owned blocks of three dofs. ``owned`` and ``size`` count the dofs of this
-    rank, and of all ranks. ``space`` and ``dirichlet`` are dolfinx objects.
+    rank, and of all ranks. ``terms`` are those of the conditions. ``space`` and ``dirichlet`` are dolfinx objects.
     """
 
     @stage("spaces, forms")
@@ -71,6 +73,7 @@ class ElasticSpace:
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
         self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
         self.forms = ElasticForms(space, body.regions, cell_kernel)
+        self.terms: list[Term] = [term.on(body, self.forms.displacement) for term in conditions.terms]
 
     @property
     def whole_dofs(self) -> int:
@@ -99,11 +102,14 @@ class ElasticSpace:
         With ``entries``, or in degree 1, it has type aij, with the first region's μ on the diagonal of prescribed dofs.
         With ``whole`` it has no conditions. Without entries it is matrix-free, with identity rows at prescribed dofs.
         """
-        matrix = self._assemble(law, whole=whole) if entries or self.degree == 1 else self._product(law)
-        try:
+        with ExitStack() as stack:
+            terms = self._terms_at_rest(law, stack)
+            if entries or self.degree == 1:
+                matrix = keep(stack, self._assemble(law, whole=whole))
+                self._add_terms(matrix, terms, whole=whole)
+            else:
+                matrix = keep(stack, self._product(law, terms))
             yield matrix
-        finally:
-            matrix.destroy()
 
     @cached_property
     def cells(self) -> CellStiffness:
@@ -116,8 +122,27 @@ class ElasticSpace:
         return StraightStiffness(self.space, curved_cells(self.body.mesh), self.body.regions)
 
     @stage("assembly")
-    def _product(self, law: MaterialLaw) -> PETSc.Mat:
-        return self.cells.operator(law).matrix()
+    def _product(self, law: MaterialLaw, terms: list[PETSc.Mat]) -> PETSc.Mat:
+        return self.cells.operator(law, list(map(SparsePart, terms))).matrix()
+
+    def _terms_at_rest(self, law: MaterialLaw, stack: ExitStack) -> list[PETSc.Mat]:
+        """Return the operators of the terms without displacement, in the unit of ``law``, freed with the stack."""
+        if not self.terms:
+            return []
+        now = self.forms.displacement.x.array.copy()
+        self.forms.displacement.x.array[:] = 0.0
+        found = [keep(stack, matrix) for term in self.terms if (matrix := term.operator()) is not None]
+        self.forms.displacement.x.array[:] = now
+        for matrix in found:
+            matrix.scale(1 / law.unit)
+        return found
+
+    def _add_terms(self, matrix: PETSc.Mat, terms: list[PETSc.Mat], *, whole: bool) -> None:
+        rows = self.prescribed_owned + self.space.dofmap.index_map_bs * self.space.dofmap.index_map.local_range[0]
+        for term in terms:
+            if not whole:
+                term.zeroRowsColumns(rows.astype(PETSc.IntType), diag=0.0)
+            matrix.axpy(1.0, term, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
 
     @stage("assembly")
     def _assemble(self, law: MaterialLaw, *, whole: bool) -> PETSc.Mat:
@@ -143,6 +168,9 @@ class ElasticSpace:
             assemble(self.forms.action, result)
         else:
             result.array[:] = self.cells.operator(law).whole(self.forms.displacement.x.array[: self.owned])
+        with ExitStack() as stack:
+            for part in map(SparsePart, self._terms_at_rest(law, stack)):
+                part.add_product(self.forms.displacement.x.array[: self.owned], result.array)
 
     def residual_of(self, other: "ElasticSpace", law: MaterialLaw, result: PETSc.Vec) -> None:
         """Write -K u (N), zero at prescribed dofs, for the displacement u of an ``other`` space, into ``result``.
@@ -178,6 +206,15 @@ class ElasticSpace:
         """Add ``factor`` times loads to ``rhs``, except at prescribed dofs."""
         rhs.array[:] += factor * applied.forces
         rhs.array[self.prescribed_owned] = 0.0
+
+    @cached_property
+    def is_loaded(self) -> bool:
+        """Whether terms have forces without displacement; collective."""
+        now = self.forms.displacement.x.array.copy()
+        self.forms.displacement.x.array[:] = 0.0
+        largest = max((float(np.abs(term.forces()).max(initial=0.0)) for term in self.terms), default=0.0)
+        self.forms.displacement.x.array[:] = now
+        return bool(self.terms) and self.comm.allreduce(largest, op=MPI.MAX) > 0
 
     @cached_property
     def places(self) -> FloatArray:

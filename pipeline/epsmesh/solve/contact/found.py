@@ -18,7 +18,6 @@ import numpy as np
 from epsmesh.arrays import BoolArray, Int32Array
 from epsmesh.solve.cell_values import plain_share
 from epsmesh.solve.compiled import global_sum, vector
-from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
 from epsmesh.solve.contact.active_set import Found, Obstacle, find_set
 from epsmesh.solve.contact.elements import ContactElements, FreeResponse, State
 from epsmesh.solve.contact.geometry import Area, contact_area
@@ -166,7 +165,7 @@ def _decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, fl
 
 
 def _displacement_decrement(elements: ContactElements, facets: Int32Array) -> float:
-    finer, law = elements.surface.spaces.get(elements.space.degree + 1, WITHOUT_FOOTPRINT), elements.law
+    finer, law = elements.surface.space(elements.space.degree + 1), elements.law
     with ExitStack() as stack, vector(finer.space) as residual:
         levels = elements.held_levels(facets, stack)
         operator = HeldOperator(finer, law, stack, direct=False, masked=True)

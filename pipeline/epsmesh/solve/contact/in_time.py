@@ -13,7 +13,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from epsmesh.arrays import FloatArray
-from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
 from epsmesh.solve.contact.active_set import ContactError
 from epsmesh.solve.contact.contact_steps import check_outside
@@ -29,16 +28,6 @@ from epsmesh.solve.time_steps import Pressed
 
 # Share of the largest contact forces so far to which the residual is compared, where forces have become small.
 _SCALE = 1e-2
-
-
-def along_axis(tool: Tool, places: FloatArray) -> Tool:
-    """Return a tool whose gaps to nodes are those along −z, above their undeformed ``places`` (n, 3)."""
-    heights = tool.height(places) - tool.first
-
-    def distance(points: FloatArray, depth: float) -> Distance:
-        return Distance.along_axis(heights - depth - (points - places)[:, 2], 3)
-
-    return replace(tool, distance=distance)
 
 
 class PressedTissue(Pressed):
@@ -121,7 +110,7 @@ class PressedTool(PressedTissue):
         """Set up; what is made is freed with the ``stack``; collective."""
         self._tissue = DeformedBody(elements, surface, law, "iterative", stack, prestressed=True)
         self.body, self._depth = self._tissue.hyperelastic, depth
-        self._tool = along_axis(tool, self._tissue.candidates.points) if law.is_linear else tool
+        self._tool = tool.along_axis(self._tissue.candidates.points) if law.is_linear else tool
         super().__init__(self._tissue, self._tissue.candidates.points, 1.0)
 
     def _placed(self, share: float) -> PlacedTool:
@@ -141,8 +130,5 @@ class PressedTool(PressedTissue):
         if touched.active.any():
             # Pressures beside the edge tell its place with the modulus of the law: those without relaxation.
             elastic = replace(touched, forces=tissue.elastic_forces() * touched.active[:, None])
-            places = tissue.candidates
-            if not tissue.law.is_linear:
-                places = replace(places, points=tissue.positions())
-            area = touched_area(tissue, places, elastic, share * self._depth).value
+            area = touched_area(tissue, elastic, share * self._depth).value
             self.area = 2.0 ** len(tissue.elements.body.mirrored) * area

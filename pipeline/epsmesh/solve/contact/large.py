@@ -26,7 +26,6 @@ from epsmesh.solve.contact.elements import State
 from epsmesh.solve.contact.geometry import Area, contact_area
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
-from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
@@ -81,7 +80,7 @@ class LargeContact:
         body = DeformedBody(self._elements, self._surface, self._law, asked.method, stack, self._applied)
         if self._sagged is None:
             self._sagged = sagged_body(body, self._tool, self._loads)
-        tool = self._sagged.placed(self._tool)
+        tool = self._sagged.placed(self._tool, body)
         if self._path is None:
             self._path = ContactPath(ContactStage(0.0, self._sagged.state))
         try:
@@ -133,7 +132,7 @@ class LargeContactSolution:
     @property
     def placed(self) -> Tool:
         """The tool whose depth counts from there."""
-        return self.sagged.placed(self.tool)
+        return self.sagged.placed(self.tool, self.body)
 
     @property
     def stored(self) -> float:
@@ -196,8 +195,7 @@ class LargeContactSolution:
         space = self.body.elements.displacements
         local = self.body.residual().reshape(-1, 3)[space.fixed_owned, 2].sum()
         support = float(global_sum(space.comm, np.array([local]))[0])
-        if self.body.applied is not None:
-            support += float(self.body.applied.resultant[2])
+        support -= float(self.body.on_terms[2])
         balance = abs(support / self.force - 1)
         check_balance(balance)
         on_probe = self.touched.forces.sum(axis=0)[None] / self.depth
@@ -260,8 +258,9 @@ class LargeContactSolution:
         """
 
         def tool_at(depth: float) -> PlacedTool:
-            return placed_tool(body, sagged.placed(self.tool), depth)
+            return placed_tool(body, tool, depth)
 
+        tool = sagged.placed(self.tool, body)
         there = tool_at(self.depth)
         active = self.body.candidates.raised(self.touched.active, body.candidates)
         if body.is_sound:
@@ -287,12 +286,14 @@ class LargeContactSolution:
         return float(areas[at_end[candidates.facets].any(axis=1)].sum() / areas.sum())
 
     def _area(self) -> Area:
-        moved = replace(self.body.candidates, points=self.body.positions())
-        return touched_area(self.body, moved, self.touched, self.depth)
+        return touched_area(self.body, self.touched, self.depth)
 
 
-def touched_area(body: DeformedBody, candidates: Candidates, touched: ContactSolution, depth: float) -> Area:
-    """Return the contact area of the modelled part, where its ``candidates`` are, normal to the axis."""
+def touched_area(body: DeformedBody, touched: ContactSolution, depth: float) -> Area:
+    """Return the contact area of the modelled part, where its candidates are, normal to the axis."""
+    candidates = body.candidates
+    if not body.law.is_linear:
+        candidates = replace(candidates, points=body.positions())
     modulus = candidates.from_regions(body.law.plane_moduli)
     state = State(np.zeros(len(candidates)), touched.forces[:, 2], nan)
     obstacle = Obstacle(candidates, touched.gap, depth)

@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from epsmesh.solve.compiled import global_sum
-from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
+from epsmesh.solve.conditions import WITHOUT_FOOTPRINT, Conditions
 from epsmesh.solve.contact.surface import Candidates, find_candidates
 from epsmesh.solve.elements import elements_of
 from epsmesh.solve.elements.base import Elements
@@ -26,23 +26,26 @@ _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 class Surface:
     """Elements of a mesh with unilateral contact, and the candidate nodes of each degree, found at first use.
 
-    ``spaces`` are those of the mesh.
+    ``spaces`` are those of the mesh, ``conditions`` have the terms that act on the body.
     """
 
-    def __init__(self, spaces: Spaces):
-        self.spaces = spaces
+    def __init__(self, spaces: Spaces, conditions: Conditions = WITHOUT_FOOTPRINT):
+        self.spaces, self._conditions = spaces, conditions.without_footprint
         self._found: dict[int, Candidates] = {}
 
     def of(self, degree: int) -> Candidates:
         """Return the candidates of a ``degree``; collective."""
         if degree not in self._found:
-            space = self.spaces.get(degree, WITHOUT_FOOTPRINT).space
-            self._found[degree] = find_candidates(self.spaces.body, space)
+            self._found[degree] = find_candidates(self.spaces.body, self.space(degree).space)
         return self._found[degree]
+
+    def space(self, degree: int) -> ElasticSpace:
+        """Return the space of a ``degree`` without a tool; collective."""
+        return self.spaces.get(degree, self._conditions)
 
     def elements(self, degree: int, element: str, stack: ExitStack) -> Elements:
         """Return elements of a ``degree`` and kind, which the ``stack`` closes; collective."""
-        found = elements_of(self.spaces, degree, WITHOUT_FOOTPRINT, element)
+        found = elements_of(self.spaces, degree, self._conditions, element)
         stack.callback(found.close)
         return found
 
@@ -112,7 +115,7 @@ class Hierarchy:
     ):
         """Assemble; collective. Matrices are freed with the ``stack``."""
         degrees = [degree] if direct else range(1, degree + 1)
-        found = [surface.spaces.get(d, WITHOUT_FOOTPRINT) for d in degrees]
+        found = [surface.space(d) for d in degrees]
         self._operators = [
             HeldOperator(space, law, stack, direct=direct, masked=masks and not direct and space.degree > 1)
             for space in found

@@ -30,9 +30,14 @@ class Sagged:
     stored: float = np.nan
     sag: float = np.nan
 
-    def placed(self, tool: Tool) -> Tool:
-        """Return a tool whose depths count from the first touch of the sagged surface."""
-        if self.applied is None:
+    def placed(self, tool: Tool, body: DeformedBody) -> Tool:
+        """Return a tool whose depths count from the first touch of the sagged surface of a ``body``.
+
+        With a linear law its gaps are those along the axis.
+        """
+        if body.law.is_linear:
+            tool = tool.along_axis(body.candidates.points)
+        if np.isnan(self.sag):
             return tool
         return replace(tool, distance=lambda points, depth: tool.distance(points, depth + self.sag))
 
@@ -43,7 +48,7 @@ def sagged_body(body: DeformedBody, tool: Tool, loads: Loads | None, guess: Floa
     Raises:
         SolveError: see :func:`epsmesh.solve.dead_loads.sag`.
     """
-    if loads is None:
+    if loads is None and not body.elements.displacements.is_loaded:
         return Sagged(np.zeros(body.elements.unknowns))
     body.state = sag(body.elements, body.law, loads, guess)
     energy = body.energy

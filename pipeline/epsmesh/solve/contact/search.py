@@ -56,7 +56,7 @@ class ContactSearch:
         of each material follow: the surface of a small body is then condensed for them, and they share error bars.
         """
         self._elements, self._tool = elements, tool
-        self._surface, self._touch = Surface(spaces), Touch(tool.height, tool.first)
+        self._surface, self._touch = Surface(spaces, elements.displacements.conditions), Touch(tool.height, tool.first)
         self.candidates: Candidates = self._surface.of(elements.degree)
         self._supported = self._held_by_support()
         self.contact: FoundContact | None = None
@@ -80,7 +80,7 @@ class ContactSearch:
             ContactError: if the contact does not settle, reaches the support, or reaches the candidates' edge where
                 the probe does not end.
         """
-        if not asked.law.is_linear:
+        if not asked.law.is_linear or self._elements.displacements.terms:
             return self._solve_large(asked, stack)
         law, movement, strict = asked.law, asked.movement, _STRICTER * asked.tolerance
         columns = self._elements.columns(movement, stack)

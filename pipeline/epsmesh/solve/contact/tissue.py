@@ -155,6 +155,11 @@ class DeformedBody:
             return self._body.split(state, parts)
 
     @property
+    def on_terms(self) -> FloatArray:
+        """The resultant (3), N, of all terms besides the law; collective."""
+        return self._body.on_terms(self._now)[0]
+
+    @property
     def work_of_loads(self) -> float:
         """The work (J) of the loads on the modelled part; collective."""
         own = 0.0 if self.applied is None else float(self.applied.forces @ self.state[: self._space.owned])

@@ -1,7 +1,7 @@
 """The tool of a contact that is found: its surface, its friction and its axis."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,15 @@ class Tool:
     distance: Callable[[FloatArray, float], Distance] = _no_distance
     foot: tuple[float, float] = (0.0, 0.0)
     is_sharp: bool = False
+
+    def along_axis(self, places: FloatArray) -> "Tool":
+        """Return the tool of linear elasticity: gaps of nodes are those along −z, above their undeformed ``places``."""
+        heights = self.height(places) - self.first
+
+        def distance(points: FloatArray, depth: float) -> Distance:
+            return Distance.along_axis(heights - depth - (points - places)[:, 2], 3)
+
+        return replace(self, distance=distance)
 
     def torque(self, points: FloatArray, forces: FloatArray) -> float:
         """Return the torque (N m) of the tissue on the tool about its advance, −z.

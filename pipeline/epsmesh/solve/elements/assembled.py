@@ -22,6 +22,7 @@ class AssembledTangent:
     def __init__(self, elements: Elements, law: MaterialLaw, stack: ExitStack):
         """Set up; :meth:`update` must be called before any product; collective."""
         self._forms = elements.large_forms(law).tangents
+        self._terms, self._of_law = elements.displacements.terms, elements.unit(law)
         self._unit = elements.pressures.unit if isinstance(elements, MixedElements) else 1.0
         self.blocks = [keep(stack, fem_petsc.create_matrix(form)) for form in self._forms]
         self.matrix, *others = self.blocks
@@ -38,4 +39,8 @@ class AssembledTangent:
         for power, (form, block) in enumerate(zip(self._forms, self.blocks, strict=True)):
             compat.assemble_matrix(form, [], 1.0, block)
             block.scale(self._unit**power)
+        for term in self._terms:
+            if (added := term.operator()) is not None:
+                self.blocks[0].axpy(1 / self._of_law, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+                added.destroy()
         self.matrix.assemble()

@@ -32,7 +32,8 @@ class Products:
     """Of n solutions: displacements ``moved`` (m) and ``residuals`` (N) of the unmodified operator, owned dofs.
 
     ``stationary`` (n, n), J, are a(u_i, u_j), or in mixed elements the form that is stationary at the solution.
-    ``energies`` (n) are twice the strain energies. Energies are global, of the modelled part.
+    ``energies`` (n) are twice the strain energies. Energies are global, of the modelled part. ``on_terms`` (n, 3), N,
+    are the resultants of further terms.
     """
 
     space: ElasticSpace
@@ -40,6 +41,7 @@ class Products:
     residuals: list[FloatArray]
     stationary: FloatArray
     energies: FloatArray
+    on_terms: FloatArray | float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

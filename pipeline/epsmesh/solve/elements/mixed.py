@@ -216,7 +216,8 @@ class MixedElements(Elements):
         return Saddle(levels, coupling, mass, stiffness, self.degree - 1)
 
     def _solver(self, elastic: MaterialLaw, *, direct: bool, below: SaddleSolver | None = None) -> SaddleSolver:
-        if elastic != self._elastic:
+        is_same = elastic == self._elastic and (elastic.unit == self._elastic.unit or not self.displacements.terms)
+        if not is_same:
             self._set_up.close()
             self._solvers.clear()
             self._elastic = elastic

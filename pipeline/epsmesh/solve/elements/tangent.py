@@ -13,7 +13,7 @@ from epsmesh.arrays import FloatArray
 from epsmesh.solve.compiled import hyperelastic_degree
 from epsmesh.solve.elements.pressures import Pressures
 from epsmesh.solve.kernels.native import Single
-from epsmesh.solve.kernels.product import CellOperator
+from epsmesh.solve.kernels.product import CellOperator, SparsePart
 from epsmesh.solve.kernels.tangent import Pressed, TangentCells, TangentCoupling
 from epsmesh.solve.krylov import keep
 from epsmesh.solve.physics import MaterialLaw, SplitLaw
@@ -45,7 +45,7 @@ class Prestress:
 class Tangent:
     """The tangent at the fields of the forms, in the unit of the law; a context for PETSc. Methods are collective.
 
-    ``matrix`` has identity rows at prescribed dofs. ``close`` frees it.
+    ``matrix`` has identity rows at prescribed dofs. ``close`` frees it. ``share`` is that of the space's terms.
     """
 
     def __init__(self, space: ElasticSpace, law: MaterialLaw, pressures: Pressures | None = None):
@@ -59,7 +59,10 @@ class Tangent:
         self.cells = TangentCells(space.space, space.cells, hyperelastic_degree(space.degree))
         self._law, self._points = law, points
         self._moduli: dict[str, list[np.ndarray]] = {}
-        self.stiffness = CellOperator(self.cells, self._moduli)
+        # Of terms: their matrices are those of the last state, times a share.
+        self._unit, self.share = 1.0 if split is None else split.unit, 1.0
+        self._terms = [(term, keep(self._stack, made)) for term in space.terms if (made := term.operator()) is not None]
+        self.stiffness = CellOperator(self.cells, self._moduli, [SparsePart(matrix) for _, matrix in self._terms])
         self.matrix = keep(self._stack, self.stiffness.matrix())
         self._mixed: _Mixed | None = None
         self._factors: list[FloatArray] = []
@@ -94,6 +97,9 @@ class Tangent:
         for moduli, more in zip(found, self._further, strict=False):
             np.add(moduli, more, out=moduli)
         self._moduli |= {"float32": found, "float64": found}
+        for term, matrix in self._terms:
+            term.operator(matrix)
+            matrix.scale(self.share / self._unit)
 
     def impose(self, factors: tuple[float, ...], moduli: list[Single]) -> None:
         """Change the energy of which this is the tangent: by ``factors`` of regions, and by further ``moduli``."""

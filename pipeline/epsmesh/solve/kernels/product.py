@@ -5,6 +5,7 @@ product takes 200 bytes and 2,000 vectorised multiplications per cell (``product
 """
 
 import itertools
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cache
@@ -79,6 +80,30 @@ def bernstein(degree: int, kind: str) -> Bernstein:
     )
 
 
+class SparsePart:
+    """A sparse ``matrix``, without conditions, that is added to a matrix-free operator."""
+
+    def __init__(self, matrix: PETSc.Mat):
+        self.matrix = matrix
+        self._given, self._found = matrix.createVecs()
+
+    def add_product(self, x: np.ndarray, y: np.ndarray) -> None:
+        """Add the product with ``x`` to ``y``, owned dofs; collective."""
+        self._given.array[:] = x
+        self.matrix.mult(self._given, self._found)
+        y += self._found.array
+
+    def diagonal(self) -> FloatArray:
+        """Return the diagonal blocks (points, 9)."""
+        offsets, columns, values = self.matrix.getValuesCSR()
+        first, last = self.matrix.getOwnershipRange()
+        blocks = np.zeros((last - first) * 3)
+        rows = np.repeat(np.arange(first, last), np.diff(offsets))
+        own = rows // 3 == columns // 3
+        blocks[3 * (rows[own] - first) + columns[own] % 3] = values[own]
+        return blocks.reshape(-1, 9)
+
+
 class CellStiffness:
     """The cells of this rank, laid out for products: straight ones and curved ones.
 
@@ -104,11 +129,11 @@ class CellStiffness:
         bent = np.empty(0) if curved is None else np.flatnonzero(curved[: len(dofs)])
         self.curved = CurvedCells(space, bent.astype(np.int32), dofs) if len(bent) else None
 
-    def operator(self, law: MaterialLaw) -> "CellOperator":
-        """Return the stiffness of a material."""
+    def operator(self, law: MaterialLaw, further: Sequence[SparsePart] = ()) -> "CellOperator":
+        """Return the stiffness of a material, with ``further`` parts."""
         lanes = [self.lanes] if self.curved is None else [self.lanes, self.curved.lanes]
         lame = [each.lame(law, self.regions) for each in lanes]
-        return CellOperator(self, {"float64": lame, "float32": [each.astype(np.float32) for each in lame]})
+        return CellOperator(self, {"float64": lame, "float32": [each.astype(np.float32) for each in lame]}, further)
 
     @property
     def nbytes(self) -> int:
@@ -158,14 +183,14 @@ class Cells(Protocol):
 class CellOperator:
     """A matrix-free stiffness or tangent, with the ``coefficients`` of cells by precision: a context for PETSc.
 
-    Rows of prescribed dofs are the identity's. Products are in double precision, or by :meth:`multiply` in single
-    precision. On several ranks each multiplies with its own cells, between two ghost exchanges: products and diagonals
-    are collective.
+    It includes ``further`` sparse parts. Rows of prescribed dofs are the identity's. Products are in double precision,
+    or by :meth:`multiply` in single precision. On several ranks each multiplies with its own cells, between two ghost
+    exchanges: products and diagonals are collective.
     """
 
-    def __init__(self, cells: Cells, coefficients: dict[str, list[np.ndarray]]):
+    def __init__(self, cells: Cells, coefficients: dict[str, list[np.ndarray]], further: Sequence[SparsePart] = ()):
         self._cells, self.rows, self.prescribed, self.comm = cells, cells.ghosts.owned, cells.prescribed, cells.comm
-        self._coefficients = coefficients
+        self._coefficients, self._further = coefficients, further
 
     def holding(self, dofs: Int32Array) -> "CellOperator":
         """Return the operator with ``dofs`` (unrolled) prescribed, too; it shares everything else."""
@@ -208,9 +233,17 @@ class CellOperator:
     def diagonal(self) -> Single:
         """Return the diagonal blocks (points, 9), without conditions."""
         blocks = self._cells.diagonal(self._coefficients["float64"])
-        return self._cells.ghosts.folded(blocks.reshape(-1), 9).reshape(-1, 9)
+        found = self._cells.ghosts.folded(blocks.reshape(-1), 9).reshape(-1, 9)
+        for part in self._further:
+            found += part.diagonal()
+        return found
 
     def _write(self, x: np.ndarray, y: np.ndarray) -> None:
+        self._write_cells(x, y)
+        for part in self._further:
+            part.add_product(x, y)
+
+    def _write_cells(self, x: np.ndarray, y: np.ndarray) -> None:
         cells, coefficients = self._cells, self._coefficients[precision(x)]
         if self.comm.size == 1:
             y[:] = 0.0

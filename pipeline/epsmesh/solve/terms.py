@@ -1,0 +1,177 @@
+"""Terms of a body's energy besides that of its law: springs under a face, a membrane, the pressure of a fluid.
+
+A term is one object with an energy, and acts on every space of displacements of a mesh. Residual, tangent and
+preconditioner of each degree have its derivatives: it combines with every law, element, constraint and solver. Most
+terms are forms of UFL, whose derivatives follow: :class:`EnergyTerm`.
+"""
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from petsc4py import PETSc
+
+from epsmesh import compat
+from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.mesh.distribute import BodyMesh
+from epsmesh.scene.model import FREE, PROBE
+from epsmesh.solve.compiled import MORE, assemble, general_form, vector
+from epsmesh.solve.kernels.product import SparsePart
+from epsmesh.solve.loads import boundary_of
+from epsmesh.solve.measures import dx, has_curved_cells
+
+# Quadrature degrees that the map of a curved facet adds.
+_CURVED = 3
+# Tells which facets a term acts on, from their corners (n, 3, 3) and outward unit normals (n, 3), in m.
+OnFacets = Callable[[FloatArray, FloatArray], BoolArray]
+
+
+class Term(Protocol):
+    """A term of the energy on one space, at the displacement of the space's forms. Methods are collective.
+
+    Energies and forces are those of the modelled part.
+    """
+
+    def energy(self) -> float:
+        """Return this rank's part of the energy (J)."""
+
+    def forces(self) -> FloatArray:
+        """Return its derivative: nodal forces (N), owned dofs."""
+
+    def operator(self, into: PETSc.Mat | None = None) -> PETSc.Mat | None:
+        """Return its second derivative (N/m), without conditions, ``into`` an earlier one; None if it is always zero.
+
+        It couples dofs of the same cell only.
+        """
+
+
+class AddedTerm(Protocol):
+    """A term of a body, to be put on each of its spaces; hashable."""
+
+    def on(self, body: BodyMesh, displacement: Any) -> Term:
+        """Return the term on the space of the function ``displacement``; collective."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """What the energy of a term is written in: the displacement ``u`` (m) on the mesh of a ``body``."""
+
+    body: BodyMesh
+    u: Any
+
+    @property
+    def x(self) -> Any:
+        """The undeformed place (m)."""
+        return ufl.SpatialCoordinate(self.body.mesh)
+
+    @property
+    def normal(self) -> Any:
+        """The outward unit normal of the undeformed boundary."""
+        return ufl.FacetNormal(self.body.mesh)
+
+    @property
+    def gradient(self) -> Any:
+        """The deformation gradient F."""
+        return ufl.Identity(3) + ufl.grad(self.u)
+
+    @property
+    def dx(self) -> Any:
+        """The measure of the undeformed volume (m³)."""
+        return dx(self.u.function_space, more=MORE)
+
+    def ds(self, on: OnFacets | None = None) -> Any:
+        """Return the measure of the undeformed boundary (m²) but for the support, or of the facets ``on`` it."""
+        mesh, boundary = self.body.mesh, boundary_of(self.body, (FREE, PROBE))
+        chosen = np.ones(len(boundary.facets), dtype=bool) if on is None else on(boundary.corners, boundary.normals)
+        degree = 2 * compat.degree(self.u.function_space) + MORE + (_CURVED if has_curved_cells(mesh) else 0)
+        tags = compat.facet_tags(mesh, np.sort(boundary.facets[chosen]))
+        return ufl.Measure("ds", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": degree})(1)
+
+    def constant(self, value: float | Sequence[float]) -> Any:
+        """Return a number, or a vector, of which other values need no new compilation."""
+        return fem.Constant(self.body.mesh, PETSc.ScalarType(value))
+
+
+@dataclass(frozen=True)
+class EnergyTerm:
+    """A term by its ``energy`` (J), a form of UFL at a :class:`Place`; its derivatives follow.
+
+    Terms of equal ``key`` are equal: their spaces are shared.
+    """
+
+    energy: Callable[[Place], Any] = field(compare=False)
+    key: Hashable = field(default_factory=object)
+
+    def on(self, body: BodyMesh, displacement: Any) -> Term:
+        """Return the term on the space of the function ``displacement``; collective."""
+        return _OfForm(self.energy(Place(body, displacement)), displacement)
+
+
+class _OfForm:
+    """A term by the form of its energy at the function u; its forms are compiled at first use."""
+
+    def __init__(self, energy: Any, u: Any):
+        self._energy, self._u, self._space = energy, u, u.function_space
+
+    @cached_property
+    def _value(self) -> Any:
+        return general_form(self._energy)
+
+    @cached_property
+    def _first(self) -> Any:
+        return ufl.derivative(self._energy, self._u, ufl.TestFunction(self._space))
+
+    @cached_property
+    def _residual(self) -> Any:
+        return general_form(self._first)
+
+    @cached_property
+    def _tangent(self) -> Any:
+        second = ufl.derivative(self._first, self._u, ufl.TrialFunction(self._space))
+        return None if ufl.algorithms.expand_derivatives(second).empty() else general_form(second)
+
+    def energy(self) -> float:
+        """Return this rank's part of the energy (J)."""
+        return float(fem.assemble_scalar(self._value))
+
+    def forces(self) -> FloatArray:
+        """Return its derivative: nodal forces (N), owned dofs."""
+        with vector(self._space) as found:
+            assemble(self._residual, found)
+            return np.array(found.array)
+
+    def operator(self, into: PETSc.Mat | None = None) -> PETSc.Mat | None:
+        """Return its second derivative (N/m), ``into`` an earlier one."""
+        return None if self._tangent is None else compat.assemble_matrix(self._tangent, [], 1.0, into)
+
+
+@dataclass(frozen=True, eq=False)
+class DeadLoads:
+    """Nodal ``loads`` (N, owned dofs) that do not depend on the displacement u (a function of the space)."""
+
+    loads: FloatArray
+    u: Any
+
+    def energy(self) -> float:
+        """Return minus the loads' work (J)."""
+        return -float(self.loads @ self.u.x.array[: len(self.loads)])
+
+    def forces(self) -> FloatArray:
+        """Return minus the loads."""
+        return -self.loads
+
+    def operator(self, into: PETSc.Mat | None = None) -> None:
+        """Return None."""
+
+
+def product(term: Term, direction: FloatArray) -> FloatArray:
+    """Return the product (N) of a term's operator with a ``direction`` (m), owned dofs; collective."""
+    matrix, found = term.operator(), np.zeros(len(direction))
+    if matrix is not None:
+        SparsePart(matrix).add_product(direction, found)
+        matrix.destroy()
+    return found

@@ -1,0 +1,168 @@
+"""Terms of the energy besides that of the law: closed forms, limits, and that they combine with all the rest."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from mpi4py import MPI
+
+from epsmesh.mesh.distribute import BodyMesh
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.loads import loads_of
+from epsmesh.run.meshing import mesh_case
+from epsmesh.run.problem import law_of, movement_of, tool_of
+from epsmesh.scene.model import FIXED, FREE, PROBE
+from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.dead_loads import sag
+from epsmesh.solve.elements import elements_of
+from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.quasi_static import QuasiStaticProblem
+from epsmesh.solve.solution import Solution
+from epsmesh.solve.spaces import Spaces
+from epsmesh.solve.terms import EnergyTerm, Place
+from tests.cases import study
+
+LARGE = {"material": {"law": "neo-hookean", "poisson": 0.4}}
+BALL = {"probe": {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "contact": "unilateral"}}
+AREA, DEPTH = 40e-3**2, 0.2e-3
+
+
+def springs(stiffness: float) -> EnergyTerm:
+    """Return springs of a stiffness (N/m³) under the body."""
+
+    def energy(at: Place) -> Any:
+        below = at.ds(lambda _, normals: normals[:, 2] < -0.9)
+        return at.constant(stiffness) / 2 * ufl.inner(at.u, at.u) * below
+
+    return EnergyTerm(energy, ("springs", stiffness))
+
+
+def fluid(pressure: float) -> EnergyTerm:
+    """Return the pressure (Pa) of a fluid round the body, which follows the surface."""
+    return EnergyTerm(lambda at: at.constant(pressure) * ufl.det(at.gradient) * at.dx, ("fluid", pressure))
+
+
+def unfixed(mesh: BodyMesh) -> BodyMesh:
+    """Return a mesh whose support is free."""
+    facets = np.sort(np.concatenate([mesh.facets[FREE], mesh.facets[FIXED]]))
+    return replace(mesh, facets=mesh.facets | {FREE: facets, FIXED: facets[:0]})
+
+
+def solve(term: EnergyTerm | None, comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> Solution:
+    """Solve the base study with changes; with springs the body stands on them alone."""
+    method, element, estimate = (changes.pop(key, None) for key in ("method", "element", "estimate"))
+    (planned,) = make_plan(study(**changes)).solves
+    case, terms = planned.case, () if term is None else (term,)
+    mesh = mesh_case(case, planned.mirrors, comm, None)
+    if term is not None and term.key[0] == "springs":
+        mesh = unfixed(mesh)
+    is_found = case.probe.is_unilateral
+    conditions, tool = Conditions(bonded=not is_found, unilateral=is_found, terms=terms), tool_of(case)
+    with Spaces(mesh) as spaces:
+        how = {"element": element or "displacement", "tool": tool if is_found else None}
+        with QuasiStaticProblem(spaces, case.mesh.degree, conditions, **how) as problem:
+            asked = {"method": method or "iterative", "estimate": bool(estimate)}
+            return problem.solve(law_of(case), movement_of(case), **asked)
+
+
+def force(term: EnergyTerm | None, **changes: Any) -> float:
+    return solve(term, **changes).reaction[2]
+
+
+@pytest.mark.parametrize("law", [{}, LARGE], ids=["linear", "neo-Hookean"])
+def test_a_body_on_soft_springs_is_rigid(law):
+    stiffness = 0.1
+    assert force(springs(stiffness), **law) == pytest.approx(stiffness * AREA * DEPTH, rel=3e-6)
+
+
+@pytest.mark.parametrize("element", ["displacement", "mixed"])
+@pytest.mark.parametrize("method", ["iterative", "direct"])
+@pytest.mark.parametrize("contact", [{}, BALL], ids=["bonded", "found"])
+def test_stiff_springs_are_a_support(contact, method, element):
+    """The difference from a fixed face falls as their compliance; the solver needs no more iterations."""
+    how = {**LARGE, **contact, "method": method, "element": element}
+    fixed, stiff, stiffer = (solve(term, **how) for term in (None, springs(1e8), springs(1e9)))
+    rest, less = (fixed.reaction[2] - other.reaction[2] for other in (stiff, stiffer))
+    assert 0 < rest < 2e-3 * fixed.reaction[2]
+    assert less == pytest.approx(rest / 10, rel=0.06)
+    assert stiffer.iterations <= fixed.iterations + 4
+
+
+def test_linear_tissue_on_springs_is_the_limit_of_small_depths():
+    at = {"probe": BALL["probe"] | {"depth": "0.01 mm"}, "mesh": {"rim": "0.2 mm"}}
+    soft = {"material": {"poisson": 0.4}}
+    term = springs(1e5)
+    assert force(term, **soft, **at) == pytest.approx(force(term, **LARGE, **at), rel=5e-3)
+
+
+def test_a_loaded_column_moves_as_a_whole_on_springs():
+    """With λ = 0 a column in tension does not narrow: it is displaced by the tension over the springs' stiffness."""
+    young, stiffness, tension = 10e3, 1e6, 2e3
+    pull = {"traction": [{"on": "top", "traction": ["0 Pa", "0 Pa", f"{tension} Pa"]}]}
+    case = study(**LARGE, load=pull, probe={"at": ["20 mm", "0 mm", "-10 mm"]}, mesh={"degree": 1}).case(())
+    turn = np.eye(3) if case.frame.turn is None else case.frame.turn
+    down = turn @ np.array([0.0, 0.0, -1.0])
+
+    def energy(at: Place) -> Any:
+        below = at.ds(lambda _, normals: normals @ down > 0.9)
+        return stiffness / 2 * ufl.inner(at.u, at.u) * below
+
+    conditions = Conditions(terms=(EnergyTerm(energy),)).without_footprint
+    with Spaces(unfixed(mesh_case(case, (), MPI.COMM_SELF))) as spaces:
+        elements = elements_of(spaces, 2, conditions)
+        sag(elements, MaterialLaw.of_moduli(young, 0.0, "neo-hookean"), loads_of(case))
+        places, moved = (v.reshape(-1, 3) @ turn for v in (elements.displacements.places, elements.values))
+    half = tension / young
+    stretch = half + np.sqrt(half**2 + 1)
+    exact = tension / stiffness + (stretch - 1) * (places[:, 2] - places[:, 2].min())
+    assert moved[:, 2] == pytest.approx(exact, abs=1e-8)
+    assert np.abs(moved[:, :2]).max() < 1e-8
+
+
+def test_small_pressure_of_a_fluid_is_a_dead_load():
+    """It acts before the tool does; where the displacement grows it follows the surface."""
+    moved = []
+    for term, pressure in ((None, 2.0), (fluid(2.0), 0.0)):
+        load = {"traction": [{"on": "free", "pressure": f"{pressure} Pa"}]}
+        case = study(**LARGE, load=load).case(())
+        mesh = mesh_case(case, (), MPI.COMM_SELF)
+        facets = np.sort(np.concatenate([mesh.facets[FREE], mesh.facets[PROBE]]))
+        mesh = replace(mesh, facets=mesh.facets | {FREE: facets, PROBE: facets[:0]})
+        conditions = Conditions(terms=() if term is None else (term,)).without_footprint
+        with Spaces(mesh) as spaces:
+            elements = elements_of(spaces, 2, conditions)
+            sag(elements, law_of(case), loads_of(case))
+            moved.append(elements.values)
+    assert np.linalg.norm(moved[0] - moved[1]) < 1e-3 * np.linalg.norm(moved[0])
+
+
+@pytest.mark.parametrize(("contact", "rest"), [({}, 0.05), (BALL, 0.3)], ids=["bonded", "found"])
+def test_a_term_that_acts_before_the_tool_is_sagged_under(contact, rest):
+    """What it does at the tool's first touch is no part of F. Nodes come into contact one by one."""
+    one, two, alone = (force(term, **LARGE, **contact) for term in (fluid(20.0), fluid(40.0), None))
+    assert two - alone == pytest.approx(2 * (one - alone), rel=rest)
+    assert abs(one / alone - 1) < 0.01
+
+
+def test_bars_cover_a_finer_mesh():
+    term, finer = springs(1e5), {"mesh": {"fine": "3 mm", "rim": "0.5 mm"}}
+    found = solve(term, estimate=True, **LARGE)
+    exact = solve(term, estimate=True, **LARGE, **finer)
+    assert abs(exact.reaction[2] / found.reaction[2] - 1) < found.bar
+    assert exact.bar < found.bar
+
+
+def test_symmetric_halves_are_the_whole():
+    term = springs(1e5)
+    assert force(term, **LARGE) == pytest.approx(force(term, **LARGE, mesh={"model": "3d"}), rel=1e-8)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("contact", [{}, BALL], ids=["bonded", "found"])
+@pytest.mark.parametrize("element", ["displacement", "mixed"])
+def test_ranks_agree(contact, element):
+    how = {**LARGE, **contact, "element": element}
+    together, alone = (solve(springs(1e5), comm, **how).reaction[2] for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
+    assert together == pytest.approx(alone, rel=1e-8)
