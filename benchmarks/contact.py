@@ -58,7 +58,7 @@ def prescribed(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
     """Solve with the whole candidate region as a frictionless footprint, on the same mesh; collective."""
     with (
         Spaces(body) as spaces,
-        QuasiStaticProblem(spaces, case.mesh.degree, Conditions(bonded=False), case.element) as problem,
+        QuasiStaticProblem(spaces, case.mesh.degree, Conditions(bonded=False), case.way.element) as problem,
     ):
         return problem.solve(law_of(case), movement_of(case), estimate=estimate)
 
@@ -76,7 +76,7 @@ def in_linear_solves(poisson: float, rim: str = "0.12 mm", repeats: int = _REPEA
     spent = median_seconds(ways, repeats)
     return {
         "poisson": poisson,
-        "element": case.element,
+        "element": case.way.element,
         "dofs": solutions["found, force"].dofs,
         "seconds": spent,
         "linear solves": spent["found, force"] / spent["prescribed, force"],

@@ -207,7 +207,7 @@ def _trial(scene: Section, mesh: Section, case: Record, truth: Record) -> Trial:
         truth.force,
         truth.force_error,
         message,
-        (declared.mesh.degree, declared.element),
+        (declared.mesh.degree, declared.way.element),
         "naive" if rim > _NAIVE else "graded",
         refused=not case.is_ok and not message,
     )

@@ -84,7 +84,7 @@ def solved(scene: Scene, finer: float, degree: int, *, estimate: bool) -> Soluti
     """Solve a scene, with elements ``finer`` than its own at the edge of contact by this factor."""
     case = case_of(scene, finer, degree)
     with Spaces(mesh_case(case, mirror_planes(case), MPI.COMM_SELF)) as spaces:
-        problem = QuasiStaticProblem(spaces, degree, WITHOUT_FOOTPRINT, case.element, tool=tool_of(case))
+        problem = QuasiStaticProblem(spaces, degree, WITHOUT_FOOTPRINT, case.way.element, tool=tool_of(case))
         return problem.solve(law_of(case), movement_of(case), estimate=estimate)
 
 

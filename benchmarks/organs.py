@@ -144,7 +144,7 @@ def measure(name: str, folder: Path) -> list[dict[str, Any]]:
                 "scene": name,
                 "place": named[at],
                 "nu": case.poisson,
-                "element": case.element,
+                "element": case.way.element,
                 "meshes": meshes.taken(),
                 "dofs": record.dofs,
                 "cells": record.cells,

@@ -25,7 +25,7 @@ def touched(depth, model=("x", "y"), base=SPHERE, **changes):
     """Return a solution, and its contact."""
     (case,) = study(**{"material": TISSUE, "probe": base | {"depth": depth}, "mesh": COARSE} | changes).cases()
     with Spaces(mesh_case(case, model, MPI.COMM_SELF)) as spaces:
-        problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.element, tool=tool_of(case))
+        problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.way.element, tool=tool_of(case))
         found = {}
         check = LargeContactSolution.check
 

@@ -108,7 +108,7 @@ def test_friction_of_a_flat_punch_settles(tool, mesh, poisson):
 def test_tractions_obey_coulomb():
     (case,) = study(body=BODY, probe=SPHERE | {"friction": 0.2}, mesh=MESH).cases()
     with Spaces(mesh_case(case, ("x", "y"), MPI.COMM_SELF)) as spaces:
-        problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.element, tool=tool_of(case))
+        problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.way.element, tool=tool_of(case))
         solution = problem.solve(law_of(case), movement_of(case))
         contact = problem.constraint.contact
     step, corner = contact.pressed, contact.obstacle.candidates.is_corner
@@ -130,7 +130,7 @@ def test_half_a_body_and_a_quarter_agree():
     for planes in (("x", "y"), ("y",)):
         (case,) = study(body=BODY, probe=SPHERE | {"friction": 0.2}, mesh=MESH).cases()
         with Spaces(mesh_case(case, planes, MPI.COMM_SELF)) as spaces:
-            problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.element, tool=tool_of(case))
+            problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.way.element, tool=tool_of(case))
             solution = problem.solve(law_of(case), movement_of(case))
             forces.append(solution.reaction)
     assert forces[1][2] == pytest.approx(forces[0][2], rel=1e-4)

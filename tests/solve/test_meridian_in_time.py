@@ -35,7 +35,7 @@ def followed(motion, *terms: Terms, steps: int = 4, **changes) -> tuple[History,
     law = MaterialLaw(tuple(replace(one, relaxation=own) for one, own in zip(law.parameters, of_regions, strict=True)))
     found = (
         LargeMeridianContact(meridian_of(case), round_tool_of(case), accuracy=0.02)
-        if case.probe.is_unilateral
+        if case.way.is_found
         else LargeMeridian(meridian_of(case), conditions_of(case), accuracy=0.02)
     ).answer(Request(law, movement_of(case), course=course_of(motion, steps)))
     assert found.history is not None

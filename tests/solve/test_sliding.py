@@ -30,7 +30,7 @@ def test_drag_at_constant_depth_is_the_law_times_the_force():
     """The tool presses, and then moves along x by three quarters of its depth, which is beyond the sticking range."""
     (case,) = study(body=BODY, probe=BALL | {"friction": FRICTION}, mesh=MESH, material=NEO_HOOKEAN).cases()
     with Spaces(mesh_case(case, ("y",), MPI.COMM_SELF)) as spaces, ExitStack() as stack:
-        problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.element, tool=tool_of(case))
+        problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.way.element, tool=tool_of(case))
         body = DeformedBody(problem.elements, Surface(spaces), law_of(case), "direct", stack)
         tool, path = tool_of(case), ContactPath(ContactStage(0.0, np.zeros_like(body.state)))
         friction = friction_of(body, FRICTION, DEPTH)

@@ -180,7 +180,7 @@ def test_layers_that_fill_the_body_have_the_relaxation_that_was_found(tmp_path):
     history = {"ramp": "1 s", "hold": "10 s"}
     (case,) = using(tmp_path, body={"layer": layer}, probe={"history": history}).cases()
     assert case.relaxations[1:] == (((0.4, 2.0),),) * 2
-    assert not case.is_stepped
+    assert not case.way.in_time
     pasted = material(identification(names=names, study="[body]\n"))
     assert "# in the table of each layer:\nrelaxation = [{" in pasted
     assert "[material]" not in pasted

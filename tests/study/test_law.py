@@ -180,7 +180,7 @@ def test_layers_that_fill_the_body_are_those_above_a_material(skin, order):
         material = {key: value for key, value in lower.items() if key != "name"}
         below = study(body={"layer": [upper], "inclusion": [ball]}, material=material, probe=probe).case(())
         assert _given(below) == found
-        assert (alone.formulation, alone.is_stepped) == (below.formulation, below.is_stepped)
+        assert (alone.way.formulation, alone.way.in_time) == (below.way.formulation, below.way.in_time)
 
 
 def test_a_layer_of_a_body_that_layers_fill_is_asked_for_its_law_and_density():
@@ -207,7 +207,7 @@ def test_an_elastic_layer_in_relaxing_tissue():
     layers = [SKIN, SKIN | {"name": "fat", "relaxation": []}]
     case = study(body={"layer": layers}, material=RELAXING, probe={"history": HISTORY}).case(())
     assert case.relaxations == (((0.8, 1.0),), ((0.8, 1.0),), ())
-    assert case.is_stepped
+    assert case.way.in_time
 
 
 def test_terms_are_swept():

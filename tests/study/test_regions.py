@@ -81,7 +81,7 @@ def test_every_value_of_a_piece_is_swept():
     assert str(found.case((1, 0, 2))) == "skin_thickness = 3 mm, tumour_radius = 3 mm, poisson = 0.45"
     case = found.case((1, 0, 2))
     assert [tissue.poisson for tissue in case.tissues] == [0.45, 0.48, 0.45]
-    assert (case.body.interfaces, case.poisson, case.element) == ((-0.003,), 0.48, "mixed")
+    assert (case.body.interfaces, case.poisson, case.way.element) == ((-0.003,), 0.48, "mixed")
 
 
 def test_material_is_needed_for_what_is_left_and_for_nothing_else():

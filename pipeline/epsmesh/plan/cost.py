@@ -18,6 +18,7 @@ from epsmesh.plan.steps import MeshStep, Solve
 from epsmesh.plan.symmetry import model_planes
 from epsmesh.shapes.body import Layered
 from epsmesh.study.case import Case
+from epsmesh.study.way import Constraint, Steps, Way
 
 # Parallel speed-up of one solve: n ranks are n^0.8 times faster.
 _PARALLEL = 0.8
@@ -40,15 +41,19 @@ _MIXED, _SEARCH, _LAYERED, _PROOF = 1.4, 2.7, 1.8, 1.6
 _COURSE, _COURSE_LARGE = 40.0, 10.0
 _MESHED = {"curved": 2.5, "folded": 18.0}
 _MERIDIAN, _MERIDIAN_BYTES = 0.27, 3.8e8
-# A meridian with contact to find takes _TRIALS times as long.
-_FOUND, _TRIALS = "meridian contact", 1.7
-# With load steps on a few meshes: Newton iterations at large displacements, or friction, with or without these.
-_STEPS, _ITERATIONS = "meridian large", 4.0
-_RUBBING, _RUBS = "meridian friction", 8.5
+# Its kinds, and their times in units of the first: trial radii of a contact; load steps on a few meshes, at large
+# displacements or with friction; some 40 time steps besides.
+_KINDS_OF_MERIDIAN = {
+    "meridian": 1.0,
+    "meridian contact": 1.7,
+    "meridian large": 4.0,
+    "meridian friction": 8.5,
+    "meridian time steps": 45.0,
+}
+# Words of a kind in three dimensions.
+_TOUCH = {Constraint.FOUND: ["found"], Constraint.FRICTION: ["found", "friction"]}
 # Friction on a linear body: a factorisation, a condensation to the surface, and load steps there.
 _FRICTION = (16.0, 1.35)
-# With some 40 time steps besides.
-_IN_TIME, _COURSE_OF_MERIDIAN = "meridian time steps", 45.0
 # Share of first meshes whose error bar exceeds the accuracy: 5 of 60 scenes, 9 of 48 slicing blades.
 _MISSED, _MISSED_BY_SEVERAL = 0.08, 0.19
 # Exponent of 1 - 2ν: growth of the iterations towards incompressibility.
@@ -105,7 +110,7 @@ class CostModel:
     def error_for(self, solves: Iterable[Solve]) -> float:
         """Return the typical factor of the error for ``solves``; kinds without stored times have that of the prior."""
         unknown = self.unknown(solves)
-        large = any(solve.case.material.is_large for solve in unknown)
+        large = any(solve.case.way.is_large for solve in unknown)
         return max(self.error, *((_PRIOR_ERROR_LARGE if large else _PRIOR_ERROR,) if unknown else ()), 1.0)
 
     def seconds(self, stage: str, kind: str, cells: float, poisson: float) -> float:
@@ -154,7 +159,7 @@ class CostModel:
 def _size(solve: Solve) -> Hashable:
     """Return what the memory of a solve depends on, among solves on one mesh."""
     case = solve.case
-    return case.element, case.mesh.degree, case.material.law, case.solve.method, solve.reduced
+    return case.way, case.mesh.degree, case.solve.method, solve.reduced
 
 
 def _memory(solve: Solve) -> float:
@@ -172,23 +177,29 @@ def kind_of(solve: Solve) -> str:
     It names element, degree, several movements, found contact, friction, several materials, time steps, and a curved
     or folded body.
     """
-    case = solve.case
+    case, way = solve.case, solve.way
     if solve.axisymmetric:
-        found = _FOUND if case.probe.is_unilateral else "meridian"
-        if case.is_stepped:
-            return _IN_TIME
-        stepped = _RUBBING if case.probe.friction else _STEPS
-        return stepped if case.has_load_steps else found
-    words = [case.formulation, str(case.mesh.degree)]
+        return _of_meridian(way)
+    words = [way.formulation, str(case.mesh.degree)]
     words += [str(case.movements)] if case.movements > 1 else []
-    words += ["found"] if case.probe.is_unilateral else []
-    words += ["friction"] if case.probe.friction else []
+    words += _TOUCH.get(way.constraint, [])
     words += ["regions"] if case.body.regions else []
-    words += ["steps"] if case.is_stepped else []
+    words += ["steps"] if way.in_time else []
     if not isinstance(case.body, Layered):
         folds = case.body.curvature > _FOLDED * _OF_BALL * case.body.volume ** (1 / 3)
         words += ["folded" if folds else "curved"]
     return " ".join(words)
+
+
+def _of_meridian(way: Way) -> str:
+    match way.steps, way.constraint:
+        case Steps.TIME, _:
+            return "meridian time steps"
+        case Steps.LOAD, Constraint.FRICTION:
+            return "meridian friction"
+        case Steps.LOAD, _:
+            return "meridian large"
+    return "meridian contact" if way.is_found else "meridian"
 
 
 def features(solve: Solve) -> tuple[str, float, float]:
@@ -255,14 +266,13 @@ def _beyond(stage: str, kind: str, cells: float) -> float:
 
 def _poisson(case: Case) -> float:
     """Return ν for the cost model; the cost of mixed elements does not depend on it."""
-    return 0.3 if case.element == "mixed" else case.poisson
+    return 0.3 if case.way.is_mixed else case.poisson
 
 
 @lru_cache
 def _prior(stage: str, kind: str) -> _Numbers:
     if kind.startswith("meridian"):
-        times = {_FOUND: _TRIALS, _STEPS: _ITERATIONS, _RUBBING: _RUBS, _IN_TIME: _COURSE_OF_MERIDIAN}
-        return log(_MERIDIAN * times.get(kind, 1.0)), 0.0, 0.0
+        return log(_MERIDIAN * _KINDS_OF_MERIDIAN.get(kind, 1.0)), 0.0, 0.0
     element, degree, *words = kind.split()
     if stage == "mesh":
         seconds, power = _MESH

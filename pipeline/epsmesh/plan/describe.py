@@ -20,6 +20,7 @@ from epsmesh.shapes.section import in_mm
 from epsmesh.shapes.segment import Segment
 from epsmesh.study.capabilities.obstacles import obstacle
 from epsmesh.study.case import Case
+from epsmesh.study.way import Steps, Way
 
 # Depth over half width at which tissue folds at the edge of a bonded punch, so that Newton's method stops; somewhat
 # less on finer meshes.
@@ -105,8 +106,8 @@ def _in_cm3(volume: float) -> str:
 
 def _of_large_displacements(plan: Plan) -> list[str]:
     """Return the largest depth to expect with large displacements, and the number of cases beyond it."""
-    large = [solve.case for solve in plan.solves if solve.case.material.is_large]
-    large = [case for case in large if not case.probe.is_unilateral]
+    large = [solve.case for solve in plan.solves if solve.case.way.is_large]
+    large = [case for case in large if not case.way.is_found]
     if not large:
         return []
     ends = sorted({_FOLDS * case.probe.half_width for case in large})
@@ -144,7 +145,7 @@ def story(plan: Plan, index: tuple[int, ...]) -> dict[str, Any]:
     return {
         "case": str(case),
         "key": key,
-        "element": f"{case.element}, degree {case.mesh.degree}"
+        "element": f"{case.way.element}, degree {case.mesh.degree}"
         if case.mesh.accuracy is None
         else "chosen for accuracy",
         "steps": _steps(plan, solve, step) if solve else [_without_solve(plan, key)],
@@ -163,9 +164,9 @@ def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
     contact = "one assembly and one solve, on the same mesh" if shares else all_of_it
     # If the contact area is to be found, probe.contact has no alternative, and each depth has its own mesh.
     is_found = not case.probe.has_singular_edge
-    deeper = {"depth": all_of_it if is_found else contact} if case.probe.is_unilateral else {}
+    deeper = {"depth": all_of_it if is_found else contact} if case.way.is_found else {}
     if depth_key(case) and "scaling" in plan.used:
-        deeper = {"depth": f"nothing: F {'is proportional' if case.probe.is_unilateral else 'does not depend on it'}"}
+        deeper = {"depth": f"nothing: F {'is proportional' if case.way.is_found else 'does not depend on it'}"}
     if obstacle("scaling", case):
         proportional = {"young, load": material, "depth": contact}
     else:
@@ -182,15 +183,22 @@ def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
 
 def _steps(plan: Plan, solve: Solve, step: MeshStep | None) -> list[str]:
     if solve.axisymmetric:
-        if solve.case.has_load_steps:
-            path = ["meridian: load steps in two dimensions, on finer and finer meshes until the error bar is small"]
-            return [*path, "time steps on the last of these meshes"] if solve.case.is_stepped else path
-        if solve.case.probe.is_unilateral:
-            return ["meridian: a few meshes and direct solves in two dimensions, until the contact radius is found"]
-        return ["meridian: mesh, assembly and direct solve in two dimensions"]
+        return _on_meridian(solve.way)
     part = {0: "whole body", 1: "half of the body", 2: "quarter of the body"}[len(solve.mirrors)]
     shared = f", shared by {len(step.solves)} solves" if step and len(step.solves) > 1 else ""
     return [f"mesh of the {part}{shared}", *_solving(plan, solve, step), "error bar"]
+
+
+def _on_meridian(way: Way) -> list[str]:
+    path = "meridian: load steps in two dimensions, on finer and finer meshes until the error bar is small"
+    match way.steps:
+        case Steps.TIME:
+            return [path, "time steps on the last of these meshes"]
+        case Steps.LOAD:
+            return [path]
+    if way.is_found:
+        return ["meridian: a few meshes and direct solves in two dimensions, until the contact radius is found"]
+    return ["meridian: mesh, assembly and direct solve in two dimensions"]
 
 
 def _without_solve(plan: Plan, key: str) -> str:
@@ -203,8 +211,8 @@ def _without_solve(plan: Plan, key: str) -> str:
 
 def _solving(plan: Plan, solve: Solve, step: MeshStep | None) -> list[str]:
     operator = next((o for o in step.operators if solve in o.solves), None) if step else None
-    plain = f"operator and solve, {solve.case.element} elements"
-    if operator is None or not solve.case.probe.is_unilateral:
+    plain = f"operator and solve, {solve.case.way.element} elements"
+    if operator is None or not solve.case.way.is_found:
         return [plain]
     depths = max(len(sweep) for sweep in operator.sweeps if solve in sweep)
     if plan.condensed and operator.is_condensed:

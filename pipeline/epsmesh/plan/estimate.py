@@ -4,22 +4,23 @@ from math import inf, log, pi
 
 from epsmesh.shapes.scanned import FINE, Scanned
 from epsmesh.study.case import Case
+from epsmesh.study.way import PLAIN, Way
 
 # Mean volume of gmsh's tetrahedra, in units of the cube of the element size: measured, docs/performance.md.
 _TETRAHEDRON = 0.21
-# Peak bytes per dof by degree: of a multigrid solve with displacement or mixed elements, or at large displacements; of
-# an error bar, which needs little accuracy; of a factorisation with 50,000 dofs. Measured: docs/solvers.md.
+# Peak bytes per dof, at small or large displacements, by element and degree: of a multigrid solve; of an error bar,
+# which needs little accuracy; of a factorisation with 50,000 dofs. Measured: docs/solvers.md.
 _BYTES_PER_DOF = {
-    "displacement": {1: 3000, 2: 620, 3: 400, 4: 400},
-    "mixed": {2: 900, 3: 800, 4: 800},
-    "large": {1: 3000, 2: 1900, 3: 2000, 4: 2800},
-    "large-mixed": {2: 3600, 3: 3600, 4: 4400},
+    (False, "displacement"): {1: 3000, 2: 620, 3: 400, 4: 400},
+    (False, "mixed"): {2: 900, 3: 800, 4: 800},
+    (True, "displacement"): {1: 3000, 2: 1900, 3: 2000, 4: 2800},
+    (True, "mixed"): {2: 3600, 3: 3600, 4: 4400},
 }
 _OF_BAR = {
-    "displacement": {2: 620, 3: 315, 4: 315},
-    "mixed": {3: 440, 4: 440},
-    "large": {2: 600, 3: 600, 4: 600},
-    "large-mixed": {3: 1000, 4: 1000},
+    (False, "displacement"): {2: 620, 3: 315, 4: 315},
+    (False, "mixed"): {3: 440, 4: 440},
+    (True, "displacement"): {2: 600, 3: 600, 4: 600},
+    (True, "mixed"): {3: 1000, 4: 1000},
 }
 _OF_FACTOR = {1: 9000, 2: 9000, 3: 10_000}
 # Further bytes per dof of a reduced basis: a multigrid hierarchy for its bound, and five vectors for each of some eight
@@ -151,23 +152,18 @@ def dofs(count: float, degree: int) -> float:
     return _DOFS_PER_CELL[degree] * count
 
 
-def solving_memory(dofs: float, degree: int, formulation: str = "displacement", *, direct: bool) -> float:
-    """Return the estimated bytes of a solve, all ranks together; ``formulation`` is that of its case."""
-    if direct:  # the fill of a 3D factorisation grows like dofs^(4/3); _OF_FACTOR is for 50,000 dofs
+def solving_memory(dofs: float, degree: int, way: Way = PLAIN, *, direct: bool) -> float:
+    """Return the estimated bytes of a solve, all ranks together; ``direct``: by a factorisation."""
+    if direct or way.is_factorised:
+        # The fill of a 3D factorisation grows like dofs^(4/3); _OF_FACTOR is for 50,000 dofs.
         return _BASE + _OF_FACTOR[degree] * (dofs / 50_000) ** (1 / 3) * dofs
-    return _BASE + _BYTES_PER_DOF[_kind(formulation)][degree] * dofs
+    return _BASE + _BYTES_PER_DOF[way.is_large, way.element][degree] * dofs
 
 
-def error_bar_memory(dofs: float, degree: int, formulation: str = "displacement") -> float:
+def error_bar_memory(dofs: float, degree: int, way: Way = PLAIN) -> float:
     """Return the estimated bytes of an error bar: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
-    return _BASE + _OF_BAR[_kind(formulation)][degree + 1] * growth * dofs
-
-
-def _kind(formulation: str) -> str:
-    if formulation in _BYTES_PER_DOF:
-        return formulation
-    return "large-mixed" if formulation.endswith("-mixed") else "large"
+    return _BASE + _OF_BAR[way.is_large, way.element][degree + 1] * growth * dofs
 
 
 def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, reduced: bool = False) -> float:
@@ -177,7 +173,7 @@ def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, 
     """
     degree = case.mesh.degree
     count = dofs((share if of_bar is None else of_bar) * cells(case), degree)
-    enriched = error_bar_memory(count, degree, case.formulation)
+    enriched = error_bar_memory(count, degree, case.way)
     basis = basis_memory(dofs(share * cells(case), degree), degree) if reduced else 0.0
     return _LOADED + max(case_memory(case, share), enriched) + basis
 
@@ -198,6 +194,5 @@ def case_memory(case: Case, share: float = 1.0) -> float:
     ``share`` is the modelled part of the body.
     """
     count, degree = share * cells(case), case.mesh.degree
-    direct = case.solve.method == "direct" or case.is_factorised
-    solving = solving_memory(dofs(count, degree), degree, case.formulation, direct=direct)
+    solving = solving_memory(dofs(count, degree), degree, case.way, direct=case.solve.method == "direct")
     return max(_BASE + _BYTES_PER_CELL * count, solving)

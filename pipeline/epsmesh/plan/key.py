@@ -41,7 +41,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     head, tail, half_width = _scene_texts(case, scaled)
     parts = [
         *head,
-        "" if half_width is None else _mesh_text(case.mesh, folded and case.is_full, half_width, case.element),
+        "" if half_width is None else _mesh_text(case.mesh, folded and case.is_full, half_width, case.way.element),
         text_of(case.solve, ("timing", "repeats", "exact")),
         *tail,
         *map(_output_text, case.outputs),
@@ -69,7 +69,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
         _ratios_text(case.probe) if scaled else "",
     )
     tail = [_load_text(case.load, case.densities)] if case.load.acts else []
-    tail += [_time_text(case)] if case.is_stepped else []
+    tail += [_time_text(case)] if case.way.in_time else []
     return head, tuple(tail), case.probe.half_width
 
 
@@ -117,8 +117,8 @@ def operator_key(case: Case) -> str:
 
     The depth is left out, too, if contact is found or displacements are large.
     """
-    probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.is_followed else _UNPHYSICAL)
-    return "\n".join([probe, str(case.mesh.degree), case.formulation])
+    probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.way.is_followed else _UNPHYSICAL)
+    return "\n".join([probe, str(case.mesh.degree), case.way.formulation])
 
 
 def normalised(case: Case) -> Case:

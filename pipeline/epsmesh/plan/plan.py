@@ -85,7 +85,7 @@ def make_plan(
             if name not in left_out:
                 plan = reduction(plan)
                 plan = replace(plan, used=plan.used | {name})
-    if any(solve.goal is not None and solve.case.is_stepped and not solve.axisymmetric for solve in plan.solves):
+    if any(solve.goal is not None and solve.case.way.in_time and not solve.axisymmetric for solve in plan.solves):
         raise StudyError(study.file, [Problem("probe.history", None, STEPS_IN_SPACE)])
     plan = _seeking(plan) if study.seeks_depths else ask_for_exact(plan)
     plan = take(first_attempts(plan), shard) if shard is not None else ask_for_ends(plan, without)

@@ -82,15 +82,15 @@ def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
 def _ladder(case: Case) -> tuple[Recipe, ...]:
     """Return the recipes for a probe, cheapest first."""
     if not case.probe.is_flat:
-        if not case.material.is_large:
-            return ladders.BALL if has_sure_contact(case) else ladders.FOUND[case.element]
-        ball = case.probe.hertz_radius if is_ball(case) and case.is_plain and not case.probe.friction else None
+        if not case.way.is_large:
+            return ladders.BALL if has_sure_contact(case) else ladders.FOUND[case.way.element]
+        ball = case.probe.hertz_radius if is_ball(case) and case.is_plain and not case.way.rubs else None
         return ladders.FOUND_LARGE if ball is None or case.probe.depth > _SHALLOW * ball else ladders.BALL_LARGE
     if not case.has_quarter_points:
         return ladders.DEEP
-    if case.material.is_large:
+    if case.way.is_large:
         return ladders.LARGE
-    if case.probe.is_unilateral:
+    if case.way.is_found:
         return ladders.FLAT
     if case.is_plain:
         return ladders.EVEN
@@ -113,19 +113,19 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
     if mirror_planes(case) == movement_planes(case):
         shape *= 1 + _SLIDE * _slide(case)
     if not case.is_plain:
-        shape *= _ELSEWHERE[case.element]
-    if case.is_plain and not case.probe.is_unilateral:
+        shape *= _ELSEWHERE[case.way.element]
+    if case.is_plain and not case.way.is_found:
         shape *= _near(case)
-    if case.material.is_large and case.has_quarter_points and not case.probe.is_unilateral:
+    if case.way.is_large and case.has_quarter_points and not case.way.is_found:
         shape *= _OF_LARGE * (1 + _BY_DEPTH * case.probe.depth / half_width_of(case))
-    locking = 1.0 if case.element == "mixed" else ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
+    locking = 1.0 if case.way.is_mixed else ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
     if not case.probe.is_flat:  # elements in a thin body are small anyway
         return [float(recipe.bar * shape * locking) for recipe in ladder]
     is_even = ladder is ladders.EVEN
     thin = min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
     shape *= locking * (1 + (_THICKNESS_EVEN if is_even else _THICKNESS) * thin)
-    of_degree = _MIXED_LARGE if case.material.is_large else _MIXED
-    if case.element == "displacement":
+    of_degree = _MIXED_LARGE if case.way.is_large else _MIXED
+    if case.way.element == "displacement":
         of_degree = dict.fromkeys(_MIXED, 1.0)
     if is_even and not has_sure_limit(case):
         of_degree = {degree: factor * _SEVERAL[degree] for degree, factor in of_degree.items()}
@@ -142,10 +142,10 @@ def has_sure_limit(case: Case) -> bool:
 
 def is_ball(case: Case) -> bool:
     """Return whether F has the limit of balls; at large displacements not in histories, nor close to a held side."""
-    if (radius := case.probe.hertz_radius) is None or not case.material.is_large:
+    if (radius := case.probe.hertz_radius) is None or not case.way.is_large:
         return radius is not None
     gaps = held_gaps(case.body, case.probe, case.mesh).values()
-    return not case.is_stepped and all(gap >= _FROM_HELD * radius for gap in gaps)
+    return not case.way.in_time and all(gap >= _FROM_HELD * radius for gap in gaps)
 
 
 def has_sure_contact(case: Case) -> bool:
@@ -153,8 +153,8 @@ def has_sure_contact(case: Case) -> bool:
 
     It is for a frictionless ball on a plain body that is not thin, with displacement elements at small displacements.
     """
-    is_simple = case.element == "displacement" and not case.is_stepped and not case.is_truncated
-    return is_ball(case) and case.probe.is_unilateral and is_simple and case.is_plain and not is_thin(case)
+    is_simple = case.way.element == "displacement" and not case.way.in_time and not case.is_truncated
+    return is_ball(case) and case.way.is_found and is_simple and case.is_plain and not is_thin(case)
 
 
 def is_thin(case: Case) -> bool:

@@ -187,7 +187,7 @@ def _sweeps_ratios(operator: OperatorStep) -> bool:
     ratios = {solve.key if case.body.regions else solve.case.material.poisson for solve in operator.solves}
     return (
         len(ratios) >= _FEWEST_RATIOS
-        and case.element == "displacement"
+        and case.way.element == "displacement"
         and solve.goal is None
         and not solve.axisymmetric
         and case.movements == 1 + case.is_closed
@@ -269,7 +269,7 @@ def _mirrored(solve: Solve) -> Solve:
 
 def _fresh(operator: OperatorStep) -> int:
     """Return the number of an operator's solves without an initial guess from a neighbour."""
-    return len(operator.sweeps) if operator.case.is_followed else 1
+    return len(operator.sweeps) if operator.case.way.is_followed else 1
 
 
 def _has_lone_depths(operators: list[OperatorStep]) -> bool:
@@ -290,7 +290,7 @@ def _is_small(step: MeshStep) -> bool:
     case = step.case
     cells = estimate.cells(case) * 0.5 ** len(step.mirrors)
     return (
-        case.element == "displacement"
+        case.way.element == "displacement"
         and case.solve.method != "iterative"
         and (estimate.dofs(cells, case.mesh.degree) <= MOST_DOFS)
     )

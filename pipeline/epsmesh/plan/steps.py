@@ -8,6 +8,7 @@ from math import nan
 from epsmesh.plan.key import mesh_key, operator_key
 from epsmesh.plan.recipe import MARGIN, Rung
 from epsmesh.study.case import Case
+from epsmesh.study.way import Way
 
 # A first mesh may be coarse for a contact on a bump, which is smaller than on a plane. The ratio of its bar to the
 # expected one then falls with the elements: more than this is not expected of finer meshes.
@@ -48,6 +49,11 @@ class Solve:
         if not self.case.is_closed:
             return self.case
         return replace(self.case, probe=self.case.probe.model_copy(update={"at": CENTRE}))
+
+    @property
+    def way(self) -> Way:
+        """How it is solved: that of its case, or the same on the meridian."""
+        return self.case.way.on_meridian if self.axisymmetric else self.case.way
 
     @property
     def label(self) -> str:
@@ -98,7 +104,7 @@ class OperatorStep:
 
         With an accuracy it does not apply: each depth then has its own error bar.
         """
-        is_plain = self.case.probe.is_unilateral and not self.case.solve.timing
+        is_plain = self.case.way.is_found and not self.case.solve.timing
         return is_plain and all(
             len(sweep) >= FEWEST_DEPTHS and all(solve.goal is None for solve in sweep) for sweep in self.sweeps
         )

@@ -52,7 +52,7 @@ def _has_slit(case: Case) -> bool:
 
 
 def _may_end_early(case: Case) -> bool:
-    return case.has_load_steps or case.probe.force is not None
+    return case.way.has_steps or case.probe.force is not None
 
 
 _COSTS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total", "time_spread")
@@ -63,9 +63,9 @@ _PARTS = (
     _Part(("force", "force_error", "energy", "balance", *_COSTS, "machine_load", "memory")),
     _Part(
         ("contact_area", "contact_area_error", "contact_radius", "contact_radius_error"),
-        of=lambda case: case.probe.is_unilateral,
+        of=lambda case: case.way.is_found,
     ),
-    _Part(_OF_FRICTION, of=lambda case: case.probe.friction > 0),
+    _Part(_OF_FRICTION, of=lambda case: case.way.rubs),
     _Part(("depth_reached", "force_reached"), of=_may_end_early),
     _Part(("surface_deviation",), of=lambda case: isinstance(case.body, Scanned)),
     _Part((*LARGEST, *_COUNTS)),

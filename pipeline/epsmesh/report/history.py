@@ -79,7 +79,7 @@ def over_time(dataset: xr.Dataset, study: Study, cases: Sequence[Case], records:
     )
     found |= _dissipated(dataset, last, dims, convolutions)
     own = [records[-1] for records in study.by_case(records)]
-    stepped = [record if case.is_stepped else None for case, record in zip(whole, own, strict=True)]
+    stepped = [record if case.way.in_time else None for case, record in zip(whole, own, strict=True)]
     found |= stepped_values(found, dims, stepped, times)
     if "load_force" in last:
         found |= _crept(last.assign(found), dims, whole, convolutions)
@@ -96,11 +96,11 @@ def convolution_of(case: Case, times: FloatArray, depths: tuple[float, ...]) -> 
         alone = np.outer(ones, only_last).astype(float)
         return Convolution(alone, (alone,), depth * ones, 0.0 * ones, 0.0 * alone, 1.0, depth * ones)
     motion, terms = history.motion(depth), case.relaxations[0]
-    if case.is_stepped:  # the record has the values
+    if case.way.in_time:  # the record has the values
         unknown = np.full(len(times), np.nan)
         weights = np.outer(unknown, only_last)
         return Convolution(weights, (weights,), motion.at(times), unknown, weights, np.nan, unknown)
-    if case.probe.is_unilateral:
+    if case.way.is_found:
         contact = _follow(motion, terms, tuple(times), depths, _power(case.probe))
         none = np.zeros(len(times))
         return Convolution(
@@ -187,7 +187,7 @@ def _contact(
     parts = [_table(dataset, part, dims) for part in (name, f"{name}_error")]
     found: list[list[FloatArray]] = [[], []]
     for number, (case, convolution, own) in enumerate(zip(cases, convolutions, depths, strict=True)):
-        if case.probe.history is None or not case.probe.is_unilateral:
+        if case.probe.history is None or not case.way.is_found:
             weights = convolution.weights
         else:
             power = 0.0 if case.probe.has_singular_edge else _CONTACT[name]

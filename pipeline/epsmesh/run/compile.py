@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Protocol
 
 from mpi4py import MPI
 
@@ -18,23 +19,66 @@ from epsmesh.solve.meridian.large_contact import DEGREE_OF_STEPS
 from epsmesh.solve.meridian.problem import compile_axisymmetric
 from epsmesh.solve.meridian.punch import TRIAL_DEGREE
 from epsmesh.stages import stage
+from epsmesh.study.way import Constraint, Way
 
 
-@dataclass(frozen=True, order=True)
-class _Forms:
-    """Identifies the forms of a solve."""
+class _Forms(Protocol):
+    """A set of forms, equal to another of the same forms."""
 
-    element: str
-    degree: int = 0
-    laws: tuple[str, ...] = ("linear",)
-    of_regions: bool = False
-    of_slit: bool = False
-    of_contact: bool = False
-    of_steps: bool = False
+    def compile(self) -> None: ...
 
 
-# The forms of a Green's function, which do not depend on a case's elements.
-_REGULAR = _Forms("regular")
+@dataclass(frozen=True)
+class _Body:
+    """Forms of a body in three dimensions."""
+
+    way: Way
+    degree: int
+    of_regions: bool
+    of_slit: bool
+
+    def compile(self) -> None:
+        way, straight = self.way, self.degree == 1
+        compile_forms(
+            self.degree,
+            way.element,
+            way.laws,
+            straight=straight,
+            of_regions=self.of_regions,
+            of_contact=way.is_found and way.is_large,
+            of_steps=way.in_time,
+        )
+        compile_cell_values(self.degree, straight=straight)
+        if self.of_slit:
+            compile_release(self.degree, mixed=way.is_mixed, of_regions=self.of_regions)
+
+
+@dataclass(frozen=True)
+class _Meridian:
+    """Forms of a half plane."""
+
+    way: Way
+    curved: bool
+
+    def compile(self) -> None:
+        way = self.way
+        if way.is_large or way.in_time:
+            degree = DEGREE_OF_STEPS if way.rubs else LARGE_DEGREE
+            compile_axisymmetric(degree, curved=self.curved, laws=way.laws, relaxes=way.in_time)
+        else:
+            compile_axisymmetric(curved=self.curved, lowest=_LOWEST.get(way.constraint, 0))
+
+
+@dataclass(frozen=True)
+class _FarField:
+    """Forms of a Green's function, which do not depend on a case's elements."""
+
+    def compile(self) -> None:
+        compile_regular()
+
+
+# The lowest degree of a contact's trials on the meridian.
+_LOWEST = {Constraint.FOUND: TRIAL_DEGREE, Constraint.FRICTION: DEGREE_OF_STEPS - 1}
 # The forms that this process has compiled.
 _compiled: set[_Forms] = set()
 
@@ -49,13 +93,13 @@ def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
     message = None
     if comm.rank == 0:
         needed = {_forms(solve) for solve in solves}
-        needed |= {_REGULAR for solve in solves if solve.case.has_own_far_field}
+        needed |= {_FarField() for solve in solves if solve.case.has_own_far_field}
         if missing := needed - _compiled:
             try:
                 with compiling():
                     native.library()
-                    for forms in sorted(missing):
-                        _compile(forms)
+                    for forms in sorted(missing, key=repr):
+                        forms.compile()
                 _compiled.update(missing)
             except CompilerError as error:
                 message = str(error)
@@ -64,50 +108,9 @@ def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
 
 
 def _forms(solve: Solve) -> _Forms:
-    body, mesh = solve.case.body, solve.case.mesh
+    body, case = solve.case.body, solve.case
     if solve.axisymmetric:
         half_plane = body.half_plane()
-        kind = "elliptic" if half_plane and half_plane.is_curved else "axisymmetric"
-        if solve.case.material.is_large or solve.case.is_stepped:
-            degree = DEGREE_OF_STEPS if solve.case.probe.friction else LARGE_DEGREE
-            laws = tuple(sorted({str(tissue.law or "linear") for tissue in solve.case.tissues}))
-            return _Forms(kind, degree, laws, of_steps=solve.case.is_stepped)
-        lowest = DEGREE_OF_STEPS - 1 if solve.case.probe.friction else TRIAL_DEGREE
-        return _Forms(kind, lowest if solve.case.probe.is_unilateral else 0)
-    has_slit = solve.case.probe.slit is not None
-    return _Forms(
-        solve.case.formulation,
-        mesh.degree,
-        of_regions=bool(body.regions) or solve.case.is_linear_beyond,
-        of_slit=has_slit,
-        of_contact=solve.case.probe.is_unilateral and solve.case.material.is_large,
-        of_steps=solve.case.is_stepped,
-    )
-
-
-def _compile(forms: _Forms) -> None:
-    element, degree, of_regions = forms.element, forms.degree, forms.of_regions
-    if element in ("axisymmetric", "elliptic"):
-        curved = element == "elliptic"
-        if forms.of_steps or forms.laws != ("linear",):
-            compile_axisymmetric(degree, curved=curved, laws=forms.laws, relaxes=forms.of_steps)
-            return
-        compile_axisymmetric(curved=curved, lowest=degree)
-        return
-    if forms == _REGULAR:
-        compile_regular()
-        return
-    laws = ("linear",) if element in ("displacement", "mixed") else element.removesuffix("-mixed").split("+")
-    element = "mixed" if element.endswith("mixed") else "displacement"
-    compile_forms(
-        degree,
-        element,
-        laws,
-        straight=degree == 1,
-        of_regions=of_regions,
-        of_contact=forms.of_contact,
-        of_steps=forms.of_steps,
-    )
-    compile_cell_values(degree, straight=degree == 1)
-    if forms.of_slit:
-        compile_release(degree, mixed=element == "mixed", of_regions=of_regions)
+        return _Meridian(solve.way, curved=bool(half_plane and half_plane.is_curved))
+    of_regions = bool(body.regions) or case.is_linear_beyond
+    return _Body(solve.way, case.mesh.degree, of_regions, of_slit=case.probe.slit is not None)

@@ -22,6 +22,7 @@ from epsmesh.solve.response import Contact
 from epsmesh.solve.solution import Solution
 from epsmesh.states import OK
 from epsmesh.study.case import Case
+from epsmesh.study.way import Constraint
 
 _ROUNDING = 1e-9
 # The mesh is graded to the axis. If first contact is farther away, in units of the half width, it is not graded to it.
@@ -55,11 +56,11 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         is_plain = case.is_plain and not is_refined(solve.meshed_case)
         known = Convergence(
             degree=case.mesh.degree,
-            element=case.element,
+            element=case.way.element,
             is_graded=is_graded_to_contact(case),
             is_fine=is_plain and has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
             has_others=not is_plain,
-            is_large=case.material.is_large,
+            is_large=case.way.is_large,
             is_ball=is_ball(case),
         )
         solution = solution.extrapolated(known)
@@ -112,7 +113,7 @@ def _course(case: Case, history: History | None) -> dict[str, tuple[float, ...]]
         "dissipated": history.dissipated,
         "dissipated_error": np.abs(history.imbalance),
     }
-    if case.probe.is_unilateral:
+    if case.way.is_found:
         found["area"] = history.areas
     return {name: tuple(map(float, values)) for name, values in found.items()}
 
@@ -154,9 +155,9 @@ def _known_of(case: Case, force: Vector) -> Vector:
     ends are not computed.
     """
     x, y, z = force
-    if case.is_closed and case.probe.contact == "bonded":
+    if case.is_closed and case.way.constraint is Constraint.BONDED:
         return x and nan, y and nan, z
-    if case.probe.slit and case.probe.contact != "bonded":
+    if case.probe.slit and case.way.constraint is Constraint.SLIDING:
         along = case.frame.upright.along
         return (x and nan, y, z) if abs(along[0]) > abs(along[1]) else (x, y and nan, z)
     return x, y, z
@@ -168,14 +169,14 @@ def is_graded_to_contact(case: Case) -> bool:
     # The coarsest recipe equals the limit of `is_graded`: rounding must not exceed it.
     found = not case.probe.is_flat
     rim *= 1 - _ROUNDING if found else 1.0
-    if case.probe.is_unilateral:  # small elements surround the axis, so contact must be there
+    if case.way.is_found:  # small elements surround the axis, so contact must be there
         *beside, _ = first_touch(case.body, case.probe, case.frame)
         if hypot(*beside) > _BESIDE * half_width_of(case):
             return False
-        if is_ball(case) and not case.material.is_large and is_thin(case):
+        if is_ball(case) and not case.way.is_large and is_thin(case):
             return False
     sure = has_sure_contact(case) and case.mesh.degree == 2
-    return is_graded(rim, case.mesh.growth, found=found, large=case.material.is_large, sure=sure)
+    return is_graded(rim, case.mesh.growth, found=found, large=case.way.is_large, sure=sure)
 
 
 def _rim(case: Case) -> float:

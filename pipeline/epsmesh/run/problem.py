@@ -39,6 +39,7 @@ from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.solution import Problem, Request, Solution
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.case import Case
+from epsmesh.study.way import Constraint
 from epsmesh.units import canonical
 
 # Largest number of unknowns for a direct solve if iterations do not converge.
@@ -62,19 +63,16 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
     """
     if case.probe.crack:
         raise CaseFailure("a needle that is inserted is solved in a plane section, in a round scene only")
-    tool = tool_of(case) if case.probe.is_unilateral else None
+    tool = tool_of(case) if case.way.is_found else None
     degree, conditions = case.mesh.degree, conditions_of(case)
-    return QuasiStaticProblem(spaces, degree, conditions, case.element, tool=tool, reuse=reuse, condense=condense)
+    return QuasiStaticProblem(spaces, degree, conditions, case.way.element, tool=tool, reuse=reuse, condense=condense)
 
 
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:
     """Return the estimated bytes of a solve of ``case`` with ``dofs`` unknowns, and of its error bar."""
     degree, direct = case.mesh.degree, is_direct(case.solve.method, dofs, DIRECT_LIMIT[case.mesh.degree])
-    direct = direct or case.is_factorised
-    return (
-        estimate.solving_memory(dofs, degree, case.formulation, direct=direct),
-        estimate.error_bar_memory(dofs, degree, case.formulation),
-    )
+    solving = estimate.solving_memory(dofs, degree, case.way, direct=direct)
+    return solving, estimate.error_bar_memory(dofs, degree, case.way)
 
 
 def memory_of_basis(case: Case, dofs: int) -> float:
@@ -87,20 +85,22 @@ def meridian_problem(case: Case) -> Problem:
     """Return the problem of an axisymmetric ``case`` without loads, on its meridian."""
     if crack := case.probe.crack:
         return NeedleSolver(crack.radius, crack.toughness, ring_cuts if crack.is_ring else plane_cuts)
-    if case.probe.is_unilateral and case.has_load_steps:
-        how = {} if case.mesh.accuracy is None else {"accuracy": case.mesh.accuracy / 2}
-        return LargeMeridianContact(meridian_of(case), round_tool_of(case), **how)
-    if case.has_load_steps:
-        return LargeMeridian(meridian_of(case), conditions_of(case))
-    if case.probe.is_unilateral:
-        return MeridianContact(meridian_of(case), round_tool_of(case))
+    match case.way.is_found, case.way.has_steps:
+        case True, True:
+            how = {} if case.mesh.accuracy is None else {"accuracy": case.mesh.accuracy / 2}
+            return LargeMeridianContact(meridian_of(case), round_tool_of(case), **how)
+        case True, False:
+            return MeridianContact(meridian_of(case), round_tool_of(case))
+        case False, True:
+            return LargeMeridian(meridian_of(case), conditions_of(case))
     return MeridianProblem(meridian_of(case), conditions_of(case))
 
 
 def conditions_of(case: Case) -> Conditions:
     """Return the boundary conditions by the probe of ``case``."""
     front, tip = _fronts_of(case)
-    return Conditions(bonded=case.probe.contact == "bonded", unilateral=case.probe.is_unilateral, front=front, tip=tip)
+    bonded = case.way.constraint is Constraint.BONDED
+    return Conditions(bonded=bonded, unilateral=case.way.is_found, front=front, tip=tip)
 
 
 def tool_of(case: Case) -> Tool:
@@ -134,7 +134,7 @@ def _fronts_of(case: Case) -> tuple[Front | None, Front | None]:
     if slit is None:
         return None, None
     front = Front(frame.point, frame.along, slit.depth, slit.reach, _CLEAR * slit.room(case.body))
-    if case.probe.contact == "bonded":
+    if case.way.constraint is Constraint.BONDED:
         return front, None
     return front, Front(frame.point, frame.along, slit.tip, slit.length / 2, _CLEAR * slit.room_at_tip(case.body))
 
@@ -179,7 +179,7 @@ def _motions_of(case: Case, meshed: Case) -> Movement:
         return Movement.all(travel, frame.point)
     if slit := case.probe.slit:
         # Tissue slides along frictionless flanks, so only their opening is prescribed.
-        pressed = Movement.along(travel) if case.probe.contact == "bonded" else Movement((), ())
+        pressed = Movement.along(travel) if case.way.constraint is Constraint.BONDED else Movement((), ())
         return pressed.opened(case.frame.upright.across, slit.width / 2)
     if case.is_closed:
         return Movement.along(travel).with_far(_moved(far_field_of(case), meshed.frame.point))
@@ -201,7 +201,7 @@ def law_of(case: Case, *, in_body: bool = False) -> MaterialLaw:
     within = [_parameters(tissue, None if in_body else case.frame.turn) for tissue in case.tissues]
     beyond = [Parameters.of_moduli(each.young, each.poisson) for each in case.tissues if case.is_linear_beyond]
     found = (*within, *beyond)
-    if case.is_stepped:
+    if case.way.in_time:
         terms = case.relaxations * (2 if beyond else 1)
         found = tuple(replace(each, relaxation=own) for each, own in zip(found, terms, strict=True))
     return MaterialLaw(found)
@@ -213,7 +213,7 @@ def course_of(case: Case, goal: float | None = None) -> Course | None:
     With a ``goal``, the largest force is wanted to this accuracy.
     """
     history = case.probe.history
-    if history is None or not case.is_stepped:
+    if history is None or not case.way.in_time:
         return None
     motion, times, depth = history.motion(case.probe.depth), history.times(), case.probe.depth
     breaks = np.flatnonzero(np.isin(times, [canonical(time) for time in motion.times]))

@@ -315,7 +315,7 @@ def _in_order(step: OperatorStep, *, condensed: bool) -> Iterator[Solve]:
 
     With condensation a depth costs less than its error bar, so some depths use the bars of others, which come first.
     """
-    if not step.case.is_followed:
+    if not step.case.way.is_followed:
         yield from step.solves
         return
     for sweep in step.sweeps:

@@ -19,6 +19,7 @@ from epsmesh.study.loads import Load
 from epsmesh.study.output import Output
 from epsmesh.study.place import CLEAR, is_clear, place_error
 from epsmesh.study.schema import Material, Mesh, Solving
+from epsmesh.study.way import LINEAR, Constraint, Dimension, Way
 from epsmesh.viscoelastic import Terms
 
 Rest = ParamSpec("Rest")
@@ -128,7 +129,7 @@ class Case:
     def movements(self) -> int:
         """How many solutions there are: press, slide, opening of a slit, far field, or all six motions; and loads."""
         slides = self.travel != tuple(self.probe.depth * a for a in self.frame.axis)
-        opens = self.probe.slit is not None and self.probe.contact == "bonded"
+        opens = self.probe.slit is not None and self.way.constraint is Constraint.BONDED
         motions = 6 if self.probe.motion == "all" else 1 + slides + opens + self.is_closed
         return motions + self.load.acts
 
@@ -155,12 +156,6 @@ class Case:
 
     @property
     @of_scene
-    def is_stepped(self) -> bool:
-        """Whether its history is computed in time steps."""
-        return needs_time_steps(self)
-
-    @property
-    @of_scene
     def densities(self) -> tuple[float | None, ...]:
         """Densities (kg/m³) of the regions of the body, in the order of their numbers; None where there is none."""
         return tuple(tissue.density for tissue in self.tissues)
@@ -182,7 +177,7 @@ class Case:
     @property
     def moves_in_proportion(self) -> tuple[str, ...]:
         """The keys of the probe that F is proportional to: none where displacements are large."""
-        return () if self.material.is_large or self.is_stepped else self.probe.proportional_to
+        return self.probe.proportional_to if self.way.is_proportional else ()
 
     @property
     @of_scene
@@ -195,7 +190,7 @@ class Case:
     @property
     def is_bent(self) -> bool:
         """Whether loads bend the surface on which contact is found: F is then proportional to nothing."""
-        return self.load.acts and self.probe.is_unilateral
+        return self.load.acts and self.way.is_found
 
     @property
     def is_plain(self) -> bool:
@@ -235,7 +230,7 @@ class Case:
     @property
     def has_quarter_points(self) -> bool:
         """Whether elements at a singular edge of the probe have quarter points; deep in tissue they would fold."""
-        if not (self.material.is_large and self.probe.has_singular_edge):
+        if not (self.way.is_large and self.probe.has_singular_edge):
             return True
         return self.probe.depth <= _SHALLOW * self.probe.half_width
 
@@ -268,33 +263,20 @@ class Case:
         return self.is_closed and self.mesh.outside == "green"
 
     @property
-    def element(self) -> str:
-        """The element that solves it: displacement or mixed."""
-        return self.mesh.element_for(self.poisson, is_large=self.material.is_large)
+    def way(self) -> Way:
+        """How it is solved; the plan may choose the half plane of a round scene."""
+        element = self.mesh.element_for(self.poisson, is_large=self.material.is_large)
+        return self._way(element, is_linear_beyond=self.is_linear_beyond)
 
-    @property
-    def formulation(self) -> str:
-        """What is solved: the element, at large displacements the names of the laws, and -mixed if the element is."""
-        if not self.material.is_large:
-            return self.element
-        beyond = ["linear"] if self.is_linear_beyond else []
-        names = "+".join(sorted({*(str(tissue.law) for tissue in self.tissues), *beyond}))
-        return names + ("-mixed" if self.element == "mixed" else "")
-
-    @property
-    def is_followed(self) -> bool:
-        """Whether a depth is reached over smaller ones: contact is found, or displacements are large."""
-        return self.probe.is_unilateral or self.material.is_large
-
-    @property
-    def has_load_steps(self) -> bool:
-        """Whether its law, friction or history makes steps necessary, which the meridian follows, too."""
-        return self.material.is_large or self.probe.friction > 0 or self.is_stepped
-
-    @property
-    def is_factorised(self) -> bool:
-        """Whether it is solved by a factorisation, whatever its size: friction on a linear body."""
-        return self.probe.friction > 0 and not self.material.is_large
+    @of_scene
+    def _way(self, element: str, *, is_linear_beyond: bool) -> Way:
+        probe, laws = self.probe, LINEAR
+        if self.material.is_large:
+            laws = tuple(sorted({*(str(tissue.law) for tissue in self.tissues), *(LINEAR if is_linear_beyond else ())}))
+        found = Constraint.FRICTION if probe.friction > 0 else Constraint.FOUND
+        constraint = {"bonded": Constraint.BONDED, "frictionless": Constraint.SLIDING}.get(probe.contact, found)
+        dimension = Dimension.SECTION if probe.crack else Dimension.BODY
+        return Way(element, laws, constraint, needs_time_steps(self), dimension)
 
     @property
     def whole(self) -> str:

@@ -44,7 +44,7 @@ def _of_curve(curve: Curve, case: Case) -> Iterator[str]:
 def doubts_of_depth(cases: Sequence[Case], found: Sequence[CurveFit]) -> Iterator[str]:
     """Yield for each fitted curve, on the scene of a case, why its law may be an extrapolation at its depth."""
     for case, curve in zip(cases, found, strict=True):
-        if case.material.is_large or any(region.is_large for region in case.body.regions):
+        if case.way.is_large or any(region.is_large for region in case.body.regions):
             continue
         problems, deepest = Problems(), float(np.nanmax(curve.depth))
         warn_of_depth(case.probe.model_copy(update={"depth": deepest, "history": None}), problems)

@@ -99,7 +99,7 @@ def domain_of(
         found = replace(found, accuracy=IN_SPACE)
     if output != FORCE:
         return replace(found, exponent=0.0)
-    exponent = (case.probe.force_exponent if case.probe.is_unilateral else None) or 1.0
+    exponent = (case.probe.force_exponent if case.way.is_found else None) or 1.0
     return replace(found, exponent=exponent, is_proportional=case.moves_in_proportion == ("depth",))
 
 

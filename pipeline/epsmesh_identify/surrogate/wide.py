@@ -53,7 +53,7 @@ def layered_body(case: Case) -> LayeredBody | None:
     body, frame = case.body, case.frame
     is_flat = isinstance(body, Layered) and not body.embedded and body.fixed in _SUPPORTS
     is_on_top = frame.is_upright and frame.point[2] == body.heights[1]
-    is_elastic = not (case.material.is_large or any(region.is_large for region in body.regions))
+    is_elastic = not (case.way.is_large or any(region.is_large for region in body.regions))
     if not (isinstance(body, Layered) and is_flat and is_on_top and is_elastic and _slides(case.probe)):
         return None
     if case.load.acts or case.is_truncated:

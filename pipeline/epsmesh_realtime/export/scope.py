@@ -152,7 +152,7 @@ def _large_refusal(case: Case, first: Case) -> str:
     """Return why a law of large displacements has no model, "" if it has one or there is none."""
     if any(tissue.keys_of_law != other.keys_of_law for tissue, other in zip(case.tissues, first.tissues, strict=True)):
         return "material.law: the study has several laws, and a model has one: export a study of each"
-    if not case.material.is_large:
+    if not case.way.is_large:
         return ""
     if not isinstance(case.body, Layered):
         return "material.law: at large displacements only boxes and cylinders have a real-time model"

@@ -1,0 +1,107 @@
+"""The way a case is solved: what its sections imply for the solver, found once, in one place.
+
+A way is a formulation (element and laws), a constraint at the tool, steps, and a dimension. Plan, cost, memory,
+compiled forms, solver and record ask it. Which features exclude each other is in :mod:`epsmesh.study.capabilities`.
+"""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+LINEAR = ("linear",)
+
+
+class Constraint(Enum):
+    """What is prescribed where tool and tissue touch."""
+
+    BONDED = "bonded"  # the displacement of the footprint
+    SLIDING = "sliding"  # its normal component
+    FOUND = "found"  # the tool's surface, where it presses: an active set
+    FRICTION = "friction"  # the same, with Coulomb's law
+
+
+class Steps(Enum):
+    """The path to the asked depth."""
+
+    NONE = "none"
+    LOAD = "load"
+    TIME = "time"
+
+
+class Dimension(Enum):
+    """Where the problem is solved."""
+
+    BODY = "body"
+    MERIDIAN = "meridian"  # a round scene's half plane
+    SECTION = "section"  # a plane through a needle, deep in tissue
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a case is solved.
+
+    ``laws`` are the sorted names of its regions' laws, :data:`LINEAR` at small displacements.
+    """
+
+    element: str = "displacement"
+    laws: tuple[str, ...] = LINEAR
+    constraint: Constraint = Constraint.BONDED
+    in_time: bool = False
+    dimension: Dimension = Dimension.BODY
+
+    @property
+    def is_large(self) -> bool:
+        """Whether displacements are large."""
+        return self.laws != LINEAR
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether elements have displacement and pressure."""
+        return self.element == "mixed"
+
+    @property
+    def is_found(self) -> bool:
+        """Whether the contact area is unknown and computed."""
+        return self.constraint in (Constraint.FOUND, Constraint.FRICTION)
+
+    @property
+    def rubs(self) -> bool:
+        """Whether there is friction."""
+        return self.constraint is Constraint.FRICTION
+
+    @property
+    def steps(self) -> Steps:
+        """What its law, friction or history makes necessary."""
+        return Steps.TIME if self.in_time else Steps.LOAD if self.is_large or self.rubs else Steps.NONE
+
+    @property
+    def has_steps(self) -> bool:
+        """Whether a path of load or time steps may end before the depth."""
+        return self.steps is not Steps.NONE
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether a depth is reached over smaller ones: contact is found, or displacements are large."""
+        return self.is_found or self.is_large
+
+    @property
+    def is_proportional(self) -> bool:
+        """Whether F may be proportional to the motion."""
+        return not (self.is_large or self.in_time)
+
+    @property
+    def is_factorised(self) -> bool:
+        """Whether it is solved by a factorisation, whatever its size: friction on a linear body."""
+        return self.rubs and not self.is_large
+
+    @property
+    def formulation(self) -> str:
+        """What is solved: the element, at large displacements the names of the laws, and -mixed if the element is."""
+        return "+".join(self.laws) + ("-mixed" if self.is_mixed else "") if self.is_large else self.element
+
+    @property
+    def on_meridian(self) -> "Way":
+        """The same in the half plane of a round scene; a needle deep in tissue stays in its section."""
+        return self if self.dimension is Dimension.SECTION else replace(self, dimension=Dimension.MERIDIAN)
+
+
+PLAIN = Way()
