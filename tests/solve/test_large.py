@@ -133,12 +133,12 @@ def test_depths_of_a_sweep_share_one_load_path(monkeypatch):
     depths = {"depth": ["9 mm", "0.4 mm", "8 mm", "0.8 mm"]}
     ends: list[tuple[float, float]] = []
 
-    def counted(path, solve_at, to, steps):
+    def counted(path, solve_at, to, **steps):
         def at(depth):
             ends.append((path.reached, to))
             return solve_at(depth)
 
-        follow(path, at, to, steps)
+        follow(path, at, to, **steps)
 
     monkeypatch.setattr(load_steps, "follow", counted)
     deep, first, far, second = solve(material=LARGE, probe=depths).values()

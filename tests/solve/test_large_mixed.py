@@ -186,9 +186,9 @@ def test_direct_and_iterative_solvers_agree():
 def test_depths_of_a_sweep_share_one_load_path(monkeypatch):
     ends: list[float] = []
 
-    def counted(path, *arguments):
+    def counted(path, *arguments, **steps):
         ends.append(path.reached)
-        follow(path, *arguments)
+        follow(path, *arguments, **steps)
 
     monkeypatch.setattr(load_steps, "follow", counted)
     second, first = solve(material=soft(0.5), probe={"depth": ["0.8 mm", "0.4 mm"]}).values()

@@ -23,14 +23,12 @@ from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Loads
 from epsmesh.solve.newton import EASY, LEFT, ON_THE_WAY, HyperelasticBody, LargeError
-from epsmesh.solve.path import Path, Stage, Steps, follow
+from epsmesh.solve.path import Path, Stage, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import whole_force
 from epsmesh.solve.spaces import Spaces
 from epsmesh.stages import stage
 
-# Shortest load step, as a share of the loads.
-_SHORTEST = 1 / 64
 # The sag of a tool: most steps of the secant method, most halvings of one, and the change (relative) and the force (in
 # units of the loads) at which it ends.
 _MOST_SECANTS, _HALVINGS, _SMALL, _NO_FORCE = 20, 6, 1e-6, 1e-9
@@ -53,7 +51,7 @@ def load_in_steps(body: HyperelasticBody, applied: Applied | None, state: PETSc.
         return Stage(share, state.array.copy()), iterations <= EASY
 
     try:
-        follow(path, solve_at, 1.0, Steps(_SHORTEST))
+        follow(path, solve_at, 1.0)
     except LargeError as error:
         raise LargeError(
             f"the tissue carries {100 * path.reached:.0f} % of its loads, and becomes unstable beyond (Newton's "

@@ -25,12 +25,12 @@ from epsmesh.solve.large_estimate import Decrements, FinerResiduals, combine, fo
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Motion, Movement
 from epsmesh.solve.newton import EASY, LEFT, ON_THE_WAY, HyperelasticBody, LargeError
-from epsmesh.solve.path import Path, Stage, Steps, follow
+from epsmesh.solve.path import Path, Stage, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import LoadResponse, Response, whole_force
 
-# Fewest load steps, fewest where the check of the work needs more, and the shortest step as a share of the depth.
-_FEWEST, _MANY, _SHORTEST = 3, 12, 1 / 100
+# Fewest load steps, and fewest where the check of the work needs more.
+_FEWEST, _MANY = 3, 12
 # Largest relative difference of work and energy, and rounding of energies where strains are tiny. An element at the
 # edge may fold between its quadrature points: the energy then drops without work.
 _WORK, _ROUNDING = 3e-4, 1e-13
@@ -272,7 +272,7 @@ class LoadSteps(Solver):
                 return Stage(there, state.array.copy()), iterations <= EASY
 
             try:
-                follow(load_path, solve_at, depth, Steps(_SHORTEST * depth, depth / fewest))
+                follow(load_path, solve_at, depth, fewest=fewest)
             except LargeError as error:
                 raise self._stopped(load_path, depth, error) from error
         state.array[:] = load_path.last.state

@@ -16,6 +16,8 @@ from epsmesh.solve.newton import LargeError
 
 # A step that would leave less than this share of the rest goes to the end: no further step for a rounding error.
 _SLIVER = 1e-6
+# The shortest step, as a share of the amount at the end, and how many times longer one after an easy one may be.
+SHORTEST, _LONGER = 1 / 100, 1.5
 # Stages that a path keeps.
 _KEPT = 3
 
@@ -70,33 +72,33 @@ class Path(Generic[S]):
         return np.asarray(np.tensordot(weights, [stage.state for stage in stages], axes=1))
 
 
-@dataclass(frozen=True)
-class Steps:
-    """The ``shortest`` and the ``longest`` step of a path, and how many times ``longer`` one after an easy one is."""
-
-    shortest: float
-    longest: float = inf
-    longer: float = 2.0
-
-
-def follow(path: Path[S], solve_at: Callable[[float], tuple[S, bool]], to: float, steps: Steps) -> None:
+def follow(
+    path: Path[S],
+    solve_at: Callable[[float], tuple[S, bool]],
+    to: float,
+    *,
+    fewest: float = 1.0,
+    shortest: float = SHORTEST,
+) -> None:
     """Continue a ``path`` to an amount; collective if ``solve_at`` is.
 
-    ``solve_at`` returns the stage at an amount, and whether it was found with ease.
+    ``solve_at`` returns the stage at an amount, and whether it was found with ease. There are at least ``fewest`` steps
+    from zero on; the ``shortest`` one is a share of the amount.
 
     Raises:
         LargeError: that of ``solve_at``, if a step becomes too short; the path keeps the stages before.
     """
+    longest = path.step
     while (reached := path.reached) < to:
         left = to - reached
-        step = min(path.step, steps.longest, left)
+        step = min(longest, to / fewest, left)
         there = to if step > (1 - _SLIVER) * left else reached + step
         try:
             stage, is_easy = solve_at(there)
         except LargeError:
-            path.step = (there - reached) / 2
-            if path.step < steps.shortest:
+            longest = (there - reached) / 2
+            if longest < shortest * to:
                 raise
             continue
         path.add(stage)
-        path.step = max(path.step, (there - reached) * (steps.longer if is_easy else 1.0))
+        path.step = longest = max(longest, (there - reached) * (_LONGER if is_easy else 1.0))

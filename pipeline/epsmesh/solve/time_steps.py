@@ -11,7 +11,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
-from math import inf
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -27,14 +26,14 @@ from epsmesh.solve.ended import ended
 from epsmesh.solve.history import Course, History, between
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.newton import HyperelasticBody, LargeError
-from epsmesh.solve.path import Path, Stage, Steps, follow
+from epsmesh.solve.path import Path, Stage, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.relaxing import HistoryVariables, Points
 from epsmesh.solve.response import whole_force
 from epsmesh.stages import stage
 
-# Longest step as a share of the movement, and the shortest part of a step.
-_LONGEST, _SHORTEST = 1 / 3, 1 / 64
+# Fewest steps of the whole movement.
+_FEWEST = 3
 # How often all steps are halved for an accuracy.
 _MOST_REFINEMENTS = 3
 # Of the difference between steps and double steps, a third is the error of the steps; the bar is twice that.
@@ -248,9 +247,8 @@ class TimeSteps:
                 raise
             return Stage(part, self._state.array), True
 
-        longest = _LONGEST / abs(rise) if rise else inf
         try:
-            follow(Path(Stage(0.0, self._state.array)), solve_at, 1.0, Steps(_SHORTEST, longest))
+            follow(Path(Stage(0.0, self._state.array)), solve_at, 1.0, fewest=max(1.0, _FEWEST * abs(rise)))
         except LargeError as error:
             raise self._stopped(course, error) from error
 

@@ -16,10 +16,8 @@ from epsmesh.solve.contact.coulomb import Neighbours, Slide, most_simplified
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, Tissue, first_set, solve_contact
 from epsmesh.solve.contact.friction_step import FrictionStep, meeting_places
 from epsmesh.solve.newton import LargeError
-from epsmesh.solve.path import Path, Stage, Steps, follow
+from epsmesh.solve.path import Path, Stage, follow
 
-# Shortest step, as a share of the depth.
-_SHORTEST = 1 / 64
 # Larger steps than this share, without friction, are given up soon.
 _LARGE = 1 / 8
 # Residual and gaps of steps on the way to the depth, without friction.
@@ -30,8 +28,8 @@ _INSIDE = 0.25
 # The first step ends where the tool's normals at the nodes that it penetrates have this mean part along its way, after
 # so many halvings at most: nodes beside the flank of a ball do not stay in contact, and would fold the tissue.
 _FACING, _FIRST_HALVINGS = 0.7, 2
-# The next step is longer by this factor if this one took at most so many iterations.
-_LONGER, _EASY = 1.5, 8
+# A step was easy if it took at most so many iterations.
+_EASY = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +92,7 @@ def press(
         return ContactStage(there, tissue.state, touched), touched.iterations <= _EASY
 
     try:
-        follow(path, solve_at, depth, Steps(_SHORTEST * depth, longer=_LONGER))
+        follow(path, solve_at, depth)
     except LargeError:
         _end(tissue, tool_at, path, start, friction)
         raise

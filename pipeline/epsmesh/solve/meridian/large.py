@@ -27,7 +27,7 @@ from epsmesh.solve.meridian.in_time import RelaxingHalfPlane
 from epsmesh.solve.meridian.problem import Answer, MeridianSolver, best_of, error_bar
 from epsmesh.solve.meridian.system import HalfPlane, System, max_strain, meshes_of
 from epsmesh.solve.newton import LargeError
-from epsmesh.solve.path import Path, Stage, Steps, follow
+from epsmesh.solve.path import SHORTEST, Path, Stage, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.time_steps import Pressed
 from epsmesh.stages import stage
@@ -37,8 +37,8 @@ DEGREE = 4
 GRADINGS = tuple(Grading(floor, 1.0, 4.0) for floor in (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3))
 # Tolerance on the residual, relative to the forces at the probe; most Newton iterations, and halvings of one.
 _LEFT, _MOST_ITERATIONS, _HALVINGS = 1e-9, 14, 6
-# Fewest load steps, the shortest one as a share of the depth, and how many times longer the next one may be.
-_FEWEST, _SHORTEST, _LONGER = 3, 1 / 50, 1.5
+# Fewest load steps.
+_FEWEST = 3
 # Steps of a mesh after the first, which must reach the depth with ease, are halved once at most.
 _SHORTEST_OF_FINER = 1 / 7
 # The bar is this many times the difference from the mesh before; or, for the first mesh, that of the degrees.
@@ -62,7 +62,7 @@ class LargeSystem(System):
         on_probe, on_support = (2 * pi * float(residual[dofs].sum()) for dofs in (self.probe, self.support))
         return on_probe, on_support, 2 * pi * self.forms.energy(state)
 
-    def press(self, depth: float, shortest: float) -> tuple[FloatArray, FloatArray]:
+    def press(self, depth: float, shortest: float = SHORTEST) -> tuple[FloatArray, FloatArray]:
         """Return the state at a ``depth``, and the path to it: depth, force and energy of each step.
 
         The ``shortest`` step is in units of the depth.
@@ -79,7 +79,7 @@ class LargeSystem(System):
             return Stage(there, state), True
 
         try:
-            follow(path, solve_at, depth, Steps(shortest * depth, depth / _FEWEST, _LONGER))
+            follow(path, solve_at, depth, fewest=_FEWEST, shortest=shortest)
         except LargeError as error:
             raise LargeError(str(error), work[-1][:2] if path.reached else None) from error
         return path.last.state, np.array(work)
@@ -199,7 +199,7 @@ class LargeMeridian(LargeSolver):
                 LargeSystem(meshes, degree, law, bonded=self._bonded) for degree in (self._degree - 1, self._degree)
             )
         try:
-            state, path = coarse.press(deep, _SHORTEST if before is None else _SHORTEST_OF_FINER)
+            state, path = coarse.press(deep, SHORTEST if before is None else _SHORTEST_OF_FINER)
         except LargeError as stop:
             raise stopped(stop, arrays, law, depth, is_found=False) from stop
         check_path(path, _ROUNDING * float(np.ptp(arrays.points, axis=0).prod()))
