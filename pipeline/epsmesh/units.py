@@ -68,6 +68,11 @@ _KINDS = {
     "m/s^2": _Kind("an acceleration", "-9.81 m/s^2", {"m/s^2": 1.0, "mm/s^2": 1e-3}),
     "N": _Kind("a force", "10 mN", {"N": 1.0, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9, "kN": 1e3}),
     "N/m": _Kind("a stiffness", "60 N/mm", {"N/m": 1.0, "N/mm": 1e3, "mN/mm": 1.0, "N/µm": 1e6}),
+    "N/m^3": _Kind(
+        "a stiffness per area",
+        "50 kPa/mm",
+        {"N/m^3": 1.0, "Pa/m": 1.0, "kPa/m": 1e3, "MPa/m": 1e6, "Pa/mm": 1e3, "kPa/mm": 1e6, "N/mm^3": 1e9},
+    ),
     "J/m^2": _Kind("a toughness", "200 J/m^2", {"J/m^2": 1.0, "kJ/m^2": 1e3, "mJ/m^2": 1e-3, "N/m": 1.0, "N/mm": 1e3}),
     "N/s": _Kind("a rate of force", "1 mN/s", {"N/s": 1.0, "mN/s": 1e-3, "µN/s": 1e-6}),
 }
@@ -218,6 +223,8 @@ Pressure = Annotated[Stress, Field(gt=0)]
 Force = Annotated[float, _quantity_in("N"), Field(gt=0, json_schema_extra={"unit": "N"})]
 Density = Annotated[float, _quantity_in("kg/m^3"), Field(gt=0, json_schema_extra={"unit": "kg/m^3"})]
 Toughness = Annotated[float, _quantity_in("J/m^2"), Field(gt=0, json_schema_extra={"unit": "J/m^2"})]
+Stiffness = Annotated[float, _quantity_in("N/m"), Field(gt=0, json_schema_extra={"unit": "N/m"})]
+Foundation = Annotated[float, _quantity_in("N/m^3"), Field(gt=0, json_schema_extra={"unit": "N/m^3"})]
 Acceleration = Annotated[float, _quantity_in("m/s^2"), Field(json_schema_extra={"unit": "m/s^2"})]
 Duration = Annotated[float, _quantity_in("s"), Field(ge=0, json_schema_extra={"unit": "s"})]
 Time = Annotated[float, _quantity_in("s"), Field(gt=0, json_schema_extra={"unit": "s"})]

@@ -33,10 +33,9 @@ def springs(stiffness: float) -> EnergyTerm:
     """Return springs of a stiffness (N/m³) under the body."""
 
     def energy(at: Place) -> Any:
-        below = at.ds(lambda _, normals: normals[:, 2] < -0.9)
-        return at.constant(stiffness) / 2 * ufl.inner(at.u, at.u) * below
+        return at.constant(stiffness) / 2 * ufl.inner(at.u, at.u) * at.ds
 
-    return EnergyTerm(energy, ("springs", stiffness))
+    return EnergyTerm(energy, ("springs", stiffness), lambda _, normals: normals[:, 2] < -0.9)
 
 
 def fluid(pressure: float) -> EnergyTerm:
@@ -106,10 +105,10 @@ def test_a_loaded_column_moves_as_a_whole_on_springs():
     down = turn @ np.array([0.0, 0.0, -1.0])
 
     def energy(at: Place) -> Any:
-        below = at.ds(lambda _, normals: normals @ down > 0.9)
-        return stiffness / 2 * ufl.inner(at.u, at.u) * below
+        return stiffness / 2 * ufl.inner(at.u, at.u) * at.ds
 
-    conditions = Conditions(terms=(EnergyTerm(energy),)).without_footprint
+    term = EnergyTerm(energy, on_facets=lambda _, normals: normals @ down > 0.9)
+    conditions = Conditions(terms=(term,)).without_footprint
     with Spaces(unfixed(mesh_case(case, (), MPI.COMM_SELF))) as spaces:
         elements = elements_of(spaces, 2, conditions)
         sag(elements, MaterialLaw.of_moduli(young, 0.0, "neo-hookean"), loads_of(case))

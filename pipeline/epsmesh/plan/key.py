@@ -11,6 +11,7 @@ from epsmesh.plan.refinement import refinements
 from epsmesh.plan.symmetry import mirror_planes, movement_planes
 from epsmesh.shapes.body import PIECES, Body
 from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section
 from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.capabilities.obstacles import obstacle
@@ -68,7 +69,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
         text_of(case.probe, (*_UNPHYSICAL, *(case.moves_in_proportion if scaled else ()))),
         _ratios_text(case.probe) if scaled else "",
     )
-    tail = [_load_text(case.load, case.densities)] if case.load.acts else []
+    tail = [_load_text(case.load, case.densities)] if case.load.acts or case.load.terms else []
     tail += [_time_text(case)] if case.way.in_time else []
     return head, tuple(tail), case.probe.half_width
 
@@ -118,7 +119,7 @@ def operator_key(case: Case) -> str:
     The depth is left out, too, if contact is found or displacements are large.
     """
     probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.way.is_followed else _UNPHYSICAL)
-    return "\n".join([probe, str(case.mesh.degree), case.way.formulation])
+    return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.load.terms)])
 
 
 def normalised(case: Case) -> Case:
@@ -210,7 +211,7 @@ def _time_text(case: Case) -> str:
 @lru_cache(_MANY)
 def _load_text(load: Load, densities: tuple[float | None, ...]) -> str:
     """Return loads in canonical form, with the densities if there is gravity."""
-    content = load.model_dump()
+    content = load.model_dump(exclude={name for name in TERMS if not getattr(load, name)})
     return _text({**content, "densities": densities if any(load.gravity) else ()})
 
 

@@ -7,7 +7,9 @@ import numpy as np
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.surface import Surface
+from epsmesh.shapes.term import BodyTerm
 from epsmesh.solve.movement import Loads, SurfaceLoad
+from epsmesh.solve.terms import AddedTerm, EnergyTerm
 from epsmesh.study.case import Case
 from epsmesh.study.loads import FREE, Cap, Traction
 
@@ -27,6 +29,19 @@ def loads_of(case: Case) -> Loads | None:
         densities = [density or 0.0 for density in case.densities] * (2 if case.is_linear_beyond else 1)
         weights = tuple((rho * gravity[0], rho * gravity[1], rho * gravity[2]) for rho in densities)
     return Loads(weights, tuple(_surface_load(case, traction) for traction in load.traction if traction.acts))
+
+
+def terms_of(case: Case) -> tuple[AddedTerm, ...]:
+    """Return the terms of the energy that [load] adds."""
+    outer, cavities = case.body.surfaces(), {name: (wall,) for name, wall in case.body.cavities.items()}
+    turn = case.frame.turn
+
+    def of(term: BodyTerm) -> AddedTerm:
+        on = None if term.on == FREE else _on_face(outer | cavities, (term.on,), case.frame)
+        key = term, None if turn is None else turn.tobytes()  # spaces are those of one mesh, hence of one body
+        return EnergyTerm(term.energy, key, on, turn)
+
+    return tuple(map(of, case.load.terms))
 
 
 def _surface_load(case: Case, traction: Traction) -> SurfaceLoad:

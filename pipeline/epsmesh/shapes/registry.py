@@ -1,4 +1,4 @@
-"""Registry of shapes: one file each, in ``bodies/`` and ``probes/``, named like the shape.
+"""Registry of shapes and terms: one file each, in ``bodies/``, ``probes/`` and ``terms/``, named like the shape.
 
 A shape is imported when its class is first used: a study loads only the shapes that it names.
 """
@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar, get_args
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.section import Section
+from epsmesh.shapes.term import BodyTerm
 
 Shape_co = TypeVar("Shape_co", bound=Section, covariant=True)
 
@@ -24,14 +25,17 @@ class Shapes(Mapping[str, type[Shape_co]], Generic[Shape_co]):
 
     @cached_property
     def _names(self) -> tuple[str, ...]:
-        files = Path(__file__).with_name(self._folder).glob("[a-z]*.py")
-        return tuple(sorted(file.stem for file in files))
+        folders = import_module(f"epsmesh.shapes.{self._folder}").__path__
+        return tuple(sorted(file.stem for folder in folders for file in Path(folder).glob("[a-z]*.py")))
 
     def __getitem__(self, name: str) -> type[Shape_co]:
         if name not in self._names:
             raise KeyError(name)
-        found: type[Shape_co] = _kind(f"epsmesh.shapes.{self._folder}.{name}", name)
+        found: type[Shape_co] = self._kind_of(f"epsmesh.shapes.{self._folder}.{name}", name)
         return found
+
+    def _kind_of(self, path: str, name: str) -> Any:
+        return _kind(path, name)
 
     def __contains__(self, name: object) -> bool:
         return name in self._names
@@ -43,10 +47,21 @@ class Shapes(Mapping[str, type[Shape_co]], Generic[Shape_co]):
         return len(self._names)
 
 
+class Terms(Shapes[BodyTerm]):
+    """Classes of terms by name: from each file, its class of a term."""
+
+    def _kind_of(self, path: str, name: str) -> Any:
+        return next(kind for kind in _classes(path) if issubclass(kind, BodyTerm))
+
+
 def _kind(path: str, shape: str) -> Any:
     """Return the class of a module with the given ``shape``."""
-    kinds = [kind for kind in vars(import_module(path)).values() if isinstance(kind, type) and kind.__module__ == path]
-    return next(kind for kind in kinds if _shape(kind) == (shape,))
+    return next(kind for kind in _classes(path) if _shape(kind) == (shape,))
+
+
+def _classes(path: str) -> list[type]:
+    """Return the classes that a module defines."""
+    return [kind for kind in vars(import_module(path)).values() if isinstance(kind, type) and kind.__module__ == path]
 
 
 def specialised(section: Section) -> Section:
@@ -70,3 +85,4 @@ def _shape(kind: type) -> tuple[object, ...]:
 
 BODIES: Shapes[Body] = Shapes("bodies")
 PROBES: Shapes[Probe] = Shapes("probes")
+TERMS = Terms("terms")

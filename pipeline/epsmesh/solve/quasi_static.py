@@ -17,6 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from epsmesh.arrays import FloatArray
+from epsmesh.solve import SolveError
 from epsmesh.solve.cell_values import CellValues, plain_share
 from epsmesh.solve.conditions import Conditions, Front
 from epsmesh.solve.contact.search import ContactSearch
@@ -148,6 +149,8 @@ class QuasiStaticProblem(Problem):
             LargeError: if the time steps do not reach its end.
         """
         assert asked.course is not None
+        if self.elements.displacements.is_loaded:
+            raise SolveError("time steps begin at rest: a term that acts without a displacement has made tissue creep")
         self.elements.set_law(asked.law)
 
         def begin() -> TimeSteps:

@@ -58,10 +58,16 @@ class AddedTerm(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """What the energy of a term is written in: the displacement ``u`` (m) on the mesh of a ``body``."""
+    """What the energy of a term is written in: the displacement ``u`` (m) on the mesh of a ``body``.
+
+    The term acts ``on`` facets of the boundary, None for all of it. ``turn`` rotates the body to the mesh.
+    """
 
     body: BodyMesh
     u: Any
+    on: OnFacets | None = None
+    turn: FloatArray | None = None
+    ufl = ufl
 
     @property
     def x(self) -> Any:
@@ -83,10 +89,12 @@ class Place:
         """The measure of the undeformed volume (m³)."""
         return dx(self.u.function_space, more=MORE)
 
-    def ds(self, on: OnFacets | None = None) -> Any:
-        """Return the measure of the undeformed boundary (m²) but for the support, or of the facets ``on`` it."""
+    @property
+    def ds(self) -> Any:
+        """The measure of the undeformed boundary (m²) on which the term acts, the support excepted."""
         mesh, boundary = self.body.mesh, boundary_of(self.body, (FREE, PROBE))
-        chosen = np.ones(len(boundary.facets), dtype=bool) if on is None else on(boundary.corners, boundary.normals)
+        every = np.ones(len(boundary.facets), dtype=bool)
+        chosen = every if self.on is None else self.on(boundary.corners, boundary.normals)
         degree = 2 * compat.degree(self.u.function_space) + MORE + (_CURVED if has_curved_cells(mesh) else 0)
         tags = compat.facet_tags(mesh, np.sort(boundary.facets[chosen]))
         return ufl.Measure("ds", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": degree})(1)
@@ -95,20 +103,27 @@ class Place:
         """Return a number, or a vector, of which other values need no new compilation."""
         return fem.Constant(self.body.mesh, PETSc.ScalarType(value))
 
+    def vector(self, value: Sequence[float]) -> Any:
+        """Return a vector in the coordinates of the body, which the mesh may have turned."""
+        found = np.array(value) if self.turn is None else self.turn @ np.array(value)
+        return self.constant(found.tolist())
+
 
 @dataclass(frozen=True)
 class EnergyTerm:
     """A term by its ``energy`` (J), a form of UFL at a :class:`Place`; its derivatives follow.
 
-    Terms of equal ``key`` are equal: their spaces are shared.
+    It acts ``on_facets`` of the boundary, None for all. Terms of equal ``key`` are equal: their spaces are shared.
     """
 
-    energy: Callable[[Place], Any] = field(compare=False)
+    energy: Callable[[Any], Any] = field(compare=False)
     key: Hashable = field(default_factory=object)
+    on_facets: OnFacets | None = field(default=None, compare=False)
+    turn: FloatArray | None = field(default=None, compare=False)
 
     def on(self, body: BodyMesh, displacement: Any) -> Term:
         """Return the term on the space of the function ``displacement``; collective."""
-        return _OfForm(self.energy(Place(body, displacement)), displacement)
+        return _OfForm(self.energy(Place(body, displacement, self.on_facets, self.turn)), displacement)
 
 
 class _OfForm:

@@ -189,8 +189,8 @@ class Case:
 
     @property
     def is_bent(self) -> bool:
-        """Whether loads bend the surface on which contact is found: F is then proportional to nothing."""
-        return self.load.acts and self.way.is_found
+        """Whether loads bend the surface on which contact is found, or terms act: F is then proportional to nothing."""
+        return self.way.has_terms or (self.load.acts and self.way.is_found)
 
     @property
     def is_plain(self) -> bool:
@@ -276,7 +276,7 @@ class Case:
         found = Constraint.FRICTION if probe.friction > 0 else Constraint.FOUND
         constraint = {"bonded": Constraint.BONDED, "frictionless": Constraint.SLIDING}.get(probe.contact, found)
         dimension = Dimension.SECTION if probe.crack else Dimension.BODY
-        return Way(element, laws, constraint, needs_time_steps(self), dimension)
+        return Way(element, laws, constraint, needs_time_steps(self), dimension, has_terms=bool(self.load.terms))
 
     @property
     def whole(self) -> str:

@@ -9,6 +9,7 @@ from epsmesh.shapes.body import Body
 from epsmesh.shapes.frame import PlaceError
 from epsmesh.shapes.from_file import FromFile
 from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section, in_mm
 from epsmesh.shapes.support import Faces, NamedFace
 from epsmesh.study.axis import Axis
@@ -30,6 +31,11 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for axis in axes:
         if axis.section == "load" and axis.piece and not axis.owner:
             problems.error(axis.path, None, "is swept: give its table a `name`")
+    for body, load in product(bodies, loads):
+        for name in TERMS:
+            for number, term in enumerate(getattr(load, name), start=1):
+                with problems.about(body=body):
+                    _check_place(body, term.on, f"load.{name}[{number}].on", problems)
     if not acting:
         return
     if any(any(load.gravity) for load in acting):
@@ -41,7 +47,7 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
 
 
 def _check_traction(body: Body, probes: Sequence[Probe], traction: Traction, key: str, problems: Problems) -> None:
-    if _check_place(body, traction, key, problems) and isinstance(cap := traction.on, Cap):
+    if _check_place(body, traction.on, key, problems) and isinstance(cap := traction.on, Cap):
         problems.each(lambda probe, _: _check_beside(body, probe, cap, key, problems), probe=probes)
 
 
@@ -67,9 +73,9 @@ def _check_densities(body: Body, material: Material, problems: Problems) -> None
                 problems.error(f"{key}.density", None, 'is required for gravity: density = "1060 kg/m^3"')
 
 
-def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -> bool:
+def _check_place(body: Body, on: str | Cap, key: str, problems: Problems) -> bool:
     """Report a part of the boundary that does not exist, and return whether it does."""
-    on, names = traction.on, sorted([*body.surfaces(), *body.cavities])
+    names = sorted([*body.surfaces(), *body.cavities])
     if isinstance(on, Cap):
         found = [in_mm(c) for c in on.around]
         try:
@@ -95,7 +101,7 @@ def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -
     support = body.support
     held = support.names if isinstance(support, Faces) else (support.face,) if isinstance(support, NamedFace) else ()
     if on in held:
-        problems.error(key, on, "is fixed: a traction there acts on the support alone")
+        problems.error(key, on, "is fixed: what is there acts on the support alone")
         return False
     return True
 

@@ -38,6 +38,7 @@ _QUANTITIES = {
     "m/s^2": ("acceleration", "accelerations"),
     "N": ("force", "forces"),
     "N/m": ("stiffness", "stiffnesses"),
+    "N/m^3": ("stiffness per area", "stiffnesses per area"),
     "J/m^2": ("toughness", "toughnesses"),
     "": ("number", "numbers"),
 }

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from epsmesh import extensions
+from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Words, words_of
 from epsmesh.study.identified import WORDS as IDENTIFIED
 from epsmesh.study.json_schema import takes_of
@@ -72,6 +73,8 @@ def text_of(section: str) -> str:
     """Return what a section is, for the author of a study."""
     if section in _TEXTS:
         return _TEXTS[section]
+    if (name := section.removeprefix("load.")) in TERMS:
+        return TERMS[name].ABOUT
     return next((one.texts[section] for one in extensions.all_sections() if section in one.texts), "")
 
 

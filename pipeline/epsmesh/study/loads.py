@@ -2,13 +2,15 @@
 
 from collections.abc import Mapping
 from math import hypot
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 from pydantic_core import PydanticCustomError
 
 from epsmesh.shapes.frame import Vector
+from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import OptionalName, Section, Words
+from epsmesh.shapes.term import BodyTerm
 from epsmesh.units import Acceleration, Coordinate, Length, Stress
 
 # All of the boundary without support and probe.
@@ -85,7 +87,7 @@ class Traction(Section):
         return bool(self.pressure) or any(self.traction or ())
 
 
-class Load(Section):
+class _Load(Section):
     """Loads on the body besides the probe."""
 
     gravity: Annotated[
@@ -100,7 +102,12 @@ class Load(Section):
         tuple[Traction, ...], Words("Tractions on parts of the boundary.", "[[load.traction]]", default="none")
     ] = ()
 
-    def with_pressures(self, pressures: Mapping[str, float]) -> "Load":
+    @property
+    def terms(self) -> tuple[BodyTerm, ...]:
+        """What else acts on the body, of all kinds of terms."""
+        return tuple(term for name in TERMS for term in getattr(self, name))
+
+    def with_pressures(self, pressures: Mapping[str, float]) -> Self:
         """Return the load with ``pressures`` (Pa) in hollow regions, by name, as tractions on their walls."""
         if not pressures:
             return self
@@ -126,7 +133,24 @@ class Load(Section):
             cap = traction.on
             if isinstance(cap, Cap) and abs(_along(cap.around, normal)) > _NONE * cap.radius:
                 return False
-        return True
+        return all(term.is_mirrored(normal) for term in self.terms)
+
+
+if TYPE_CHECKING:
+
+    class Load(_Load):
+        """Loads on the body besides the probe."""
+
+else:  # with an array of tables of each term
+    Load = create_model(
+        "Load",
+        __base__=_Load,
+        __module__=__name__,
+        **{
+            name: (Annotated[tuple[kind, ...], Words(kind.ABOUT, f"[[load.{name}]]", default="none")], ())
+            for name, kind in TERMS.items()
+        },
+    )
 
 
 def _along(vector: Vector, normal: Vector) -> float:

@@ -15,7 +15,7 @@ from epsmesh.shapes.body import Body
 from epsmesh.shapes.history import History
 from epsmesh.shapes.insertion import Insertion
 from epsmesh.shapes.regions import Inclusion, Layer
-from epsmesh.shapes.registry import BODIES, PROBES
+from epsmesh.shapes.registry import BODIES, PROBES, TERMS
 from epsmesh.shapes.section import Section, Words
 from epsmesh.shapes.segment import Segment
 from epsmesh.shapes.tissue import LAWS, Fibres, Relaxation, Term, Tissue
@@ -313,7 +313,7 @@ OWN = (*SECTIONS, *FURTHER, "title", "identified")
 NESTED: dict[str, dict[str, type[Section]]] = {
     "body": {"layer": Layer, "inclusion": Inclusion, "region": Segment},
     "material": {"relaxation": Relaxation, "terms": Term},
-    "load": {"traction": Traction},
+    "load": {"traction": Traction, **TERMS},
 }
 # Sections that say how, not what: their lists are no sweeps.
 SINGLE = ("solve", "plan", "figure")

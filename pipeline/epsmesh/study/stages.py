@@ -54,8 +54,8 @@ def with_stages(
     """
     probes = cast("tuple[Probe, ...]", sections["probe"])
     found = [probe for probe in probes if probe.history and probe.is_unilateral]
-    parts = product(found, sections["body"], sections["material"])
-    scenes = (SimpleNamespace(probe=probe, body=body, material=material) for probe, body, material in parts)
+    parts = product(found, sections["body"], sections["material"], sections["load"])
+    scenes = (SimpleNamespace(probe=p, body=b, material=m, load=load) for p, b, m, load in parts)
     if all(needs_time_steps(cast(Scene, scene)) for scene in scenes):
         return sections, axes
     meshes = cast("tuple[Mesh, ...]", sections["mesh"])

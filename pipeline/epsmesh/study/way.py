@@ -39,7 +39,8 @@ class Dimension(Enum):
 class Way:
     """How a case is solved.
 
-    ``laws`` are the sorted names of its regions' laws, :data:`LINEAR` at small displacements.
+    ``laws`` are the sorted names of its regions' laws, :data:`LINEAR` at small displacements. ``has_terms`` says that
+    the energy has other terms than those of laws and dead loads.
     """
 
     element: str = "displacement"
@@ -47,11 +48,17 @@ class Way:
     constraint: Constraint = Constraint.BONDED
     in_time: bool = False
     dimension: Dimension = Dimension.BODY
+    has_terms: bool = False
 
     @property
     def is_large(self) -> bool:
         """Whether displacements are large."""
         return self.laws != LINEAR
+
+    @property
+    def is_nonlinear(self) -> bool:
+        """Whether it is solved by Newton's method, whatever the contact and the time."""
+        return self.is_large or self.has_terms
 
     @property
     def is_mixed(self) -> bool:
@@ -71,7 +78,7 @@ class Way:
     @property
     def steps(self) -> Steps:
         """What its law, friction or history makes necessary."""
-        return Steps.TIME if self.in_time else Steps.LOAD if self.is_large or self.rubs else Steps.NONE
+        return Steps.TIME if self.in_time else Steps.LOAD if self.is_nonlinear or self.rubs else Steps.NONE
 
     @property
     def has_steps(self) -> bool:
@@ -81,17 +88,17 @@ class Way:
     @property
     def is_followed(self) -> bool:
         """Whether a depth is reached over smaller ones: contact is found, or displacements are large."""
-        return self.is_found or self.is_large
+        return self.is_found or self.is_nonlinear
 
     @property
     def is_proportional(self) -> bool:
         """Whether F may be proportional to the motion."""
-        return not (self.is_large or self.in_time)
+        return not (self.is_nonlinear or self.in_time)
 
     @property
     def is_factorised(self) -> bool:
         """Whether it is solved by a factorisation, whatever its size: friction on a linear body."""
-        return self.rubs and not self.is_large
+        return self.rubs and not self.is_nonlinear
 
     @property
     def formulation(self) -> str:

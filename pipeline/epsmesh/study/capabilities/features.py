@@ -5,6 +5,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import inf, isfinite
 from typing import Any, Protocol
 
@@ -13,6 +14,7 @@ from epsmesh.shapes.contact import first_touch, is_flat, is_level
 from epsmesh.shapes.from_file import FromFile
 from epsmesh.shapes.insertion import Inserted
 from epsmesh.shapes.probe import STICK, Probe
+from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import in_mm
 from epsmesh.study.loads import Load
 from epsmesh.study.schema import Material, Mesh
@@ -123,6 +125,10 @@ def _is_loaded(scene: Scene) -> bool:
     return scene.load.acts or bool(scene.body.pressures)
 
 
+def _has_term(scene: Scene, name: str) -> bool:
+    return bool(getattr(scene.load, name))
+
+
 def _wants_exact(scene: Scene) -> bool:
     solve = getattr(scene, "solve", None)
     return solve is not None and bool(solve.wants_exact(scene.mesh))
@@ -130,7 +136,8 @@ def _wants_exact(scene: Scene) -> bool:
 
 def needs_time_steps(scene: Scene) -> bool:
     """Return whether the force over time is no elastic force times a function of time."""
-    return scene.probe.history is not None and (_is_large(scene) or len(_relaxations(scene)) > 1)
+    is_simple = not _is_large(scene) and len(_relaxations(scene)) == 1 and not scene.load.terms
+    return scene.probe.history is not None and not is_simple
 
 
 def _is_off_axis(scene: Scene) -> bool:
@@ -152,9 +159,9 @@ FEATURES: dict[str, Feature] = {
     "static relaxing tissue": Feature(
         "probe.history", lambda s: any(_relaxations(s)) and s.probe.history is None, ("body", "material")
     ),
-    "time steps": Feature("probe.history", needs_time_steps, ("body", "material")),
+    "time steps": Feature("probe.history", needs_time_steps, ("body", "material", "load")),
     "time steps in three dimensions": Feature(
-        "probe.history", lambda s: needs_time_steps(s) and _is_in_space(s), ("body", "material", "mesh")
+        "probe.history", lambda s: needs_time_steps(s) and _is_in_space(s), ("body", "material", "mesh", "load")
     ),
     "fibres": Feature("material.law", lambda s: any(t.has_fibres for t in (s.material, *s.body.regions)), ("body",)),
     # Of regions, those of layers that fill the body included, the study's check of laws reports it.
@@ -219,6 +226,8 @@ FEATURES: dict[str, Feature] = {
     "mixed elements": Feature("mesh.element", lambda s: s.mesh.element == "mixed"),
     "accuracy": Feature("mesh.accuracy", lambda s: s.mesh.accuracy is not None),
     "loads": Feature("load", _is_loaded, ("body",)),
+    "terms": Feature("load", lambda s: bool(s.load.terms)),
+    **{name: Feature(f"load.{name}", partial(_has_term, name=name), write=lambda _: None) for name in TERMS},
     # Of a case: the sections of a scene have none.
     "outputs": Feature("output", lambda s: bool(getattr(s, "outputs", ()))),
     "F_exact": Feature("solve.exact", _wants_exact, ("mesh",)),

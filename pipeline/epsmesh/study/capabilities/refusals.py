@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section
 from epsmesh.study.capabilities.features import FEATURES, MOST_OF_GREEN, PLACE, Scene
 from epsmesh.study.problems import Problems
@@ -35,6 +36,7 @@ STEPS_IN_SPACE = (
     "use a round tool on the axis of a round body"
 )
 _NO_LOADS = "omit [load], and pressure in hollow regions"
+_WITH_TERMS, _NO_TERMS = "with springs or other terms in [load]", "omit them"
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
 _OF_LAW = "with a law of large displacements"
 
@@ -230,6 +232,15 @@ REFUSALS: tuple[Refusal, ...] = (
         "fibres",
         f"fibres resist tension at any strain, and the linear law beyond epsilon is isotropic: {_COARSE}",
     ),
+    # Terms of the energy: the force is found as at large displacements, and is no multiple of the depth.
+    Refusal("six motions", "terms", f'must be "press" {_WITH_TERMS}: there is no single stiffness'),
+    Refusal("slit", "terms", f"a slit {_WITH_TERMS} is not computed: {_NO_TERMS}"),
+    Refusal("slice", "terms", f"must be 0 mm {_WITH_TERMS}: the blade only presses"),
+    Refusal("insertion", "terms", f"cuts in tissue {_WITH_TERMS} are not computed: {_NO_TERMS}"),
+    Refusal("half ball", "terms", f"the far field has none of [load]: {_COARSE}"),
+    Refusal("truncated body", "terms", f"they act on the whole body, so no part of it may be cut away: {_COARSE}"),
+    Refusal("degree 1", "terms", f"is too low {_WITH_TERMS}: use 2 or 3"),
+    *(Refusal(name, other, reason) for name, kind in TERMS.items() for other, reason in kind.EXCLUDES.items()),
     Refusal("half ball", "large displacements", f'must be "coarse", "linear", "free" or "fixed" {_OF_LAW}'),
 )
 

@@ -1,0 +1,84 @@
+"""The term that CONTRIBUTING shows, as one file: its keys, its pairs, its records and its forces."""
+
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+
+from tests.commands import ENVIRONMENT, ROOT
+
+PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+RUN = """
+import json, sys
+import epsmesh.shapes.terms
+epsmesh.shapes.terms.__path__.append(sys.argv[1])
+import epsmesh
+from epsmesh.study.json_schema import study_schema
+from epsmesh.study.keys import keys_of, text_of
+
+box = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "sides"}
+mesh = {"epsilon": "full", "fine": "5 mm", "coarse": "8 mm", "rim": "1 mm"}
+material = {"young": "10 kPa", "poisson": 0.4}
+tools = {
+    "bonded": {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm"},
+    "found": {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "contact": "unilateral"},
+}
+
+
+def study(tool, **more):
+    springs = {"spring": [{"name": "floor", "on": "bottom", "stiffness": ["10 Pa/mm", "10 kPa/mm"]}]}
+    return {"body": box, "material": material, "probe": tools[tool], "mesh": mesh, "load": springs} | more
+
+
+found = {"keys": [key.name for key in keys_of("load.spring")], "about": text_of("load.spring")}
+found["schema"] = list(study_schema()["$defs"]["Spring"]["properties"])
+for tool in tools:
+    result = epsmesh.read(study(tool), tool).run(output=sys.argv[2])
+    fixed = epsmesh.read(study(tool, body=box | {"fixed": "bottom+sides"}, load={}), "fixed").run(output=sys.argv[2])
+    found[tool] = [*result.force.values.tolist(), float(fixed.force)]
+for name, changes in {
+    "slit": {"probe": {"shape": "blade", "length": "10 mm", "width": "1 mm", "depth": "0.1 mm", "incision": "4 mm"}},
+    "history": {"probe": tools["bonded"] | {"history": {"ramp": "1 s", "hold": "1 s"}}},
+    "face": {"load": {"spring": [{"on": "floor", "stiffness": "10 kPa/mm"}]}},
+}.items():
+    try:
+        epsmesh.read(study("bonded", **changes), name)
+    except epsmesh.StudyError as error:
+        found[name] = str(error)
+print(json.dumps(found))
+"""
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """Return what studies with the page's term give, in a process that finds its file."""
+    terms, output = tmp_path_factory.mktemp("terms"), tmp_path_factory.mktemp("results")
+    (text,) = re.findall(r'```python\n("""Springs.*?)```', PAGE, re.DOTALL)
+    (terms / "spring.py").write_text(text, encoding="utf-8")
+    command = [sys.executable, "-c", RUN, str(terms), str(output)]
+    done = subprocess.run(
+        command, capture_output=True, text=True, env=ENVIRONMENT, cwd=output, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_its_keys_are_those_of_its_class(found):
+    assert found["keys"] == ["name", "on", "stiffness"]
+    assert {"on", "stiffness"} <= set(found["schema"])
+    assert found["about"].startswith("Springs")
+
+
+@pytest.mark.parametrize("contact", ["bonded", "found"])
+def test_springs_are_between_a_free_and_a_fixed_face(found, contact):
+    soft, stiff, fixed = found[contact]
+    assert soft < stiff < fixed * 1.001
+    assert stiff == pytest.approx(fixed, rel=0.01)
+
+
+def test_pairs_that_it_and_all_terms_exclude_are_refused(found):
+    assert "a slit with springs" in found["slit"]
+    assert "springs that relax are not computed" in found["history"]
+    assert "no such face" in found["face"]
