@@ -91,16 +91,18 @@ def solve_wide(study: Study, error: float = _ERROR) -> "xr.Dataset":
     """
     import xarray as xr  # noqa: PLC0415 (slow to import, and only needed here)
 
-    force, message = np.full(study.shape, np.nan), np.full(study.shape, "", dtype=object)
+    number = np.arange(len(study)).reshape(study.shape)
+    force, message = np.full(number.size, np.nan), np.full(number.size, "", dtype=object)
     for (body, profile), cases in _by_scene(study):
-        depth, places = np.array([case.probe.depth for case in cases]), tuple(np.transpose([c.index for c in cases]))
+        depth, places = np.array([case.probe.depth for case in cases]), [number[case.index] for case in cases]
         try:
             force[places] = body.force(profile, depth)
         except ValueError as too_wide:
             message[places] = str(too_wide)
     status = np.where(np.isfinite(force), OK, FAILED).astype(object)
     data = {"force": force, "force_error": error * force, "status": status, "message": message}
-    return xr.Dataset({name: ([axis.name for axis in study.axes], values) for name, values in data.items()})
+    axes = [axis.name for axis in study.axes]
+    return xr.Dataset({name: (axes, values.reshape(study.shape)) for name, values in data.items()})
 
 
 def _by_scene(study: Study) -> list[tuple[tuple[LayeredBody, Profile], list[Case]]]:
