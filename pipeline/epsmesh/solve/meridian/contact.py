@@ -27,6 +27,7 @@ from epsmesh.solve.meridian.punch import POWERS, Punches, Rings, RoundTool
 from epsmesh.solve.meridian.signs import LiftsOff, check_signs
 from epsmesh.solve.meridian.system import HalfPlane, max_strain
 from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.response import Contact
 from epsmesh.stages import stage
 
 # Tolerance on the depth of a trial radius (F errs by its square), and most trials.
@@ -189,7 +190,6 @@ class _Search:
             dofs=fine.forms.dofs,
             cells=len(arrays.cells),
             iterations=self.punches.count,
-            area=patch.area(radius),
-            area_error=of_area,
+            contact=Contact(patch.area(radius), of_area),
             energy=pi * float(solution @ residual),
         )

@@ -31,6 +31,7 @@ from epsmesh.solve.meridian.system import HalfPlane, max_strain
 from epsmesh.solve.meridian.touch import MeridianTouch
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.response import Contact
 
 # Bar: these multiples of the differences of the degrees, on one mesh, and of two meshes, and the square of the distance
 # of nodes at the edge.
@@ -90,12 +91,7 @@ class LargeMeridianContact(LargeSolver):
             raise stopped(stop, arrays, law, depth, is_found=True, friction=self._tool.friction) from stop
         fine.check()
         deep, force, balance = depth / arrays.unit, fine.force, fine.balance
-        of_force, of_friction, of_area, of_slip = (_OF_RESULTS * bars).tolist()
-        error, area = of_force / fine.results[0] + fine.resolution**2 + 3 * balance, fine.area * arrays.unit**2
-        # Too few steps make friction too large, which then errs by more than by its share of itself.
-        of_friction /= 1 - min(of_friction / max(fine.results[1], of_friction), _MOST) if of_friction else 1.0
-        # Sliding may begin between the last two nodes. Tissue that sticks by definition does not slide.
-        of_slip += fine.slip_resolution * arrays.unit**2 + fine.resolution * area
+        error = float(_OF_RESULTS[0] * bars[0]) / fine.results[0] + fine.resolution**2 + 3 * balance
         return _Found(
             stiffness=force / deep,
             on_probe=-force / deep,
@@ -106,15 +102,31 @@ class LargeMeridianContact(LargeSolver):
             dofs=fine.tissue.system.forms.dofs,
             cells=len(arrays.cells),
             iterations=fine.tissue.iterations,
-            area=area,
-            area_error=of_area / area + _OF_EDGE * fine.resolution,
-            slip_area=fine.slip_area * arrays.unit**2,
-            slip_area_error=of_slip if self._tool.friction < inf else 0.0,
-            friction=fine.friction / deep,
-            friction_error=of_friction / arrays.unit**2 / deep + error * fine.friction / deep,
+            contact=self._contact(fine, bars, error),
             energy=fine.energy * arrays.unit**2,
             touch=fine,
             in_time=lambda: PressedTouch(replace(fine, touched=None), deep),
+        )
+
+    def _contact(self, fine: MeridianTouch, bars: FloatArray, error: float) -> Contact:
+        """Return the contact with ``bars`` on its results (4,); ``error`` is the relative bar of the force."""
+        _, friction, area, slip_area = fine.results.tolist()
+        _, of_friction, of_area, of_slip = (_OF_RESULTS * bars).tolist()
+        found = Contact(area, of_area / area + _OF_EDGE * fine.resolution)
+        if not self._tool.friction:
+            return found
+        # Too few steps make friction too large, which then errs by more than by its share of itself.
+        of_friction /= 1 - min(of_friction / max(friction, of_friction), _MOST) if of_friction else 1.0
+        # Sliding may begin between the last two nodes. Tissue that sticks by definition does not slide.
+        of_slip += fine.slip_resolution * fine.unit**2 + fine.resolution * area
+        return replace(
+            found,
+            slip_area=slip_area,
+            slip_area_bar=of_slip if self._tool.friction < inf else 0.0,
+            friction_force=fine.law.lame_mu[0] * friction,
+            friction_force_bar=fine.law.lame_mu[0] * (of_friction + error * friction),
+            torque=0.0,
+            torque_bar=0.0,
         )
 
     def _from(

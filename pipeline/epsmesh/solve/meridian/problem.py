@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import product
-from math import isnan, nan, pi
+from math import pi
 
 import numpy as np
 
@@ -39,10 +39,9 @@ _WORST_ERROR = 1e-3
 class Answer:
     """Result of one mesh at a depth: F/d from the energy and from the reaction, in units of μ a, and the solution.
 
-    ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²) with a relative bar,
-    friction the part of it that slides and the sum of tangential forces over d, in units of μ a, with bars in the same
-    units. The strain energy, in units of μ a times m², is half of F d if it is not given. ``in_time`` returns the same
-    body at rest, of a law with relaxation.
+    ``error`` is the relative error bar of the force; unilateral contact has its own results. The strain energy, in
+    units of μ a times m², is half of F d if it is not given. ``in_time`` returns the same body at rest, of a law with
+    relaxation.
     """
 
     stiffness: float
@@ -54,29 +53,9 @@ class Answer:
     dofs: int
     cells: int
     iterations: int
-    area: float = nan
-    area_error: float = nan
-    slip_area: float = nan
-    slip_area_error: float = nan
-    friction: float = nan
-    friction_error: float = nan
+    contact: Contact | None = None
     energy: float | None = None
     in_time: Callable[[], InTime] | None = None
-
-    def contact(self, scale: float) -> Contact:
-        """Return the contact, with the tangential forces times ``scale``; by symmetry they have no torque."""
-        found = Contact(self.area, self.area_error)
-        if isnan(self.slip_area):
-            return found
-        return replace(
-            found,
-            slip_area=self.slip_area,
-            slip_area_bar=self.slip_area_error,
-            friction_force=scale * self.friction,
-            friction_force_bar=scale * self.friction_error,
-            torque=0.0,
-            torque_bar=0.0,
-        )
 
 
 class MeridianSolver(Problem):
@@ -132,7 +111,7 @@ class MeridianSolver(Problem):
             times=times,
             history=history,
             bars=found.error * stiffness,
-            contact=None if isnan(found.area) else found.contact(scale * depth),
+            contact=found.contact,
             stored=None if found.energy is None else scale * found.energy,
         )
 

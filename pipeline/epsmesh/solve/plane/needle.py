@@ -15,6 +15,7 @@ from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.plane.crack import LEVELS, open_crack
 from epsmesh.solve.plane.cut import Cut, Cuts
 from epsmesh.solve.plane.opening import Opening
+from epsmesh.solve.response import Contact
 
 # Two meshes may have the same results by chance: round-off errs by less than this many times the balance.
 _ROUND_OFF = 3.0
@@ -46,7 +47,7 @@ class NeedleSolver(MeridianSolver):
         error, touched = max(_apart(coarse[:3], fine[:3])) + round_off, fine.touched * self._radius * depth
         of_touched = _apart(coarse[3:4], fine[3:4])[0] + round_off
         # Per length, forces are in units of μ R, energies of μ R².
-        share = depth / self._radius
+        share, along = depth / self._radius, law.lame_mu[0] * self._radius * depth * fine.pressure
         return Answer(
             stiffness=fine.energy / share,
             on_probe=-fine.energy / share,
@@ -57,12 +58,16 @@ class NeedleSolver(MeridianSolver):
             dofs=0,
             cells=0,
             iterations=fine.steps,
-            area=touched,
-            area_error=of_touched,
-            slip_area=touched,
-            slip_area_error=of_touched * touched,
-            friction=fine.pressure,
-            friction_error=error * fine.pressure,
+            contact=Contact(
+                touched,
+                of_touched,
+                slip_area=touched,
+                slip_area_bar=of_touched * touched,
+                friction_force=along,
+                friction_force_bar=error * along,
+                torque=0.0,
+                torque_bar=0.0,
+            ),
             energy=fine.stored * self._radius * depth,
         )
 
