@@ -27,7 +27,7 @@ SIDE_BY_SIDE := -n logical --maxprocesses 8 --dist loadfile
 # Tests and documentation start hundreds of processes: each would compile the package again.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Huge pages for large arrays: a tenth of a run's time (docs/performance.md).
+# Huge pages for large arrays: a tenth of a run's time (docs/why/performance.md).
 export GLIBC_TUNABLES ?= glibc.malloc.hugetlb=1
 
 DOCS := docs/_build/html
@@ -97,7 +97,7 @@ slurm-test: setup ## install and start a Slurm of two virtual nodes here, and ru
 verify: setup ## compare forces with closed forms and published tables
 	$(EPSMESH) verify
 
-benchmark: setup ## make every table of docs/performance.md in results/ (on an idle machine, one to two hours)
+benchmark: setup ## make the tables of docs/why/performance.md in results/ (on an idle machine, one to two hours)
 	@scripts/peers.sh
 	$(PYTHON) -m benchmarks.start_up
 	$(PYTHON) -m benchmarks.ranks

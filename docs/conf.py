@@ -15,7 +15,7 @@ from epsmesh import __version__  # noqa: E402
 project, author = "epsmesh", "the epsmesh authors"
 release = version = __version__
 extensions = ["myst_parser"]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "decisions.md"]  # the latter is for contributors
 myst_heading_anchors = 3
 nitpicky = True
 smartquotes = False  # options begin with two hyphens
@@ -34,7 +34,12 @@ _REFERENCE = (
 
 
 def complete_contents(app: Any, name: str, source: list[str]) -> None:
-    """Leave out of the contents what does not exist, name the other pages at OTHERS, and link the reference."""
+    """Leave out of the contents what does not exist, name the other pages at OTHERS, and link the reference.
+
+    Tables of campaigns are outside the folder of the pages: links lead to their copies.
+    """
+    copies = "../" * name.count("/") + "reference/results/"
+    source[0] = re.sub(r"\]\((\.\./)*benchmarks/results/", f"]({copies}", source[0])
     if name != "index":
         return
     found = app.env.found_docs

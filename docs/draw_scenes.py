@@ -1,7 +1,7 @@
 """The page of scenes, and its pictures: ``python docs/draw_scenes.py [NAME ...]``, with ``EXTRAS=view``.
 
-Each study in ``docs/scenes/`` has one case. Its title is a heading of ``docs/scenes.md``, its first comment the text,
-and its picture ``docs/figures/scenes/<name>.png``.
+Each study in ``docs/scenes/`` has one case, with the picture ``docs/figures/scenes/<name>.png`` and a link in
+``docs/scenes.md``.
 """
 
 import sys
@@ -37,11 +37,13 @@ MOST = 150_000
 
 _HEAD = """# Scenes
 
-A picture and a study file for every body and every tool. The mesh is cut open at the contact; the black line is the
-sphere of radius ε, red the edge of the tool's footprint. `epsmesh new mine --like docs/scenes/box.toml` starts from
-the first of them, and `epsmesh view docs/scenes/box.toml` [draws it](view.md).
+Each body and each tool, with its study file. The mesh is cut open at the contact; the black line is the sphere of
+radius ε, red the edge of the footprint. `epsmesh new mine --like docs/scenes/box.toml` starts from one of them.
 
 <!-- Written by docs/draw_scenes.py from the studies in docs/scenes/. -->
+
+| | |
+|---|---|
 """
 
 
@@ -52,20 +54,14 @@ def studies() -> list[Path]:
 
 
 def page() -> str:
-    """Return the page."""
-    return "\n".join([_HEAD, *map(_section, studies())])
+    """Return the page: two scenes a row."""
+    cells = [*map(_cell, studies()), ""]
+    return _HEAD + "".join(f"| {left} | {right} |\n" for left, right in zip(cells[::2], cells[1::2], strict=False))
 
 
-def _section(path: Path) -> str:
-    text = path.read_text(encoding="utf-8")
-    title = tomllib.loads(text)["title"]
-    words = [line.removeprefix("# ") for line in text.splitlines() if line.startswith("# ")]
-    return f"""## {title}
-
-{" ".join(words)} Study file: [{path.name}](scenes/{path.name}).
-
-![{title}](figures/scenes/{path.stem}.png)
-"""
+def _cell(path: Path) -> str:
+    title = tomllib.loads(path.read_text(encoding="utf-8"))["title"]
+    return f"![{title}](figures/scenes/{path.stem}.png) [{title}](scenes/{path.name})"
 
 
 def draw(path: Path) -> Path:

@@ -42,6 +42,8 @@ _VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
 )
 
 
+# Tables that campaigns wrote; the site has copies.
+_TABLES = sorted((Path(__file__).parents[1] / "benchmarks" / "results").glob("*.md"))
 # Variables without the attribute `units` that are not text.
 _WITHOUT_UNIT = {"status": "flag", "stiffness": "several", "stiffness_error": "several"}
 
@@ -52,6 +54,8 @@ def write_reference(folder: Path) -> None:
     pages = {"study": study_page, "features": features_page, "dataset": dataset_page, "commands": commands_page}
     texts = {f"{name}.md": page() for name, page in pages.items()}
     texts["study.schema.json"] = schema_text()
+    texts |= {f"results/{table.name}": f"---\norphan: true\n---\n\n{table.read_text('utf-8')}" for table in _TABLES}
+    (folder / "results").mkdir(exist_ok=True)
     for name, text in texts.items():
         path = folder / name
         if not path.exists() or path.read_text(encoding="utf-8") != text:

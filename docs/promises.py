@@ -21,7 +21,7 @@ from markdown_it.token import Token
 
 ROOT = Path(__file__).parents[1]
 TABLE = ROOT / "docs" / "promises.toml"
-PAGES = ("README.md", "CONTRIBUTING.md", "docs/*.md", "docs/howto/*.md")
+PAGES = ("README.md", "CONTRIBUTING.md", "docs/*.md", "docs/guide/*.md", "docs/why/*.md")
 # "each", "any", "no" and "only" are left out: most of their sentences describe a rule, few of them guarantee one.
 WORDS = ("always", "never", "every", "everywhere", "all", "whole", "at most", "within", "nothing")
 # Answers other than tests, for what promises nothing. "measured by" names the file that prints or makes its figures.

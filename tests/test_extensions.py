@@ -135,7 +135,7 @@ def test_a_section_is_read_explained_and_told(epsmesh, tmp_path):
     assert "# Remarks on a study.\n# [note]\n# What to remember." in starter("x")
     with pytest.raises(StudyError, match=r"note\.text.*must be good") as wrong:
         parse(raw() | {"note": {"text": "bad"}})
-    assert wrong.value.problems[0].howto == "docs/report.md"
+    assert wrong.value.problems[0].howto == "docs/guide/results.md"
     file = tmp_path / "wet.toml"
     file.write_text(study.declared.text)
     planned = epsmesh("plan", file, "--output", tmp_path, "--json")

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.docs.numbers import NUMBER, SOURCES, prose
+
 ROOT = Path(__file__).parents[1]
 PAPER = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
 BIBLIOGRAPHY = (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8")
@@ -12,14 +14,6 @@ SECTIONS = dict(re.findall(r"^# (.+?)\n(.*?)(?=^# |\Z)", PAPER, re.MULTILINE | r
 # Of the Journal of Open Source Software.
 ASKED = ("Summary", "Statement of need", "State of the field", "Software design", "Research impact statement")
 ASKED += ("AI usage disclosure", "Acknowledgements", "References")
-# Below a paragraph: where its numbers are from, as a page and words of it.
-SOURCES = re.compile(r"<!-- numbers: (\S+): (.+?) -->")
-NUMBER = re.compile(r"(?<![\w.])\d+(?:[.,]\d+)*")
-
-
-def prose(text):
-    """Return what is read of a part of the paper: without comments, code, citations and paths of figures."""
-    return re.sub(r"<!--.*?-->|`[^`]*`|\[@[^\]]*\]|@\w+|\]\([^)]*\)", "", text, flags=re.DOTALL)
 
 
 def test_sections_and_length_are_those_that_the_journal_asks_for():

@@ -1,9 +1,9 @@
 """Validation on measured force curves: python -m benchmarks.identify.curves FOLDER [--results DIR]
 
-FOLDER has the curves of two public sets, which are not in the checkout (docs/validation.md says where they are from):
-`asmi/`, balls on elastomers in the wells of a plate, and `ecoflex/`, silicone cylinders between plates. Each is fitted
-with the scene as its authors have it and as it probably was. Written is a table, curves.md: E with both error bars, its
-parts, and the authors' value.
+FOLDER has the curves of two public sets, which are not in the checkout (benchmarks/results/curves.md says where they
+are from): `asmi/`, balls on elastomers in the wells of a plate, and `ecoflex/`, silicone cylinders between plates. Each
+is fitted with the scene as its authors have it and as it probably was. Written is a table, curves.md: E with both error
+bars, its parts, and the authors' value.
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """How fine must a finite-element mesh be, and where, for the reaction force of a surgical tool?
 
-From Python: :func:`read` a study, plan and run it; :func:`open` a dataset (docs/python.md). Nothing heavy is imported
-before it is needed.
+From Python: :func:`read` a study, plan and run it; :func:`open` a dataset (docs/guide/python.md). Nothing heavy is
+imported before it is needed.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The program from Python: a study that plans and runs itself. What `import epsmesh` offers; see docs/python.md."""
+"""The program from Python: a study that plans and runs itself; what `import epsmesh` offers (docs/guide/python.md)."""
 
 import warnings
 from collections.abc import Callable, Collection, Mapping

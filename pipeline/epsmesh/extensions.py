@@ -105,7 +105,7 @@ class Sections:
     ``models`` are the keys of each section, in the order of the reference, and ``texts`` what it says of a section, or
     of a table within one (``section.table``), of which ``tables`` has the models. Sections in ``arrays`` are arrays of
     tables. ``others`` is the JSON schema of further keys of a section, such as names of parameters. ``pages`` names the
-    page of the documentation (``howto/name``) for messages about a section.
+    page of the documentation (``guide/name``) for messages about a section.
 
     ``read`` returns what the sections say, for ``Study.extra``. ``fill`` returns a study that has one of them with what
     it need not say, ``left_out`` what `epsmesh run` leaves out of it, "" for nothing. ``forecast`` tells what work

@@ -44,7 +44,7 @@ def test_what_cannot_be_exported_is_refused(tmp_path, contact, arguments, word):
     assert not list(tmp_path.rglob("*.nc"))
 
 
-# Seconds within which all processes are gone, as docs/reliability.md has it.
+# Seconds within which all processes are gone, as benchmarks/results/reliability.md has it.
 LONGEST = 30
 
 

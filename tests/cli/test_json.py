@@ -69,10 +69,10 @@ def test_a_bad_study_is_told_problem_by_problem(epsmesh, small, command):
     errors = {error["key"]: error for error in failed(done)}
     assert errors["material.poisson"]["value"] == 0.9
     assert errors["material.poisson"]["allowed"] == "must be at most 0.5"
-    assert errors["probe.radius"]["howto"] == "docs/howto/own-study.md"
+    assert errors["probe.radius"]["howto"] == "docs/guide/study.md"
     assert {error["file"] for error in errors.values()} == {str(small)}
     assert "material.poisson = 0.9: must be at most 0.5" in done.stderr
-    assert done.stderr.splitlines()[-1] == "see docs/howto/own-study.md"
+    assert done.stderr.splitlines()[-1] == "see docs/guide/study.md"
     (report,) = json.loads(epsmesh("plan", "--check", small, "--json").stdout)
     assert report["errors"] == list(errors.values())
 

@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 SHELLS, PYTHON = ("sh", "bash", "console"), "python"
-_FENCE = re.compile(r"((?:^<!--.*?-->\n)*)^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_FENCE = re.compile(r"((?:^<!--(?:(?!-->).)*-->\n)*)^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _MARK = re.compile(r"<!-- test: (.*?) -->", re.DOTALL)
 
 

@@ -32,7 +32,7 @@ SENTENCES = ["Every force has a bar (how).", "`tests` never fail.", "F | always 
 @pytest.fixture
 def root(tmp_path):
     """A project with a page, and a test."""
-    (tmp_path / "docs" / "howto").mkdir(parents=True)
+    (tmp_path / "docs" / "guide").mkdir(parents=True)
     (tmp_path / "README.md").write_text(PAGE)
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests" / "test_it.py").write_text("def test_it():\n    pass\n")

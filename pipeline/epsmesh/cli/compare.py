@@ -7,7 +7,7 @@ from epsmesh.cli.faults import DONE, SOME_FAILED, Fault, fail
 from epsmesh.cli.words import DEFAULT_OUTPUT, Dataset, Found, Json
 
 # What is compared, and what is refused.
-_HOWTO = "docs/howto/compare.md"
+_HOWTO = "docs/guide/results.md"
 
 
 def compare(a: Dataset, b: Dataset, output: Found = DEFAULT_OUTPUT, as_json: Json = False) -> None:

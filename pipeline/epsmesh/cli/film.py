@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from epsmesh.view.fields import Fields
     from epsmesh.view.film import Pictures
 
-_HOWTO = "docs/howto/insertion.md"
+_HOWTO = "docs/guide/insertion.md"
 
 
 def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, MPI.Comm], Fields | None]") -> None:

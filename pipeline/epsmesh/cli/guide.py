@@ -9,7 +9,7 @@ from epsmesh.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
 from epsmesh.cli.words import DEFAULT_OUTPUT, Dataset, Found, Json, read_dataset
 
 # What it asks and answers.
-_HOWTO = "docs/guideline.md"
+_HOWTO = "docs/why/guideline.md"
 
 
 def guide(

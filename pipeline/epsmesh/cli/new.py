@@ -20,7 +20,7 @@ from epsmesh.study.named import NAME, SCHEMA, SHORT, examples, is_name
 _FOLDER = Path("studies")
 # Keys of a study that name files: of bodies, regions, labels, measurements; a dataset of identified material.
 _FILES = ("file", "names", "from")
-_HOWTO = "docs/howto/own-body.md"
+_HOWTO = "docs/guide/bodies.md"
 
 
 def _names(incomplete: str) -> list[str]:

@@ -104,7 +104,7 @@ def view(
     is_state = mesh_only or bool(export) or "stage" in case
     if is_state and study.is_insertion and study.tool(chosen).CUTS == "crack":
         why = "states of a needle that is inserted are found on the way: only the film of its path is drawn"
-        fail(of_file(study.file, why, "docs/howto/needle.md"))
+        fail(of_file(study.file, why, "docs/guide/insertion.md"))
     if study.is_insertion and not is_state:
         from epsmesh.cli.film import film
 
@@ -144,7 +144,7 @@ def _check_sofa(study: "Study", case: "Case", mesh_only: bool) -> None:
             )
         )
     if why := obstacle("SOFA scene", case):
-        fail(of_file(study.file, why, "docs/view.md"))
+        fail(of_file(study.file, why, "docs/guide/results.md"))
 
 
 def fields_of(
@@ -160,7 +160,7 @@ def fields_of(
     from epsmesh.view.compute import compute_fields
 
     if case.lost_contact:
-        why, howto = case.lost_contact, "docs/howto/path.md"
+        why, howto = case.lost_contact, "docs/guide/path.md"
         fail(Fault(f"{case}: {why}", key="CASE", value=str(case), allowed=why, howto=howto))
     note = error if comm.rank == 0 else lambda _: None
     note(str(case))

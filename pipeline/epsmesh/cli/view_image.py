@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from epsmesh.shapes.files.label_map import LabelMap
     from epsmesh.view.segments import Segment
 
-_HOWTO = "docs/howto/organs.md"
+_HOWTO = "docs/guide/bodies.md"
 _HEADS = ("label", "name", "cm³", "extent, mm", "pieces", "x, mm", "y, mm", "z, mm")
 _MM = 1e3
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from epsmesh.plan.shard import Shard
     from epsmesh.study.sweep import Study
 
-_SKIPPING, CLUSTER = "docs/skipping.md", "docs/cluster.md"  # pages that errors refer to
+_SKIPPING, CLUSTER = "docs/why/method.md", "docs/guide/cluster.md"  # pages that errors refer to
 _SQLITE = b"SQLite format 3\0"
 DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")
 

@@ -4,7 +4,7 @@ Tissue slides along the blade, and its drag T = 2 μ N moves the slit's faces by
 coupling B of that motion with the opening, they press with N + B s: N' = N / (1 − κ μ), with κ = 2 B/C, and N' =
 N / (1 + κ μ) as the blade is pulled out. B and C are stiffnesses of a slit whose faces stick to the blade. Their ratio
 depends on the shape of the flank alone, depth over length: within 1 % on Poisson's ratio from 0.3 to 0.5
-(docs/howto/insertion.md).
+(benchmarks/results/insertion.md).
 """
 
 from typing import TYPE_CHECKING

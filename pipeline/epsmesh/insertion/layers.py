@@ -3,7 +3,7 @@
 The front of the slit stays at its interface, and the blade presses on the layers below. The stiffness is at least that
 of these layers alone, which is solved. The tissue above is bonded to them, and adds that of a half-space of it at most.
 Half of that is added, and is the error bar. Blades at the bottom of notches are between these bounds
-(docs/howto/insertion.md).
+(benchmarks/results/insertion.md).
 """
 
 from collections.abc import Sequence

@@ -13,7 +13,8 @@ stored energy follows by integration over the area of the slit.
 from dataclasses import dataclass
 from math import log, pi, sqrt
 
-# Relative error of what is integrated from the solved distance on: measured at 1/2 to 1/16 of it (docs/accuracy.md).
+# Relative error of what is integrated from the solved distance on: measured at 1/2 to 1/16 of it
+# (benchmarks/results/insertion.md).
 EXTENSION_ERROR = 0.01
 
 

@@ -6,8 +6,9 @@ goes like a power of r, whose exponent is R N/e, since de/dr is the pressure N a
 sections down to a depth D is E(D), and its derivative the force of cutting. Coulomb's friction is μ N per depth.
 
 Sections are those of an endless needle. What the surface and the tip change is in the bar of E: e over half a radius,
-twice what tips change that widen holes (docs/howto/needle.md); over a radius for blunt ends, and for the change of e at
-an interface. The bar of the force is as much of e at a distance of a radius, and falls with the square of the distance.
+twice what tips change that widen holes (benchmarks/results/needle.md); over a radius for blunt ends, and for the change
+of e at an interface. The bar of the force is as much of e at a distance of a radius, and falls with the square of the
+distance.
 """
 
 from collections.abc import Iterator
@@ -25,8 +26,8 @@ from epsmesh.shapes.insertion import Needle
 from epsmesh.shapes.section import in_mm
 
 # Free sides at a distance r take (b/r)² of e, s and N, within half of that: solved for r/b from 5 to 60 and three
-# toughnesses (docs/howto/needle.md). A fixed side adds 1/(1 − 2ν) times that: of a hole, at small strains. The longest
-# crack, in units of r.
+# toughnesses (benchmarks/results/needle.md). A fixed side adds 1/(1 − 2ν) times that: of a hole, at small strains. The
+# longest crack, in units of r.
 _UNSURE, _LONGEST = 0.5, 1 / 3
 # What the surface and a tip that is as high as the shaft's half width change at most, in units of e times that.
 _POINTED = 0.5

@@ -2,8 +2,8 @@
 
 Below the tip the slit closes. In the layer of the front, U with a front at a distance a from the tip is the energy of
 cutting at that depth less what the front releases from its own distance there to a. The field near the tip gives it,
-with an error bar that was measured on solved slits (docs/howto/insertion.md). That field has the modulus of one layer:
-with the tip in layers above, the slit is solved with the front where cutting ended.
+with an error bar that was measured on solved slits (benchmarks/results/insertion.md). That field has the modulus of one
+layer: with the tip in layers above, the slit is solved with the front where cutting ended.
 """
 
 from collections.abc import Sequence

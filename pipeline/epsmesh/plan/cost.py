@@ -23,7 +23,7 @@ from epsmesh.study.way import Constraint, Steps, Way
 # Parallel speed-up of one solve: n ranks are n^0.8 times faster.
 _PARALLEL = 0.8
 # Seconds for 10,000 tetrahedra on one core of 2020s hardware, and the exponent of their number; by degree of
-# displacement elements. Fitted to eight studies, tested on eight others (docs/performance.md).
+# displacement elements. Fitted to eight studies, tested on eight others (benchmarks/results/start_up.md).
 _MESH = (0.35, 0.66)
 _SOLVE = {1: (0.04, 0.75), 2: (0.165, 0.75), 3: (0.4, 0.8)}
 _BAR = {1: (0.03, 0.8), 2: (0.105, 0.8), 3: (0.3, 0.85)}

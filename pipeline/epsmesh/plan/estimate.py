@@ -6,10 +6,10 @@ from epsmesh.shapes.scanned import FINE, Scanned
 from epsmesh.study.case import Case
 from epsmesh.study.way import PLAIN, Way
 
-# Mean volume of gmsh's tetrahedra, in units of the cube of the element size: measured, docs/performance.md.
+# Mean volume of gmsh's tetrahedra, in units of the cube of the element size: measured, benchmarks/results/solvers.md.
 _TETRAHEDRON = 0.21
 # Peak bytes per dof, at small or large displacements, by element and degree: of a multigrid solve; of an error bar,
-# which needs little accuracy; of a factorisation with 50,000 dofs. Measured: docs/solvers.md.
+# which needs little accuracy; of a factorisation with 50,000 dofs. Measured: benchmarks/results/solvers.md.
 _BYTES_PER_DOF = {
     (False, "displacement"): {1: 3000, 2: 620, 3: 400, 4: 400},
     (False, "mixed"): {2: 900, 3: 800, 4: 800},
@@ -38,7 +38,7 @@ _BYTES_PER_CELL = 1000
 _OF_BEND, _ON_BOUNDARY, _FOLLOW = 0.5, 1.4, 30.0
 _TRIANGLE = 0.43
 # Element size in a layer below the probe in units of its thickness. With elements of degree 2, F is then within .4 % of
-# its value for half this size (docs/accuracy.md), and the error bar accounts for the rest.
+# its value for half this size (benchmarks/results/organs.md), and the error bar accounts for the rest.
 IN_LAYER = 0.5
 # Largest element size in a layer, in its thickness. In a film of 10 µm on a box of 20 mm, elements as long as 700
 # thicknesses (no limit), 20 and 8 take 163, 39 and 25 iterations at ν = .3, and .45 fails without a limit, which takes

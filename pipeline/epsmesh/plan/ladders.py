@@ -1,4 +1,4 @@
-"""Tables of mesh recipes for an accuracy, cheapest first, with the error bars that were measured (docs/accuracy.md).
+"""Tables of mesh recipes for an accuracy, cheapest first, with measured error bars (benchmarks/results/coverage.md).
 
 :mod:`epsmesh.plan.recipe` chooses from them.
 """
@@ -32,7 +32,7 @@ LADDER = (
     Recipe(3, 0.025, 0.3, 5.0e-5),
 )
 # If the probe's edge dominates the error, error bars are predictable: rungs are closer. None has degree 3 and a larger
-# rim: few quadratic arcs approximate a circle poorly, and the force is too low (docs/accuracy.md).
+# rim: few quadratic arcs approximate a circle poorly, and the force is too low (benchmarks/results/coverage.md).
 EVEN = (
     Recipe(2, 0.4, 0.7, 7.0e-3),
     Recipe(2, 0.3, 0.6, 4.1e-3),
@@ -49,7 +49,7 @@ EVEN = (
     Recipe(3, 0.025, 0.3, 1.0e-4),
 )
 # On a curved surface, smaller elements of degree 2 have a smaller error bar than the first rung of degree 3, in the
-# same time (docs/decisions.md).
+# same time (benchmarks/results/decisions.md).
 ROUND = (
     *LADDER[:4],
     Recipe(2, 0.15, 0.35, 1.15e-3),

@@ -1,8 +1,8 @@
 """The mesh for an accuracy: degree, rim and growth of the elements, cheapest first.
 
 The error of F comes from the singular edge of the probe, and from the elements between it and the support. Both parts
-scale with the probe, hardly with the body. The expected error bars are measured ones (docs/accuracy.md). If a case's
-own error bar exceeds the accuracy, the next mesh is tried.
+scale with the probe, hardly with the body. The expected error bars are measured ones (benchmarks/results/coverage.md).
+If a case's own error bar exceeds the accuracy, the next mesh is tried.
 """
 
 from collections.abc import Sequence

@@ -17,7 +17,7 @@ _WORSE = 2.9
 CENTRE = (0.0, 0.0)
 # With at least so many depths of found contact, a small body is condensed to the possible contact surface.
 FEWEST_DEPTHS = 10
-# Largest number of unknowns of a small body, measured: docs/solvers.md.
+# Largest number of unknowns of a small body, measured: benchmarks/results/solvers.md.
 MOST_DOFS = 40_000
 
 

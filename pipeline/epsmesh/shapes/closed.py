@@ -10,7 +10,7 @@ from epsmesh.shapes.frame import Vector
 from epsmesh.shapes.surface import Surface
 
 # Element size on the surface in units of half of the thickness inside it. With elements of degree 2, F is then within
-# .1 % of its value for half these sizes (docs/accuracy.md), and the error bar accounts for the rest.
+# .1 % of its value for half these sizes (benchmarks/results/organs.md), and the error bar accounts for the rest.
 ON_SURFACE = 0.4
 # Far from the contact, element sizes are this share of the distance from it, up to the second in units of half of the
 # thickness.

@@ -145,7 +145,7 @@ class Probe(Footprint):
     SWEPT: ClassVar[tuple[str, ...]] = ()
     # Contacts for which real-time models support the tool.
     REALTIME: ClassVar[tuple[Contact, ...]] = ()
-    # Error of F on a mesh that is graded to the footprint's edge, in units of a disc's: docs/accuracy.md.
+    # Error of F on a mesh that is graded to the footprint's edge, in units of a disc's: benchmarks/results/coverage.md.
     EXPECTED_ERROR: ClassVar[float]
 
     # ---- place and movement ---------------------------------------------------------------------------

@@ -23,7 +23,7 @@ BALANCE_LIMIT = 1e-6
 # The same of the work of forces in a small change of the displacement, and the change of the energy.
 _WORK_LIMIT = 1e-5
 # Relative energy norm of the solver's error. F is quadratic in this error: it errs by at most 1e-9 up to ν = 0.49, and
-# by 1e-11 as a rule (docs/solvers.md).
+# by 1e-11 as a rule (benchmarks/results/solvers.md).
 TOLERANCE = 1e-6
 # Where forces do not balance: rounds of further iterations, the imbalance that each round aims at (share of the limit),
 # and the largest reduction of the error in one round.

@@ -3,7 +3,7 @@
 With s = (F_p - F_{p+1}) / F_p (:mod:`epsmesh.solve.hierarchical_estimate`) and an error that falls like p⁻², as at an
 edge where u ~ r^½ (I. Babuška and M. Suri, SIAM J. Numer. Anal. 24, 750, 1987), degree p + 1 leaves an error θ s with
 θ = p² / (2 p + 1). With quarter points at the probe's edge it leaves less, without them more
-(:mod:`epsmesh.solve.cell_values`). The multiples below are measured; docs/accuracy.md has their coverage.
+(:mod:`epsmesh.solve.cell_values`). The multiples below are measured; benchmarks/results/coverage.md has their coverage.
 
 Shares are relative to F_p. Bars are valid relative to the exact force, too: where F_p is a third too high, F_exact is
 25 % below it, but F_p errs by 33 %.
@@ -43,7 +43,8 @@ _LIMITS_FINE = {("displacement", 2): (0.345, 0.17), ("mixed", 2): (0.37, 0.24)}
 # s, while N contains both. Where limits are those of small elements, N counts from 1.3 |s| on.
 _APART, _APART_FINE = {2: 0.3, 3: 0.15}, 1.3
 _LIMITS_COARSE, _LIMITS_PLAIN = (0.4, 1.0), (0.85, 0.85)
-# The same at large displacements, where contact is bonded and one degree more was solved: docs/accuracy.md.
+# The same at large displacements, where contact is bonded and one degree more was solved:
+# benchmarks/results/deep_contact.md.
 _LIMITS_SOLVED = (0.9, 0.6)
 # Interfaces between materials, curved surfaces and thin plates add errors. The next degree removes another share of
 # these errors than of those at the probe's edge.
@@ -70,7 +71,7 @@ _FOUND_COARSE = {2: (0.4, 0.8), 3: (0.0, 1.0)}
 _FOUND_ENDED, _FOUND_ELSEWHERE = (0.43, 0.4), 1.25
 # The same where contact is solved again: in units of the change in one degree more, and of the area's bar.
 _FOUND_AGAIN, _FOUND_AT_EDGE = 2.0, 0.1
-# The same at large displacements, for the area's bar, by degree: docs/accuracy.md.
+# The same at large displacements, for the area's bar, by degree: benchmarks/results/deep_contact.md.
 AT_EDGE_LARGE = {2: 0.15, 3: 0.075}
 # The same for the share of the contact in facets at sharp ends of the tool, in all degrees: nodes at an end slide off
 # it, so that F lacks a part of that strip, of which one degree more sees little. Errors against meshes four times

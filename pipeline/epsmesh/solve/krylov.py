@@ -12,8 +12,8 @@ from petsc4py import PETSc
 
 from epsmesh.solve import SolveError
 
-# Number of dofs up to which Cholesky is faster than conjugate gradients, measured: docs/solvers.md. Degree 4 is that of
-# error bars.
+# Number of dofs up to which Cholesky is faster than conjugate gradients, measured: benchmarks/results/solvers.md.
+# Degree 4 is that of error bars.
 DIRECT_LIMIT = {1: 5_000, 2: 1_500, 3: 1_500, 4: 1_500}
 
 _CG = {"ksp_type": "cg", "ksp_atol": 0.0, "ksp_initial_guess_nonzero": True}
@@ -50,7 +50,7 @@ SOLVERS: dict[str, dict[str, Any]] = {
     },
 }
 # Where PETSc has no hypre, as in the wheels: smoothed aggregation of all neighbours, with rigid-body modes. Without
-# these a thin stiff layer does not converge (docs/solvers.md). Jacobi is the same on any number of ranks.
+# these a thin stiff layer does not converge (benchmarks/results/solvers.md). Jacobi is the same on any number of ranks.
 _WITHOUT_HYPRE = {
     "pc_type": "gamg",
     "pc_gamg_threshold": 0.0,

@@ -26,11 +26,11 @@ from epsmesh.solve.estimate import extrapolate
 from epsmesh.solve.movement import Movement, Vector
 
 # Bar on the loads' effect on the probe, in units of the geometric mean of both bars: factor of the cosine, and rest.
-# Measured: docs/accuracy.md.
+# Measured: benchmarks/results/friction.md.
 _SEEN, _UNSEEN = {"displacement": 1.15, "mixed": 1.25}, {"displacement": 0.12, "mixed": 0.2}
 # Bars with friction, in units of the change from half as many load steps, to which the area that slides adds a part of
 # the facets in which sliding begins or ends, and the tangential force the relative bars on the axial one and on the
-# contact area. Measured: docs/accuracy.md.
+# contact area. Measured: benchmarks/results/friction.md.
 _OF_STEPS, _OF_UNSURE, _OF_FORCE, _OF_AREA = 1.5, 0.6, 2.0, 3.0
 # Directions are equal within this distance.
 _SAME = 1e-9
@@ -102,7 +102,7 @@ class Rubbing:
         return replace(self, force=force, change_of_force=change, unsure=unsure)
 
     def bars(self, area: float, relative: float, area_bar: float) -> tuple[float, float]:
-        """Return the 95 % bars on the area that slides (m²) and on the force (N); docs/accuracy.md.
+        """Return the 95 % bars on the area that slides (m²) and on the force (N); benchmarks/results/friction.md.
 
         ``area`` (m²) is that of the contact, ``area_bar`` its relative bar, and ``relative`` that of the axial force.
         """

@@ -25,7 +25,7 @@ from epsmesh.viscoelastic import Terms
 Rest = ParamSpec("Rest")
 Value = TypeVar("Value")
 
-# Thickness over reach up to which a body without support below the probe is a plate (docs/accuracy.md).
+# Thickness over reach up to which a body without support below the probe is a plate (benchmarks/results/coverage.md).
 _PLATE = 0.1
 # Depth, in units of the footprint's half width, up to which quarter-point elements do not fold at large displacements.
 _SHALLOW = 0.1

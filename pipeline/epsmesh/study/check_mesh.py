@@ -15,7 +15,7 @@ from epsmesh.study.regions import tissues_of
 from epsmesh.study.schema import Material, Mesh
 
 # Displacement elements lock as ν nears ½: from the first value on visibly, from the second on F is worth nothing
-# (docs/accuracy.md), and a number that looks like any other would be returned for it.
+# (benchmarks/results/coverage.md), and a number that looks like any other would be returned for it.
 _LOCKING = {1: (0.45, 0.45), 2: (0.49, 0.495), 3: (0.49, 0.495)}
 
 # Mixed elements keep λ = μ, which is ν = 0.25, with the displacement and give the rest to the pressure.

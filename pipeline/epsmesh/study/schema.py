@@ -55,7 +55,7 @@ class Material(Tissue):
     # Keys that F is proportional to, if all of them change together.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]] = ("young",)
     # Least Poisson's ratio at large displacements: below, F depends on the elements at the probe's edge
-    # (docs/accuracy.md).
+    # (benchmarks/results/coverage.md).
     LEAST_OF_LARGE: ClassVar[float] = 0.2
 
 
@@ -171,9 +171,11 @@ class Mesh(Section):
         ),
     ] = "auto"
 
-    # A tenth of the probe's half width puts F within about 1 % on the default elements (docs/accuracy.md).
+    # A tenth of the probe's half width puts F within about 1 % on the default elements
+    # (benchmarks/results/coverage.md).
     RIM_SHARE: ClassVar[float] = 0.1
-    # From this Poisson's ratio on, mixed elements give a smaller error for the same time (docs/accuracy.md).
+    # From this Poisson's ratio on, mixed elements give a smaller error for the same time
+    # (benchmarks/results/coverage.md).
     MIXED_FROM: ClassVar[float] = 0.45
     # What must be given where no accuracy is.
     SIZES: ClassVar[tuple[str, ...]] = ("epsilon", "fine", "coarse")

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
     from epsmesh.study.sweep import Study
 
-_HOWTO = "docs/howto/identify.md"
-_OF_CURVES = "docs/howto/curves.md"
+_HOWTO = "docs/guide/identify.md"
+_OF_CURVES = "docs/guide/identify.md"
 # Endings of files that are no curves: studies by name or path, and datasets.
 _NO_CURVES = ("", ".toml", ".nc")
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from epsmesh.study.sweep import Study
 
-_HOWTO = "docs/howto/sensitivity.md"
+_HOWTO = "docs/guide/identify.md"
 # What the names of the files add to the study's: its own dataset stays.
 _ENDING = "_sensitivity"
 

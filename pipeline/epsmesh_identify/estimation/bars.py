@@ -9,7 +9,7 @@ from epsmesh_identify.estimation.mixture import Mixture
 
 # Probability of each side beyond a bar of 95 %: less than 2.5 %, since the mixture is of models made linear, with the
 # noise on a grid. Calibrated on 640 synthetic curves, and on 100 pairs of them: their noises are drawn from the grid.
-# docs/identification.md reports on others.
+# benchmarks/results/identify.md reports on others.
 _TAIL, _OF_SEVERAL = 0.019, 0.012
 # Standard deviations in which quantiles are looked for, and how exactly.
 _FAR, _EXACT = 60.0, 1e-3

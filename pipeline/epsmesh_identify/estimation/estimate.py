@@ -35,7 +35,7 @@ from epsmesh_identify.experiment.reading import ExperimentError
 from epsmesh_identify.report.identified import engineering, title
 
 # A law does not fit if a smooth deviation from it is so much more likely, as logarithm of the ratio of the evidence:
-# on synthetic curves of the right law this happens to less than 2 % (docs/identification.md).
+# on synthetic curves of the right law this happens to less than 2 % (benchmarks/results/identify.md).
 MISFIT = 1.2
 # Least squares of a right law is within this share of the bar, but for 1 % of 900 synthetic curves.
 _FAR = 0.85

@@ -16,7 +16,7 @@ from scipy.linalg import lapack
 from epsmesh.arrays import FloatArray
 
 # Correlations with their weights beforehand. White noise is common. A likelihood from one curve finds slow noise too
-# fast on average: its weight makes good for it (calibrated on synthetic curves, see docs/identification.md).
+# fast on average: its weight makes good for it (calibrated on synthetic curves, see benchmarks/results/identify.md).
 _CORRELATIONS = {0.3: 1.0, 0.6: 1.0, 0.8: 1.0, 0.9: 1.0, 0.95: 1.0, 0.98: 1.5, 0.99: 2.0, 0.995: 3.0, 0.998: 4.0}
 _WHITE_WEIGHT = 8.0
 _WHITE = (0.0, 0.1, 0.3, 0.6)

@@ -21,8 +21,8 @@ _BEFORE = (
     "Ctrl-C ends the export at once; what is solved is kept beside the model, and the next export goes on from there"
 )
 # The page on what can be exported; refusals refer to it.
-_HOWTO = "docs/realtime.md"
-_FMU = "docs/howto/fmu.md"
+_HOWTO = "docs/guide/realtime.md"
+_FMU = "docs/guide/realtime.md"
 # The range of --accuracy: tables and formulas allow no less, and more is of no use.
 _ACCURACIES = (0.002, 0.2)
 _MOST_CHECKS = 1000

@@ -60,10 +60,10 @@ def touch(
             return
         text = render(surface, model.name)
     except BuildError as problem:
-        fail(Fault(str(problem), howto="docs/howto/touch.md"))
+        fail(Fault(str(problem), howto="docs/guide/realtime.md"))
     except (ModelError, OSError) as problem:
         why = getattr(problem, "strerror", None) or str(problem)
-        fail(of_file(model, f"{why}{_meant(model)}", "docs/howto/touch.md"))
+        fail(of_file(model, f"{why}{_meant(model)}", "docs/guide/realtime.md"))
     _serve(text, open_it=open_it)
 
 

@@ -18,7 +18,7 @@ from epsmesh_realtime.model import Model
 # Least factor on the parts of a bar that grow with the tool: few touches are of the largest.
 _LEAST_SHAPE = 0.25
 # Error that full solves have in common, as a share of their error bars: on facets, meshes of the table and of the
-# checks err alike (docs/realtime.md).
+# checks err alike (benchmarks/results/realtime.md).
 _LEAST, _LEAST_CURVED = 0.25, 1.0
 # Range of a blade's length over its width.
 _SLENDER = (1.0, 12.0)

@@ -32,8 +32,9 @@ _TERMS = 4
 _POWER = 1.5
 # Depths of the checks, in radii of the ball, and the factor to the next depth if one has no answer.
 _SHARES, _LESS = (0.1, 0.95), 0.9
-# Least error of c by large displacements, times room²/depth: measured near a side (docs/decisions.md). Largest effect
-# of the support that a fit may have, in the units of `Near`, and the one to which its first order is taken.
+# Least error of c by large displacements, times room²/depth: measured near a side (benchmarks/results/realtime.md).
+# Largest effect of the support that a fit may have, in the units of `Near`, and the one to which its first order is
+# taken.
 _LEAST, _MOST_SUPPORT, _TRIAL = 0.04, 0.3, 0.05
 # Seeds of calibration and test.
 _SEEDS = (3, 4)

@@ -112,7 +112,7 @@ def test_hidden_parts_widen_the_second_bar_and_a_second_ball_narrows_it():
 
 
 def test_bars_are_those_that_fits_then_have():
-    """Medians of twelve are 0.78 to 1.23 times as wide (docs/identification.md); here, of three."""
+    """Medians of twelve are 0.78 to 1.23 times as wide (benchmarks/results/identify.md); here, of three."""
     designer = Designer(study(), never)
     (declared, _) = designer.widths(designer.planned)["young"]
     young = designer.unknowns[0]

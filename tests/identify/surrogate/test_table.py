@@ -128,7 +128,7 @@ def test_a_punch_is_that_of_the_half_space(tmp_path: Path):
     for poisson in (0.05, 0.3, 0.49):
         values = {"young": 2e4, "poisson": poisson}
         expected = 2 * 2e4 * 2e-3 * DEPTH / (1 - poisson**2)
-        # The body is 200 contact radii deep and wide: 1/F grows by about a/h (docs/accuracy.md).
+        # The body is 200 contact radii deep and wide: 1/F grows by about a/h (benchmarks/results/verify.md).
         wrong = forward.force(DEPTH, values) / expected - 1
         assert np.all((wrong > -1e-4) & (wrong < 0.006))
         assert np.all(forward.error(DEPTH, values) < 1e-3)

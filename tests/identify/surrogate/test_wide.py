@@ -67,7 +67,7 @@ LAYERS = {
 
 @pytest.mark.parametrize("layers", LAYERS)
 def test_forces_on_layers_are_those_of_solves(layers, tmp_path):
-    """To 5e-6 on wider bodies and for balls, too (docs/accuracy.md)."""
+    """To 5e-6 on wider bodies and for balls, too (benchmarks/results/verify.md)."""
     study = parse(changed(WIDE, body={"layer": LAYERS[layers]}, probe=DISC), file="wide.toml")
     solved = solve(study, MPI.COMM_SELF, tmp_path / "store.nc")
     assert float(solve_wide(study)["force"]) == pytest.approx(float(solved["force"]), rel=3e-5)

@@ -21,7 +21,7 @@ from epsmesh.solve.linear_solver import Level, LinearSolver
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.stages import stage
 
-# Most candidates for which condensation pays within ten depths, measured: docs/solvers.md.
+# Most candidates for which condensation pays within ten depths, measured: benchmarks/results/solvers.md.
 _MOST_CANDIDATES = 1_500
 # Right-hand sides solved together.
 _TOGETHER = 64

@@ -34,7 +34,7 @@ from epsmesh.stages import stage
 _RINGS = 2
 # Right-hand sides solved with one factorisation of mixed elements.
 _TOGETHER = 128
-# The bar on what friction adds to the force, as a share of it: docs/accuracy.md.
+# The bar on what friction adds to the force, as a share of it: benchmarks/results/friction.md.
 _OF_FRICTION = 0.2
 # Signs of the components: the tool advances along −z, x and y are tangents.
 _COMPONENTS = np.array([2, 0, 1])

@@ -95,7 +95,8 @@ _WIDTH = 1.3
 _SEMI_AXIS = 5**0.5
 # Fixed-point iteration for K and the area, which depend on each other: most rounds, and the change at which it ends.
 _MOST_ROUNDS, _SMALL = 60, 1e-9
-# The 95 % bar on the area, in units of the area of nodes that share a facet with the contact's edge: docs/accuracy.md.
+# The 95 % bar on the area, in units of the area of nodes that share a facet with the contact's edge:
+# benchmarks/results/coverage.md.
 _BAR = 0.07
 
 

@@ -47,7 +47,7 @@ class MixedElements(Elements):
 
     # Forces balance at a tenth of the tolerance for F: three more iterations, less than a second round would cost.
     element, stricter, masks = "mixed", 0.1, False
-    # Measured for degrees 2 and 3 (docs/solvers.md).
+    # Measured for degrees 2 and 3 (benchmarks/results/solvers.md).
     direct_limit = 1_500
 
     def __init__(self, spaces: Spaces, degree: int, conditions: Conditions):

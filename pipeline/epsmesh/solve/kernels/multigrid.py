@@ -23,7 +23,7 @@ from epsmesh.solve.kernels.product import CellOperator
 from epsmesh.stages import stage
 
 # Chebyshev's iteration: steps, lower end of its interval as a share of the largest eigenvalue, safety factor on the
-# estimated largest eigenvalue, and Lanczos steps for that estimate. Measured: docs/solvers.md.
+# estimated largest eigenvalue, and Lanczos steps for that estimate. Measured: benchmarks/results/solvers.md.
 _STEPS, _LEFT, _RAISED, _LANCZOS = 2, 0.1, 1.15, 5
 # Where the material jumps, the largest eigenvector is in the stiffest region, where random vectors have little of it.
 _LANCZOS_JUMPS = 12
