@@ -67,7 +67,7 @@ def write_page(dataset, path):
 
 
 SECTIONS = Sections(
-    models={"note": Note}, texts={"note": "Remarks on a study."}, read=read, pages={"note": "report"},
+    models={"note": Note}, texts={"note": "Remarks on a study."}, read=read, pages={"note": "guide/results"},
     left_out=lambda study: "its note is not run",
     forecast=lambda study, cost: [Forecast({"of": "note"}, "  a note: no work")],
 )
