@@ -6,7 +6,6 @@ checked for the first time and again, and maps of a liver with a tumour on one r
 takes three minutes.
 """
 
-import json
 import os
 import subprocess
 import sys
@@ -24,7 +23,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.machine import MPI_ENVIRONMENT
 from benchmarks.one_run import stages_by
 from benchmarks.processor import MPIRUN, processor_seconds
-from benchmarks.tables import markdown
+from benchmarks.tables import markdown, write
 from epsmesh import stages
 from epsmesh.plan.plan import make_plan
 from epsmesh.run.compile import prepare
@@ -225,9 +224,7 @@ def main(output: Path = Path("results")) -> None:
         maps = [on_ranks(tool, probe, Path(folder)) for tool, probe in (("disc", DISC), ("ball", BALL))]
     tables = f"{markdown(rows, COLUMNS)}\n{markdown(commands, WHOLE)}\n{markdown(maps, ON_RANKS)}"
     print(tables)
-    output.mkdir(parents=True, exist_ok=True)
-    (output / "organs.json").write_text(json.dumps({"places": rows, "commands": commands, "maps": maps}, indent=1))
-    (output / "organs.md").write_text(tables)
+    write("organs", output, {"places": rows, "commands": commands, "maps": maps}, tables)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from benchmarks.machine import heading
+
 RESULTS = Path("results")
 
 
@@ -18,11 +20,11 @@ def markdown(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> s
 
 
 def write(name: str, output: Path, content: Any, text: str = "") -> None:
-    """Write ``content`` to NAME.json in the folder ``output``, and ``text``, if not empty, to NAME.md."""
+    """Write ``content`` to NAME.json in the folder ``output``, and ``text``, if any, below a heading to NAME.md."""
     output.mkdir(parents=True, exist_ok=True)
     (output / f"{name}.json").write_text(json.dumps(content, indent=1) + "\n")
     if text:
-        (output / f"{name}.md").write_text(text)
+        (output / f"{name}.md").write_text(heading(name) + text)
 
 
 @dataclass

@@ -15,6 +15,7 @@ from typing import Any
 
 import xarray as xr
 
+from benchmarks.machine import heading
 from epsmesh.files import write_whole
 from epsmesh.report.words import percent
 from epsmesh.study.identified import FITS
@@ -45,7 +46,7 @@ def main() -> None:
     arguments = parser.parse_args()
     rows = [row_of(test, arguments.results) for test in tests(arguments.folder.resolve())]
     lines = [_line(_HEADS), _line(["---"] * len(_HEADS)), *map(_line, rows)]
-    print(write_whole(arguments.results / "curves.md", "\n".join(lines) + "\n"))
+    print(write_whole(arguments.results / "curves.md", heading("curves") + "\n".join(lines) + "\n"))
 
 
 def tests(folder: Path) -> Iterator[Test]:
