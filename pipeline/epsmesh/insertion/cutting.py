@@ -10,9 +10,10 @@ from typing import Self
 
 import scipy
 
+from epsmesh.insertion.curve import Curve
 from epsmesh.insertion.near_tip import EXTENSION_ERROR, NearTip, strength
-from epsmesh.insertion.states import SHORT, Cut, Scene, Tissue
-from epsmesh.insertion.steps import CUTTING, INDENTATION
+from epsmesh.insertion.states import SHORT, Scene, Solved, Tissue
+from epsmesh.insertion.steps import CUTTING, Step
 
 # A front is solved again if it is this much farther ahead than where it was solved.
 _FARTHER = 1.1
@@ -21,52 +22,28 @@ _MOST_ROUNDS = 8
 _SHALLOW = 3.5
 
 
-@dataclass(frozen=True)
-class Cutting:
-    """A blade that cuts, its tip at ``depth`` (m) and the front of the slit ``ahead`` (m), in the ``field`` between.
+@dataclass(frozen=True, kw_only=True)
+class Cutting(Step):
+    """A step of a blade with the front of its slit ``ahead`` (m) of the tip, and the ``field`` between.
 
-    ``stored`` and ``fracture`` are energies (J) since the first touch; ``elastic`` and ``cutting`` the parts of the
-    force (N), ``squeeze`` (N) the normal force on each flank. Those with an error have its 95 % bar. In the ``phase``
-    of indentation, the tip is below the front.
+    ``squeeze`` (N) is the normal force on each flank, with its bar. In the phase of indentation, the tip may be below
+    the front.
     """
 
-    depth: float
     ahead: float
     field: NearTip
-    stored: float = 0.0
-    stored_error: float = 0.0
-    fracture: float = 0.0
-    elastic: float = 0.0
-    elastic_error: float = 0.0
-    cutting: float = 0.0
     squeeze: float = 0.0
     squeeze_error: float = 0.0
-    phase: str = CUTTING
 
     @property
-    def energy(self) -> float:
-        """Stored energy and work of fracture (J)."""
-        return self.stored + self.fracture
-
-    @property
-    def slope(self) -> float:
-        """Change of both energies with the depth (N)."""
-        return self.elastic + self.cutting
-
-    @property
-    def crack_depth(self) -> float:
+    def front(self) -> float:
         """Depth (m) of the front of the slit."""
         return self.depth + self.ahead
 
     @property
     def flank(self) -> float:
         """Depth (m) to which its flanks touch tissue."""
-        return min(self.depth, self.crack_depth)
-
-    @property
-    def is_indentation(self) -> bool:
-        """Whether it presses on tissue that it does not cut."""
-        return self.phase == INDENTATION
+        return min(self.depth, self.front)
 
     def moved(self, depth: float) -> Self:
         """Return it at another depth (m), at the same force."""
@@ -81,14 +58,26 @@ class Cutting:
         return abs((after.energy - self.energy) / moved - (after.slope + self.slope) / 2) if moved else 0.0
 
 
-def between(before: Cutting, after: Cutting, depth: float) -> Cutting:
-    """Return the cutting blade at a depth (m) between two others."""
-    share = (depth - before.depth) / (after.depth - before.depth)
-    numbers = [name for name, value in vars(before).items() if isinstance(value, float)]
-    mixed = {name: (1 - share) * getattr(before, name) + share * getattr(after, name) for name in numbers}
-    ends = [before.depth, after.depth]
-    stored = scipy.interpolate.CubicHermiteSpline(ends, [before.stored, after.stored], [before.elastic, after.elastic])
-    return replace(after, **(mixed | {"depth": depth, "stored": float(stored(depth))}))
+@dataclass(frozen=True)
+class Cuts(Curve):
+    """The cutting blade from one state to the next; without the first, its front stays where the next one has it."""
+
+    before: Cutting | None
+    after: Cutting
+
+    def at(self, depth: float) -> Cutting:
+        """Return the blade at a depth (m)."""
+        before, after = self.before, self.after
+        if before is None:
+            return after.moved(depth)
+        share = (depth - before.depth) / (after.depth - before.depth)
+        numbers = [name for name, value in vars(before).items() if isinstance(value, float)]
+        mixed = {name: (1 - share) * getattr(before, name) + share * getattr(after, name) for name in numbers}
+        ends = [before.depth, after.depth]
+        stored = scipy.interpolate.CubicHermiteSpline(
+            ends, [before.stored, after.stored], [before.elastic, after.elastic]
+        )
+        return replace(after, **(mixed | {"depth": depth, "stored": float(stored(depth))}))
 
 
 def cuttings(scene: Scene, depths: list[float]) -> tuple[list[Cutting], str]:
@@ -98,11 +87,12 @@ def cuttings(scene: Scene, depths: list[float]) -> tuple[list[Cutting], str]:
     message: dict[float, str] = {}
     for _ in range(_MOST_ROUNDS):
         again: dict[float, float] = {}
-        for (depth, ahead), cut in scene.cuts(sorted(places.items())).items():
+        for depth, ahead in sorted(places.items()):
+            cut = scene.cut(depth, ahead)
             if isinstance(cut, str):
                 message[depth] = cut
                 continue
-            one, farthest = _cutting(scene, cut), _room(scene, depth)
+            one, farthest = _cutting(scene, depth, ahead, cut), _room(scene, depth)
             if one.ahead <= _FARTHER * ahead:
                 found[depth] = one
             elif farthest <= _FARTHER * ahead:
@@ -127,37 +117,42 @@ def _room(scene: Scene, depth: float) -> float:
     return min(SHORT * (min(ends) - depth), _SHALLOW * depth)
 
 
-def _cutting(scene: Scene, cut: Cut) -> Cutting:
-    """Return the blade where G is the toughness, below its tip and beside its ends, from one solved slit."""
-    tissue, length, width = scene.at(cut.depth), scene.blade.length, scene.blade.width
-    field = NearTip.through(_strength(scene, tissue), cut.ahead, cut.release)
-    ahead, share = field.ahead(tissue.toughness), cut.release_error / cut.release
+def _cutting(scene: Scene, depth: float, solved: float, cut: Solved) -> Cutting:
+    """Return the blade where G is the toughness, below its tip and beside its ends, from one ``solved`` slit.
+
+    Its front is that distance (m) ahead of the tip at a depth (m).
+    """
+    tissue, length, width, release = scene.at(depth), scene.blade.length, scene.blade.width, cut.energy_release
+    field = NearTip.through(_strength(scene, tissue), solved, release)
+    release_error = cut.energy_release_error * release
+    ahead, share = field.ahead(tissue.toughness), release_error / release
     # What is between the solved front and this one, and how far the error of G moves it.
-    added = length * field.per_length(ahead, cut.ahead) + field.corners(ahead, cut.ahead)
-    added += sides(scene, field, cut.depth, cut.ahead)
+    added = length * field.per_length(ahead, solved) + field.corners(ahead, solved)
+    added += sides(scene, field, depth, solved)
     moved = length * field.strength
-    fracture = length * scene.tear(cut.depth + ahead) + 2 * ahead**2 * tissue.toughness
-    for layer, height in scene.above(cut.depth):
+    fracture = length * scene.tear(depth + ahead) + 2 * ahead**2 * tissue.toughness
+    for layer, height in scene.above(depth):
         beside = _beside(scene, field, layer)
         end = beside.ahead(layer.toughness)
         moved += 2 * height * beside.strength
         fracture += 2 * height * end * layer.toughness
-    widened, solved_front = 2 * field.per_length(ahead, cut.ahead), length + 2 * cut.ahead
+    widened, solved_front = 2 * field.per_length(ahead, solved), length + 2 * solved
     stored = cut.energy + added
-    stored_error = cut.energy_error + EXTENSION_ERROR * abs(added) + share * moved
-    force_error = cut.drive_error + solved_front * cut.release_error
+    energy_error = cut.force_error * cut.energy + EXTENSION_ERROR * abs(added) + share * moved
+    force_error = cut.force_error * abs(cut.force) + solved_front * release_error
     return Cutting(
-        depth=cut.depth,
+        phase=CUTTING,
+        depth=depth,
         ahead=ahead,
         field=field,
         stored=stored,
-        stored_error=stored_error,
+        energy_error=energy_error,
         fracture=fracture,
-        elastic=cut.drive - solved_front * cut.release + widened,
-        elastic_error=force_error + EXTENSION_ERROR * abs(widened) + 2 * share * field.strength,
+        elastic=cut.force - solved_front * release + widened,
+        error=force_error + EXTENSION_ERROR * abs(widened) + 2 * share * field.strength,
         cutting=(length + 2 * ahead) * tissue.toughness,
         squeeze=2 * stored / width,
-        squeeze_error=2 * stored_error / width,
+        squeeze_error=2 * energy_error / width,
     )
 
 

@@ -8,27 +8,16 @@ energy. At the body's surface F₀ and U₀ are zero. At an interface F₀ is th
 from dataclasses import dataclass, replace
 from typing import Self
 
-import scipy
-
-from epsmesh.insertion.cutting import Cutting, between
+from epsmesh.insertion.curve import Curve
+from epsmesh.insertion.cutting import Cuts, Cutting
 from epsmesh.insertion.near_tip import NearTip
-from epsmesh.insertion.steps import INDENTATION
+from epsmesh.insertion.steps import INDENTATION, Puncture
 
-_TINY = 1e-9
-
-
-@dataclass(frozen=True)
-class Pierced:
-    """A puncture: the blade ``before`` it and ``after`` it, at one depth; 95 % bars of the depth (m) and force (N)."""
-
-    before: Cutting
-    after: Cutting
-    depth_error: float
-    force_error: float
+_TINY, _TOLERANCE = 1e-9, 1e-9
 
 
 @dataclass(frozen=True)
-class Indentation:
+class Indentation(Curve):
     """A layer that a blade presses on: the blade that has ``arrived`` there, and the layer's stiffness (N/m)."""
 
     arrived: Cutting
@@ -38,7 +27,8 @@ class Indentation:
     @classmethod
     def of_surface(cls, stiffness: float, error: float) -> Self:
         """Return the indentation of the intact body."""
-        return cls(Cutting(0.0, 0.0, NearTip(0.0, 0.0), phase=INDENTATION), stiffness, error)
+        touch = Cutting(phase=INDENTATION, depth=0.0, elastic=0.0, ahead=0.0, field=NearTip(0.0, 0.0))
+        return cls(touch, stiffness, error)
 
     def at(self, depth: float) -> Cutting:
         """Return the blade at a depth (m)."""
@@ -47,37 +37,30 @@ class Indentation:
             first,
             phase=INDENTATION,
             depth=depth,
-            ahead=first.crack_depth - depth,
+            ahead=first.front - depth,
             stored=first.stored + first.slope * below + self.stiffness * below**2 / 2,
-            stored_error=first.stored_error + first.elastic_error * below + self.stiffness_error * below**2 / 2,
+            energy_error=first.energy_error + first.error * below + self.stiffness_error * below**2 / 2,
             elastic=first.slope + self.stiffness * below,
-            elastic_error=first.elastic_error + self.stiffness_error * below,
+            error=first.error + self.stiffness_error * below,
             cutting=0.0,
         )
 
-    def pierced(self, before: Cutting | None, after: Cutting) -> Pierced | None:
+    def pierced(self, before: Cutting | None, after: Cutting) -> Puncture[Cutting] | None:
         """Return the puncture between two states of cutting; None if the first already has less energy.
 
         Without a state ``before``, that with the front where it stays follows from the one ``after``.
         """
-
-        def cut(depth: float) -> Cutting:
-            return after.moved(depth) if before is None else between(before, after, depth)
-
-        def excess(depth: float) -> float:
-            return self.at(depth).energy - cut(depth).energy
-
-        first = self.arrived
-        low = max(first.depth, first.crack_depth - after.ahead) if before is None else before.depth
-        if excess(low) >= 0:
+        first, cut = self.arrived, Cuts(before, after)
+        low = before.depth if before else max(first.depth, first.front - after.ahead)
+        depth = self.crossing(cut, low, after.depth, tolerance=_TOLERANCE)
+        if depth is None or depth == low:
             return None
-        depth = float(scipy.optimize.brentq(excess, low, after.depth, xtol=1e-9))
-        intact, torn = self.at(depth), cut(depth)
+        intact, torn = self.at(depth), cut.at(depth)
         missed = before.defect(after) * (after.depth - before.depth) if before else 0.0
-        error = intact.stored_error + torn.stored_error + missed
+        error = intact.energy_error + torn.energy_error + missed
         return self.pierced_at(torn, error / max(intact.slope - torn.slope, _TINY * intact.slope))
 
-    def pierced_at(self, after: Cutting, error: float) -> Pierced:
+    def pierced_at(self, after: Cutting, error: float) -> Puncture[Cutting]:
         """Return the puncture at the depth of a state of cutting, with an ``error`` (m) of this depth."""
         before = self.at(after.depth)
-        return Pierced(before, after, error, before.elastic_error + self.stiffness * error)
+        return Puncture(before, after, error, before.error + self.stiffness * error)

@@ -9,17 +9,20 @@ Half of that is added, and is the error bar. Blades at the bottom of notches are
 from collections.abc import Sequence
 
 from epsmesh.insertion.cutting import Cutting
-from epsmesh.insertion.indentation import Indentation, Pierced
+from epsmesh.insertion.indentation import Indentation
 from epsmesh.insertion.states import Scene
+from epsmesh.insertion.steps import Puncture
 
 
-def through_layers(scene: Scene, states: Sequence[Cutting]) -> tuple[list[Cutting], list[Pierced | None], str]:
+def through_layers(
+    scene: Scene, states: Sequence[Cutting]
+) -> tuple[list[Cutting], list[Puncture[Cutting] | None], str]:
     """Return the states of a path in which the blade indents tougher layers, the punctures of these, and a message.
 
     ``states`` are those of cutting from the first puncture on. The punctures are those of the layers below the first,
     None for a layer that is not pierced. The message says why the path ends early, if it does.
     """
-    found, punctures = list(states), list[Pierced | None]()
+    found, punctures = list(states), list[Puncture[Cutting] | None]()
     for number, end in enumerate(scene.interfaces, start=1):
         above = [one for one in found if one.depth < end]
         below = found[len(above) :]

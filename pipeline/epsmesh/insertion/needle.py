@@ -8,9 +8,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
-from epsmesh.insertion.pressing import Press, Pressed
+from epsmesh.insertion.pressing import Press, Solves
 from epsmesh.insertion.shaft import NeedleCut, ShaftCut
 from epsmesh.insertion.states import InsertionScene, Solved, Tissue
 from epsmesh.insertion.steps import INDENTATION, WITHDRAWAL, Path, Puncture, Step, with_work
@@ -53,7 +52,7 @@ class NeedleScene(InsertionScene[Needle]):
         cut, end, message = self._cut()
         if cut is None:
             return Path(message=message)
-        steps, punctures, press = [Step(INDENTATION, 0.0, 0.0)], list[Puncture | None](), None
+        steps, punctures, press = [Step(INDENTATION, 0.0, 0.0)], list[Puncture[Step] | None](), None
         reached: Step | None = None
         for number, top in enumerate(cut.tops):
             punctures.append(None)
@@ -69,7 +68,7 @@ class NeedleScene(InsertionScene[Needle]):
             if pierced is None:
                 message = why or message
                 steps += self._presses(press, end)
-                reached = press.step(min(press.deepest, end)) if message else None
+                reached = press.at(min(press.deepest, end)) if message else None
                 break
             if number and pierced == self._touch(press):
                 continue
@@ -127,7 +126,7 @@ class NeedleScene(InsertionScene[Needle]):
     def _cuts(self, cut: NeedleCut, last: Step, end: float) -> list[Step]:
         """Return the steps of cutting after the ``last`` one, down to a depth (m)."""
         depths = sorted({depth for depth in (*self.depths, end) if last.depth < depth <= end})
-        return with_work([last, *map(cut.step, depths)], self.interfaces)[1:]
+        return with_work([last, *map(cut.at, depths)], self.interfaces)[1:]
 
     def _withdrawn(self, cut: NeedleCut, press: Press | None, last: Step) -> list[Step]:
         """Return the steps of the withdrawal after the ``last`` step: from the layer that is pressed, and the cut."""
@@ -135,7 +134,7 @@ class NeedleScene(InsertionScene[Needle]):
             return []
         pressed = press if press and last.phase == INDENTATION else None
         steps = [
-            pressed.step(depth, WITHDRAWAL) if pressed and depth > last.crack_depth else cut.step(depth, WITHDRAWAL)
+            pressed.at(depth, WITHDRAWAL) if pressed and depth > last.crack_depth else cut.at(depth, WITHDRAWAL)
             for depth in reversed(self.depths)
         ]
         steps = [replace(step, fracture=last.fracture, crack_depth=last.crack_depth) for step in steps]
@@ -161,7 +160,7 @@ class NeedleScene(InsertionScene[Needle]):
                 depth, why = canonical(_NEARLY * reached), f"{1e3 * at:.4g} mm: {one}"
                 continue
             found[depth] = one
-            press = Press(Pressed.of(found), arrived, added)
+            press = Press(Solves.of(found), arrived, added)
             if (pierced := self._pierced(cut, press, end)) or press.deepest >= end or why:
                 break
             # On the curve of layers, a depth of the tip is known to the tolerance of a root.
@@ -171,7 +170,7 @@ class NeedleScene(InsertionScene[Needle]):
             depth = float(f"{press.own_depth(pierced):.3g}")
             one = self.solved(self.tool.pressed_to(depth), number)
             if not isinstance(one, str):
-                press = Press(Pressed.of(found | {depth: one}), arrived, added)
+                press = Press(Solves.of(found | {depth: one}), arrived, added)
             why = ""
         elif why and press.is_reached:
             why = self._too_tough(cut, press, number)
@@ -184,7 +183,7 @@ class NeedleScene(InsertionScene[Needle]):
         the length of the crack makes the energy least. By dimensions, half of Γ is as good as twice the radius.
         """
         depth, layer = press.deepest, cut.layers[number]
-        has, takes = press.energy(depth)[0], cut.energy(depth) - cut.energy(press.arrived.depth)
+        has, takes = press.energy(depth), replace(cut, since=press.arrived.depth).energy(depth)
         share = (has / takes) ** (layer.force / layer.torn)
         toughness = self.layers[number].toughness
         return (
@@ -199,44 +198,28 @@ class NeedleScene(InsertionScene[Needle]):
 
     def _pierced(self, cut: NeedleCut, press: Press, end: float) -> float | None:
         """Return the depth (m) at which tissue is pierced; None if it is not, down to ``end`` (m)."""
-        touch, deepest = self._touch(press), min(press.deepest, end)
-        if deepest <= touch or _excess(cut, press, deepest) < 0:
-            return None
-        if _excess(cut, press, touch) >= 0:
-            return touch
-        return float(
-            scipy.optimize.brentq(
-                lambda depth: _excess(cut, press, depth), touch, deepest, xtol=_TINY * self.tool.limit
-            )
-        )
+        taken, deepest = replace(cut, since=press.arrived.depth), min(press.deepest, end)
+        return press.crossing(taken, self._touch(press), deepest, tolerance=_TINY * self.tool.limit)
 
     def _presses(self, press: Press, end: float) -> list[Step]:
         """Return the steps of indentation down to a depth (m)."""
         end = min(end, press.deepest)
-        return [press.step(depth) for depth in self.depths if press.arrived.depth < depth <= end]
+        return [press.at(depth) for depth in self.depths if press.arrived.depth < depth <= end]
 
 
-def _excess(cut: NeedleCut, press: Press, depth: float) -> float:
-    """Return by how much (J) more the tissue stores at a depth (m) than a cut takes."""
-    return press.energy(depth)[0] - (cut.energy(depth) - cut.energy(press.arrived.depth))
-
-
-def _puncture(cut: NeedleCut, press: Press, depth: float) -> Puncture:
+def _puncture(cut: NeedleCut, press: Press, depth: float) -> Puncture[Step]:
     """Return the puncture at a depth (m).
 
     Its bar reaches to where the excess of energy is the bar of both energies, at most up to the first touch.
     """
-    before, low = press.step(depth), press.arrived.depth
-    after = replace(cut.step(depth), work=before.work, rubbed=before.rubbed)
-    error = cut.energy_error(depth, low) + press.energy(depth)[1]
+    before, low, taken = press.at(depth), press.arrived.depth, replace(cut, since=press.arrived.depth)
+    after = replace(cut.at(depth), work=before.work, rubbed=before.rubbed)
+    error = taken.energy_error(depth) + before.energy_error
     gap = before.elastic - after.elastic - after.cutting
     # The tissue's force grows, that of the cut does not: the excess reaches any error.
-    far = depth + cut.needle.limit * 2.0 ** np.arange(_DOUBLINGS)
-    end = next((at for at in far.tolist() if _excess(cut, press, at) >= error), None)
-    below = (
-        float(scipy.optimize.brentq(lambda at: _excess(cut, press, at) - error, depth, end)) - depth
-        if end
-        else float(far[-1])
-    )
+    far = (depth + cut.needle.limit * 2.0 ** np.arange(_DOUBLINGS)).tolist()
+    end = next((at for at in far if press.excess(taken, at) >= error), far[-1])
+    reached = press.crossing(taken, depth, end, more=error)
+    below = (end if reached is None else reached) - depth
     bar = max(below, min(error / max(gap, _TINY * before.elastic), depth - low))
-    return Puncture(before, after, bar, before.error + press.force(depth + bar)[0] - before.elastic)
+    return Puncture(before, after, bar, before.error + press.at(depth + bar).elastic - before.elastic)

@@ -6,17 +6,18 @@ G = Γ, as in cutting. No threshold is fitted. Friction acts on both flanks.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
 
 import numpy as np
-import scipy  # which loads its parts when they are used: a run without an insertion uses none
 
+from epsmesh.insertion.curve import Curve
 from epsmesh.insertion.cutting import Cutting, cuttings
 from epsmesh.insertion.friction import rub
-from epsmesh.insertion.indentation import Indentation, Pierced
+from epsmesh.insertion.indentation import Indentation
 from epsmesh.insertion.layers import through_layers
 from epsmesh.insertion.states import Scene
-from epsmesh.insertion.steps import Path, Puncture, Step, with_work
+from epsmesh.insertion.steps import CUTTING, Path, Puncture, Step, with_work
 from epsmesh.insertion.withdrawal import withdrawn
 
 # The least depth at which a slit is solved, in widths of the blade.
@@ -29,52 +30,55 @@ class BladeScene(Scene):
 
     def needed(self) -> tuple[float, ...]:
         """Return the depths (m) at which the path needs a slit: all of them until the intact body is solved."""
-        return _needed(self)
+        pressed = self.stiffness()
+        if isinstance(pressed, str):
+            return self.depths if self.is_pending else ()
+        first = _first(self, Indentation.of_surface(*pressed))
+        through_all = self.insertion.withdraw and np.isfinite(first)  # after the tissue is cut
+        return tuple(depth for depth in self.depths if through_all or depth >= first)
 
     def _follow(self) -> Path:
-        return _follow(self)
+        intact_body, depths = self.stiffness(), np.array(self.depths)
+        if isinstance(intact_body, str):
+            return Path(message=intact_body)
+        whole = Indentation.of_surface(*intact_body)
+        first = _first(self, whole)
+        found, message = cuttings(self, list(self.needed()))
+        pierced = (number for number, one in enumerate(found) if whole.energy(one.depth) >= one.energy)
+        count = next(pierced, len(found))
+        intact, cut = found[:count], found[count:]
+        if not cut:
+            deepest = intact[-1].depth if intact else max(depths[depths < first], default=0.0)
+            return Path(tuple(_steps(self, [whole.at(one) for one in depths if one <= deepest])), message=message)
+        surface = _puncture(self, whole, intact, cut[0], max(depths[depths < first], default=0.0))
+        deeper = [surface.after, *(one for one in cut if one.depth > surface.after.depth)]
+        states, punctures, ended = through_layers(self, deeper)
+        states = [*(whole.at(one) for one in depths if one < surface.after.depth), surface.before, *states]
+        steps = {id(state): step for state, step in zip(states, _steps(self, states), strict=True)}
+        last, pierces = steps[id(states[-1])], [one for one in (surface, *punctures) if one]
+        peaks = tuple(one and _of(one, steps) for one in (surface, *punctures))
+        peaked = {id(one.before) for one in pierces}
+        own = [step for key, step in steps.items() if key not in peaked and step.depth in self.depths]
+        back, message = list[Step](), ended or message
+        if self.insertion.withdraw and not self.is_pending:  # its slits depend on where the path ended
+            pressed = list(takewhile(lambda one: one.is_indentation, states[::-1]))
+            back, stuck = withdrawn(self, pressed, found[::-1], last)
+            message = message or stuck
+        return Path(tuple(own), peaks, message, tuple(step for step in back[::-1] if step.depth in self.depths))
 
 
-def _needed(scene: Scene) -> tuple[float, ...]:
-    pressed = scene.stiffness()
-    if isinstance(pressed, str):
-        return scene.depths if scene.is_pending else ()
-    first = _first(scene, Indentation.of_surface(*pressed))
-    through_all = scene.insertion.withdraw and np.isfinite(first)  # after the tissue is cut
-    return tuple(depth for depth in scene.depths if through_all or depth >= first)
+@dataclass(frozen=True)
+class Torn(Curve):
+    """A slit that the intact body could just tear, without opening it: its work of fracture alone."""
+
+    scene: Scene
+
+    def at(self, depth: float) -> Step:
+        """Return what a slit down to a depth (m) takes."""
+        return Step(CUTTING, depth, 0.0, fracture=self.scene.blade.length * self.scene.tear(depth))
 
 
-def _follow(scene: Scene) -> Path:
-    intact_body, depths = scene.stiffness(), np.array(scene.depths)
-    if isinstance(intact_body, str):
-        return Path(message=intact_body)
-    whole = Indentation.of_surface(*intact_body)
-    first = _first(scene, whole)
-    found, message = cuttings(scene, list(_needed(scene)))
-    pierced = (number for number, one in enumerate(found) if whole.at(one.depth).energy >= one.energy)
-    count = next(pierced, len(found))
-    intact, cut = found[:count], found[count:]
-    if not cut:
-        deepest = intact[-1].depth if intact else max(depths[depths < first], default=0.0)
-        return Path(tuple(_steps(scene, [whole.at(one) for one in depths if one <= deepest])), message=message)
-    surface = _puncture(scene, whole, intact, cut[0], max(depths[depths < first], default=0.0))
-    deeper = [surface.after, *(one for one in cut if one.depth > surface.after.depth)]
-    states, punctures, ended = through_layers(scene, deeper)
-    states = [*(whole.at(one) for one in depths if one < surface.after.depth), surface.before, *states]
-    steps = {id(state): step for state, step in zip(states, _steps(scene, states), strict=True)}
-    last = steps[id(states[-1])]
-    peaks = tuple(_of(one, steps) if one else None for one in (surface, *punctures))
-    peaked = {id(one.before) for one in (surface, *punctures) if one}
-    own = [step for key, step in steps.items() if key not in peaked and step.depth in scene.depths]
-    back, message = list[Step](), ended or message
-    if scene.insertion.withdraw and not scene.is_pending:  # its slits depend on where the path ended
-        pressed = list(takewhile(lambda one: one.is_indentation, states[::-1]))
-        back, stuck = withdrawn(scene, pressed, found[::-1], last)
-        message = message or stuck
-    return Path(tuple(own), peaks, message, tuple(step for step in back[::-1] if step.depth in scene.depths))
-
-
-def _of(one: Pierced, steps: Mapping[int, Step]) -> Puncture:
+def _of(one: Puncture[Cutting], steps: Mapping[int, Step]) -> Puncture[Step]:
     """Return a puncture by the steps of its states."""
     return Puncture(steps[id(one.before)], steps[id(one.after)], one.depth_error, one.force_error)
 
@@ -89,26 +93,15 @@ def _first(scene: Scene, whole: Indentation) -> float:
     return next(may, np.inf)
 
 
-def _puncture(scene: Scene, whole: Indentation, intact: list[Cutting], after: Cutting, low: float) -> Pierced:
+def _puncture(scene: Scene, whole: Indentation, intact: list[Cutting], after: Cutting, low: float) -> Puncture[Cutting]:
     """Return the puncture above the first cut, and below the last ``intact`` state or a ``low`` depth (m)."""
     if not intact:
-        # A slit that the intact body could just tear, without opening it.
-        depth = max(_crossing(scene, whole, low, after.depth), _LEAST * scene.blade.width)
+        depth = whole.crossing(Torn(scene), max(low, _TINY * after.depth), after.depth)
+        depth = max(after.depth if depth is None else depth, _LEAST * scene.blade.width)
         intact, _ = cuttings(scene, [scene.clear(depth)]) if depth < after.depth else ([], "")
     found = whole.pierced(intact[-1], after) if intact else None
     # Tissue that is cut at the first touch, before a depth at which slits are solved.
     return found or whole.pierced_at(one := (intact or [after])[0], one.depth)
-
-
-def _crossing(scene: Scene, whole: Indentation, low: float, high: float) -> float:
-    """Return the depth (m) at which the intact body stores the work of fracture of a slit alone."""
-
-    def lacks(depth: float) -> float:
-        return whole.at(depth).energy - scene.blade.length * scene.tear(depth)
-
-    return (
-        float(scipy.optimize.brentq(lacks, max(low, _TINY * high), high)) if lacks(max(low, _TINY * high)) < 0 else low
-    )
 
 
 def _steps(scene: Scene, states: list[Cutting]) -> list[Step]:
@@ -117,17 +110,8 @@ def _steps(scene: Scene, states: list[Cutting]) -> list[Step]:
     missed = [0.0 if scene.crosses(one.depth, other.depth) else one.defect(other) for one, other in pairwise(states)]
     missed = [max(pair) for pair in pairwise([0.0, *missed, 0.0])]
     steps = [
-        Step(
-            phase=one.phase,
-            depth=one.depth,
-            elastic=one.elastic,
-            cutting=one.cutting,
-            friction=rubs,
-            error=one.elastic_error + uncertain + missed[number],
-            stored=one.stored,
-            fracture=one.fracture,
-            work=one.energy,
-            crack_depth=one.crack_depth,
+        replace(
+            one, friction=rubs, error=one.error + uncertain + missed[number], work=one.energy, crack_depth=one.front
         )
         for number, (one, (rubs, uncertain)) in enumerate(zip(states, found, strict=True))
     ]

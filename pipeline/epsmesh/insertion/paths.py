@@ -181,4 +181,4 @@ def scenes(plan: Plan, records: Records) -> Iterator[tuple[InsertionScene[Any], 
 def _scene(states: CaseStates) -> InsertionScene[Any]:
     case, study = states.cases[0], states.plan.study
     tool, body = cast("Inserted", study.tool(case)), cast("Layered", case.body)
-    return _SCENES[tool.CUTS](tool, body, case.material, kept=case.column, depths=study.step_depths, states=states)
+    return _SCENES[tool.CUTS](tool, body, case.material, kept=case.column, depths=study.step_depths, find=states.of)

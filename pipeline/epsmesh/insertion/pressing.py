@@ -9,11 +9,13 @@ added, and is the error bar. At the surface of the body, F₀ and d₀ are zero.
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
+from typing import Self
 
 import numpy as np
 import scipy
 
 from epsmesh.arrays import FloatArray
+from epsmesh.insertion.curve import Curve
 from epsmesh.insertion.states import Solved
 from epsmesh.insertion.steps import INDENTATION, Step
 
@@ -23,7 +25,7 @@ _TINY = 1e-6
 
 
 @dataclass(frozen=True)
-class Pressed:
+class Solves:
     """Tissue on which a needle was pressed to ``depths`` (n) in m: energies (J), forces (N), and their relative bar."""
 
     depths: FloatArray
@@ -32,7 +34,7 @@ class Pressed:
     bar: float
 
     @classmethod
-    def of(cls, found: "dict[float, Solved]") -> "Pressed":
+    def of(cls, found: dict[float, Solved]) -> Self:
         """Return the tissue of solved depths (m).
 
         The last one that was solved tells how well energies and forces are interpolated between the others.
@@ -83,13 +85,13 @@ class Pressed:
 
 
 @dataclass(frozen=True)
-class Press:
+class Press(Curve):
     """A needle that presses on ``tissue`` from the step on at which it has ``arrived``.
 
     Tissue above adds the stiffness ``added`` (N/m), give or take as much.
     """
 
-    tissue: Pressed
+    tissue: Solves
     arrived: Step
     added: float = 0.0
 
@@ -120,30 +122,30 @@ class Press:
         """The depth (m) of the tip to which it is solved."""
         return self.depth_of(self.tissue.deepest) if self.is_reached else self.arrived.depth
 
-    def energy(self, depth: float) -> tuple[float, float]:
-        """Return the energy (J) that is stored since the arrival, with the tip at a depth (m), and its bar."""
+    def _stored(self, depth: float) -> tuple[float, float]:
+        """Return the energy (J) since the arrival that the tissue stores, and what is above it."""
         own = self.tissue.at(self.own_depth(depth))[0] - self.tissue.at(self._first)[0]
-        more = self.added * (depth - self.arrived.depth) ** 2 / 2
-        return own + more, self.tissue.bar * own + more
+        return own, self.added * (depth - self.arrived.depth) ** 2 / 2
 
-    def force(self, depth: float) -> tuple[float, float]:
-        """Return the force (N) on the tip at a depth (m), and its bar."""
-        own, more = self.tissue.at(self.own_depth(depth))[1], self.added * (depth - self.arrived.depth)
-        return own + more, self.tissue.bar * own + more
+    def energy(self, depth: float) -> float:
+        """Return the energy (J) that is stored since the arrival, with the tip at a depth (m)."""
+        return sum(self._stored(depth))
 
-    def step(self, depth: float, phase: str = INDENTATION) -> Step:
+    def at(self, depth: float, phase: str = INDENTATION) -> Step:
         """Return the step at a depth (m); the shaft rubs as on arrival, pulled out against its motion."""
-        (energy, _), (force, error) = self.energy(depth), self.force(depth)
-        rubbed = self.arrived.friction * (depth - self.arrived.depth)
+        bar, (own, above), moved = self.tissue.bar, self._stored(depth), depth - self.arrived.depth
+        _, force = self.tissue.at(self.own_depth(depth))
+        more, rubbed = self.added * moved, self.arrived.friction * moved
         return replace(
             self.arrived,
             phase=phase,
             depth=depth,
-            elastic=force,
+            elastic=force + more,
             cutting=0.0,
             friction=self.arrived.friction if phase == INDENTATION else -self.arrived.friction,
-            error=self.arrived.error + error,
-            stored=self.arrived.stored + energy,
+            error=self.arrived.error + (bar * force + more),
+            stored=self.arrived.stored + (own + above),
+            energy_error=bar * own + above,
             rubbed=self.arrived.rubbed + rubbed,
-            work=self.arrived.work + energy + rubbed,
+            work=self.arrived.work + (own + above) + rubbed,
         )

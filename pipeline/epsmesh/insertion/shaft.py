@@ -20,6 +20,7 @@ from typing import Self
 import numpy as np
 
 from epsmesh.arrays import FloatArray
+from epsmesh.insertion.curve import Curve
 from epsmesh.insertion.states import Solved, Tissue
 from epsmesh.insertion.steps import CUTTING, Step
 from epsmesh.shapes.insertion import Needle
@@ -101,12 +102,13 @@ class ShaftCut:
 
 
 @dataclass(frozen=True)
-class NeedleCut:
-    """A needle that cuts layers, each from a depth (m) of ``tops`` on."""
+class NeedleCut(Curve):
+    """A needle that cuts layers, each from a depth (m) of ``tops`` on; its energy counts from a depth ``since`` (m)."""
 
     needle: Needle
     tops: tuple[float, ...]
     layers: tuple[ShaftCut, ...]
+    since: float = 0.0
 
     def _parts(self, depth: float) -> Iterator[tuple[ShaftCut, float, float]]:
         """Yield each layer, and the heights (m) of its top and bottom above a tip at a depth (m)."""
@@ -125,20 +127,19 @@ class NeedleCut:
         return self.layers[number].force > self.layers[number - 1].force
 
     def energy(self, depth: float) -> float:
-        """Return stored energy and work of fracture (J) with the tip at a depth (m)."""
-        step = self.step(depth)
-        return step.stored + step.fracture
+        """Return the stored energy and work of fracture (J) that an advance to a depth (m) takes."""
+        return self.at(depth).energy - self.at(self.since).energy
 
-    def energy_error(self, depth: float, since: float = 0.0) -> float:
-        """Return the bar (J) of what an advance from a depth ``since`` (m) takes.
+    def energy_error(self, depth: float) -> float:
+        """Return the bar of that (J).
 
         It has those of the solves, and what is not known of the force of the shaft at each top, over one radius.
         """
         bar = max(layer.bar for layer in self.layers)
-        ends = sum(jump for top, jump in self._jumps() if since <= top < depth)
-        return bar * (self.energy(depth) - self.energy(since)) + ends * self.needle.limit
+        ends = sum(jump for top, jump in self._jumps() if self.since <= top < depth)
+        return bar * self.energy(depth) + ends * self.needle.limit
 
-    def step(self, depth: float, phase: str = CUTTING) -> Step:
+    def at(self, depth: float, phase: str = CUTTING) -> Step:
         """Return the step at a depth (m), without its work; pulled out, no tissue is cut."""
         cuts, limit = phase == CUTTING, self.needle.limit
         stored = torn = rubs = elastic = cutting = error = 0.0

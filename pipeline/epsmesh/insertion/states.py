@@ -1,7 +1,7 @@
 """The body and the tool of an insertion, and its solved states; those of a blade: intact, and with a slit."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from epsmesh.shapes.insertion import Insertion
     from epsmesh.study.schema import Material
 
-__all__ = ["SHORT", "Cut", "InsertionScene", "Scene", "Solved", "States", "Tissue"]
+__all__ = ["SHORT", "InsertionScene", "Scene", "Solved", "Tissue"]
 
 Tool = TypeVar("Tool", bound=Inserted)
 
@@ -52,17 +52,6 @@ class Solved(Protocol):
     def energy_release_error(self) -> float: ...  # noqa: D102
 
 
-class States(Protocol):
-    """What has the solved states of a scene."""
-
-    def of(self, state: Inserted, below: int = 0) -> Solved | None:
-        """Return the tool in a state of its insertion; None if that is still to be solved.
-
-        It is on the body, or on what is ``below`` so many of its layers.
-        """
-        ...
-
-
 @dataclass(frozen=True)
 class Tissue:
     """A layer from a depth ``top`` (m) on: moduli (Pa, 1), and toughness (J/m²)."""
@@ -78,29 +67,12 @@ class Tissue:
         return self.young / (1 - self.poisson**2)
 
 
-@dataclass(frozen=True)
-class Cut:
-    """A solved slit: tip of the blade at ``depth`` (m), front of the slit ``ahead`` of it (m).
-
-    ``energy`` (J) is stored, ``release`` (J/m²) the energy release rate of the front, and ``drive`` (N) the force that
-    moves the blade on at a fixed front; each with the half width of its 95 % error bar.
-    """
-
-    depth: float
-    ahead: float
-    energy: float
-    energy_error: float
-    release: float
-    release_error: float
-    drive: float
-    drive_error: float
-
-
 class InsertionScene(ABC, Generic[Tool]):
     """A body, a tool that is inserted, the depths (m) of its steps, and its solved states.
 
     Tissue is kept up to a distance (m) from the tool's axis; ``beside`` is that, or the distance of the
-    nearest side, which ``is_held`` if it is fixed.
+    nearest side, which ``is_held`` if it is fixed. ``find`` returns the tool in a state, on what is below so many
+    layers of the body; None if that is still to be solved.
 
     ``is_pending`` tells whether a state was asked for that is still to be solved.
     """
@@ -113,11 +85,11 @@ class InsertionScene(ABC, Generic[Tool]):
         *,
         kept: float,
         depths: Sequence[float],
-        states: States,
+        find: "Callable[[Tool, int], Solved | None]",
     ):
         assert tool.insertion is not None
         assert tool.toughness is not None
-        self.tool, self.depths, self._states = tool, tuple(depths), states
+        self.tool, self.depths, self._find = tool, tuple(depths), find
         self.insertion: Insertion = tool.insertion
         self.toughness, self.is_pending = tool.toughness, False
         top, frame = body.heights[1], tool.frame_on(body)
@@ -169,7 +141,7 @@ class InsertionScene(ABC, Generic[Tool]):
 
     def solved(self, state: Tool, below: int = 0) -> Solved | str:
         """Return the tool in a state, on the body ``below`` so many layers, or why there is no force of it."""
-        found = self._states.of(state, below)
+        found = self._find(state, below)
         if found is None:
             self.is_pending = True
             return "not yet solved"
@@ -177,7 +149,7 @@ class InsertionScene(ABC, Generic[Tool]):
 
     def reached(self, state: Tool, below: int = 0) -> float:
         """Return the depth (m) at which the load steps of a state that is not solved ended; NaN if there are none."""
-        found = self._states.of(state, below)
+        found = self._find(state, below)
         return found.depth_reached if found else np.nan
 
 
@@ -233,19 +205,10 @@ class Scene(InsertionScene[Blade]):
             return f"the intact {'layers below' if below else 'body'}: {found}"
         return found.force / self.insertion.to, found.force * found.force_error / self.insertion.to
 
-    def cuts(self, places: Sequence[tuple[float, float]]) -> dict[tuple[float, float], Cut | str]:
-        """Return the solved slits of pairs of depth and distance ahead (m), or why there is none."""
-        return {place: self.cut(*place) for place in places}
-
-    def cut(self, depth: float, ahead: float, beside: float | None = None) -> Cut | str:
+    def cut(self, depth: float, ahead: float, beside: float | None = None) -> Solved | str:
         """Return the solved slit with the front ``ahead`` of the tip at a depth (m), or why there is none.
 
-        The front is as far ``beside`` the blade's ends (m), if that is not given.
+        The front is as far ``beside`` the blade's ends (m), if that is not given. Its force moves the blade on at a
+        fixed front; the bar on that contains the one on the energy.
         """
-        found = self.solved(self.blade.in_slit(depth, ahead, beside))
-        if isinstance(found, str):
-            return found
-        # The bar on the force contains that on the energy.
-        energy, drive, error, release = found.energy, found.force, found.force_error, found.energy_release
-        release_error = found.energy_release_error * release
-        return Cut(depth, ahead, energy, error * energy, release, release_error, drive, error * abs(drive))
+        return self.solved(self.blade.in_slit(depth, ahead, beside))

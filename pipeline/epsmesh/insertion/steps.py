@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 from epsmesh.states import FAILED, OK, PARTIAL, PENDING
 
@@ -12,7 +13,10 @@ PHASES = (INDENTATION, CUTTING, WITHDRAWAL, ENDED)
 
 @dataclass(frozen=True)
 class Step:
-    """One depth (m) of a path: forces (N) with the error bar of their sum, energies (J) since the first touch."""
+    """One depth (m) of a path: forces (N) with the error bar of their sum, energies (J) since the first touch.
+
+    ``energy_error`` is the bar of the stored energy.
+    """
 
     phase: str
     depth: float
@@ -25,11 +29,27 @@ class Step:
     rubbed: float = 0.0
     work: float = 0.0
     crack_depth: float = 0.0
+    energy_error: float = 0.0
+
+    @property
+    def energy(self) -> float:
+        """Stored energy and work of fracture (J)."""
+        return self.stored + self.fracture
+
+    @property
+    def slope(self) -> float:
+        """Change of both with the depth (N): the force without friction."""
+        return self.elastic + self.cutting
 
     @property
     def force(self) -> float:
         """Force (N) of the tissue against the advance."""
-        return self.elastic + self.cutting + self.friction
+        return self.slope + self.friction
+
+    @property
+    def is_indentation(self) -> bool:
+        """Whether the tool presses on tissue that it does not cut."""
+        return self.phase == INDENTATION
 
     @property
     def balance(self) -> float:
@@ -37,15 +57,18 @@ class Step:
         return (self.work - self.stored - self.fracture - self.rubbed) / self.work
 
 
+Step_co = TypeVar("Step_co", bound=Step, covariant=True)
+
+
 @dataclass(frozen=True)
-class Puncture:
+class Puncture(Generic[Step_co]):
     """A puncture: the step ``before`` it, the peak, and the one ``after`` it, at the same depth (m).
 
     Error bars are those of the depth (m), and of the force (N) before.
     """
 
-    before: Step
-    after: Step
+    before: Step_co
+    after: Step_co
     depth_error: float
     force_error: float
 
@@ -71,7 +94,7 @@ class Path:
     """
 
     steps: tuple[Step, ...] = ()
-    punctures: tuple[Puncture | None, ...] = ()
+    punctures: tuple[Puncture[Step] | None, ...] = ()
     message: str = ""
     withdrawal: tuple[Step, ...] = ()
     is_pending: bool = False

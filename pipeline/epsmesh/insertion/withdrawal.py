@@ -7,7 +7,8 @@ layer: with the tip in layers above, the slit is solved with the front where cut
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -26,32 +27,24 @@ _SHIFT_ERROR = 0.3
 _TINY = 1e-9
 
 
-@dataclass(frozen=True)
-class _Open:
-    """A blade at rest in a slit: ``ahead`` (m) of its tip, energy (J), and force and friction (N) with bars.
+@dataclass(frozen=True, kw_only=True)
+class _Open(Cutting):
+    """A blade at rest in a slit.
 
-    ``steady`` (N) is the force without that of the front at a fixed field; all of it ``without_field``.
+    ``steady`` (N) is the force without that of the front at a fixed field; all of it where ``without_field``.
     """
 
-    state: Cutting
-    ahead: float
-    stored: float
     steady: float
-    elastic: float
-    elastic_error: float
-    friction: float
-    friction_error: float
-    without_field: bool = False
+    without_field: bool = True
 
     def work_from(self, before: "_Open", scene: Scene) -> float:
         """Return the work (J), but that of friction, since a state ``before`` in which the tip was deeper."""
-        moved = before.state.depth - self.state.depth
-        if before.without_field != self.without_field or scene.crosses(self.state.depth, before.state.depth):
+        moved = before.depth - self.depth
+        if before.without_field != self.without_field or scene.crosses(self.depth, before.depth):
             return self.stored - before.stored
         released = 0.0
         if not self.without_field:
-            fields = (side.state.field for side in (before, self))
-            released = sum(field.per_length(before.ahead, self.ahead) for field in fields) / 2
+            released = sum(side.field.per_length(before.ahead, self.ahead) for side in (before, self)) / 2
         return -scene.blade.length * released - (self.steady + before.steady) / 2 * moved
 
 
@@ -75,44 +68,32 @@ def withdrawn(
             message = f"withdrawal, {1e3 * state.depth:.4g} mm: {one}"
             break
         opened.append(one or _open(scene, state, bending, front))
-    work, rubbed, found = last.work, last.rubbed, []
-    for number, one in enumerate(opened):
-        if number:
-            before = opened[number - 1]
-            rubs = (one.friction + before.friction) / 2 * (before.state.depth - one.state.depth)
-            rubbed += rubs
-            work += rubs + one.work_from(before, scene)
-        found.append(
-            Step(
-                phase=WITHDRAWAL,
-                depth=one.state.depth,
-                elastic=one.elastic,
-                friction=-one.friction,
-                error=one.elastic_error + one.friction_error,
-                stored=one.stored,
-                fracture=last.fracture,
-                rubbed=rubbed,
-                work=work,
-                crack_depth=front,
-            )
-        )
-    return found, message
+    found: list[_Open] = []
+    for one in opened:
+        work, rubbed = last.work, last.rubbed
+        if found:
+            before = found[-1]
+            rubs = -(one.friction + before.friction) / 2 * (before.depth - one.depth)
+            rubbed = before.rubbed + rubs
+            work = before.work + (rubs + one.work_from(before, scene))
+        found.append(replace(one, fracture=last.fracture, rubbed=rubbed, work=work, crack_depth=front))
+    return list(found), message
+
+
+def _at_rest(scene: Scene, state: Cutting, ahead: float, **found: Any) -> _Open:
+    """Return the blade at the depth of a ``state``, in a slit with the front ``ahead`` (m), and what is ``found``."""
+    width = scene.blade.width
+    squeeze, squeeze_error = 2 * found["stored"] / width, 2 * found["energy_error"] / width
+    friction, error = rub(scene.blade, state.depth, squeeze, squeeze_error, inwards=False)
+    found["error"] += error
+    return _Open(phase=WITHDRAWAL, depth=state.depth, ahead=ahead, field=state.field, friction=-friction, **found)
 
 
 def _pressed(scene: Scene, state: Cutting) -> _Open:
     """Return the blade in a ``state`` of indentation."""
     friction, error = rub(scene.blade, state.flank, state.squeeze, state.squeeze_error, inwards=False)
-    return _Open(
-        state=state,
-        ahead=state.ahead,
-        stored=state.stored,
-        steady=state.elastic,
-        elastic=state.elastic,
-        elastic_error=state.elastic_error,
-        friction=friction,
-        friction_error=error,
-        without_field=True,
-    )
+    changes = {"phase": WITHDRAWAL, "friction": -friction, "error": state.error + error, "cutting": 0.0}
+    return _Open(**vars(state) | changes, steady=state.elastic)
 
 
 def _above(scene: Scene, state: Cutting, deepest: Cutting, front: float) -> _Open | str | None:
@@ -120,33 +101,32 @@ def _above(scene: Scene, state: Cutting, deepest: Cutting, front: float) -> _Ope
 
     The front that is solved is that of the ``deepest`` state of cutting, as for any toughness; near to where it is.
     """
-    depth, length, width = state.depth, scene.blade.length, scene.blade.width
+    depth, length = state.depth, scene.blade.length
     if not scene.crosses(depth, (1 - _TINY) * front):
         return None
     _, solved, beside = place = scene.far(depth, deepest.depth)
     cut = scene.cut(*place)
     if isinstance(cut, str):
         return cut
-    ahead = front - depth
+    ahead, release = front - depth, cut.energy_release
+    drive_error = cut.force_error * abs(cut.force)
     # Far from the tip, G falls with the square of the distance.
     nearer = solved / ahead
-    shift, pull = length * cut.release * solved * (nearer - 1), length * cut.release * (nearer**2 - 1)
+    shift, pull = length * release * solved * (nearer - 1), length * release * (nearer**2 - 1)
     corners = state.field.corners(state.ahead, beside) / 2
     added, widened = sides(scene, state.field, depth, beside) + corners, 2 * state.field.per_length(state.ahead, beside)
     stored = cut.energy + shift + added
-    error = cut.energy_error + _SHIFT_ERROR * abs(shift) + EXTENSION_ERROR * abs(added)
-    elastic = cut.drive + pull + widened
-    friction = rub(scene.blade, depth, 2 * stored / width, 2 * error / width, inwards=False)
-    return _Open(
-        state=state,
-        ahead=ahead,
+    error = cut.force_error * cut.energy + _SHIFT_ERROR * abs(shift) + EXTENSION_ERROR * abs(added)
+    elastic = cut.force + pull + widened
+    return _at_rest(
+        scene,
+        state,
+        ahead,
         stored=stored,
+        energy_error=error,
         steady=elastic,
         elastic=elastic,
-        elastic_error=cut.drive_error + _SHIFT_ERROR * abs(pull) + EXTENSION_ERROR * abs(widened),
-        friction=friction[0],
-        friction_error=friction[1],
-        without_field=True,
+        error=drive_error + _SHIFT_ERROR * abs(pull) + EXTENSION_ERROR * abs(widened),
     )
 
 
@@ -154,17 +134,17 @@ def _open(scene: Scene, state: Cutting, bending: float, front: float) -> _Open:
     """Return the blade at the depth of a ``state`` of cutting, where κ changes by ``bending`` (1/m²) with the depth."""
     ahead, length, width, field = front - state.depth, scene.blade.length, scene.blade.width, state.field
     stored = state.stored - length * field.per_length(state.ahead, ahead)
-    stored_error = state.stored_error + _FAR_ERROR * length * max(field.per_length(width, ahead), 0.0)
+    energy_error = state.energy_error + _FAR_ERROR * length * max(field.per_length(width, ahead), 0.0)
     pushed, changed = length * field.release(ahead), length * bending * field.by_bend(state.ahead, ahead)
-    friction = rub(scene.blade, state.depth, 2 * stored / width, 2 * stored_error / width, inwards=False)
     far_error = _FAR_ERROR * pushed if ahead > width else 0.0
-    return _Open(
-        state=state,
-        ahead=ahead,
+    return _at_rest(
+        scene,
+        state,
+        ahead,
         stored=stored,
+        energy_error=energy_error,
         steady=state.elastic + changed,
         elastic=state.elastic + changed + pushed,
-        elastic_error=state.elastic_error + far_error + _CHANGE_ERROR * abs(changed),
-        friction=friction[0],
-        friction_error=friction[1],
+        error=state.error + far_error + _CHANGE_ERROR * abs(changed),
+        without_field=False,
     )

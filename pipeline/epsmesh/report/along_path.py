@@ -125,10 +125,10 @@ def _phases(steps: Sequence[Step], depths: Sequence[float]) -> list[int]:
     return [PHASES.index(by_depth.get(depth, ENDED)) for depth in depths]
 
 
-def _puncture(one: Puncture | None) -> tuple[float, ...]:
+def _puncture(one: Puncture[Step] | None) -> tuple[float, ...]:
     return (one.depth, one.depth_error, one.force, one.force_error) if one else (np.nan,) * len(_PUNCTURE)
 
 
-def _at_puncture(one: Puncture | None) -> list[tuple[float, ...]]:
+def _at_puncture(one: Puncture[Step] | None) -> list[tuple[float, ...]]:
     sides = (one.before, one.after) if one else ()
     return [_of(side)[:-1] for side in sides] or [(np.nan,) * len(AT_PUNCTURE)] * 2

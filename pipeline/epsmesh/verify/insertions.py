@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from epsmesh.insertion.near_tip import EXTENSION_ERROR, NearTip, strength
 from epsmesh.insertion.paths import lacking, paths, scenes
-from epsmesh.insertion.states import Cut, Scene
+from epsmesh.insertion.states import Scene, Solved
 from epsmesh.plan.plan import Plan, make_plan
 from epsmesh.run.execute import compute
 from epsmesh.run.record import Record
@@ -51,15 +51,15 @@ def insertion_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
         message=path.message,
     )
     near, far = _fronts(comm, plan, records)
-    field = NearTip.through(strength(20e3, 0.3, 0.4e-3), _FAR, far.release)
+    field = NearTip.through(strength(20e3, 0.3, 0.4e-3), _FAR, far.energy_release)
     yield Row(
         "front near a blade's tip, ν = 0.3: energy release",
         "3D",
         field.release(_NEAR),
         "rigid plate, G. I. Barenblatt 1962; κ from a front four times as far",
-        near.release,
-        near.release_error / near.release,
-        far.release_error / far.release + EXTENSION_ERROR,
+        near.energy_release,
+        near.energy_release_error,
+        far.energy_release_error + EXTENSION_ERROR,
     )
 
 
@@ -73,14 +73,15 @@ def _solved(comm: MPI.Comm, plan: Plan) -> dict[str, Record]:
     return records
 
 
-def _fronts(comm: MPI.Comm, plan: Plan, records: dict[str, Record]) -> list[Cut]:
+def _fronts(comm: MPI.Comm, plan: Plan, records: dict[str, Record]) -> list[Solved]:
     """Return the solved slits with a near front, and with that of a stage, whose ``records`` are known."""
     places = [(_DEPTH, _NEAR), (_DEPTH, _FAR)]
     ((scene, states),) = scenes(plan, records)
     assert isinstance(scene, Scene)
-    scene.cuts(places)
+    for place in places:
+        scene.cut(*place)  # which asks for it
     for own in states.further.values():
         records |= compute(own, comm)
     ((scene, _),) = scenes(plan, records)
     assert isinstance(scene, Scene)
-    return [cut for cut in scene.cuts(places).values() if isinstance(cut, Cut)]
+    return [cut for cut in (scene.cut(*place) for place in places) if not isinstance(cut, str)]
