@@ -28,7 +28,7 @@ from epsmesh.run.meshing import mesh_case
 from epsmesh.run.problem import law_of, movement_of, tool_of
 from epsmesh.solve import SolveError
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
-from epsmesh.solve.contact.large_friction import LargeFrictionalContact
+from epsmesh.solve.contact.large import LargeContact
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.solution import Solution
 from epsmesh.solve.spaces import Spaces
@@ -64,12 +64,12 @@ class Trial:
 @contextmanager
 def more_steps() -> Iterator[None]:
     """Take twice as many load steps with friction."""
-    usual = LargeFrictionalContact.STEPS
-    LargeFrictionalContact.STEPS = 2 * usual
+    usual = LargeContact.STEPS
+    LargeContact.STEPS = 2 * usual
     try:
         yield
     finally:
-        LargeFrictionalContact.STEPS = usual
+        LargeContact.STEPS = usual
 
 
 def truth_of(scene: Scene) -> float:

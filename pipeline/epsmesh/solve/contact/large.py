@@ -5,25 +5,33 @@ the work of the reactions in a small change of the displacement is the change of
 
 The error bar comes from one degree more, from the same state on and with contact found again: the contact area is the
 larger part of the error.
+
+With friction, contact without it is found first; it gives the error bar of the mesh. The path is then followed in load
+steps, and again in half as many: the change of the force is the bar of the steps.
 """
 
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from math import nan
+from typing import ClassVar
 
 import numpy as np
 
-from epsmesh.arrays import BoolArray
+from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve import SolveError
-from epsmesh.solve.balance import check_balance, check_work
+from epsmesh.solve.balance import check_balance
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.active_set import ContactError, Obstacle
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, check_outside, press
+from epsmesh.solve.contact.checks import check_energy, check_support, force_of
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, check_outside, press, press_with_friction
 from epsmesh.solve.contact.corrections import Corrections
+from epsmesh.solve.contact.coulomb import rubbing_of
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
 from epsmesh.solve.contact.elements import State
+from epsmesh.solve.contact.frictional import with_friction
 from epsmesh.solve.contact.geometry import Area, contact_area
+from epsmesh.solve.contact.large_friction import friction_of
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
 from epsmesh.solve.contact.tissue import DeformedBody
@@ -45,7 +53,13 @@ _FOUND_AGAIN = 1e-3
 
 
 class LargeContact:
-    """Contact of a tool with a hyperelastic body of one law under loads; a load path continues to larger depths."""
+    """Contact of a tool with a hyperelastic body of one law under loads; a load path continues to larger depths.
+
+    With friction each depth has a path of its own. ``STEPS`` is the number of its load steps: enough for a bar of some
+    tenths of a per cent where tissue sticks.
+    """
+
+    STEPS: ClassVar[int] = 8
 
     def __init__(self, surface: Surface, elements: Elements, tool: Tool, asked: Request):
         """Prepare for law and loads of a request."""
@@ -71,10 +85,13 @@ class LargeContact:
             LargeError: if the load steps end before the depth, or the solution fails a check.
             ContactError: if contact reaches the support or the edge of the candidates.
         """
-        found, iterations = self.find(asked, stack)
+        found, iterations = self._without_friction(asked, stack)
+        if self._tool.friction:
+            found, more = self._with_friction(found)
+            iterations += more
         return found.equilibrium(asked.movement, iterations, stack)
 
-    def find(self, asked: Request, stack: ExitStack) -> "tuple[LargeContactSolution, int]":
+    def _without_friction(self, asked: Request, stack: ExitStack) -> "tuple[LargeContactSolution, int]":
         """Return contact at the depth of the movement, and Newton's iterations; see :meth:`solve`."""
         (depth,) = asked.movement.amounts
         body = DeformedBody(self._elements, self._surface, self._law, asked.method, stack, self._applied)
@@ -94,11 +111,29 @@ class LargeContact:
             self._surface, body, self._tool, touched, depth, self._sagged, self._corrections
         ), iterations
 
+    def _with_friction(self, smooth: "LargeContactSolution") -> "tuple[LargeContactSolution, int]":
+        """Return contact with friction, beside that without, ``smooth``, and Newton's iterations; see :meth:`solve`."""
+        body, depth, state, tool = smooth.body, smooth.depth, smooth.body.state, smooth.placed
+        friction, found, iterations = friction_of(body, self._tool.friction, depth), list[ContactSolution](), 0
+        for steps in (self.STEPS // 2, self.STEPS):
+            path = ContactPath(ContactStage(0.0, smooth.sagged.state))
+            try:
+                iterations += press_with_friction(
+                    body, lambda there: placed_tool(body, tool, there), path, depth, friction, steps
+                )
+            except LargeError as error:
+                raise stopped(body, path, depth, error, self._tool.friction) from error
+            assert path.last.touched is not None
+            found.append(path.last.touched)
+        body.state = path.last.state
+        coarse, fine = found
+        return replace(smooth, touched=fine, beside=Beside(smooth, state, coarse)), iterations
+
 
 def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError, friction: float = 0.0) -> LargeError:
     """Return the error of a ``path`` that ends before ``depth`` (m)."""
     last, whole = path.last, 2.0 ** len(body.elements.body.mirrored)
-    reached = last.amount, 0.0 if last.touched is None else -whole * float(last.touched.forces[:, 2].sum())
+    reached = last.amount, 0.0 if last.touched is None else whole * force_of(last.touched)
     return ended(why, body.law, reached, depth, is_found=True, friction=friction)
 
 
@@ -115,10 +150,20 @@ def placed_tool(body: DeformedBody, tool: Tool, depth: float) -> PlacedTool:
 
 
 @dataclass(frozen=True, eq=False)
+class Beside:
+    """Beside contact with friction: that without, ``smooth``, with its ``state``; and the one from half the steps."""
+
+    smooth: "LargeContactSolution"
+    state: FloatArray
+    coarse: ContactSolution
+
+
+@dataclass(frozen=True, eq=False)
 class LargeContactSolution:
     """Contact at a ``depth`` (m) with the state of a ``body``; methods are collective.
 
     ``sagged`` is the body before, from whose first touch the depth counts. ``corrections`` are those of the path.
+    ``beside`` is given with friction.
     """
 
     surface: Surface
@@ -128,6 +173,7 @@ class LargeContactSolution:
     depth: float
     sagged: Sagged
     corrections: Corrections
+    beside: Beside | None = None
 
     @property
     def placed(self) -> Tool:
@@ -142,7 +188,7 @@ class LargeContactSolution:
     @property
     def force(self) -> float:
         """The force (N) on the modelled part of the tool, along its axis."""
-        return -float(self.touched.forces[:, 2].sum())
+        return force_of(self.touched)
 
     @property
     def is_ended(self) -> bool:
@@ -164,9 +210,14 @@ class LargeContactSolution:
         return Equilibrium(self, columns, movement, iterations, self.response(movement), contact=self.summary())
 
     def summary(self) -> Contact:
-        """Return the area of the whole contact, with loads their effects."""
-        loaded = 2.0 ** len(self.body.elements.body.mirrored) * self.sagged.stored
-        return Contact(self.whole_area, sag=self.sagged.sag, load_energy=loaded, is_ended=self.is_ended)
+        """Return the area of the whole contact, the part that slides, the friction, and the effects of loads."""
+        mirrored, touched, tool = self.body.elements.body.mirrored, self.touched, self.tool
+        loaded = 2.0 ** len(mirrored) * self.sagged.stored
+        found = Contact(self.whole_area, sag=self.sagged.sag, load_energy=loaded, is_ended=self.is_ended)
+        if self.beside is None:
+            return found
+        rubbing = rubbing_of(self.body.candidates, tool.friction, touched, self.beside.coarse)
+        return found.with_friction(rubbing, tool.torque(self.body.positions(), touched.forces), mirrored)
 
     def check(self) -> None:
         """Check the work, and that contact ends within the candidates.
@@ -175,20 +226,13 @@ class LargeContactSolution:
             LargeError: if the work of the reactions is not the change of the energy.
             ContactError: if contact reaches the support or the edge of the candidates.
         """
-        body, candidates = self.body, self.body.candidates
-        if np.any(self.touched.gap[body.fixed.all(axis=1)] < 0):
-            raise ContactError("the probe reaches the fixed part of the body: no displacement satisfies both")
+        candidates = self.body.candidates
+        check_support(self.body, self.touched)
         if not np.all(self.tool.ends_at(candidates.points[self.touched.active & candidates.is_edge])):
             raise ContactError(
                 "the contact reaches the edge of the surface region that is searched for contact: use a smaller depth"
             )
-        state, work = body.state, float((self.touched.forces * (body.positions() - candidates.points)).sum())
-        energies = []
-        for change in (_SMALL, -_SMALL):
-            body.state = (1 + change) * state
-            energies.append(body.energy)
-        body.state = state
-        check_work(work, (energies[0], energies[1]), _SMALL, LargeError)
+        check_energy(self.body, self.touched, _SMALL)
 
     def response(self, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d."""
@@ -206,9 +250,18 @@ class LargeContactSolution:
     ) -> HierarchicalEstimate:
         """Return the change of the force in one degree more, where contact is found again, and its bar.
 
+        With friction the change is that of contact without, and the bar has the bars of friction, too.
+
         Raises:
             LargeError: if the next degree does not converge.
         """
+        if self.beside is not None:
+            smooth, state = self.beside.smooth, self.body.state
+            self.body.state = self.beside.state
+            found = smooth.hierarchical_estimate(columns, movement, stack, keep=keep)
+            self.body.state = state
+            path_bar = abs(force_of(self.beside.coarse) / self.force - 1)
+            return with_friction(found, path_bar, added=self.force / smooth.force - 1)
         finer = self._found_again(movement.loads, stack)
         share, at_edge = 1 - finer.force / self.force, self._area().bar
         least = AT_EDGE_LARGE[self.body.elements.degree]

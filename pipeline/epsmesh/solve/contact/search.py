@@ -25,7 +25,6 @@ from epsmesh.solve.contact.frictional import add_friction
 from epsmesh.solve.contact.geometry import Touch
 from epsmesh.solve.contact.in_time import PressedTool
 from epsmesh.solve.contact.large import LargeContact
-from epsmesh.solve.contact.large_friction import LargeFrictionalContact
 from epsmesh.solve.contact.levels import Numbering, Surface
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.sweep import Sweep
@@ -119,8 +118,7 @@ class ContactSearch:
     def _solve_large(self, asked: Request, stack: ExitStack) -> Equilibrium:
         """Find contact at large displacements: see :class:`LargeContact`."""
         if self._large is None or not (self._reuse and self._large.can_reach(asked)):
-            kind = LargeFrictionalContact if self._tool.friction else LargeContact
-            self._large = kind(self._surface, self._elements, self._tool, asked)
+            self._large = LargeContact(self._surface, self._elements, self._tool, asked)
         return self._large.solve(asked, stack)
 
     def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> PressedTool:

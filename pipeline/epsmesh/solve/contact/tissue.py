@@ -84,7 +84,7 @@ class DeformedBody:
 
     def positions(self) -> FloatArray:
         """Return the nodes' deformed positions (n, 3), in m."""
-        return self.candidates.points + self._numbering.gather_vectors(self._now.array[: self._space.owned])
+        return self.places + self._numbering.gather_vectors(self._now.array[: self._space.owned])
 
     def forces(self) -> FloatArray:
         """Return the nodal forces (n, 3), N; zero at prescribed components."""
@@ -142,6 +142,11 @@ class DeformedBody:
     def energy(self) -> float:
         """Energy (J) of the modelled part less the work of loads, NaN if tissue is inside out; collective."""
         return self._body.energy(self._now)
+
+    @property
+    def places(self) -> FloatArray:
+        """The nodes' places (n, 3) at rest, in m."""
+        return self.candidates.points
 
     # ---- results ----------------------------------------------------------------------------------------
 

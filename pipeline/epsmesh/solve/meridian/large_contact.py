@@ -21,6 +21,7 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.mesh.elliptic_meridian import EllipticMeridian
 from epsmesh.mesh.meridian import Grading
+from epsmesh.solve.contact.checks import check_support
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool
 from epsmesh.solve.contact.in_time import PressedTissue
 from epsmesh.solve.meridian.in_time import RelaxingHalfPlane
@@ -182,7 +183,7 @@ class PressedTouch(PressedTissue):
         return replace(self._touch.placed(share * self._depth), depth=self._depth)
 
     def _check(self, touched: ContactSolution) -> None:
-        self._touch.check_outside(touched)
+        check_support(self._touch.tissue, touched)
 
     def _measure(self, touched: ContactSolution, share: float) -> None:
         found, is_touched = replace(self._touch, touched=touched), bool(touched.active.any())

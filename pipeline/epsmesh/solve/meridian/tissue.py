@@ -84,7 +84,12 @@ class MeridianTissue:
     @property
     def is_sound(self) -> bool:
         """Whether no tissue is inside out."""
-        return bool(np.isfinite(self.system.forms.energy(self._now)))
+        return bool(np.isfinite(self.energy))
+
+    @property
+    def energy(self) -> float:
+        """The energy, NaN if tissue is inside out."""
+        return self.system.forms.energy(self._now)
 
     def _blocks(self, blocks: FloatArray) -> sp.csr_matrix:
         """Return the matrix with ``blocks`` (n, 2, 2) at the nodes."""

@@ -18,7 +18,8 @@ from epsmesh.mesh.meridian import MeridianArrays
 from epsmesh.scene.model import FREE, PROBE
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
-from epsmesh.solve.balance import check_balance, check_work
+from epsmesh.solve.balance import check_balance
+from epsmesh.solve.contact.checks import check_energy, check_support, force_of
 from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, Friction, press, press_with_friction
 from epsmesh.solve.contact.coulomb import Neighbours
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
@@ -45,7 +46,7 @@ _DOWN = np.array([0.0, -1.0])
 class MeridianTouch:
     """A ``tool`` above ``tissue`` of a ``law``, whose nodes are those of the surface from the axis outwards.
 
-    ``unit`` (m) is that of the mesh, ``volume`` that of a cylinder round the body. ``touched`` is the contact.
+    ``unit`` (m) is that of the mesh, ``volume`` that of a cylinder round the body, per radian; ``touched`` the contact.
     """
 
     tissue: MeridianTissue
@@ -67,7 +68,7 @@ class MeridianTouch:
         order = order[seen_from_above(arrays, places[order])]
         wide, high = np.ptp(arrays.points, axis=0)
         tissue = MeridianTissue(system, dofs[order], places[order])
-        return MeridianTouch(tissue, tool, law, arrays.unit, pi * wide**2 * high)
+        return MeridianTouch(tissue, tool, law, arrays.unit, wide**2 * high / 2)
 
     def pressed(self, depth: float) -> "MeridianTouch":
         """Return the contact without friction at the end of the load path to a ``depth`` (m).
@@ -181,7 +182,7 @@ class MeridianTouch:
     @cached_property
     def force(self) -> float:
         """F on the tool, against its advance."""
-        return -2 * pi * float(self._contact.forces[:, 1].sum())
+        return 2 * pi * force_of(self._contact)
 
     @property
     def force_in_metres(self) -> float:
@@ -198,7 +199,7 @@ class MeridianTouch:
     @cached_property
     def energy(self) -> float:
         """The stored energy."""
-        return 2 * pi * self.tissue.system.forms.energy(self.tissue.state)
+        return 2 * pi * self.tissue.energy
 
     @property
     def _outermost(self) -> tuple[float, float]:
@@ -281,18 +282,6 @@ class MeridianTouch:
         Raises:
             SolveError: if forces do not balance, the work is not the change of the energy, or the support is touched.
         """
-        tissue, touched = self.tissue, self._contact
-        self.check_outside(touched)
+        check_support(self.tissue, self._contact)
         check_balance(self.balance)
-        work = 2 * pi * float((touched.forces * (tissue.positions() - tissue.places)).sum())
-        more, less = (2 * pi * tissue.system.forms.energy((1 + change) * tissue.state) for change in (_SMALL, -_SMALL))
-        check_work(work, (more, less), _SMALL, LargeError, _ROUNDING * self.volume)
-
-    def check_outside(self, touched: ContactSolution) -> None:
-        """Check that the tool does not reach the support.
-
-        Raises:
-            SolveError: if it does.
-        """
-        if np.any(touched.gap[self.tissue.fixed.all(axis=1)] < 0):
-            raise SolveError("the probe reaches the fixed part of the body: no displacement satisfies both")
+        check_energy(self.tissue, self._contact, _SMALL, _ROUNDING * self.volume)

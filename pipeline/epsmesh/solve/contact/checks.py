@@ -1,0 +1,52 @@
+"""Checks of contact at equilibrium that are independent of the loop that finds it, in two and in three dimensions."""
+
+from typing import Protocol
+
+import numpy as np
+
+from epsmesh.arrays import FloatArray
+from epsmesh.solve.balance import check_work
+from epsmesh.solve.contact.active_set import ContactError
+from epsmesh.solve.contact.deformed import ContactSolution, Tissue
+from epsmesh.solve.newton import LargeError
+
+
+class StoringTissue(Tissue, Protocol):
+    """Tissue with nodes whose ``places`` (n, d) at rest are known, and with its ``energy``; NaN if J <= 0."""
+
+    @property
+    def places(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def energy(self) -> float: ...  # noqa: D102
+
+
+def force_of(touched: ContactSolution) -> float:
+    """Return the force on the tool along its axis, from the modelled part."""
+    return -float(touched.forces[:, -1].sum())
+
+
+def check_support(tissue: Tissue, touched: ContactSolution) -> None:
+    """Check that the tool does not reach the support.
+
+    Raises:
+        ContactError: if it does.
+    """
+    if np.any(touched.gap[tissue.fixed.all(axis=1)] < 0):
+        raise ContactError("the probe reaches the fixed part of the body: no displacement satisfies both")
+
+
+def check_energy(tissue: StoringTissue, touched: ContactSolution, change: float, rounding: float = 0.0) -> None:
+    """Check that reactions do the work in a small ``change`` of the displacement, a share of it, that tissue stores.
+
+    ``rounding`` is the error of energies. Collective.
+
+    Raises:
+        LargeError: if they do not.
+    """
+    state, work = tissue.state, float((touched.forces * (tissue.positions() - tissue.places)).sum())
+    energies = []
+    for share in (1 + change, 1 - change):
+        tissue.state = share * state
+        energies.append(tissue.energy)
+    tissue.state = state
+    check_work(work, (energies[0], energies[1]), change, LargeError, rounding)
