@@ -19,21 +19,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import epsmesh
-from epsmesh.report.compliance import sinking
 from epsmesh.report.figures import STYLE, figure
 from epsmesh.report.figures.style import COLOURS
 
 DOCS = Path(__file__).parent
 RESULTS, PICTURES = DOCS.parent / "results", DOCS / "figures"
 DPI = 130
-# Tools of compliance.toml, by their contact.
-MARKS = {"o": "slides", "s": "sticks", "^": "ball", "D": "cone"}
-KINDS: dict[str, Callable[[str], bool]] = {
-    "slides": lambda name: name.endswith("mm"),
-    "sticks": lambda name: name.endswith("sticks"),
-    "ball": lambda name: name == "ball",
-    "cone": lambda name: name == "cone",
-}
 # What the paper claims of F/F_max, at ε (mm).
 PAPER = (10.0, 0.8)
 
@@ -47,37 +38,6 @@ def guideline(data: xr.Dataset) -> Figure:
         ax.annotate("paper: 80 %", PAPER, (8, -10), textcoords="offset points", color="#d81b60", fontsize=9)
         ax.set_ylim(0, 1.05)
         ax.legend(fontsize=9, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
-    return drawn
-
-
-def one_number(data: xr.Dataset) -> Figure:
-    """c of every tool over that of the smallest disc that slides, against the mean square distance of F, over ε²."""
-    found = data.epsmesh.compliance("full")["compliance"].sel(outside="free")
-    square = sinking(data).assign_coords(data.coords)["square"].sel(outside="free")
-    drawn, axes = plt.subplots(1, 2, figsize=(8.4, 3.4), sharey=True, layout="constrained")
-    for ax, nu in zip(axes, data["poisson"].values, strict=True):
-        for epsilon, colour in zip((5e-3, 7e-3, 10e-3), COLOURS, strict=False):
-            c, m = (part.sel(poisson=nu, epsilon=epsilon) for part in (found, square))
-            least = float(c.sel(probe="disc 0.5 mm"))
-            for marker, kind in MARKS.items():
-                tools = [name for name in map(str, c["probe"].values) if KINDS[kind](name)]
-                x, y = m.sel(probe=tools) / epsilon**2, c.sel(probe=tools) / least
-                ax.plot(
-                    x,
-                    100 * (y - 1),
-                    marker,
-                    color=colour,
-                    markersize=5,
-                    fillstyle="none" if kind == "sticks" else "full",
-                )
-            ax.plot([], [], "-", color=colour, label=f"ε = {1e3 * epsilon:g} mm")
-        ax.set_title(f"ν = {nu:g}", fontsize=9)
-        ax.set_xlabel("mean square distance of the load over ε², m²/ε²")
-    for marker, kind in MARKS.items():
-        axes[1].plot([], [], marker, color="black", fillstyle="none" if kind == "sticks" else "full", label=kind)
-    axes[0].set_ylabel("compliance c beyond that of\nthe smallest disc, %")
-    axes[0].legend(handles=axes[0].get_legend_handles_labels()[0], fontsize=9)
-    axes[1].legend(handles=axes[1].get_legend_handles_labels()[0][-len(MARKS) :], fontsize=9)
     return drawn
 
 
@@ -123,13 +83,6 @@ def deep(data: xr.Dataset) -> Figure:
     return drawn
 
 
-def path_excess(data: xr.Dataset) -> Figure:
-    """By how much the tumour makes a needle's force larger, and where it is found."""
-    found = data.epsmesh.locate(body="with a tumour", healthy="healthy").plot().figure
-    assert isinstance(found, Figure)
-    return found
-
-
 def of_kind(kind: str) -> Callable[[xr.Dataset], Figure]:
     """Return what draws one of the program's own figures."""
     return partial(figure, kind=kind)
@@ -141,17 +94,10 @@ FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
     "speedup": ("speedup", of_kind("ratio")),
     "guideline": ("guideline", guideline),
     "compliance": ("compliance", of_kind("compliance")),
-    "one_number": ("compliance", one_number),
     "closure": ("closure", closure),
-    "needles": ("needles", of_kind("force")),
     "path": ("path", of_kind("map")),
-    "path_excess": ("path", path_excess),
-    "retractor": ("retractor", of_kind("force")),
     "insertion": ("scalpel-path", of_kind("insertion")),
-    "insertion_layers": ("scalpel-layers", of_kind("insertion")),
-    "insertion_epsilon": ("scalpel-epsilon", of_kind("insertion")),
     "needle_path": ("needle-path", of_kind("insertion")),
-    "punch_path": ("punch-path", of_kind("insertion")),
     "deep": ("deep", deep),
     "large_depth": ("large_depth", of_kind("force")),
 }
