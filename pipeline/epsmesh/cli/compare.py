@@ -4,13 +4,13 @@ import typer
 
 from epsmesh.cli.console import say, warning
 from epsmesh.cli.faults import DONE, SOME_FAILED, Fault, fail
-from epsmesh.cli.words import DEFAULT_OUTPUT, Dataset, Found, Json
+from epsmesh.cli.words import DEFAULT_OUTPUT, Dataset, Json, ResultFolder
 
 # What is compared, and what is refused.
 _HOWTO = "docs/guide/results.md"
 
 
-def compare(a: Dataset, b: Dataset, output: Found = DEFAULT_OUTPUT, as_json: Json = False) -> None:
+def compare(a: Dataset, b: Dataset, output: ResultFolder = DEFAULT_OUTPUT, as_json: Json = False) -> None:
     """Compare the forces of two datasets case by case, within their error bars, and the times.
 
     Cases are matched by the values of the study's keys. Meshes, machines and versions may differ; scenes may not.

@@ -6,7 +6,7 @@ import typer
 
 from epsmesh.cli.console import say
 from epsmesh.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
-from epsmesh.cli.words import DEFAULT_OUTPUT, Dataset, Found, Json, read_dataset
+from epsmesh.cli.words import DEFAULT_OUTPUT, Dataset, Json, ResultFolder, read_dataset
 
 # What it asks and answers.
 _HOWTO = "docs/why/guideline.md"
@@ -19,7 +19,7 @@ def guide(
     verbose: Annotated[
         bool, typer.Option("--verbose", "-v", help="Also corrections of F, all values of outside, and missing cases.")
     ] = False,
-    output: Found = DEFAULT_OUTPUT,
+    output: ResultFolder = DEFAULT_OUTPUT,
     as_json: Json = False,
 ) -> None:
     """Return the smallest ε for an accuracy, or the most accurate setting within a time, over all scenes of a study.

@@ -12,8 +12,8 @@ from epsmesh.cli.words import (
     DEFAULT_MESHES,
     DEFAULT_OUTPUT,
     Dataset,
-    Found,
     Json,
+    ResultFolder,
     check_machine,
     check_output,
     faults_of_machine,
@@ -35,7 +35,7 @@ _MOST_CELLS = 100_000
 
 def report(
     file: Dataset,
-    output: Found = DEFAULT_OUTPUT,
+    output: ResultFolder = DEFAULT_OUTPUT,
     scene: Annotated[
         str | None,
         typer.Option(

@@ -52,7 +52,7 @@ Dataset = Annotated[
     Path, typer.Argument(metavar="FILE", help="A dataset (.nc), or a study with a dataset.", callback=by_name)
 ]
 Output = Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results.")]
-Found = Annotated[
+ResultFolder = Annotated[
     Path, typer.Option("--output", metavar="DIR", help="Folder of the results, where a study's dataset is.")
 ]
 StoreFile = Annotated[

@@ -80,21 +80,21 @@ def is_corrected(domain: Domain) -> bool:
 
 
 @dataclass(frozen=True)
-class Found:
+class Interpolated:
     """An interpolation over parameters, at nodes of the depth, with its error."""
 
     depths: Depths
     grid: SparseGrid
     error: float
 
-    def plus(self, other: "Found") -> "Found":
+    def plus(self, other: "Interpolated") -> "Interpolated":
         """Return the sum of two interpolations, at the nodes of the one that has more."""
         finest = max(self.depths, other.depths, key=lambda depths: depths.count)
         grids = [one.grid.at_nodes(one.depths.basis(finest.values)) for one in (self, other)]
-        return Found(finest, grids[0].plus(grids[1]), self.error + other.error)
+        return Interpolated(finest, grids[0].plus(grids[1]), self.error + other.error)
 
 
-def over_all(cases: Cases | Difference, tolerance: float, most: int) -> Found:
+def over_all(cases: Cases | Difference, tolerance: float, most: int) -> Interpolated:
     """Return the interpolation over parameters and depth to a tolerance."""
     depths, place = first_depths(cases.domain), cases.domain.middle
     while True:
@@ -103,7 +103,7 @@ def over_all(cases: Cases | Difference, tolerance: float, most: int) -> Found:
         place = _where_depth_matters(found, depths)
         enough, of_depth = _finer(cases, depths, place, _OF_DEPTH * tolerance)
         if enough == depths:
-            return Found(depths, found.grid, found.error + of_depth)
+            return Interpolated(depths, found.grid, found.error + of_depth)
         depths = enough
 
 

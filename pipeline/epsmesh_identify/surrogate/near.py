@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from epsmesh.arrays import FloatArray
-from epsmesh_identify.surrogate.build import MANY, MOST, Found, over_all
+from epsmesh_identify.surrogate.build import MANY, MOST, Interpolated, over_all
 from epsmesh_identify.surrogate.cases import Cases, Difference, Domain, Solve
 from epsmesh_identify.surrogate.depths import Depths
 from epsmesh_identify.surrogate.derived import FORCE, ON_MERIDIAN
@@ -34,7 +34,7 @@ class Correction:
     """
 
     ranges: tuple[Range, ...]
-    found: Found
+    found: Interpolated
     mesh: float
     cases: int
 

@@ -48,7 +48,7 @@ class Image:
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
+class LoadedBody:
     """A meshed body with a ``region`` of its face, and the point ``force`` at a place for a Poisson's ratio.
 
     ``law`` gives the tissues in units of μ at the face, for its Poisson's ratio; None if there is one tissue. R is not
@@ -95,7 +95,7 @@ class FarFields:
     ``motions`` are the symmetries of the body; they map the sources to all ``places``, source by source.
     """
 
-    body: Pressed
+    body: LoadedBody
     poissons: tuple[float, float]
     ratios: FloatArray
     sources: list[Place]
@@ -145,7 +145,7 @@ class FarFields:
 
 
 @stage("far field")
-def far_fields(body: Pressed, poissons: tuple[float, float]) -> FarFields:
+def far_fields(body: LoadedBody, poissons: tuple[float, float]) -> FarFields:
     """Return R on the whole boundary, for a range of Poisson's ratios; collective.
 
     Raises:

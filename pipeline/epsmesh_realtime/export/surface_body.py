@@ -10,7 +10,7 @@ from epsmesh.mesh.of_case import mesh_arrays
 from epsmesh.shapes.body import Layered
 from epsmesh.solve.far_field import PointForce
 from epsmesh_realtime.export.compliance import coarse_mesh, law_of
-from epsmesh_realtime.export.far import Pressed
+from epsmesh_realtime.export.far import LoadedBody
 from epsmesh_realtime.export.placed_force import PlacedForce
 from epsmesh_realtime.export.ranks import ALONE, Ranks
 from epsmesh_realtime.export.region import Region, curved_region, surface_case
@@ -28,7 +28,7 @@ _DOUBT = 0.003
 _STRAIGHT_ABOVE = 0.9
 
 
-def surface_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE) -> Pressed:
+def surface_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE) -> LoadedBody:
     """Return the body of a model, with the forces on its face; collective.
 
     Raises:
@@ -43,11 +43,11 @@ def surface_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE
             return PointForce(poisson, (*place, 0.0), region.room(*place))
 
         off = _ON_FACE * region.thickness
-        return Pressed(coarse_mesh(scope.case, region, ranks=ranks), region, on_plane, law, off=off, ranks=ranks)
+        return LoadedBody(coarse_mesh(scope.case, region, ranks=ranks), region, on_plane, law, off=off, ranks=ranks)
     return _curved(scope, model, ranks)
 
 
-def _curved(scope: Scope, model: Model, ranks: Ranks) -> Pressed:
+def _curved(scope: Scope, model: Model, ranks: Ranks) -> LoadedBody:
     radius = scope.case.probe.circumradius
     region = curved_region(scope, model.thickness, model.table.reach[0])
 
@@ -62,7 +62,7 @@ def _curved(scope: Scope, model: Model, ranks: Ranks) -> Pressed:
     corners = [(x * region.reach[0], y * region.reach[1]) for x in (-0.7, 0.0, 0.7) for y in (-0.7, 0.0, 0.7)]
     if max(on_face(place, scope.poisson).above(points) for place in corners) > _STRAIGHT_ABOVE:
         raise ExportError("part of the body is above the model's region, where its displacement cannot be tabulated")
-    return Pressed(mesh, region, on_face, partial(law_of, scope), _NEXT * radius, model.off, _DOUBT, ranks)
+    return LoadedBody(mesh, region, on_face, partial(law_of, scope), _NEXT * radius, model.off, _DOUBT, ranks)
 
 
 def _mesh(scope: Scope, region: Region, ranks: Ranks) -> BodyMesh:

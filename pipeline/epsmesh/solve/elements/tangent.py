@@ -14,7 +14,7 @@ from epsmesh.solve.compiled import hyperelastic_degree
 from epsmesh.solve.elements.pressures import Pressures
 from epsmesh.solve.kernels.native import Single
 from epsmesh.solve.kernels.product import CellOperator, SparsePart
-from epsmesh.solve.kernels.tangent import Pressed, TangentCells, TangentCoupling
+from epsmesh.solve.kernels.tangent import PressureField, TangentCells, TangentCoupling
 from epsmesh.solve.krylov import keep
 from epsmesh.solve.physics import MaterialLaw, SplitLaw
 from epsmesh.solve.point_law import SYMMETRIC, PointKernel, PointLaw
@@ -125,10 +125,10 @@ class Tangent:
         return stress, self.cells.values([point.strain(each) for point, each in laws], u, at, size)
 
     @property
-    def _pressed(self) -> Pressed | None:
+    def _pressed(self) -> PressureField | None:
         if self._mixed is None:
             return None
-        return Pressed(self._mixed.pressures.cells, self._mixed.pressures.forms.pressure.x.array)
+        return PressureField(self._mixed.pressures.cells, self._mixed.pressures.forms.pressure.x.array)
 
     def _scaled(self, found: list[Single]) -> list[Single]:
         """Return values of the energy with its factors."""

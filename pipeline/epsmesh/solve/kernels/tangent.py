@@ -52,7 +52,7 @@ class _Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
+class PressureField:
     """Pressures (Pa, or in the law's unit), local dofs."""
 
     pressures: CellPressures
@@ -86,15 +86,17 @@ class TangentCells:
         """Bytes of geometry that products read."""
         return sum(part.lanes.dofs.nbytes + part.maps["float64"].nbytes for part in self._parts)
 
-    def moduli(self, laws: Sequence[PointKernel], u: FloatArray, at: Pressed | None) -> list[Single]:
+    def moduli(self, laws: Sequence[PointKernel], u: FloatArray, at: PressureField | None) -> list[Single]:
         """Return ∂²ψ/∂F² at local displacements u, and at pressures in mixed elements, by the law of each region."""
         return self._evaluated(laws, u, at, MODULI)
 
-    def coupling(self, laws: Sequence[PointKernel], u: FloatArray, at: Pressed) -> list[Single]:
+    def coupling(self, laws: Sequence[PointKernel], u: FloatArray, at: PressureField) -> list[Single]:
         """Return ∂²ψ/∂p∂F at local displacements u and local pressures."""
         return self._evaluated(laws, u, at, _COUPLING)
 
-    def values(self, laws: Sequence[PointKernel], u: FloatArray, at: Pressed | None, size: int) -> list[FloatArray]:
+    def values(
+        self, laws: Sequence[PointKernel], u: FloatArray, at: PressureField | None, size: int
+    ) -> list[FloatArray]:
         """Return ``size`` values of the laws at the quadrature points, (batches, quadrature, size, lanes) by part."""
         found = []
         for part, values in zip(self._parts, self._evaluated(laws, u, at, size), strict=True):
@@ -146,7 +148,9 @@ class TangentCells:
             given = factors, values.shape[1], dofs, np.ascontiguousarray(values)
             call(f"add_tangent_{which}", *part.laid_out("float64"), *given, x, y)
 
-    def _evaluated(self, laws: Sequence[PointKernel], u: FloatArray, at: Pressed | None, outputs: int) -> list[Single]:
+    def _evaluated(
+        self, laws: Sequence[PointKernel], u: FloatArray, at: PressureField | None, outputs: int
+    ) -> list[Single]:
         """Return a second derivative of the energy, for each part (batches, quadrature, ``outputs``, lanes)."""
         most = max(1, *(len(law.constants) for law in laws))
         constants = np.zeros((len(laws), most))

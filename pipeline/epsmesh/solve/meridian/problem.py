@@ -19,7 +19,7 @@ from epsmesh.solve import SolveError
 from epsmesh.solve.conditions import Conditions
 from epsmesh.solve.laws import LAWS
 from epsmesh.solve.meridian.forms import MeridianForms
-from epsmesh.solve.meridian.system import HalfPlane, Pressed, System, Unbalanced, max_strain, meshes_of
+from epsmesh.solve.meridian.system import HalfPlane, RefinedSolution, System, Unbalanced, max_strain, meshes_of
 from epsmesh.solve.physics import MaterialLaw, Parameters
 from epsmesh.solve.response import Contact, reaction
 from epsmesh.solve.solution import Problem, Request, Solution
@@ -196,7 +196,7 @@ class MeridianProblem(MeridianSolver):
         with stage("meshing"):
             arrays = self._meridian.mesh(grading)
             meshes = meshes_of(arrays)
-        found: list[tuple[System, Pressed, float]] = []
+        found: list[tuple[System, RefinedSolution, float]] = []
         for degree in (self._degree - 1, self._degree):
             with stage("assembly"):
                 system = System(meshes, degree, law, bonded=self._bonded)

@@ -35,7 +35,7 @@ class Unbalanced(SolveError):
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
+class RefinedSolution:
     """A solution with its residual, relative imbalance, and number of refinement steps."""
 
     solution: FloatArray
@@ -102,7 +102,7 @@ class System(FreeSystem):
         return self.forms.stiffness()
 
     @contextmanager
-    def factors(self, held: IntArray) -> Iterator[Callable[[FloatArray], Pressed]]:
+    def factors(self, held: IntArray) -> Iterator[Callable[[FloatArray], RefinedSolution]]:
         """Factorise with the dofs ``held`` of u_z below the tool fixed; lend the solver for their values."""
         free = np.setdiff1d(self.free, held)
         unknown = self._stiffness[free][:, free]
@@ -111,7 +111,7 @@ class System(FreeSystem):
 
     def _refined(
         self, solve: Callable[[FloatArray], FloatArray], free: IntArray, held: IntArray, values: FloatArray
-    ) -> Pressed:
+    ) -> RefinedSolution:
         """Return the solution with ``values`` at the dofs ``held``; ``solve`` inverts the operator on ``free`` dofs.
 
         The mixed form's second row, p = λ div u, vanishes at the solution. The work on the solution is then twice its
@@ -125,7 +125,7 @@ class System(FreeSystem):
         solution[held] = values
         residual, balance = self.forms.residual(solution), inf
         if not values.any():
-            return Pressed(solution, residual, 0.0, 0)
+            return RefinedSolution(solution, residual, 0.0, 0)
         for step in range(1, _MOST_REFINEMENTS + 1):  # noqa: B007
             solution[free] -= solve(residual[free])
             residual, before = self.forms.residual(solution), balance
@@ -137,7 +137,7 @@ class System(FreeSystem):
             if balance < _BALANCED or balance > before / 2:
                 break
         check_balance(balance, Unbalanced, "; the body is so slender that round-off exceeds its stiffness")
-        return Pressed(solution, residual, balance, step)
+        return RefinedSolution(solution, residual, balance, step)
 
 
 def meshes_of(arrays: MeridianArrays) -> Meshes:
