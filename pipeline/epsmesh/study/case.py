@@ -265,18 +265,28 @@ class Case:
     @property
     def way(self) -> Way:
         """How it is solved; the plan may choose the half plane of a round scene."""
-        element = self.mesh.element_for(self.poisson, is_large=self.material.is_large)
-        return self._way(element, is_linear_beyond=self.is_linear_beyond)
+        # Asked several times for each case of a large study: of the mesh it depends on these alone.
+        mesh = self.mesh
+        key = mesh.element, mesh.degree, mesh.outside == "linear" and not self.is_full
+        found: Way | None = self.shared.get(key)
+        if found is None:
+            found = self.shared[key] = self._find_way()
+        return found
 
-    @of_scene
-    def _way(self, element: str, *, is_linear_beyond: bool) -> Way:
-        probe, laws = self.probe, LINEAR
-        if self.material.is_large:
-            laws = tuple(sorted({*(str(tissue.law) for tissue in self.tissues), *(LINEAR if is_linear_beyond else ())}))
+    def _find_way(self) -> Way:
+        probe, laws, is_large = self.probe, LINEAR, self.material.is_large
+        if is_large:
+            beyond = LINEAR if self.is_linear_beyond else ()
+            laws = tuple(sorted({*(str(tissue.law) for tissue in self.tissues), *beyond}))
         found = Constraint.FRICTION if probe.friction > 0 else Constraint.FOUND
-        constraint = {"bonded": Constraint.BONDED, "frictionless": Constraint.SLIDING}.get(probe.contact, found)
-        dimension = Dimension.SECTION if probe.crack else Dimension.BODY
-        return Way(element, laws, constraint, needs_time_steps(self), dimension, has_terms=bool(self.load.terms))
+        return Way(
+            self.mesh.element_for(self.poisson, is_large=is_large),
+            laws,
+            {"bonded": Constraint.BONDED, "frictionless": Constraint.SLIDING}.get(probe.contact, found),
+            needs_time_steps(self),
+            Dimension.SECTION if probe.crack else Dimension.BODY,
+            has_terms=bool(self.load.terms),
+        )
 
     @property
     def whole(self) -> str:
