@@ -14,10 +14,13 @@ if TYPE_CHECKING:
     from epsmesh.api import RunnableStudy
 
 __version__ = "0.1.0"
-__all__ = ["DatasetError", "StoreError", "StudyError", "__version__", "open", "read"]
+__all__ = ["DatasetError", "Problem", "SolveError", "StoreError", "StudyError", "__version__", "open", "read"]
 
-_ERRORS = {
+# Where what is imported late is.
+_LATE = {
     "DatasetError": "epsmesh.report.table",
+    "Problem": "epsmesh.script",
+    "SolveError": "epsmesh.solve",
     "StoreError": "epsmesh.run.store",
     "StudyError": "epsmesh.study.problems",
 }
@@ -50,11 +53,11 @@ def open(path: str | Path, output: str | Path = "results") -> "xr.Dataset":
 
 
 def __getattr__(name: str) -> Any:
-    """Return the errors that are raised, and `epsmesh.realtime`, the evaluator of real-time models, when asked for."""
+    """Return the errors that are raised, a problem, and `epsmesh.realtime`, the real-time evaluator, when asked for."""
     from importlib import import_module  # noqa: PLC0415
 
-    if name in _ERRORS:
-        return getattr(import_module(_ERRORS[name]), name)
+    if name in _LATE:
+        return getattr(import_module(_LATE[name]), name)
     if name == "realtime":
         return import_module("epsmesh.realtime")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

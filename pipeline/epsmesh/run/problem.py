@@ -16,7 +16,9 @@ from epsmesh.run.loads import loads_of, terms_of
 from epsmesh.run.room import MEMORY_SHARE
 from epsmesh.shapes.contact import first_touch
 from epsmesh.shapes.distance import Distance
+from epsmesh.shapes.frame import Frame
 from epsmesh.shapes.indenter import Indenter
+from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.tissue import FIBRE, Tissue
 from epsmesh.solve import SolveError
 from epsmesh.solve.conditions import Conditions, Front
@@ -105,7 +107,12 @@ def conditions_of(case: Case) -> Conditions:
 
 def tool_of(case: Case) -> Tool:
     """Return the surface of the probe of ``case``, for the mesh turned so that the probe presses along -z."""
-    probe, frame = case.probe, case.frame.upright
+    *_, first = first_touch(case.body, case.probe, case.frame)
+    return tool_at(case.probe, case.frame.upright, first)
+
+
+def tool_at(probe: Probe, frame: Frame, first: float) -> Tool:
+    """Return the surface of a probe that presses along -z, in its ``frame``; ``first``: see :class:`Tool`."""
 
     def height(points: FloatArray) -> FloatArray:
         local = frame.local(points)
@@ -116,7 +123,6 @@ def tool_of(case: Case) -> Tool:
         assert isinstance(probe, Indenter)
         return probe.distance(frame.local(points) + np.array([0.0, 0.0, first + depth])).turned(frame.axes)
 
-    *_, first = first_touch(case.body, probe, case.frame)
     return Tool(
         height,
         lambda points: probe.ends_at(frame.local(points)[:, :2]),

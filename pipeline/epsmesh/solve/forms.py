@@ -197,10 +197,15 @@ class HyperelasticForms:
     def _test(self, row: int) -> tuple[int, Any]:
         return row, ufl.TestFunction(self._fields[row].function_space)
 
+    @property
+    def expression(self) -> Any:
+        """The stored energy, in UFL."""
+        return self._derivative()
+
     @cached_property
     def energy(self) -> Any:
         """Stored energy; NaN where J < 0 anywhere."""
-        return form(self._derivative())
+        return form(self.expression)
 
     @cached_property
     def residuals(self) -> tuple[Any, ...]:
