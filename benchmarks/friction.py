@@ -21,8 +21,9 @@ from epsmesh.run.execute import compute
 from epsmesh.run.record import Record
 from epsmesh.scene.model import FIXED, PROBE
 from epsmesh.shapes.rounded import Rounded
-from epsmesh.solve.contact.coulomb import Neighbours
-from epsmesh.solve.contact.friction_path import CondensedSurface, press
+from epsmesh.solve.contact.condensed import CondensedTissue
+from epsmesh.solve.contact.frictional import Surface, force_of, press
+from epsmesh.solve.contact.surface import Neighbours
 from epsmesh.solve.meridian.forms import MeridianForms
 from epsmesh.solve.meridian.system import meshes_of
 from epsmesh.solve.physics import MaterialLaw, Parameters
@@ -67,33 +68,28 @@ def true_ratio(scene: Scene, friction: float, radius: float) -> float:
     arrays = Meridian(body.radius, body.height, edge, "bottom", kinks=marks).mesh(Grading(1e3, 0.5, 1.0))  # type: ignore[attr-defined]
     law = MaterialLaw((Parameters.of_moduli(_YOUNG, case.material.poisson),))
     surface = _condensed(MeridianForms(meshes_of(arrays), 2, law), case.probe.section, arrays.unit)  # type: ignore[attr-defined]
-    smooth = press(surface, case.probe.depth, 0.0, _STEPS).force
-    coarse, fine = (press(surface, case.probe.depth, friction, count).force for count in (_STEPS, 2 * _STEPS))
+    depth = case.probe.depth
+    smooth = force_of(press(surface, depth, 0.0, 1))
+    coarse, fine = (force_of(press(surface, depth, friction, count)) for count in (_STEPS, 2 * _STEPS))
     return (2 * fine - coarse) / smooth
 
 
-def _condensed(forms: MeridianForms, section: Rounded, unit: float) -> CondensedSurface:
-    """Return the surface below the tool; components are along the advance and along the radius."""
+def _condensed(forms: MeridianForms, section: Rounded, unit: float) -> Surface:
+    """Return the surface below the tool; components are along the radius and the axis."""
     dofs, places = forms.on(PROBE)
     order = np.argsort(places[:, 0], kind="stable")
     fixed = np.concatenate([forms.on(FIXED)[0].ravel(), forms.on(AXIS)[0][:, 0]])
     free = np.setdiff1d(np.arange(forms.dofs), fixed)
     factors, at = splu(forms.stiffness()[free][:, free].tocsc()), np.full(forms.dofs, -1)
     at[free] = np.arange(len(free))
-    components = at[dofs[order][:, ::-1]]
+    components = at[dofs[order]]
     known = np.flatnonzero(components.ravel() >= 0)
     loads = np.zeros((len(free), components.size))
     loads[components.ravel()[known], known] = 1.0
     moved = np.where((components.ravel() >= 0)[:, None], factors.solve(loads)[components.ravel()], 0.0)
-    signs = np.tile([-1.0, 1.0], len(components))
-    compliance = (signs[:, None] * moved * signs).reshape(len(components), 2, len(components), 2)
     is_axis = np.arange(len(components)) == 0  # its reaction means nothing, like a corner's
-    return CondensedSurface(
-        compliance,
-        section.height(places[order, 0] * unit),
-        components >= 0,
-        Neighbours(is_axis, np.array([[0, 1]])),
-    )
+    tissue = CondensedTissue(moved, places[order] * unit, components < 0)
+    return Surface(tissue, section.height(places[order, 0] * unit), Neighbours(is_axis, np.array([[0, 1]]), is_axis))
 
 
 def row_of(seed: int) -> Scene:

@@ -1,15 +1,9 @@
-"""The active set of unilateral contact, by the primal-dual active-set method.
+"""The active set of unilateral contact in linear elasticity, found by the loop of :mod:`.deformed`.
 
     u_z <= b,    r <= 0,    r (u_z - b) = 0    at each candidate node,
 
 where b is the height of the pressed-in probe above the node, and r the reaction (K u along z). Active nodes have
-u_z = b. A node with a tensile reaction leaves the set, a node that penetrates the probe enters it, until the set does
-not change (M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 865, 2002).
-
-A uniform pressure on quadratic facets has nodal forces at their mid nodes only, on cubic facets hardly any at their
-corners. The sign of a corner's reaction then means nothing: a corner is active if all its neighbours along edges are.
-Other corners follow the two conditions. (In :mod:`.deformed`, other corners of quadratic facets are inactive; F differs
-by about 1e-4.)
+u_z = b: the gap is that along the axis, above the undeformed place of the node.
 """
 
 from collections.abc import Sequence
@@ -18,15 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
+from epsmesh.solve.contact.deformed import PlacedTool, solve_contact
 from epsmesh.solve.contact.elements import ContactElements, State
 from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.newton import LargeError
 from epsmesh.stages import stage
-
-# Tension below this share of the mean reaction, and penetration below this share of the depth, are solver error.
-SLACK = 1e-6
-# The largest number of sets seen is 14. Sets only repeated where the linear solver had been stopped early.
-_MOST_SETS = 60
 
 
 class ContactError(SolveError):
@@ -35,25 +27,35 @@ class ContactError(SolveError):
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A converged active set and its solution; ``sets`` and ``iterations`` count the sets solved and all iterations."""
+    """A converged active set and its solution; ``sets`` is the number of sets that were solved."""
 
     active: BoolArray
     state: State
     sets: int
-    iterations: int
 
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """The obstacle above the ``candidates``: their ``bounds`` (n, m) with the probe pressed in by ``depth`` (m)."""
+    """The obstacle above the ``candidates``: their ``bounds`` (n, m) with the probe pressed in by ``depth`` (m).
+
+    Beside the tool bounds are infinite.
+    """
 
     candidates: Candidates
     bounds: FloatArray
     depth: float
 
-    def enclosed(self, active: BoolArray) -> BoolArray:
-        """Return a mask of nodes below the tool with only ``active`` neighbours; beside it bounds are infinite."""
-        return self.candidates.enclosed(active) & np.isfinite(self.bounds)
+    def placed(self, fixed: BoolArray) -> PlacedTool:
+        """Return the tool above nodes that move along the axis only; the support holds those that are ``fixed`` (n)."""
+
+        def distance(points: FloatArray) -> Distance:
+            return Distance.along_axis(self.bounds - points[:, -1], 1)
+
+        def complete(active: BoolArray) -> BoolArray:
+            return neighbours.complete(active) & can_touch
+
+        neighbours, can_touch = self.candidates.neighbours, np.isfinite(self.bounds) & ~fixed
+        return PlacedTool(distance, complete, neighbours.followers, self.depth)
 
 
 @stage("contact sets")
@@ -68,41 +70,20 @@ def find_set(
 ) -> Found:
     """Return the converged active set from the initial guess ``active`` (n); collective.
 
-    The ``tolerances`` are used in turn, the last one for the result. Each is an energy norm of the error, relative to
-    the root of ``energy`` (J), of which an estimate will do. With ``roughly`` a set from a repeating cycle is accepted.
+    For ``tolerances`` and ``energy`` see :class:`.elements.LinearTissue`. With ``roughly`` a set from a repeating cycle
+    is accepted.
 
     Raises:
         SolveError: if the linear solver fails.
-        ContactError: if sets repeat, or become empty.
+        ContactError: if sets repeat, or no node touches.
     """
-    count = iterations = 0
-    active = active & np.isfinite(obstacle.bounds)  # guessed from larger elements, it may reach beside the tool
-    elements.hold(active)
-    for number, tolerance in enumerate(tolerances, start=1):
-        seen = set[bytes]()
-        while True:
-            iterations += elements.improve(obstacle.bounds, tolerance, energy)
-            count += 1
-            state = elements.state()
-            energy = state.energy
-            following = next_set(obstacle, active, state)
-            following |= obstacle.enclosed(following)
-            if np.array_equal(following, active):
-                break
-            seen.add(active.tobytes())
-            if count >= _MOST_SETS or following.tobytes() in seen:
-                if roughly or number < len(tolerances):
-                    break
-                raise ContactError(f"the contact area does not settle: {count} active sets were tried")
-            if not following.any():
-                raise ContactError("the probe does not touch a single node: use smaller elements below it")
-            active = following
-            elements.hold(active)
-    return Found(active, state, count, iterations)
-
-
-def next_set(obstacle: Obstacle, active: BoolArray, state: State) -> BoolArray:
-    """Return the next active set: active nodes under pressure, and inactive nodes that penetrate the probe."""
-    pull = SLACK * float(np.abs(state.reactions[active]).mean())
-    through = SLACK * obstacle.depth
-    return np.where(active, state.reactions < pull, state.moved - obstacle.bounds > through)
+    tissue = elements.tissue(tolerances, energy)
+    tool = obstacle.placed(tissue.fixed[:, 0])
+    first = tool.complete(active)  # guessed from larger elements, it may reach beside the tool
+    try:
+        touched = solve_contact(tissue, tool, first)
+    except LargeError as error:
+        if not roughly:
+            raise ContactError(f"the contact area does not settle: {error}") from error
+        return Found(tissue.forces()[:, 0] != 0.0, elements.state(), 0)
+    return Found(touched.active, elements.state(), touched.iterations)

@@ -1,10 +1,11 @@
-"""Static condensation of displacement elements to the candidate nodes: each active set is then a small dense solve.
+"""Static condensation of a linear body to nodes of its surface: each active set is then a small dense solve.
 
-A unit force on each candidate in turn gives the compliance C, the inverse of the stiffness condensed to these nodes:
-its columns are the candidates' displacements. For an active set A with displacement b the reactions solve C_AA r = b,
-exactly as in a direct solve. The result does not depend on the initial guess.
+A unit force on each node in turn gives the compliance C, the inverse of the stiffness condensed to these nodes: its
+columns are the nodes' displacements. For an active set A with displacement b the reactions solve C_AA r = b, exactly as
+in a direct solve. The result does not depend on the initial guess.
 """
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.linalg import cho_factor, cho_solve
 from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.solve import SolveError
 from epsmesh.solve.compiled import vector
+from epsmesh.solve.contact.constraint import Constraint, Sliding
 from epsmesh.solve.contact.elements import ContactElements, FarShare, State, Unknowns
 from epsmesh.solve.contact.levels import Hierarchy, Surface
 from epsmesh.solve.contact.surface import Candidates
@@ -25,6 +27,95 @@ from epsmesh.stages import stage
 _MOST_CANDIDATES = 1_500
 # Right-hand sides solved together.
 _TOGETHER = 64
+
+
+class CondensedTissue:
+    """A linear body seen from nodes of its surface, through their compliance: see :class:`.deformed.Tissue`.
+
+    ``compliance`` (n, d, n, d), in m/N, is symmetric; ``fixed`` (n, d) are the components that have none. The tool's
+    normal is the last axis. The state are forces (N) and displacements (m) of the nodes at ``places`` (n, d), m.
+    """
+
+    is_sound = True
+
+    def __init__(self, compliance: FloatArray, places: FloatArray, fixed: BoolArray):
+        """Begin at rest."""
+        self._compliance, self.places, self.fixed = compliance.reshape(fixed.size, -1), places, fixed
+        self.state = np.zeros((2, *fixed.shape))
+
+    def positions(self) -> FloatArray:
+        """Return the nodes' places under the forces (n, d), in m."""
+        return np.asarray(self.places + self.state[1])
+
+    def forces(self) -> FloatArray:
+        """Return the forces (n, d) on the nodes, N."""
+        return np.asarray(self.state[0])
+
+    def unbalanced(self) -> float:
+        """Return zero: the body below is condensed."""
+        return 0.0
+
+    def linearise(self, constraint: Constraint) -> FloatArray:
+        """Find the forces (n, d) under a ``constraint``, and return them; they are exact.
+
+        Raises:
+            SolveError: if the compliance is not positive definite.
+        """
+        wanted = self.state[1] + np.einsum("nii->ni", constraint.frames) * constraint.values
+        sliding = constraint.sliding
+        if sliding is None or not sliding.nodes.any():
+            forces = self._holding(constraint.held & ~self.fixed, wanted)
+        else:
+            forces = self._sliding(constraint.held[:, -1], wanted, sliding)
+        self._from, self._to = self.state, np.stack([forces, self.moved(forces)])
+        return forces
+
+    def advance(self, share: float) -> bool:
+        """Set the state to the last one linearised plus a ``share`` of its increment."""
+        self.state = self._from + share * (self._to - self._from)
+        return True
+
+    def moved(self, forces: FloatArray) -> FloatArray:
+        """Return the displacements (n, d), m, under ``forces`` (n, d), N."""
+        return np.asarray((self._compliance @ forces.ravel()).reshape(forces.shape))
+
+    @property
+    def penalty(self) -> FloatArray:
+        """The parameter c (n) of the trial traction (N/m): the stiffness of a node alone, along tangents."""
+        own = self._compliance.diagonal().reshape(self.fixed.shape)[:, :-1].max(axis=1)
+        return np.divide(1.0, own, out=np.zeros_like(own), where=own > 0)
+
+    def _holding(self, held: BoolArray, wanted: FloatArray) -> FloatArray:
+        """Return the forces (n, d) that move the ``held`` components (n, d) to ``wanted`` (n, d), m."""
+        forces, those = np.zeros(held.shape), np.flatnonzero(held)
+        if len(those):
+            try:
+                factors = cho_factor(self._compliance[np.ix_(those, those)], check_finite=False)
+            except np.linalg.LinAlgError as error:
+                raise SolveError("the compliance of the condensed surface is not positive definite") from error
+            forces[held] = cho_solve(factors, wanted[held], check_finite=False)
+        return forces
+
+    def _sliding(self, active: BoolArray, wanted: FloatArray, sliding: Sliding) -> FloatArray:
+        """Return the forces (n, d) on ``active`` nodes (n), which move to ``wanted`` (n, d), m, or are ``sliding``."""
+        nodes, dim = np.flatnonzero(active), self.fixed.shape[1]
+        all_of = (dim * nodes[:, None] + np.arange(dim)).ravel()
+        rows = self._compliance[np.ix_(all_of, all_of)].reshape(len(nodes), dim, len(nodes), dim)
+        right, (those,) = wanted[nodes], np.nonzero(sliding.nodes[nodes])
+        which, count, tangents = nodes[those], np.arange(len(those)), np.arange(dim - 1)
+        turning = sliding.turning[which][:, :-1, :-1]
+        pull = sliding.penalty[which][:, None, None] * turning
+        equations = (pull @ rows[those, :-1].reshape(len(those), dim - 1, -1)).reshape(len(those), dim - 1, -1, dim)
+        own = np.ix_(count, tangents, tangents)
+        equations[own[0], own[1], those[:, None, None], own[2]] += np.eye(dim - 1) - turning
+        equations[count, :, those, -1] += sliding.slope[which, :-1]  # the pressure counts against the last axis
+        rows[those, :-1] = equations
+        right[those, :-1] = np.einsum("kij,kj->ki", pull, (self.state[1] - sliding.slips)[which, :-1])
+        free, found = np.flatnonzero(~self.fixed[nodes]), np.zeros(len(all_of))
+        found[free] = np.linalg.solve(rows.reshape(len(found), -1)[np.ix_(free, free)], right.ravel()[free])
+        forces = np.zeros(self.fixed.shape)
+        forces[nodes] = found.reshape(-1, dim)
+        return forces
 
 
 def suits(elements: Elements, candidates: Candidates, method: str) -> bool:
@@ -49,12 +140,9 @@ class CondensedElements(ContactElements):
         self._multigrid: Hierarchy | None = None
         self._free = self._factor()
         stack.callback(self._free.close)
-        self._dofs = self.numbering.normal_dofs(np.ones(len(self.candidates), dtype=bool))
-        order = np.argsort(3 * self.numbering.local + 2)
-        self._place = np.empty_like(order)
-        self._place[order] = np.arange(len(order))  # position of each candidate among the sorted dofs
         with stage("set-up"):
-            self._near = self._compliance = self._condense()
+            self._near = self._condense()
+        self.couple(None)
 
     def _factor(self) -> LinearSolver:
         space = self.space
@@ -64,61 +152,43 @@ class CondensedElements(ContactElements):
     @stage("condensation")
     def _condense(self) -> FloatArray:
         """Return the compliance C (n, n), in m/N, symmetric."""
-        count, size = len(self._dofs), self.space.owned
-        compliance = np.empty((count, count))
-        for first in range(0, count, _TOGETHER):
-            here = self._dofs[first : first + _TOGETHER]
+        dofs, size = 3 * self.numbering.local + 2, self.space.owned
+        compliance = np.empty((len(dofs), len(dofs)))
+        for first in range(0, len(dofs), _TOGETHER):
+            here = dofs[first : first + _TOGETHER]
             loads = np.zeros((size, len(here)), order="F")
             loads[here, np.arange(len(here))] = 1.0
-            compliance[:, first : first + len(here)] = self._free.solve_many(loads)[self._dofs]
-        compliance = compliance[np.ix_(self._place, self._place)]
+            compliance[:, first : first + len(here)] = self._free.solve_many(loads)[dofs]
         return (compliance + compliance.T) / 2
 
-    def hold(self, active: BoolArray) -> None:
-        """Prescribe the displacement of the ``active`` candidates (n) from now on."""
-        self._active = active
-
-    def approach(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
-        """Find the reactions that move the active nodes to ``bounds`` (n, m), exactly: ``tolerance`` is ignored.
-
-        Raises:
-            SolveError: if the compliance is not positive definite.
-        """
-        held = np.flatnonzero(self._active)
-        try:
-            pressed = cho_solve(cho_factor(self._compliance[np.ix_(held, held)], check_finite=False), bounds[held])
-        except np.linalg.LinAlgError as error:
-            raise SolveError("the compliance of the condensed surface is not positive definite") from error
-        self._reactions = np.zeros(len(bounds))
-        self._reactions[held] = pressed
-        return 1
-
-    def near_state(self) -> State:
-        """Return displacements and reactions of the candidates, without the far field."""
-        moved = self._compliance @ self._reactions
-        return State(moved, self._reactions, float(moved @ self._reactions))
+    def tissue(self, tolerances: Sequence[float], energy: float | None) -> CondensedTissue:
+        """Return the condensed tissue in its current state; it is exact, whatever the tolerances."""
+        return self._tissue
 
     def couple(self, far: FarShare | None) -> None:
         """Couple a far field to the cut face from now on: it adds φ φᵀ / k to the compliance."""
         super().couple(far)
+        compliance, count = self._near, len(self.candidates)
         if far is not None:
-            self._compliance = self._near + np.outer(far.unit.moved, far.unit.moved) / far.stiffness
-
-    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
-        """Find the reactions that move the active nodes to ``bounds`` (n, m), and the amplitude of the far field."""
-        iterations = self.approach(bounds, tolerance, energy)
-        if self.far is not None:
-            self.far.share = self.far.wanted(self._reactions)
-        return iterations
+            compliance = compliance + np.outer(far.unit.moved, far.unit.moved) / far.stiffness
+        self._tissue = CondensedTissue(compliance[:, None, :, None], np.zeros((count, 1)), self.is_fixed[:, None])
 
     def state(self) -> State:
-        """Return displacements and reactions of the candidates."""
-        return self.near_state()
+        """Return displacements and reactions of the candidates; the far field takes the amplitude of these."""
+        reactions, moved = self._tissue.state[..., 0]
+        if self.far is not None:
+            self.far.share = self.far.wanted(reactions)
+        return State(moved, reactions, float(moved @ reactions))
+
+    def begin(self, state: State, unknowns: Unknowns) -> None:
+        """Begin with forces and displacements of the candidates."""
+        self._tissue.state = np.stack([state.reactions, state.moved])[..., None]
 
     def unknowns(self) -> Unknowns:
         """Return the displacement (m) of the whole body, owned dofs, under the current reactions."""
         with vector(self.space.space) as loads:
-            self.numbering.put(loads.array, self._reactions, self._active)
+            reactions = self._tissue.forces()[:, 0]
+            self.numbering.put(loads.array, reactions, reactions != 0.0)
             self._free.solve(loads, self.fields[0])
         return super().unknowns()
 

@@ -6,12 +6,28 @@ from epsmesh.arrays import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, eq=False)
+class Sliding:
+    """Friction of the ``nodes`` (n) that slide, linearised: ``slope`` λ + ``turning`` T.
+
+    λ (N) is the normal reaction, and T = R − c s the trial traction with the reaction R, the ``penalty`` c (n), N/m,
+    and the slip s, now ``slips`` (n, d), m. ``slope`` (n, d) and ``turning`` (n, d, d) are along the tangents.
+    """
+
+    nodes: BoolArray
+    slope: FloatArray
+    turning: FloatArray
+    penalty: FloatArray
+    slips: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Constraint:
     """Constraint of one Newton step at n nodes, in d coordinates.
 
     ``frames`` (n, d, d) have the tangents and, in the last column, the tool's normal. ``held`` (n, d) are the slots of
     the frames whose displacement is prescribed, to ``values`` (n, d), m. ``turning`` (n, d, d), N/m, is λ H, which is
-    subtracted from the tangent. ``forces`` (n, d), N, act on the nodes besides the reactions.
+    subtracted from the tangent. ``forces`` (n, d), N, act on the nodes besides the reactions; where they are friction,
+    ``sliding`` is how they follow the reactions, for tissue that can solve for both.
     """
 
     frames: FloatArray
@@ -19,3 +35,4 @@ class Constraint:
     values: FloatArray
     turning: FloatArray
     forces: FloatArray
+    sliding: Sliding | None = None

@@ -12,9 +12,17 @@ import numpy as np
 
 from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
-from epsmesh.solve.contact.coulomb import Neighbours, Slide, most_simplified
-from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, Tissue, first_set, solve_contact
+from epsmesh.solve.contact.coulomb import Slide, most_simplified
+from epsmesh.solve.contact.deformed import (
+    ContactSolution,
+    PlacedTool,
+    SteppedTissue,
+    continue_linear,
+    first_set,
+    solve_contact,
+)
 from epsmesh.solve.contact.friction_step import FrictionStep, meeting_places
+from epsmesh.solve.contact.surface import Neighbours
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.path import Path, Stage, follow
 
@@ -52,7 +60,8 @@ class ContactPath(Path[ContactStage]):
 class Friction:
     """Coulomb's ``coefficient`` (infinite: it sticks) for a tool that moves along the unit vector ``advance``.
 
-    ``penalty`` (n), N/m: see :mod:`.coulomb`. ``deepest`` (m) is the depth at the end of the path.
+    ``penalty`` (n), N/m: see :mod:`.coulomb`. ``deepest`` (m) is the depth at the end of the path. ``is_linear``: the
+    tissue is, and the initial guess of a step is its solution for the contact before.
     """
 
     coefficient: float
@@ -60,10 +69,11 @@ class Friction:
     penalty: FloatArray
     neighbours: Neighbours
     deepest: float
+    is_linear: bool = False
 
 
 def press(
-    tissue: Tissue,
+    tissue: SteppedTissue,
     tool_at: Callable[[float], PlacedTool],
     path: ContactPath,
     depth: float,
@@ -99,7 +109,7 @@ def press(
     return iterations
 
 
-def check_outside(tissue: Tissue, touched: ContactSolution, deepest: float) -> None:
+def check_outside(tissue: SteppedTissue, touched: ContactSolution, deepest: float) -> None:
     """Check that no tissue is left inside the tool: such an equilibrium goes round a tool that is ``deepest`` (m) deep.
 
     Raises:
@@ -109,7 +119,7 @@ def check_outside(tissue: Tissue, touched: ContactSolution, deepest: float) -> N
         raise LargeError("tissue is left inside the tool")
 
 
-def _first_step(tissue: Tissue, tool_at: Callable[[float], PlacedTool], start: float, depth: float) -> float:
+def _first_step(tissue: SteppedTissue, tool_at: Callable[[float], PlacedTool], start: float, depth: float) -> float:
     """Return the first step (m) from ``start`` towards a ``depth`` (m); collective."""
     step, nothing = depth - start, np.zeros(len(tissue.fixed), dtype=bool)
     for _ in range(_FIRST_HALVINGS):
@@ -122,7 +132,7 @@ def _first_step(tissue: Tissue, tool_at: Callable[[float], PlacedTool], start: f
 
 
 def _end(
-    tissue: Tissue,
+    tissue: SteppedTissue,
     tool_at: Callable[[float], PlacedTool],
     path: ContactPath,
     start: ContactStage,
@@ -143,7 +153,7 @@ def _end(
 
 
 def press_with_friction(
-    tissue: Tissue,
+    tissue: SteppedTissue,
     tool_at: Callable[[float], PlacedTool],
     path: ContactPath,
     depth: float,
@@ -180,7 +190,7 @@ def press_with_friction(
 
 
 def _friction_step(
-    tissue: Tissue, tool_at: Callable[[float], PlacedTool], last: ContactStage, depth: float, friction: Friction
+    tissue: SteppedTissue, tool_at: Callable[[float], PlacedTool], last: ContactStage, depth: float, friction: Friction
 ) -> FrictionStep:
     """Return the friction of a step from the ``last`` stage to a ``depth`` (m), whose state is predicted."""
     after, guess = tissue.positions(), tissue.state
@@ -208,11 +218,12 @@ def _friction_step(
         normal,
         tissue.fixed,
         most_simplified(depth, friction.deepest),
+        friction.is_linear,
     )
 
 
 def _step(
-    tissue: Tissue,
+    tissue: SteppedTissue,
     tool_at: Callable[[float], PlacedTool],
     path: ContactPath,
     depth: float,
@@ -227,6 +238,9 @@ def _step(
     if not tissue.is_sound:
         tissue.state = last.state
     friction_step = None if friction is None else _friction_step(tissue, tool_at, last, depth, friction)
+    if friction is not None and friction_step is not None and friction.is_linear and last.touched is not None:
+        continue_linear(tissue, tool, last.touched, friction_step)
+        friction_step = _friction_step(tissue, tool_at, last, depth, friction)
     return solve_contact(
         tissue, tool, first_set(tissue, tool, active), friction_step, is_patient=is_patient, limit=limit
     )

@@ -5,8 +5,8 @@ node sticks (s = 0) if |T| ≤ μ λ; otherwise it slides, with R = μ λ T/|T|.
 Newton's method solves with the tangents of the last iterate (P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng.
 92, 353, 1991). Tissue that "sticks" has infinite friction.
 
-The sign of a corner's reaction means nothing (:mod:`epsmesh.solve.contact.active_set`), nor does its trial traction:
-corners slide where most of their neighbours do, in the mean direction of these.
+The sign of a corner's reaction means nothing (:class:`epsmesh.solve.contact.surface.Neighbours`), nor does its trial
+traction: corners slide where most of their neighbours do, in the mean direction of these.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray, IntArray
-from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.surface import Candidates, Neighbours
 from epsmesh.solve.response import Rubbing
 
 # Nodes change between sticking and sliding beyond this share of the largest friction.
@@ -28,35 +28,6 @@ _MOST_SIMPLIFIED = 0.1
 _CHANGES = 3
 # Steps of iterations are halved where a change of directions of slip is not smaller than the one before by this share.
 _CONTRACTS = 0.3
-
-
-@dataclass(frozen=True, eq=False)
-class Neighbours:
-    """Corners of facets: a mask ``is_corner`` (n), and pairs ``beside`` (k, 2) of a corner and a node next to it."""
-
-    is_corner: BoolArray
-    beside: IntArray
-
-    def enclosed(self, active: BoolArray) -> BoolArray:
-        """Return a mask (n) of corners whose neighbours are all active."""
-        corner, beside = self.beside.T
-        has = np.bincount(corner, minlength=len(active)) > 0
-        return np.asarray(has & (np.bincount(corner, ~active[beside], len(active)) == 0))
-
-    def majority(self, chosen: BoolArray, active: BoolArray) -> BoolArray:
-        """Return ``chosen`` (n), at corners the choice of most of their ``active`` neighbours, true if it is even."""
-        corner, beside = self.beside.T
-        votes = np.bincount(corner, np.where(chosen[beside], 1.0, -1.0) * active[beside], len(chosen))
-        return np.where(self.is_corner, votes >= 0, chosen)
-
-    def mean(self, vectors: FloatArray, chosen: BoolArray) -> FloatArray:
-        """Return ``vectors`` (n, t), at corners the sum of those of the ``chosen`` neighbours."""
-        corner, beside = self.beside.T
-        found = vectors.copy()
-        for axis, values in enumerate(vectors.T):
-            total = np.bincount(corner, np.where(chosen[beside], values[beside], 0.0), len(vectors))
-            found[self.is_corner, axis] = total[self.is_corner]
-        return found
 
 
 @dataclass(frozen=True, eq=False)

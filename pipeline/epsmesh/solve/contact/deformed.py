@@ -21,18 +21,19 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
-from epsmesh.solve.contact.active_set import SLACK
 from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.coulomb import Slide
 from epsmesh.solve.contact.friction_step import FrictionIteration, FrictionStep, Placed
 from epsmesh.solve.contact.turned import turned_frames
 from epsmesh.solve.newton import LargeError
 
+# Tension below this share of the mean reaction, and penetration below this share of the depth, are solver error.
+SLACK = 1e-6
 # Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
 LEFT, _CLOSED = 1e-8, 1e-8
 # A residual below this that no longer falls is the rounding error of a body that is large compared with the contact.
 _ROUNDING = 1e-6
-# With friction: the residual of nodes that slide, whose friction is that of the iteration before, and of all others.
+# With friction: the residual of nodes that slide, where their friction is that of the iteration before, and of others.
 _LEFT_WITH_FRICTION, _LEFT_BESIDE = 1e-4, 1e-7
 # Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
 _MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
@@ -44,16 +45,12 @@ _WITHOUT_FOLLOWERS, _ONE_BY_ONE = 2, 3
 
 
 class Tissue(Protocol):
-    """A body seen from n nodes of its surface, at its current ``state``. Methods are collective.
+    """A body seen from n nodes of its surface, at its current state. Methods are collective.
 
-    ``fixed`` (n, d) marks prescribed components; ``state`` are the unknowns of this rank; ``is_sound`` says that J > 0.
+    ``fixed`` (n, d) marks prescribed components.
     """
 
     fixed: BoolArray
-    state: FloatArray
-
-    @property
-    def is_sound(self) -> bool: ...  # noqa: D102
 
     def positions(self) -> FloatArray:
         """Return the nodes' deformed positions (n, d), in m."""
@@ -73,6 +70,15 @@ class Tissue(Protocol):
 
     def advance(self, share: float) -> bool:
         """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
+
+
+class SteppedTissue(Tissue, Protocol):
+    """A body on a path: ``state`` are the unknowns of this rank; ``is_sound`` says that J > 0."""
+
+    state: FloatArray
+
+    @property
+    def is_sound(self) -> bool: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +164,18 @@ def solve_contact(
     raise LargeError(f"no equilibrium after {_MOST} iterations")
 
 
+def continue_linear(tissue: Tissue, tool: PlacedTool, touched: ContactSolution, friction_step: FrictionStep) -> None:
+    """Move linear tissue on to a ``tool``, with the contact and the states of friction before; collective.
+
+    Raises:
+        SolveError: if a linear solver fails.
+    """
+    place, there = _placed(tissue, tool)
+    constraint = _constraint(place, there.normal, touched.pressed, touched.active)
+    tissue.linearise(FrictionIteration(friction_step).constrain(constraint, there, touched.active))
+    tissue.advance(1.0)
+
+
 class _Loop:
     """The iterations of :func:`solve_contact`: the ``active`` set, what was predicted, and the sets seen."""
 
@@ -185,10 +203,8 @@ class _Loop:
             LargeError: if the loop will not converge.
         """
         tissue, tool, before = self._tissue, self._tool, self._active
-        positions, forces = tissue.positions(), tissue.forces()
-        self._place = tool.distance(positions)
-        normal = _within_planes(self._place.normal, tissue.fixed)
-        self._there = Placed(positions, normal)
+        self._place, self._there = _placed(tissue, tool)
+        normal, forces = self._there.normal, tissue.forces()
         following = _next_set(tool, before, self._reactions, self._place.gap)
         self._active = active = _with_care(tool, before, following, self._repeats)
         is_same, is_rough = np.array_equal(active, before), self._limit > 0
@@ -241,7 +257,8 @@ class _Loop:
             return False
         if self._friction is None:
             return residual.size <= max(LEFT, limit) * most
-        is_close = residual.inside <= _LEFT_BESIDE * most and residual.on_surface <= _LEFT_WITH_FRICTION * most
+        on_surface = _LEFT_BESIDE if self._friction.is_linear else _LEFT_WITH_FRICTION
+        is_close = residual.inside <= _LEFT_BESIDE * most and residual.on_surface <= on_surface * most
         return is_close and self._friction.is_same
 
     @property
@@ -268,6 +285,13 @@ class _Loop:
         self._repeats = max(self._repeats, self._seen[key])
         if self._repeats >= _MOST_REPEATS and self._friction is None:
             raise LargeError("active sets repeat")
+
+
+def _placed(tissue: Tissue, tool: PlacedTool) -> tuple[Distance, Placed]:
+    """Return distance and place of the nodes."""
+    positions = tissue.positions()
+    place = tool.distance(positions)
+    return place, Placed(positions, _within_planes(place.normal, tissue.fixed))
 
 
 def _constraint(place: Distance, normal: FloatArray, pressed: FloatArray, active: BoolArray) -> Constraint:

@@ -5,8 +5,11 @@ displacement is v + s φ + w, where v belongs to the reactions r alone. Since v 
 The amplitude s of the far field follows from k s = φ·r, where k is twice the energy of φ on both sides of the cut.
 """
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import cached_property
+from math import inf
 
 import numpy as np
 
@@ -14,6 +17,8 @@ from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.compiled import global_sum
+from epsmesh.solve.contact.constraint import Constraint
+from epsmesh.solve.contact.deformed import Tissue
 from epsmesh.solve.contact.levels import Hierarchy, Numbering, Surface, normal_dofs
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.elements.base import Elements, Solver
@@ -108,6 +113,17 @@ class ContactElements:
         self.solver: Solver | None = None
         stack.callback(self.close)
 
+    @cached_property
+    def is_fixed(self) -> BoolArray:
+        """Mask (n) of the candidates that the support holds along z."""
+        is_held = np.zeros(self.space.owned)
+        is_held[3 * self.space.fixed_owned + 2] = 1.0
+        return np.asarray(self.numbering.gather(is_held) > 0)
+
+    def tissue(self, tolerances: Sequence[float], energy: float | None) -> Tissue:
+        """Return the body as the loop sees it; see :class:`LinearTissue`."""
+        return LinearTissue(self, tolerances, energy)
+
     def finer(self, stack: ExitStack) -> "ContactElements":
         """Return elements of one degree more, with the current fields as initial guess."""
         elements = self.surface.elements(self.plug.degree + 1, self.plug.element, stack)
@@ -200,6 +216,11 @@ class ContactElements:
                 whole.axpy(1.0, part)
         return iterations
 
+    def moved(self) -> FloatArray:
+        """Return the displacements (n, m) of the candidates."""
+        moved = self.numbering.gather(self.fields[0].array)
+        return moved if self.far is None else moved + self.far.share * self.far.unit.moved
+
     def near_state(self) -> State:
         """Return displacements and reactions of the candidates, without the far field."""
         with self.plug.fields() as forces:
@@ -240,6 +261,10 @@ class ContactElements:
         """Set the unknowns."""
         for field, values in zip(self.fields, unknowns, strict=True):
             field.array[:] = values
+
+    def begin(self, state: State, unknowns: Unknowns) -> None:
+        """Begin with a ``state`` of the candidates and its unknowns."""
+        self.start_at(unknowns)
 
     def start_from(self, coarse: "ContactElements") -> None:
         """Interpolate the initial guess from ``coarse``; prescribed displacements go to the right-hand side."""
@@ -295,3 +320,57 @@ class ContactElements:
         found, self.load = self.unknowns(), None
         self.start_at(nothing)
         return found
+
+
+class LinearTissue:
+    """A linear body with the candidates' displacement along z: see :class:`.deformed.Tissue`. Methods are collective.
+
+    The ``tolerances`` are used in turn: a set is solved to the first one, and to the next one when the loop asks for a
+    set again. Each is an energy norm of the error, relative to the root of ``energy`` (J), of which an estimate will
+    do. The body is in balance once a set is solved to the last one.
+    """
+
+    def __init__(self, elements: ContactElements, tolerances: Sequence[float], energy: float | None):
+        """Begin with the fields of the ``elements``."""
+        self._elements, self._tolerances, self._energy = elements, list(tolerances), energy
+        self.fixed = elements.is_fixed[:, None]
+        self._moved = elements.moved()
+        self._reactions = np.zeros(len(self._moved))
+        self._active: BoolArray | None = None
+        self._solved = set[bytes]()
+
+    def positions(self) -> FloatArray:
+        """Return the displacement along z (n, 1), in m."""
+        return self._moved[:, None]
+
+    def forces(self) -> FloatArray:
+        """Return the reactions (n, 1), N."""
+        return self._reactions[:, None]
+
+    def unbalanced(self) -> float:
+        """Return zero once a set is solved to the last tolerance, else infinity."""
+        return inf if self._tolerances[1:] or self._active is None else 0.0
+
+    def linearise(self, constraint: Constraint) -> FloatArray:
+        """Move the nodes of a ``constraint`` to the tool; return the reactions (n, 1), N.
+
+        Raises:
+            SolveError: if the solver or the far field does not converge.
+        """
+        active, elements = constraint.held[:, -1], self._elements
+        bounds = self._moved + constraint.frames[:, -1, -1] * constraint.values[:, -1]
+        key = active.tobytes()
+        if key in self._solved:
+            self._tolerances, self._solved = self._tolerances[1:] or self._tolerances, set()
+        self._solved.add(key)
+        if self._active is None or not np.array_equal(active, self._active):
+            elements.hold(active)
+        elements.improve(bounds, self._tolerances[0], self._energy)
+        state = elements.state()
+        self._active, self._energy = active, state.energy
+        self._moved, self._reactions = state.moved, np.where(active, state.reactions, 0.0)
+        return self.forces()
+
+    def advance(self, share: float) -> bool:
+        """Return that there is no limit: the whole increment was taken."""
+        return True

@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
-from epsmesh.solve.contact.constraint import Constraint
-from epsmesh.solve.contact.coulomb import Damping, Neighbours, Simplified, Slide, largest_friction
+from epsmesh.solve.contact.constraint import Constraint, Sliding
+from epsmesh.solve.contact.coulomb import Damping, Simplified, Slide, largest_friction
+from epsmesh.solve.contact.surface import Neighbours
 
-# Iterations from which changes of the directions of slip are damped.
-_SWINGING = 4
+# Iterations from which changes of the directions of slip are damped, and of Newton's method in linear tissue.
+_SWINGING, _SWINGING_LINEAR = 4, 12
 # Share of the force below which friction is no part of it.
 _NO_PART = 1e-6
 
@@ -27,7 +28,7 @@ class FrictionStep:
     ``references`` (n, d) are places on the tool at this depth (m); ``penalty`` (n) is the parameter c (N/m). ``slide``
     and ``normal`` (n, N) are the state and the normal reactions at the equilibrium before. ``fixed`` (n, d) are the
     components that symmetry or the support fixes. ``simplified`` is the largest share of the force on nodes that do not
-    settle.
+    settle. ``is_linear``: the tissue is, and solves for friction and reactions together.
     """
 
     friction: float
@@ -38,6 +39,7 @@ class FrictionStep:
     normal: FloatArray
     fixed: BoolArray
     simplified: float
+    is_linear: bool = False
 
 
 class FrictionIteration:
@@ -46,7 +48,8 @@ class FrictionIteration:
     def __init__(self, friction_step: FrictionStep):
         self._with, self.slide, self.normal = friction_step, friction_step.slide, friction_step.normal
         self._simple = Simplified.none(len(friction_step.normal))
-        self._damping = Damping(_SWINGING, swings=False)
+        self.is_linear = friction_step.is_linear
+        self._damping = Damping(_SWINGING_LINEAR if self.is_linear else _SWINGING, swings=self.is_linear)
         self._seen, self._single = set[bytes](), False
         self.is_same = False
 
@@ -85,9 +88,13 @@ class FrictionIteration:
         most = largest_friction(law, self.normal)
         if self._with.friction < np.inf:
             most = np.where(self._with.neighbours.is_corner, law * self.normal, most)
+        most = np.where(self.slide.sliding & (most < np.inf), most, 0.0)
+        return np.where(self._with.fixed, 0.0, most[:, None] * self._within(place).directions)
+
+    def _within(self, place: "Placed") -> Slide:
+        """Return the state with trial tractions along the tool's surface."""
         within = self.slide.trial - np.einsum("ni,ni->n", self.slide.trial, place.normal)[:, None] * place.normal
-        directions = replace(self.slide, trial=np.where(self._with.fixed, 0.0, within)).directions
-        return np.where(self.slide.sliding & (most < np.inf), most, 0.0)[:, None] * directions
+        return replace(self.slide, trial=within)
 
     def exerted(self, place: "Placed", forces: FloatArray, active: BoolArray) -> FloatArray:
         """Return the friction (n, d) N of the tool: of nodes that stick what their ``forces`` (n, d) need."""
@@ -101,7 +108,17 @@ class FrictionIteration:
         along = -np.einsum("nji,nj->ni", constraint.frames, self.slips(place))
         held[sticks, :-1] = True
         values[sticks, :-1] = along[sticks, :-1]
-        return replace(constraint, held=held, values=values, forces=self.friction(place))
+        sliding = self._sliding(place, active & ~sticks)
+        return replace(constraint, held=held, values=values, forces=self.friction(place), sliding=sliding)
+
+    def _sliding(self, place: "Placed", nodes: BoolArray) -> Sliding:
+        """Return the friction of ``nodes`` (n) that slide, linearised: that of corners and of simplified nodes is not
+        turned by their own tractions."""
+        law, slide = np.where(nodes, self._simple.law(self._with.friction), 0.0), self._within(place)
+        is_given = self._with.neighbours.is_corner | self._simple.nodes
+        most = np.where(is_given, 0.0, largest_friction(law, self.normal))
+        penalty, slips = self._with.penalty, self.slips(place)
+        return Sliding(nodes, law[:, None] * slide.directions, slide.turning(most), penalty, slips)
 
     def sticks(self, active: BoolArray) -> BoolArray:
         """Return a mask (n) of the nodes that stick."""

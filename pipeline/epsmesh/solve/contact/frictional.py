@@ -1,8 +1,8 @@
 """Unilateral contact with friction in a linear elastic body: response, slip, and error bar.
 
 Contact without friction is found first. The surface near it is then condensed, all three components of its nodes, and
-the load path of the tool is followed there (:mod:`epsmesh.solve.contact.friction_path`). As in linear elasticity, the
-normal of the contact is the tool's axis.
+the load path of the tool is followed there, in steps whose depths go with the square of their numbers: the contact of a
+ball grows by equal widths. As in linear elasticity, the normal of the contact is the tool's axis.
 
 The error bar is that of frictionless contact on the same mesh, plus the change of the force from half as many load
 steps, plus a share of what friction adds.
@@ -11,34 +11,39 @@ steps, plus a share of what friction adds.
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray, IntArray
+from epsmesh.shapes.distance import Distance
 from epsmesh.solve.compiled import global_sum
-from epsmesh.solve.contact.active_set import SLACK, Obstacle
-from epsmesh.solve.contact.coulomb import Neighbours, Slide, rubbing_of
+from epsmesh.solve.contact.active_set import ContactError
+from epsmesh.solve.contact.condensed import CondensedTissue
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, Friction, press_with_friction
+from epsmesh.solve.contact.coulomb import Slide, rubbing_of
+from epsmesh.solve.contact.deformed import SLACK, ContactSolution, PlacedTool
 from epsmesh.solve.contact.elements import State, Unknowns
 from epsmesh.solve.contact.found import FoundContact
-from epsmesh.solve.contact.friction_path import STEPS, CondensedSurface, Step, press
-from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.surface import Candidates, Neighbours
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.elements.base import Elements, HierarchicalEstimate, Solver
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.movement import Movement
+from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import Contact, Response, reaction
 from epsmesh.stages import stage
 
+# Steps of a load path.
+STEPS = 16
 # Facets round the frictionless contact whose nodes are condensed, too.
 _RINGS = 2
 # Right-hand sides solved with one factorisation of mixed elements.
 _TOGETHER = 128
 # The bar on what friction adds to the force, as a share of it: benchmarks/results/friction.md.
 _OF_FRICTION = 0.2
-# Signs of the components: the tool advances along −z, x and y are tangents.
-_COMPONENTS = np.array([2, 0, 1])
-_SIGNS = np.array([-1.0, 1.0, 1.0])
+_ADVANCE = np.array([0.0, 0.0, -1.0])
 # The solver is direct: its tolerance has no effect.
 _EXACT = 1e-12
 
@@ -58,7 +63,7 @@ class SurfaceBody:
         self._elements, self._unit = elements, elements.unit(law)
         self._space = space = elements.displacements
         self._solver: Solver = elements.set_up(law, stack, direct=True, keep=False)
-        dofs = 3 * local[:, None] + _COMPONENTS
+        dofs = 3 * local[:, None] + np.arange(3)
         self._dofs = np.where((local[:, None] >= 0) & (dofs < space.owned), dofs, -1)
 
     def is_free(self) -> BoolArray:
@@ -96,7 +101,7 @@ class SurfaceBody:
             columns = []
             for load in loads:
                 right, unknown = (stack.enter_context(self._elements.fields()) for _ in range(2))
-                right[0].array[self._dofs[own]] = (_SIGNS * load)[own] / self._unit
+                right[0].array[self._dofs[own]] = load[own] / self._unit
                 right[0].array[space.prescribed_owned] = 0.0
                 columns.append(Column(prescribed=nothing, applied=None, right=right, unknown=unknown))
             self._solver.solve(columns, _EXACT)
@@ -109,38 +114,39 @@ class SurfaceBody:
         own = self._dofs >= 0
         found = np.zeros(self._dofs.shape)
         found[own] = values[self._dofs[own]]
-        return _SIGNS * global_sum(self._space.comm, found)
+        return np.asarray(global_sum(self._space.comm, found))
 
 
 @dataclass(frozen=True, eq=False)
 class FrictionalContact(FoundContact):
     """Contact with the friction of a ``tool``, beside the frictionless one that was ``found``.
 
-    ``pressed`` is its equilibrium, nodes in the order of the candidates, and ``coarse`` that from half as many load
-    steps. ``smooth`` and ``frictional`` are the unknowns without and with friction.
+    ``pressed`` is its equilibrium, nodes in the order of the candidates, which ``moved`` (n, 3), m, and ``coarse`` that
+    from half as many load steps. ``smooth`` and ``frictional`` are the unknowns without and with friction.
     """
 
     tool: Tool
-    pressed: Step
-    coarse: Step
+    pressed: ContactSolution
+    coarse: ContactSolution
+    moved: FloatArray
     smooth: Unknowns
     frictional: Unknowns
 
     @property
     def stored(self) -> float:
         """The energy (J) of the modelled part: less than half the work of the force, since friction dissipates."""
-        return self.pressed.energy
+        return float((self.moved * self.pressed.forces).sum()) / 2
 
     @property
     def force(self) -> float:
         """The force (N) on the modelled part of the tool."""
-        return self.pressed.force
+        return force_of(self.pressed)
 
     def summary(self, sag: float) -> Contact:
         """Return the area of the whole contact, and the part of it that slides."""
-        candidates, step = self.obstacle.candidates, self.pressed
-        torque = self.tool.torque(candidates.points, step.reactions[:, 1:])
-        rubbing = rubbing_of(candidates, self.tool.friction, step, self.coarse)
+        candidates, pressed = self.obstacle.candidates, self.pressed
+        torque = self.tool.torque(candidates.points, pressed.forces)
+        rubbing = rubbing_of(candidates, self.tool.friction, pressed, self.coarse)
         return super().summary(sag).with_friction(rubbing, torque, self._plug.body.mirrored)
 
     def response(self, column: Column, movement: Movement) -> Response:
@@ -150,8 +156,8 @@ class FrictionalContact(FoundContact):
         (moved,), (residual,) = products.moved, products.residuals
         local = np.array([residual.reshape(-1, 3)[space.fixed_owned, 2].sum(), moved @ residual])
         support, energy = global_sum(space.comm, depth * local * (1.0, depth))
-        balance = max(abs(support / self.force - 1), abs(2 * self.pressed.energy / energy - 1))
-        across = self.pressed.reactions[:, 1:].sum(axis=0)
+        balance = max(abs(support / self.force - 1), abs(2 * self.stored / energy - 1))
+        across = self.pressed.forces[:, :2].sum(axis=0)
         on_probe = np.array([[*across, -self.force]]) / depth
         return reaction(movement, np.array([[self.force / depth]]), on_probe, self._plug.body.mirrored, balance)
 
@@ -163,12 +169,16 @@ class FrictionalContact(FoundContact):
         self._plug.put(columns[0], self.smooth, depth)
         found = super().hierarchical_estimate(columns, movement, stack, keep=keep)
         self._plug.put(columns[0], self.frictional, depth)
-        path_bar = abs(self.coarse.force / self.force - 1)
+        path_bar = abs(force_of(self.coarse) / self.force - 1)
         return with_friction(found, path_bar, added=self.force / super().force - 1)
 
     def _touching(self) -> tuple[BoolArray, State]:
-        step = self.pressed
-        return step.active, State(-step.moved[:, 0], -step.reactions[:, 0], 2 * step.energy)
+        return self.pressed.active, State(self.moved[:, 2], self.pressed.forces[:, 2], 2 * self.stored)
+
+
+def force_of(touched: ContactSolution) -> float:
+    """Return the force (N) on the tool against its advance, −z."""
+    return -float(touched.forces[:, -1].sum())
 
 
 def with_friction(found: HierarchicalEstimate, path_bar: float, *, added: float) -> HierarchicalEstimate:
@@ -194,27 +204,23 @@ def add_friction(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: Exi
     elements, candidates = sweep.elements.plug, obstacle.candidates
     body = SurfaceBody(elements, sweep.law, sweep.elements.numbering.local, stack)
     is_free, reachable = body.is_free(), np.isfinite(obstacle.bounds)
-    reachable &= is_free[:, 0]
+    reachable &= is_free[:, 2]
     touched = contact.found.active
     while True:
         nodes = np.flatnonzero(_around(candidates, touched) & reachable)
-        surface = _condensed(body, obstacle, nodes, is_free)
-        steps = [press(surface, obstacle.depth, tool.friction, count) for count in (STEPS, STEPS // 2)]
-        pressed, coarse = (_of_all(candidates, nodes, step) for step in steps)
-        moved, frictional = body.moved(pressed.reactions)
-        through = (-obstacle.bounds - moved[:, 0] > SLACK * obstacle.depth) & ~pressed.active & reachable
+        tissue = CondensedTissue(body.compliance(nodes, is_free), candidates.points[nodes], ~is_free[nodes])
+        surface = Surface(tissue, obstacle.bounds[nodes] + obstacle.depth, candidates.neighbours.of(nodes))
+        both = [press(surface, obstacle.depth, tool.friction, count) for count in (STEPS, STEPS // 2)]
+        pressed, coarse = (_of_all(candidates, nodes, one) for one in both)
+        moved, frictional = body.moved(pressed.forces)
+        through = (moved[:, 2] - obstacle.bounds > SLACK * obstacle.depth) & ~pressed.active & reachable
         through[nodes] = False
         if not through.any():
             break
         touched = touched | through
     known = {name: getattr(contact, name) for name in ("sweep", "obstacle", "found", "loaded", "obstacle_above")}
     return FrictionalContact(
-        **known,
-        tool=tool,
-        pressed=replace(pressed, moved=moved),
-        coarse=coarse,
-        smooth=smooth,
-        frictional=frictional,
+        **known, tool=tool, pressed=pressed, coarse=coarse, moved=moved, smooth=smooth, frictional=frictional
     )
 
 
@@ -226,26 +232,53 @@ def _around(candidates: Candidates, active: BoolArray) -> BoolArray:
     return found
 
 
-def _condensed(body: SurfaceBody, obstacle: Obstacle, nodes: IntArray, is_free: BoolArray) -> CondensedSurface:
-    candidates = obstacle.candidates
-    heights = obstacle.bounds[nodes] + obstacle.depth
-    neighbours = Neighbours(candidates.is_corner[nodes], candidates.beside_corners(nodes))
-    return CondensedSurface(body.compliance(nodes, is_free), heights, is_free[nodes], neighbours)
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Condensed ``tissue`` below a tool, whose ``heights`` (n) above the nodes, m, are those at first touch."""
+
+    tissue: CondensedTissue
+    heights: FloatArray
+    neighbours: Neighbours
+
+    def tool_at(self, depth: float) -> PlacedTool:
+        """Return the tool at a ``depth`` (m), with the gaps along its axis."""
+        places, dim = self.tissue.places, self.tissue.places.shape[1]
+
+        def distance(points: FloatArray) -> Distance:
+            return Distance.along_axis(self.heights - depth - (points - places)[:, -1], dim)
+
+        return PlacedTool(distance, self.neighbours.complete, self.neighbours.followers, depth)
 
 
-def _of_all(candidates: Candidates, nodes: IntArray, step: Step) -> Step:
-    """Return a step of some ``nodes`` as one of all candidates."""
+def press(surface: Surface, depth: float, friction: float, steps: int = STEPS) -> ContactSolution:
+    """Return the equilibrium at a ``depth`` (m), reached in ``steps``; infinite ``friction`` sticks.
 
-    def spread(values: FloatArray) -> FloatArray:
-        found = np.zeros((len(candidates), *values.shape[1:]))
+    Raises:
+        ContactError: if no node touches, or a step does not settle however small it is.
+    """
+    tissue, dim = surface.tissue, surface.tissue.places.shape[1]
+    tissue.state = np.zeros_like(tissue.state)
+    path = ContactPath(ContactStage(0.0, tissue.state))
+    of = Friction(friction, _ADVANCE[-dim:], tissue.penalty, surface.neighbours, depth, is_linear=True)
+    try:
+        iterations = press_with_friction(tissue, surface.tool_at, path, depth, of, steps)
+    except LargeError as error:
+        raise ContactError(
+            f"contact with friction does not settle ({error}): use smaller elements below the probe, or less friction"
+        ) from error
+    assert path.last.touched is not None
+    return replace(path.last.touched, iterations=iterations)
+
+
+def _of_all(candidates: Candidates, nodes: IntArray, touched: ContactSolution) -> ContactSolution:
+    """Return contact of some ``nodes`` as that of all candidates."""
+
+    def spread(values: FloatArray | BoolArray) -> Any:
+        found = np.zeros((len(candidates), *values.shape[1:]), values.dtype)
         found[nodes] = values
         return found
 
-    active, sliding = (spread(mask.astype(float)) > 0 for mask in (step.active, step.slide.sliding))
-    return replace(
-        step,
-        moved=spread(step.moved),
-        reactions=spread(step.reactions),
-        active=active,
-        slide=Slide(sliding, spread(step.slide.trial)),
-    )
+    assert touched.slide is not None
+    slide = Slide(spread(touched.slide.sliding), spread(touched.slide.trial))
+    arrays = {name: spread(getattr(touched, name)) for name in ("active", "forces", "gap", "pressed")}
+    return replace(touched, **arrays, slide=slide)

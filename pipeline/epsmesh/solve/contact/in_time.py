@@ -16,7 +16,7 @@ from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.contact.active_set import ContactError
 from epsmesh.solve.contact.contact_steps import check_outside
-from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, Tissue, first_set, solve_contact
+from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, SteppedTissue, first_set, solve_contact
 from epsmesh.solve.contact.large import placed_tool, touched_area
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.tissue import DeformedBody
@@ -38,7 +38,7 @@ class PressedTissue(Pressed):
 
     is_found = True
 
-    def __init__(self, tissue: Tissue, places: FloatArray, unit: float):
+    def __init__(self, tissue: SteppedTissue, places: FloatArray, unit: float):
         """Begin at rest."""
         self._found_on, self._places, self._unit = tissue, places, unit
         self._active = np.zeros(len(places), dtype=bool)

@@ -139,14 +139,12 @@ def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError
 
 def placed_tool(body: DeformedBody, tool: Tool, depth: float) -> PlacedTool:
     """Return the tool at a ``depth`` (m) above the candidates of a body."""
-    candidates, on_support = body.candidates, body.fixed.all(axis=1)
-    # In degree 2 a pressure has no forces at corners, whose own reactions are noise; in degree 3 they have some.
-    followers = candidates.is_corner & (candidates.shape.degree == 2)
+    neighbours, on_support = body.candidates.neighbours, body.fixed.all(axis=1)
 
     def complete(active: BoolArray) -> BoolArray:
-        return np.asarray((active & ~followers | candidates.enclosed(active) & followers) & ~on_support)
+        return neighbours.complete(active) & ~on_support
 
-    return PlacedTool(lambda points: tool.distance(points, depth), complete, followers, depth)
+    return PlacedTool(lambda points: tool.distance(points, depth), complete, neighbours.followers, depth)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,6 @@
 import numpy as np
 
 from epsmesh.solve.contact.contact_steps import Friction
-from epsmesh.solve.contact.coulomb import Neighbours
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.physics import of_regions
 
@@ -17,6 +16,6 @@ def friction_of(body: DeformedBody, coefficient: float, depth: float) -> Frictio
         coefficient,
         np.array([0.0, 0.0, -1.0]),
         np.full(len(candidates), modulus * width),
-        Neighbours(candidates.is_corner, candidates.beside_corners(np.arange(len(candidates)))),
+        candidates.neighbours,
         depth,
     )

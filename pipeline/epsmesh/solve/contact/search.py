@@ -25,7 +25,7 @@ from epsmesh.solve.contact.frictional import add_friction
 from epsmesh.solve.contact.geometry import Touch
 from epsmesh.solve.contact.in_time import PressedTool
 from epsmesh.solve.contact.large import LargeContact
-from epsmesh.solve.contact.levels import Numbering, Surface
+from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.sweep import Sweep
 from epsmesh.solve.contact.tool import Tool
@@ -57,7 +57,6 @@ class ContactSearch:
         self._elements, self._tool = elements, tool
         self._surface, self._touch = Surface(spaces, elements.displacements.conditions), Touch(tool.height, tool.first)
         self.candidates: Candidates = self._surface.of(elements.degree)
-        self._supported = self._held_by_support()
         self.contact: FoundContact | None = None
         self._reuse, self._condense = reuse or condense, condense
         self._sweep: Sweep | None = None  # kept from depth to depth of one material
@@ -88,7 +87,7 @@ class ContactSearch:
         self._couple(elements, movement, columns, law.lame_mu[0], strict)
         loaded = None if movement.loads is None else elements.free_response(columns[-1], strict)
         obstacle = self._obstacle(self.candidates, depth, loaded)
-        if np.any(obstacle.bounds[self._supported] < 0):
+        if np.any(obstacle.bounds[elements.is_fixed] < 0):
             raise ContactError("the probe reaches the fixed part of the body: no displacement satisfies both")
         first, found = self._find(sweep, obstacle, (_LOOSE, strict), loaded)
         self._check_edge(found.active)
@@ -213,13 +212,6 @@ class ContactSearch:
         else:
             stack.callback(sweep.close)
         return sweep
-
-    def _held_by_support(self) -> BoolArray:
-        """Return a mask (n) of candidates that the support fixes; they never become active; collective."""
-        space = self._elements.displacements
-        is_held = np.zeros(space.owned)
-        is_held[3 * space.fixed_owned + 2] = 1.0
-        return np.asarray(Numbering(space.space, self.candidates.numbers).gather(is_held) > 0)
 
     def _check_edge(self, active: BoolArray) -> None:
         points = self.candidates.points[active & self.candidates.is_edge]

@@ -87,10 +87,60 @@ def facet_nodes(degree: int) -> FacetNodes:
     return FacetNodes(degree, places, first, on_edge[np.argsort(angle[on_edge])], np.array(edges), weights)
 
 
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Corners of facets: a mask ``is_corner`` (n), and pairs ``beside`` (k, 2) of a corner and a node next to it.
+
+    A uniform pressure on quadratic facets has nodal forces at their mid nodes only: a corner's reaction means nothing.
+    Such corners are ``followers`` (n), active where all nodes beside them are. (On 45 meshes F of balls and cones is
+    nearer to the meridian's in this way than with corners that enter and leave by their own gap and reaction, too.)
+    """
+
+    is_corner: BoolArray
+    beside: IntArray
+    followers: BoolArray
+
+    def complete(self, active: BoolArray) -> BoolArray:
+        """Return the ``active`` nodes (n) with followers where these belong."""
+        return np.where(self.followers, self.enclosed(active), active)
+
+    def enclosed(self, active: BoolArray) -> BoolArray:
+        """Return a mask (n) of corners whose neighbours are all active."""
+        corner, beside = self.beside.T
+        has = np.bincount(corner, minlength=len(active)) > 0
+        return np.asarray(has & (np.bincount(corner, ~active[beside], len(active)) == 0))
+
+    def of(self, nodes: IntArray) -> "Neighbours":
+        """Return those of some ``nodes`` alone."""
+        position = np.full(len(self.is_corner), -1)
+        position[nodes] = np.arange(len(nodes))
+        pairs = position[self.beside]
+        return Neighbours(self.is_corner[nodes], pairs[(pairs >= 0).all(axis=1)], self.followers[nodes])
+
+    def majority(self, chosen: BoolArray, active: BoolArray) -> BoolArray:
+        """Return ``chosen`` (n), at corners the choice of most of their ``active`` neighbours, true if it is even."""
+        corner, beside = self.beside.T
+        votes = np.bincount(corner, np.where(chosen[beside], 1.0, -1.0) * active[beside], len(chosen))
+        return np.where(self.is_corner, votes >= 0, chosen)
+
+    def mean(self, vectors: FloatArray, chosen: BoolArray) -> FloatArray:
+        """Return ``vectors`` (n, t), at corners the sum of those of the ``chosen`` neighbours, zero if they cancel."""
+        corner, beside = self.beside.T
+        there = np.where(chosen[beside, None], vectors[beside], 0.0)
+        total, size = np.zeros_like(vectors), np.bincount(corner, np.linalg.norm(there, axis=1), len(vectors))
+        np.add.at(total, corner, there)
+        total[np.linalg.norm(total, axis=1) <= _CANCELLED * size] = 0.0
+        return np.where(self.is_corner[:, None], total, vectors)
+
+
 # A point counts as in a plane of symmetry within this distance, in units of the candidates' extent.
 _IN_PLANE = 1e-9
 # Nodes of two degrees are neighbours within this share of an edge, divided by p; mid nodes are included.
 _NEAR = 0.6
+# Vectors whose sum is smaller than this share of them cancel.
+_CANCELLED = 1e-6
+# The degree whose facets have no force of a pressure at their corners.
+_FOLLOWING = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,13 +195,6 @@ class Candidates:
         found[self.facets] = of_regions(values, self.regions, len(self.facets))[:, None]
         return found
 
-    def enclosed(self, active: BoolArray) -> BoolArray:
-        """Return a mask (n) of corners whose neighbours along all edges are active."""
-        if self.shape.degree == 1:
-            return np.zeros(len(self), dtype=bool)
-        corner, beside = self._beside_corners.T
-        return np.asarray((np.bincount(corner, ~active[beside], len(self)) == 0) & self.is_corner)
-
     def bordering(self, active: BoolArray) -> BoolArray:
         """Return a mask (n) of nodes that share a facet with both active and inactive nodes; corners do not count."""
         inner = active[self.facets[:, FACET_CORNERS:]]
@@ -181,18 +224,13 @@ class Candidates:
         pairs = [np.column_stack([self.facets[:, i], higher.facets[:, j]]) for i, j in near]
         return np.unique(np.concatenate(pairs), axis=0)
 
-    def beside_corners(self, nodes: IntArray) -> IntArray:
-        """Return pairs (k, 2) of a corner and a node next to it, as positions in ``nodes`` that contain both."""
-        position = np.full(len(self), -1)
-        position[nodes] = np.arange(len(nodes))
-        pairs = position[self._beside_corners]
-        return np.asarray(pairs[(pairs >= 0).all(axis=1)])
-
     @cached_property
-    def _beside_corners(self) -> IntArray:
+    def neighbours(self) -> Neighbours:
+        """The corners, and the nodes beside them."""
         near = np.argwhere(self.shape.distances(self.shape)[:FACET_CORNERS] < 0.5 + 1e-9)
         pairs = [self.facets[:, (i, j)] for i, j in near if i != j]
-        return np.unique(np.concatenate(pairs), axis=0)
+        beside = np.unique(np.concatenate(pairs), axis=0) if pairs else np.empty((0, 2), dtype=np.int64)
+        return Neighbours(self.is_corner, beside, self.is_corner & (self.shape.degree == _FOLLOWING))
 
     def _marked(self, nodes: IntArray) -> BoolArray:
         found = np.zeros(len(self), dtype=bool)

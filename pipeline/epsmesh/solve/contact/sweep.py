@@ -7,7 +7,7 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray
 from epsmesh.solve.contact.active_set import Found, Obstacle, find_set
-from epsmesh.solve.contact.elements import ContactElements, Unknowns
+from epsmesh.solve.contact.elements import ContactElements, State, Unknowns
 from epsmesh.solve.movement import FarField
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.stages import Times
@@ -24,11 +24,11 @@ _FARTHEST = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """An initial guess: active set (n), unknowns of the elements (owned dofs), twice the energy (J), estimated."""
+    """An initial guess: active set (n), state of the candidates, and unknowns of the elements (owned dofs)."""
 
     active: BoolArray
+    state: State
     unknowns: Unknowns
-    energy: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +67,10 @@ class Sweep:
             ContactError: if the contact does not settle.
         """
         guess = self.guess(obstacle)
-        if self.elements.is_exact:
-            active = obstacle.bounds < 0 if guess is None else guess.active
-            return find_set(self.elements, obstacle, active, tolerances[-1:])
-        if guess is None:
-            return None
-        self.elements.start_at(guess.unknowns)
-        return find_set(self.elements, obstacle, guess.active, tolerances, guess.energy)
+        if guess is not None:
+            self.elements.begin(guess.state, guess.unknowns)
+            return find_set(self.elements, obstacle, guess.active, tolerances, guess.state.energy)
+        return find_set(self.elements, obstacle, obstacle.bounds < 0, tolerances) if self.elements.is_exact else None
 
     def guess(self, obstacle: Obstacle) -> Guess | None:
         """Return the initial guess for an ``obstacle``, or None.
@@ -93,14 +90,14 @@ class Sweep:
             for name in ("moved", "reactions")
         )
         active = np.where(last.found.active, reactions < 0, moved > obstacle.bounds)
-        active |= obstacle.enclosed(active)
         if not active.any():
             return None
         unknowns = tuple(
             np.sum([share * known.unknowns[number] for share, known in mix], axis=0)
             for number in range(len(last.unknowns))
         )
-        return Guess(active, unknowns, last.found.state.energy * (obstacle.depth / last.depth) ** 2)
+        energy = last.found.state.energy * (obstacle.depth / last.depth) ** 2
+        return Guess(active, State(moved, reactions, energy), unknowns)
 
     def keep(self, depth: float, found: Found, unknowns: Unknowns) -> None:
         """Remember the contact ``found`` at a ``depth`` (m), and its unknowns."""

@@ -17,6 +17,9 @@ def turned_frames(normal: FloatArray, chosen: BoolArray) -> FloatArray:
     count, dim = normal.shape
     frames = np.broadcast_to(np.eye(dim), (count, dim, dim)).copy()
     n = normal[chosen]
+    if dim == 1:
+        frames[chosen] = n[:, :, None]
+        return frames
     if dim == 2:
         first = np.column_stack([np.abs(n[:, 1]), -n[:, 0] * np.where(n[:, 1] < 0, -1.0, 1.0)])
         frames[chosen] = np.stack([first, n], axis=2)

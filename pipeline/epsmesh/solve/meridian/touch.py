@@ -21,8 +21,8 @@ from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.contact.checks import check_energy, check_support, force_of
 from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, Friction, press, press_with_friction
-from epsmesh.solve.contact.coulomb import Neighbours
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
+from epsmesh.solve.contact.surface import Neighbours
 from epsmesh.solve.meridian.forms import Meshes
 from epsmesh.solve.meridian.punch import RoundTool
 from epsmesh.solve.meridian.signs import seen_from_above
@@ -171,7 +171,7 @@ class MeridianTouch:
         radii, nobody = self.tissue.places[:, 0], np.zeros(len(self.tissue.places), dtype=bool)
         # Forces are per radian: the stiffness of a node is its radius times a modulus. None follows its neighbours.
         penalty = self.law.plane_moduli[0] / self.law.lame_mu[0] * np.maximum(radii, radii[1])
-        neighbours = Neighbours(nobody, np.empty((0, 2), dtype=np.int64))
+        neighbours = Neighbours(nobody, np.empty((0, 2), dtype=np.int64), nobody)
         return Friction(self.tool.friction, _DOWN, penalty, neighbours, deepest)
 
     @property
