@@ -21,8 +21,9 @@ from epsmesh.run.execute import compute
 from epsmesh.run.record import Record
 from epsmesh.scene.model import FIXED, PROBE
 from epsmesh.shapes.rounded import Rounded
+from epsmesh.solve.contact.checks import force_of
 from epsmesh.solve.contact.condensed import CondensedTissue
-from epsmesh.solve.contact.frictional import Surface, force_of, press
+from epsmesh.solve.contact.frictional import Surface, press
 from epsmesh.solve.contact.surface import Neighbours
 from epsmesh.solve.meridian.forms import MeridianForms
 from epsmesh.solve.meridian.system import meshes_of

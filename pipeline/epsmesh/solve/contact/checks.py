@@ -7,11 +7,11 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.balance import check_work
 from epsmesh.solve.contact.active_set import ContactError
-from epsmesh.solve.contact.deformed import ContactSolution, Tissue
+from epsmesh.solve.contact.deformed import ContactSolution, SteppedTissue, Tissue
 from epsmesh.solve.newton import LargeError
 
 
-class StoringTissue(Tissue, Protocol):
+class StoringTissue(SteppedTissue, Protocol):
     """Tissue with nodes whose ``places`` (n, d) at rest are known, and with its ``energy``; NaN if J <= 0."""
 
     @property

@@ -19,6 +19,7 @@ from epsmesh.arrays import BoolArray, FloatArray, IntArray
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.active_set import ContactError
+from epsmesh.solve.contact.checks import force_of
 from epsmesh.solve.contact.condensed import CondensedTissue
 from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, Friction, press_with_friction
 from epsmesh.solve.contact.coulomb import Slide, rubbing_of
@@ -174,11 +175,6 @@ class FrictionalContact(FoundContact):
 
     def _touching(self) -> tuple[BoolArray, State]:
         return self.pressed.active, State(self.moved[:, 2], self.pressed.forces[:, 2], 2 * self.stored)
-
-
-def force_of(touched: ContactSolution) -> float:
-    """Return the force (N) on the tool against its advance, −z."""
-    return -float(touched.forces[:, -1].sum())
 
 
 def with_friction(found: HierarchicalEstimate, path_bar: float, *, added: float) -> HierarchicalEstimate:
