@@ -3,8 +3,8 @@
 import pytest
 
 from epsmesh.plan.plan import make_plan
-from epsmesh.study.way import Constraint, Dimension, Steps
-from tests.cases import study
+from epsmesh.study.way import Constraint, Dimension, Motion, Steps
+from tests.cases import BLADE, study
 
 BALL = {"shape": "sphere", "radius": "3 mm", "depth": "0.2 mm"}
 NEO = {"law": "neo-hookean"}
@@ -34,6 +34,14 @@ def test_tissue_beyond_is_part_of_the_formulation():
     mesh = {"epsilon": ["8 mm", "full"], "outside": "linear"}
     cases = study(material=NEO, mesh=mesh).cases()
     assert [case.way.formulation for case in cases] == ["linear+neo-hookean", "neo-hookean"]
+
+
+def test_what_moves():
+    blade = BLADE | {"incision": "4 mm", "radius": None}
+    ball = {"epsilon": "8 mm", "outside": "halfspace"}
+    changes = [{}, {"probe": {"motion": "all"}}, {"probe": blade}, {"mesh": ball}]
+    found = [study(**change).case(()).way.motion for change in changes]
+    assert found == [Motion.PRESS, Motion.SIX, Motion.SLIT, Motion.FAR]
 
 
 def test_only_friction_on_a_linear_body_is_factorised():

@@ -21,6 +21,7 @@ from epsmesh.study.ends import ends_of
 from epsmesh.study.problems import Problem, StudyError
 from epsmesh.study.schema import Mesh, Solving
 from epsmesh.study.sweep import Study
+from epsmesh.study.way import Motion
 
 __all__ = [
     "EXACT",
@@ -167,7 +168,7 @@ def _exact_of(
     if case.lost_contact or (reason := obstacle("F_exact", case)):
         return "" if case.lost_contact else reason, None
     case = study.case(source)
-    enough = max(accuracy, EXACT_OF_SLIT) if case.probe.slit else accuracy
+    enough = max(accuracy, EXACT_OF_SLIT) if case.way.motion is Motion.SLIT else accuracy
     return "", Solve(reference_key(case, enough), case, goal=enough, is_reference=True)
 
 

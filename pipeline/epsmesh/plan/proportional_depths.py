@@ -10,7 +10,6 @@ from epsmesh.plan.key import case_key
 from epsmesh.shapes.contact import is_level
 from epsmesh.study.capabilities.obstacles import obstacle
 from epsmesh.study.case import Case
-from epsmesh.study.way import Constraint
 
 
 @dataclass(frozen=True)
@@ -49,5 +48,4 @@ def _is_flat_and_unilateral(case: Case) -> bool:
 
 def _is_frictionless_in_slit(case: Case) -> bool:
     """Return whether a blade is in a slit, without friction."""
-    in_slit = case.probe.slit is not None and case.way.constraint is Constraint.SLIDING
-    return in_slit and not obstacle("proportional depths", case)
+    return case.way.slides_in_slit and not obstacle("proportional depths", case)

@@ -8,7 +8,7 @@ from math import nan
 from epsmesh.plan.key import mesh_key, operator_key
 from epsmesh.plan.recipe import MARGIN, Rung
 from epsmesh.study.case import Case
-from epsmesh.study.way import Way
+from epsmesh.study.way import Motion, Way
 
 # A first mesh may be coarse for a contact on a bump, which is smaller than on a plane. The ratio of its bar to the
 # expected one then falls with the elements: more than this is not expected of finer meshes.
@@ -46,7 +46,7 @@ class Solve:
     @property
     def meshed_case(self) -> Case:
         """The case that is meshed: this one, or, for half balls, the one at the centre, which all places share."""
-        if not self.case.is_closed:
+        if self.case.way.motion is not Motion.FAR:
             return self.case
         return replace(self.case, probe=self.case.probe.model_copy(update={"at": CENTRE}))
 

@@ -30,6 +30,7 @@ from epsmesh.states import LOST, OK, PENDING
 from epsmesh.study.axis import Axis
 from epsmesh.study.case import Case
 from epsmesh.study.sweep import Study
+from epsmesh.study.way import Motion
 
 _SIZES = {"component": 3, "movement": 6, "conjugate": 6}
 
@@ -48,7 +49,7 @@ class _Part:
 
 
 def _has_slit(case: Case) -> bool:
-    return case.probe.slit is not None
+    return case.way.motion is Motion.SLIT
 
 
 def _may_end_early(case: Case) -> bool:
@@ -71,7 +72,7 @@ _PARTS = (
     _Part((*LARGEST, *_COUNTS)),
     _Part(("force_exact", "force_exact_error"), is_exact=True),
     _Part(("force_vector", "force_vector_error"), ("component",)),
-    _Part(("stiffness", "stiffness_error"), ("movement", "conjugate"), lambda case: case.probe.motion == "all"),
+    _Part(("stiffness", "stiffness_error"), ("movement", "conjugate"), lambda case: case.way.motion is Motion.SIX),
     _Part(("energy_release", "energy_release_error"), of=_has_slit),
     _Part(("energy_release_exact", "energy_release_exact_error"), of=_has_slit, is_exact=True),
     _Part(_OF_LOADS[:-1], of=lambda case: case.load.acts),

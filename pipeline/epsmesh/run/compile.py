@@ -16,10 +16,10 @@ from epsmesh.solve.greens_function import compile_regular
 from epsmesh.solve.kernels import native
 from epsmesh.solve.meridian.large import DEGREE as LARGE_DEGREE
 from epsmesh.solve.meridian.large_contact import DEGREE_OF_STEPS
-from epsmesh.solve.meridian.problem import compile_axisymmetric
+from epsmesh.solve.meridian.problem import DEGREE, compile_axisymmetric
 from epsmesh.solve.meridian.punch import TRIAL_DEGREE
 from epsmesh.stages import stage
-from epsmesh.study.way import Constraint, Way
+from epsmesh.study.way import LINEAR, Constraint, Motion
 
 
 class _Forms(Protocol):
@@ -32,41 +32,35 @@ class _Forms(Protocol):
 class _Body:
     """Forms of a body in three dimensions."""
 
-    way: Way
     degree: int
+    element: str
+    laws: tuple[str, ...]
     of_regions: bool
+    of_contact: bool
+    of_steps: bool
     of_slit: bool
 
     def compile(self) -> None:
-        way, straight = self.way, self.degree == 1
-        compile_forms(
-            self.degree,
-            way.element,
-            way.laws,
-            straight=straight,
-            of_regions=self.of_regions,
-            of_contact=way.is_found and way.is_large,
-            of_steps=way.in_time,
-        )
+        straight = self.degree == 1
+        forms = {name: value for name, value in vars(self).items() if name != "of_slit"}
+        compile_forms(**forms, straight=straight)
         compile_cell_values(self.degree, straight=straight)
         if self.of_slit:
-            compile_release(self.degree, mixed=way.is_mixed, of_regions=self.of_regions)
+            compile_release(self.degree, mixed=self.element == "mixed", of_regions=self.of_regions)
 
 
 @dataclass(frozen=True)
 class _Meridian:
-    """Forms of a half plane."""
+    """Forms of a half plane; those of degrees from the ``lowest`` on, if that is given."""
 
-    way: Way
     curved: bool
+    degree: int = DEGREE
+    lowest: int = 0
+    laws: tuple[str, ...] = LINEAR
+    relaxes: bool = False
 
     def compile(self) -> None:
-        way = self.way
-        if way.is_large or way.in_time:
-            degree = DEGREE_OF_STEPS if way.rubs else LARGE_DEGREE
-            compile_axisymmetric(degree, curved=self.curved, laws=way.laws, relaxes=way.in_time)
-        else:
-            compile_axisymmetric(curved=self.curved, lowest=_LOWEST.get(way.constraint, 0))
+        compile_axisymmetric(**vars(self))
 
 
 @dataclass(frozen=True)
@@ -108,9 +102,20 @@ def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
 
 
 def _forms(solve: Solve) -> _Forms:
-    body, case = solve.case.body, solve.case
-    if solve.axisymmetric:
-        half_plane = body.half_plane()
-        return _Meridian(solve.way, curved=bool(half_plane and half_plane.is_curved))
-    of_regions = bool(body.regions) or case.is_linear_beyond
-    return _Body(solve.way, case.mesh.degree, of_regions, of_slit=case.probe.slit is not None)
+    body, case, way = solve.case.body, solve.case, solve.way
+    if not solve.axisymmetric:
+        return _Body(
+            case.mesh.degree,
+            way.element,
+            way.laws,
+            of_regions=bool(body.regions) or case.is_linear_beyond,
+            of_contact=way.is_found and way.is_large,
+            of_steps=way.in_time,
+            of_slit=way.motion is Motion.SLIT,
+        )
+    half_plane = body.half_plane()
+    curved = bool(half_plane and half_plane.is_curved)
+    if way.is_large or way.in_time:
+        degree = DEGREE_OF_STEPS if way.rubs else LARGE_DEGREE
+        return _Meridian(curved, degree, laws=way.laws, relaxes=way.in_time)
+    return _Meridian(curved, lowest=_LOWEST.get(way.constraint, 0))

@@ -22,7 +22,7 @@ from epsmesh.solve.response import Contact
 from epsmesh.solve.solution import Solution
 from epsmesh.states import OK
 from epsmesh.study.case import Case
-from epsmesh.study.way import Constraint
+from epsmesh.study.way import Constraint, Motion
 
 _ROUNDING = 1e-9
 # The mesh is graded to the axis. If first contact is farther away, in units of the half width, it is not graded to it.
@@ -76,10 +76,10 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         force_error=bar / abs(force),
         force_vector=turned_back(turn, _known_of(case, solution.reaction)),
         force_vector_error=_vector_bars(solution, turn),
-        stiffness=_rows(solution.stiffness, turn) if case.probe.motion == "all" else (),
-        stiffness_error=_rows(solution.bars, turn, bars=True) if case.probe.motion == "all" else (),
+        stiffness=_rows(solution.stiffness, turn) if case.way.motion is Motion.SIX else (),
+        stiffness_error=_rows(solution.bars, turn, bars=True) if case.way.motion is Motion.SIX else (),
         energy=solution.energy,
-        energy_release=solution.release / _front_length(case) if case.probe.slit else nan,
+        energy_release=solution.release / _front_length(case) if case.way.motion is Motion.SLIT else nan,
         energy_release_error=solution.release_bar,
         largest=solution.largest,
         **_of_contact(solution.contact),
@@ -155,9 +155,9 @@ def _known_of(case: Case, force: Vector) -> Vector:
     ends are not computed.
     """
     x, y, z = force
-    if case.is_closed and case.way.constraint is Constraint.BONDED:
+    if case.way.motion is Motion.FAR and case.way.constraint is Constraint.BONDED:
         return x and nan, y and nan, z
-    if case.probe.slit and case.way.constraint is Constraint.SLIDING:
+    if case.way.slides_in_slit:
         along = case.frame.upright.along
         return (x and nan, y, z) if abs(along[0]) > abs(along[1]) else (x, y and nan, z)
     return x, y, z

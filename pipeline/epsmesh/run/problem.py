@@ -41,7 +41,7 @@ from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.solution import Problem, Request, Solution
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.case import Case
-from epsmesh.study.way import Constraint
+from epsmesh.study.way import Constraint, Motion
 from epsmesh.units import canonical
 
 # Largest number of unknowns for a direct solve if iterations do not converge.
@@ -181,13 +181,14 @@ def movement_of(case: Case, meshed: Case | None = None) -> Movement:
 def _motions_of(case: Case, meshed: Case) -> Movement:
     frame = case.frame.upright
     travel = case.probe.travel(frame)
-    if case.probe.motion == "all":
+    motion, slit = case.way.motion, case.probe.slit
+    if motion is Motion.SIX:
         return Movement.all(travel, frame.point)
-    if slit := case.probe.slit:
+    if slit:
         # Tissue slides along frictionless flanks, so only their opening is prescribed.
         pressed = Movement.along(travel) if case.way.constraint is Constraint.BONDED else Movement((), ())
         return pressed.opened(case.frame.upright.across, slit.width / 2)
-    if case.is_closed:
+    if motion is Motion.FAR:
         return Movement.along(travel).with_far(_moved(far_field_of(case), meshed.frame.point))
     # Across a plane of symmetry, sliding gives no axial force, and pressing gives no lateral force.
     return Movement.along(travel, apart=mirror_planes(case) != movement_planes(case))

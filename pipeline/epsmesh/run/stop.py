@@ -11,6 +11,7 @@ from epsmesh.quantities import write
 from epsmesh.run.record import Record
 from epsmesh.states import SKIPPED
 from epsmesh.study.case import Case
+from epsmesh.study.way import Motion
 
 # F stays close to F_exact if it is close at this many values of ε in a row.
 _IN_A_ROW = 2
@@ -22,8 +23,8 @@ def waves(plan: Plan, todo: Collection[Solve]) -> list[tuple[Solve, ...]]:
     Of insertions, intact bodies are first.
     """
     if plan.study.is_insertion:
-        slits = tuple(solve for solve in todo if solve.case.probe.slit)
-        return [tuple(solve for solve in todo if not solve.case.probe.slit), slits]
+        slits = tuple(solve for solve in todo if solve.way.motion is Motion.SLIT)
+        return [tuple(solve for solve in todo if solve.way.motion is not Motion.SLIT), slits]
     if plan.study.planning.stop_near_exact is None:
         return [tuple(todo)]
     exact = tuple(solve for solve in todo if solve.is_reference)
@@ -40,7 +41,7 @@ def reason_to_skip(plan: Plan, solve: Solve, find: Callable[[str], Record | None
     if plan.study.is_insertion:
         from epsmesh.insertion.paths import needs  # noqa: PLC0415 (it loads scipy)
 
-        is_needed = solve.case.probe.slit is None or any(needs(plan, index, find) for index in solve.serves)
+        is_needed = solve.way.motion is not Motion.SLIT or any(needs(plan, index, find) for index in solve.serves)
         return "" if is_needed else "the intact body stores less than the work of fracture of a slit"
     limit = plan.study.planning.stop_near_exact
     if limit is None or solve.is_reference or not plan.reference_keys:

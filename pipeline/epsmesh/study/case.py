@@ -19,7 +19,7 @@ from epsmesh.study.loads import Load
 from epsmesh.study.output import Output
 from epsmesh.study.place import CLEAR, is_clear, place_error
 from epsmesh.study.schema import Material, Mesh, Solving
-from epsmesh.study.way import LINEAR, Constraint, Dimension, Way
+from epsmesh.study.way import LINEAR, Constraint, Dimension, Motion, Way
 from epsmesh.viscoelastic import Terms
 
 Rest = ParamSpec("Rest")
@@ -27,6 +27,8 @@ Value = TypeVar("Value")
 
 # Thickness over reach up to which a body without support below the probe is a plate (benchmarks/results/coverage.md).
 _PLATE = 0.1
+# What may be beyond ε besides coarse, free or fixed tissue.
+BEYOND = ("linear", "halfspace", "green")
 # Depth, in units of the footprint's half width, up to which quarter-point elements do not fold at large displacements.
 _SHALLOW = 0.1
 
@@ -129,9 +131,9 @@ class Case:
     def movements(self) -> int:
         """How many solutions there are: press, slide, opening of a slit, far field, or all six motions; and loads."""
         slides = self.travel != tuple(self.probe.depth * a for a in self.frame.axis)
-        opens = self.probe.slit is not None and self.way.constraint is Constraint.BONDED
-        motions = 6 if self.probe.motion == "all" else 1 + slides + opens + self.is_closed
-        return motions + self.load.acts
+        motion, is_bonded = self.way.motion, self.way.constraint is Constraint.BONDED
+        further = slides + (motion is Motion.FAR or (motion is Motion.SLIT and is_bonded))
+        return (6 if motion is Motion.SIX else 1 + further) + self.load.acts
 
     @property
     @of_scene
@@ -267,7 +269,7 @@ class Case:
         """How it is solved; the plan may choose the half plane of a round scene."""
         # Asked several times for each case of a large study: of the mesh it depends on these alone.
         mesh = self.mesh
-        key = mesh.element, mesh.degree, mesh.outside == "linear" and not self.is_full
+        key = mesh.element, mesh.degree, mesh.outside in BEYOND and not self.is_full and mesh.outside
         found: Way | None = self.shared.get(key)
         if found is None:
             found = self.shared[key] = self._find_way()
@@ -286,7 +288,14 @@ class Case:
             needs_time_steps(self),
             Dimension.SECTION if probe.crack else Dimension.BODY,
             has_terms=bool(self.load.terms),
+            motion=self._motion,
         )
+
+    @property
+    def _motion(self) -> Motion:
+        if self.probe.motion == "all":
+            return Motion.SIX
+        return Motion.SLIT if self.probe.slit else Motion.FAR if self.is_closed else Motion.PRESS
 
     @property
     def whole(self) -> str:

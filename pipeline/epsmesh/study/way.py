@@ -1,7 +1,8 @@
 """The way a case is solved: what its sections imply for the solver, found once, in one place.
 
-A way is a formulation (element and laws), a constraint at the tool, steps, and a dimension. Plan, cost, memory,
-compiled forms, solver and record ask it. Which features exclude each other is in :mod:`epsmesh.study.capabilities`.
+A way is a formulation (element and laws), a constraint at the tool, a motion, steps, and a dimension. Plan, cost,
+memory, compiled forms, solver and record ask it. Which features exclude each other:
+:mod:`epsmesh.study.capabilities`.
 """
 
 from dataclasses import dataclass, replace
@@ -17,6 +18,15 @@ class Constraint(Enum):
     SLIDING = "sliding"  # its normal component
     FOUND = "found"  # the tool's surface, where it presses: an active set
     FRICTION = "friction"  # the same, with Coulomb's law
+
+
+class Motion(Enum):
+    """What moves: each case has one."""
+
+    PRESS = "press"  # the tool, along its axis and across it
+    SIX = "six"  # the tool, in each of the six rigid motions
+    SLIT = "slit"  # a blade in a slit, whose faces it opens
+    FAR = "far"  # the tool, and the far field that closes a half ball
 
 
 class Steps(Enum):
@@ -49,6 +59,7 @@ class Way:
     in_time: bool = False
     dimension: Dimension = Dimension.BODY
     has_terms: bool = False
+    motion: Motion = Motion.PRESS
 
     @property
     def is_large(self) -> bool:
@@ -69,6 +80,11 @@ class Way:
     def is_found(self) -> bool:
         """Whether the contact area is unknown and computed."""
         return self.constraint in (Constraint.FOUND, Constraint.FRICTION)
+
+    @property
+    def slides_in_slit(self) -> bool:
+        """Whether tissue slides along the faces of a blade in a slit: its tip and front alone carry the force."""
+        return self.motion is Motion.SLIT and self.constraint is Constraint.SLIDING
 
     @property
     def rubs(self) -> bool:
