@@ -148,8 +148,8 @@ class Drawing:
 
     def _add_lines(self, plotter: Any, lines: Any, colour: str, width: float) -> None:
         if lines.n_points:
-            # A little nearer to the eye, so that the surface does not hide half of each line.
-            lines = lines.translate(2e-3 * self._surface.length * self._view.eye)
+            # Nearer to the eye, so that the surface does not hide half of a line, nor a thin line parts of a thick one.
+            lines = lines.translate(1e-3 * width * self._surface.length * self._view.eye)
             plotter.add_mesh(lines, color=colour, line_width=width, lighting=False)
 
     def _aim(self, plotter: Any, shape: float, *, close: bool) -> None:
