@@ -136,8 +136,9 @@ def _wants_exact(scene: Scene) -> bool:
 
 def needs_time_steps(scene: Scene) -> bool:
     """Return whether the force over time is no elastic force times a function of time."""
-    is_simple = not _is_large(scene) and len(_relaxations(scene)) == 1 and not scene.load.terms
-    return scene.probe.history is not None and not is_simple
+    if scene.probe.history is None:
+        return False
+    return _is_large(scene) or len(_relaxations(scene)) > 1 or bool(scene.load.terms)
 
 
 def _is_off_axis(scene: Scene) -> bool:
