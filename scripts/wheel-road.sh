@@ -97,6 +97,8 @@ fi
     { tail -n 30 "$work/log" >&2; fail "the packages for tests cannot be installed"; }
 cd "$work/source"
 "$venv/python" -m pytest -q -p no:cacheprovider "${tests[@]}" </dev/null
+"$venv/mpiexec" -n 2 scripts/one-voice.sh "$venv/python" -m mpi4py -m pytest -q -m mpi -p no:cacheprovider \
+    tests/solve/test_without_hypre.py -k "locking or inclusion" </dev/null # one mesh on both ranks
 if [[ ! $short ]]; then
     cd "$work/away"
     "$epsmesh" verify --quick

@@ -65,6 +65,7 @@ def test_what_does_not_converge_is_a_failure():
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_iterations_do_not_grow_with_the_mesh(degree):
+    """Or hardly: from 600 to 44,000 unknowns of degree 1 hypre takes 9 to 13, PETSc 3.25's GAMG 9 to 15."""
     counts, dofs = [], []
     for rim, fine in (("1 mm", "5 mm"), ("0.25 mm", "2.5 mm")):
         mesh = make_mesh(mesh={"rim": rim, "fine": fine, "growth": 0.5, "degree": degree})
