@@ -15,7 +15,7 @@ from epsmesh.solve.history import Course, History
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.spaces import Spaces
-from epsmesh.solve.time_steps import PressedFootprint, TimeSteps
+from epsmesh.solve.time_steps import FootprintIndentation, TimeSteps
 from epsmesh.viscoelastic import Motion, Terms, respond
 from tests.cases import study
 
@@ -46,7 +46,7 @@ def followed(motion, *terms: Terms, steps: int = 4, **changes) -> tuple[History,
         law = MaterialLaw(tuple(replace(one, relaxation=own) for one, own in each))
         elements.set_law(law)
         linear = elements.linearised(law, stack, direct=True)
-        pressed = PressedFootprint(elements, law, linear, movement, stack)
+        pressed = FootprintIndentation(elements, law, linear, movement, stack)
         course = course_of(motion, steps)
         found = TimeSteps(law, pressed, movement.amounts[0], stack, mirrored=mesh.mirrored).follow(course)
         return found, static.reaction[2], static.energy

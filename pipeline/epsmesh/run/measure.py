@@ -15,10 +15,10 @@ from epsmesh.run.record import Record
 from epsmesh.shapes.body import Layered
 from epsmesh.shapes.contact import first_touch
 from epsmesh.shapes.frame import Vector
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.convergence import Convergence
 from epsmesh.solve.estimate import is_fine, is_graded
 from epsmesh.solve.history import History
-from epsmesh.solve.response import Contact
 from epsmesh.solve.solution import Solution
 from epsmesh.states import OK
 from epsmesh.study.case import Case
@@ -118,7 +118,7 @@ def _course(case: Case, history: History | None) -> dict[str, tuple[float, ...]]
     return {name: tuple(map(float, values)) for name, values in found.items()}
 
 
-def _of_contact(contact: Contact | None) -> dict[str, Any]:
+def _of_contact(contact: ContactResult | None) -> dict[str, Any]:
     """Return the fields of a record for found contact, none for a prescribed footprint."""
     if contact is None:
         return {}

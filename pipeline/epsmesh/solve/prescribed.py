@@ -25,7 +25,7 @@ from epsmesh.solve.path import Stage
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import LoadResponse, Response, load_response_of, reaction
 from epsmesh.solve.solution import Request
-from epsmesh.solve.time_steps import PressedFootprint
+from epsmesh.solve.time_steps import FootprintIndentation
 from epsmesh.stages import stage
 
 # Tolerance of each motion's own balance for the balance of both sides of a cut, as a share of the limit.
@@ -81,14 +81,14 @@ class PrescribedMotion:
                 response = _balanced(respond(solver.products(columns), columns, law, movement)[0])
         return Equilibrium(solver, columns, movement, iterations, response, load_response)
 
-    def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> PressedFootprint:
+    def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> FootprintIndentation:
         """Return the body whose footprint is pressed in time steps; the ``stack`` frees it; collective."""
         elements, solver = self._elements, found.solver
         if isinstance(solver, LoadSteps):
             linear = solver.linearised
         else:
             linear = elements.linearised(asked.law, stack, direct=elements.is_direct(asked.method))
-        return PressedFootprint(elements, asked.law, linear, found.movement, stack)
+        return FootprintIndentation(elements, asked.law, linear, found.movement, stack)
 
     def _iterate(
         self, solver: Solver, columns: list[Column], todo: list[Column], movement: Movement, tolerance: float

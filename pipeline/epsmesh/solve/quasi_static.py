@@ -22,6 +22,7 @@ from epsmesh.solve.cell_values import CellValues, plain_share
 from epsmesh.solve.conditions import Conditions, Front
 from epsmesh.solve.contact.search import ContactSearch
 from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.crack import Advance
 from epsmesh.solve.elements import elements_of
 from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
@@ -33,10 +34,10 @@ from epsmesh.solve.movement import Motion, Movement
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.points.state import State
 from epsmesh.solve.prescribed import PrescribedMotion, respond
-from epsmesh.solve.response import Contact, LoadResponse, Response, shares
+from epsmesh.solve.response import LoadResponse, Response, shares
 from epsmesh.solve.solution import Problem, Request, Solution
 from epsmesh.solve.spaces import Spaces
-from epsmesh.solve.time_steps import Pressed, TimeSteps, follow_course
+from epsmesh.solve.time_steps import Indentation, TimeSteps, follow_course
 from epsmesh.stages import recorded, stage
 
 
@@ -50,7 +51,7 @@ class Constraint(Protocol):
             SolveError: if there is none, or it fails a check.
         """
 
-    def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> Pressed:
+    def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> Indentation:
         """Return the body in time steps up to the equilibrium that was found; collective."""
 
     def close(self) -> None:
@@ -154,8 +155,8 @@ class QuasiStaticProblem(Problem):
         self.elements.set_law(asked.law)
 
         def begin() -> TimeSteps:
-            pressed = self.constraint.in_time(asked, found, stack)
-            return TimeSteps(asked.law, pressed, found.movement.amounts[0], stack, mirrored=self._body.mirrored)
+            indentation = self.constraint.in_time(asked, found, stack)
+            return TimeSteps(asked.law, indentation, found.movement.amounts[0], stack, mirrored=self._body.mirrored)
 
         history, iterations = follow_course(begin, asked.course)
         return replace(solution, history=history, iterations=solution.iterations + iterations)
@@ -258,7 +259,7 @@ def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:
     return response.stiffness if load_response is None else load_response.form
 
 
-def _with_bars(contact: Contact, finer: HierarchicalEstimate) -> Contact:
+def _with_bars(contact: ContactResult, finer: HierarchicalEstimate) -> ContactResult:
     found = replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)
     if contact.rubbing is None or finer.relative is None:
         return found

@@ -15,7 +15,7 @@ degree more, measures how far this is so. It may vanish by chance: a fraction of
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import nan, pi
+from math import nan
 
 import numpy as np
 
@@ -28,86 +28,8 @@ from epsmesh.solve.movement import Movement, Vector
 # Bar on the loads' effect on the probe, in units of the geometric mean of both bars: factor of the cosine, and rest.
 # Measured: benchmarks/results/friction.md.
 _SEEN, _UNSEEN = {"displacement": 1.15, "mixed": 1.25}, {"displacement": 0.12, "mixed": 0.2}
-# Bars with friction, in units of the change from half as many load steps, to which the area that slides adds a part of
-# the facets in which sliding begins or ends, and the tangential force the relative bars on the axial one and on the
-# contact area. Measured: benchmarks/results/friction.md.
-_OF_STEPS, _OF_UNSURE, _OF_FORCE, _OF_AREA = 1.5, 0.6, 2.0, 3.0
 # Directions are equal within this distance.
 _SAME = 1e-9
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Unilateral contact: its area (m²), with a relative 95 % bar if requested.
-
-    ``slip_area`` (m²) is the part of it that slides along the tool, ``friction_force`` (N) the sum of the sizes of the
-    tangential forces, and ``torque`` (N m) that of the tissue on the tool about its advance: NaN without friction. Each
-    has a 95 % bar in its own unit, NaN if unknown; ``rubbing`` is what those of the first two follow from.
-    ``friction_bar`` is the relative bar on what friction adds to the force. ``sag`` (m) is the displacement of the
-    first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere the
-    tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's bar by the
-    size of elements there.
-    """
-
-    area: float
-    bar: float = nan
-    slip_area: float = nan
-    friction_force: float = nan
-    torque: float = nan
-    slip_area_bar: float = nan
-    friction_force_bar: float = nan
-    torque_bar: float = nan
-    friction_bar: float = 0.0
-    rubbing: "Rubbing | None" = None
-    sag: float = nan
-    load_energy: float = nan
-    is_ended: bool = False
-    at_edge: float = 0.0
-
-    @property
-    def radius(self) -> float:
-        """Radius (m) of a disc of the same area."""
-        return float(self.area / pi) ** 0.5
-
-    def with_friction(self, rubbing: "Rubbing", torque: float, mirrored: Sequence[int]) -> "Contact":
-        """Return the contact with friction.
-
-        The ``rubbing`` and the ``torque`` (N m) are those of the part that planes of symmetry, normal to the axes
-        ``mirrored``, bound. A mirror image has the opposite torque: the whole has exactly none.
-        """
-        whole = rubbing.times(2.0 ** len(mirrored))
-        found = replace(
-            self, slip_area=whole.share * self.area, friction_force=whole.force, torque=torque, rubbing=whole
-        )
-        return replace(found, torque=0.0, torque_bar=0.0) if mirrored else found
-
-
-@dataclass(frozen=True)
-class Rubbing:
-    """Friction at nodes: the ``share`` of the contact that slides, and the sum of the tangential ``force`` (N).
-
-    The changes of both are those from half as many load steps; ``unsure`` (m²) is the area of the facets in which
-    sliding begins or ends, zero if tissue sticks by definition.
-    """
-
-    share: float
-    force: float
-    change_of_share: float
-    change_of_force: float
-    unsure: float
-
-    def times(self, images: float) -> "Rubbing":
-        """Return that of the whole body, of which the modelled part has so many ``images``."""
-        force, change, unsure = images * self.force, images * self.change_of_force, images * self.unsure
-        return replace(self, force=force, change_of_force=change, unsure=unsure)
-
-    def bars(self, area: float, relative: float, area_bar: float) -> tuple[float, float]:
-        """Return the 95 % bars on the area that slides (m²) and on the force (N); benchmarks/results/friction.md.
-
-        ``area`` (m²) is that of the contact, ``area_bar`` its relative bar, and ``relative`` that of the axial force.
-        """
-        of_slip = (_OF_STEPS * self.change_of_share + area_bar * self.share) * area + _OF_UNSURE * self.unsure
-        return of_slip, _OF_STEPS * self.change_of_force + (_OF_FORCE * relative + _OF_AREA * area_bar) * self.force
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,13 +9,14 @@ import numpy as np
 
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.balance import TOLERANCE
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.convergence import Convergence
 from epsmesh.solve.crack import Advance
 from epsmesh.solve.estimate import extrapolate, extrapolate_found
 from epsmesh.solve.history import Course, History
 from epsmesh.solve.movement import Movement, Vector
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.solve.response import Contact, LoadResponse, Response, load_bars
+from epsmesh.solve.response import LoadResponse, Response, load_bars
 from epsmesh.stages import Times
 
 
@@ -45,7 +46,7 @@ class Solution:
     is_solved: bool = False
     unseen: FloatArray | None = None
 
-    contact: Contact | None = None  # unilateral contact only
+    contact: ContactResult | None = None  # unilateral contact only
 
     history: History | None = None  # over the course of a request
 

@@ -83,7 +83,7 @@ class Body(Protocol):
         """Return the energy (J)."""
 
 
-class Pressed(ABC):
+class Indentation(ABC):
     """A relaxing ``body`` and what presses it, at the equilibrium at a share of the movement. Methods are collective.
 
     ``force`` (3), N, is that of the tool on the modelled part, ``rate`` (J) the work per share, and ``area`` (m²) the
@@ -116,7 +116,7 @@ class Pressed(ABC):
         """Return the displacement, a state, per metre of the tool in which stresses do the work of the force."""
 
 
-class PressedFootprint(Pressed):
+class FootprintIndentation(Indentation):
     """A body whose footprint has a prescribed ``movement``."""
 
     is_found = False
@@ -181,7 +181,7 @@ class TimeSteps:
     def __init__(
         self,
         law: MaterialLaw,
-        pressed: Pressed,
+        indentation: Indentation,
         depth: float,
         stack: ExitStack,
         *,
@@ -193,7 +193,7 @@ class TimeSteps:
         The body is ``mirrored`` at planes normal to these axes. ``has_own_mesh``: the study does not choose the mesh.
         """
         self._law, self._depth, self._mirrored, self._has_own_mesh = law, depth, mirrored, has_own_mesh
-        self._place, self._pressed, self._body = _Place(), pressed, pressed.body
+        self._place, self._indentation, self._body = _Place(), indentation, indentation.body
         self._variables = HistoryVariables(self._body.points, [each.relaxation for each in law.parameters])
         self._state, self._before = (stack.enter_context(self._body.state()) for _ in range(2))
 
@@ -219,8 +219,8 @@ class TimeSteps:
             dissipated, stored = self._energies()
             heat.append(dissipated)
             imbalance.append(self._place.work - stored - dissipated)
-            areas.append(self._pressed.area)
-            rough.append(self._pressed.rough * abs(forces[-1][2]))
+            areas.append(self._indentation.area)
+            rough.append(self._indentation.rough * abs(forces[-1][2]))
         whole = 2.0 ** len(self._mirrored)
         return History(
             times=np.array(course.times),
@@ -268,10 +268,10 @@ class TimeSteps:
             trial.array[:] = self._state.array
             if change and (rate := self._rate()) is not None:
                 trial.array[:] += change * rate
-            self._pressed.equilibrate(trial, share)
+            self._indentation.equilibrate(trial, share)
             self._before.array[:] = self._state.array
             self._state.array[:] = trial.array
-        rate_of_work = self._pressed.rate
+        rate_of_work = self._indentation.rate
         place.work += change * (place.rate + rate_of_work) / 2
         self._variables.advance(step, *body.stresses(self._state))
         place.time, place.share, place.rate, place.has_moved = time, share, rate_of_work, True
@@ -284,18 +284,18 @@ class TimeSteps:
         """Return the change of the state per share of the movement: that of the last step, or by the tangent."""
         if self._place.changed:
             return np.asarray((self._state.array - self._before.array) / self._place.changed)
-        return self._pressed.guess(self._state)
+        return self._indentation.guess(self._state)
 
     def _step_error(self) -> float:
         """Return the change (N) of the modelled part's force along the first motion by steps of twice the length."""
         stress = self._variables.advance_coarse()
         if not self._place.share:
             return 0.0
-        return abs(self._body.force_of(stress, self._state, self._pressed.unit(self._state, self._place.share)))
+        return abs(self._body.force_of(stress, self._state, self._indentation.unit(self._state, self._place.share)))
 
     def _force(self) -> FloatArray:
         """Return the force (N) of the tissue on the probe, of the whole body."""
-        return -whole_force(self._pressed.force, self._mirrored)
+        return -whole_force(self._indentation.force, self._mirrored)
 
     def _energies(self) -> tuple[float, float]:
         """Return what is dissipated and what is stored (J) of the modelled part."""
@@ -316,7 +316,7 @@ class TimeSteps:
             self._law,
             reached,
             self._depth,
-            is_found=self._pressed.is_found,
+            is_found=self._indentation.is_found,
             times=times,
             has_own_mesh=self._has_own_mesh,
         )

@@ -17,7 +17,7 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray, IntArray
 from epsmesh.solve.contact.surface import Candidates, Neighbours
-from epsmesh.solve.response import Rubbing
+from epsmesh.solve.contact_result import Rubbing
 
 # Nodes change between sticking and sliding beyond this share of the largest friction.
 _SLACK = 1e-6

@@ -23,6 +23,7 @@ from epsmesh.solve.contact.elements import ContactElements, FreeResponse, State
 from epsmesh.solve.contact.geometry import Area, contact_area
 from epsmesh.solve.contact.levels import HeldOperator, normal_dofs
 from epsmesh.solve.contact.sweep import Sweep
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.elements.base import Elements, HierarchicalEstimate
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.elements.mixed import MixedSolver
@@ -30,7 +31,7 @@ from epsmesh.solve.estimate import error_bar, found_again_bar, found_bar
 from epsmesh.solve.hierarchical_estimate import energy_decrements
 from epsmesh.solve.linear_solver import LinearSolver
 from epsmesh.solve.movement import Movement
-from epsmesh.solve.response import Contact, Response, reaction
+from epsmesh.solve.response import Response, reaction
 
 # Bounds that differ by at most this share of the depth are equal.
 _SAME = 1e-9
@@ -73,11 +74,11 @@ class FoundContact:
         """The force (N) on the modelled part of the tool."""
         return _force(self.found)
 
-    def summary(self, sag: float) -> Contact:
+    def summary(self, sag: float) -> ContactResult:
         """Return the area of the whole contact, and the effect of loads; ``sag`` (m) is that of the first touch."""
         whole = 2.0 ** len(self._plug.body.mirrored)
         energy = nan if self.loaded is None else whole * self.loaded.energy / 2
-        return Contact(whole * self._area().value, sag=sag, load_energy=energy, is_ended=self._is_ended)
+        return ContactResult(whole * self._area().value, sag=sag, load_energy=energy, is_ended=self._is_ended)
 
     @property
     def _is_ended(self) -> bool:

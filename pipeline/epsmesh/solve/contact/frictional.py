@@ -25,15 +25,17 @@ from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, Frict
 from epsmesh.solve.contact.coulomb import Slide, rubbing_of
 from epsmesh.solve.contact.deformed import SLACK, ContactSolution, PlacedTool
 from epsmesh.solve.contact.elements import State, Unknowns
+from epsmesh.solve.contact.estimators import half_the_steps
 from epsmesh.solve.contact.found import FoundContact
 from epsmesh.solve.contact.surface import Candidates, Neighbours
 from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.elements.base import Elements, HierarchicalEstimate, Solver
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.solve.response import Contact, Response, reaction
+from epsmesh.solve.response import Response, reaction
 from epsmesh.stages import stage
 
 # Steps of a load path.
@@ -42,8 +44,6 @@ STEPS = 16
 _RINGS = 2
 # Right-hand sides solved with one factorisation of mixed elements.
 _TOGETHER = 128
-# The bar on what friction adds to the force, as a share of it: benchmarks/results/friction.md.
-_OF_FRICTION = 0.2
 _ADVANCE = np.array([0.0, 0.0, -1.0])
 # The solver is direct: its tolerance has no effect.
 _EXACT = 1e-12
@@ -143,7 +143,7 @@ class FrictionalContact(FoundContact):
         """The force (N) on the modelled part of the tool."""
         return force_of(self.pressed)
 
-    def summary(self, sag: float) -> Contact:
+    def summary(self, sag: float) -> ContactResult:
         """Return the area of the whole contact, and the part of it that slides."""
         candidates, pressed = self.obstacle.candidates, self.pressed
         torque = self.tool.torque(candidates.points, pressed.forces)
@@ -170,21 +170,10 @@ class FrictionalContact(FoundContact):
         self._plug.put(columns[0], self.smooth, depth)
         found = super().hierarchical_estimate(columns, movement, stack, keep=keep)
         self._plug.put(columns[0], self.frictional, depth)
-        path_bar = abs(force_of(self.coarse) / self.force - 1)
-        return with_friction(found, path_bar, added=self.force / super().force - 1)
+        return half_the_steps(found, self.pressed, self.coarse, super().force)
 
     def _touching(self) -> tuple[BoolArray, State]:
         return self.pressed.active, State(self.moved[:, 2], self.pressed.forces[:, 2], 2 * self.stored)
-
-
-def with_friction(found: HierarchicalEstimate, path_bar: float, *, added: float) -> HierarchicalEstimate:
-    """Return the estimate of frictionless contact with the bars of friction, which has ``added`` this to the force.
-
-    ``path_bar`` is that of the load steps; both are shares of the force.
-    """
-    assert found.relative is not None
-    of_friction = path_bar + _OF_FRICTION * abs(added)
-    return replace(found, relative=found.relative + of_friction, friction_bar=of_friction)
 
 
 def add_friction(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: ExitStack) -> FrictionalContact:

@@ -24,13 +24,13 @@ from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.solve.time_steps import Pressed
+from epsmesh.solve.time_steps import Indentation
 
 # Share of the largest contact forces so far to which the residual is compared, where forces have become small.
 _SCALE = 1e-2
 
 
-class PressedTissue(Pressed):
+class ContactIndentation(Indentation):
     """Relaxing ``tissue`` with nodes at ``places`` (n, d), and a tool whose contact with them is found.
 
     ``unit`` (J) is that of the nodes' forces times their displacements.
@@ -101,7 +101,7 @@ class PressedTissue(Pressed):
         return np.asarray(state.array_r * (-self.force[2] / work if work else 0.0))
 
 
-class PressedTool(PressedTissue):
+class ToolIndentation(ContactIndentation):
     """Relaxing tissue of a ``law`` and a tool that is pressed in by shares of a ``depth`` (m)."""
 
     def __init__(

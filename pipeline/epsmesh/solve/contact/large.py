@@ -29,20 +29,21 @@ from epsmesh.solve.contact.corrections import Corrections
 from epsmesh.solve.contact.coulomb import rubbing_of
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
 from epsmesh.solve.contact.elements import State
-from epsmesh.solve.contact.frictional import with_friction
+from epsmesh.solve.contact.estimators import half_the_steps
 from epsmesh.solve.contact.geometry import Area, contact_area
 from epsmesh.solve.contact.large_friction import friction_of
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.ended import ended
 from epsmesh.solve.estimate import AT_EDGE_LARGE, found_again_bar
 from epsmesh.solve.movement import Loads, Movement
 from epsmesh.solve.newton import LargeError
-from epsmesh.solve.response import Contact, Response, reaction
+from epsmesh.solve.response import Response, reaction
 from epsmesh.solve.solution import Request
 from epsmesh.stages import stage
 
@@ -207,11 +208,11 @@ class LargeContactSolution:
         self.check()
         return Equilibrium(self, columns, movement, iterations, self.response(movement), contact=self.summary())
 
-    def summary(self) -> Contact:
+    def summary(self) -> ContactResult:
         """Return the area of the whole contact, the part that slides, the friction, and the effects of loads."""
         mirrored, touched, tool = self.body.elements.body.mirrored, self.touched, self.tool
         loaded = 2.0 ** len(mirrored) * self.sagged.stored
-        found = Contact(self.whole_area, sag=self.sagged.sag, load_energy=loaded, is_ended=self.is_ended)
+        found = ContactResult(self.whole_area, sag=self.sagged.sag, load_energy=loaded, is_ended=self.is_ended)
         if self.beside is None:
             return found
         rubbing = rubbing_of(self.body.candidates, tool.friction, touched, self.beside.coarse)
@@ -258,8 +259,7 @@ class LargeContactSolution:
             self.body.state = self.beside.state
             found = smooth.hierarchical_estimate(columns, movement, stack, keep=keep)
             self.body.state = state
-            path_bar = abs(force_of(self.beside.coarse) / self.force - 1)
-            return with_friction(found, path_bar, added=self.force / smooth.force - 1)
+            return half_the_steps(found, self.touched, self.beside.coarse, smooth.force)
         finer = self._found_again(movement.loads, stack)
         share, at_edge = 1 - finer.force / self.force, self._area().bar
         least = AT_EDGE_LARGE[self.body.elements.degree]

@@ -23,7 +23,7 @@ from epsmesh.solve.contact.elements import ContactElements, FarShare, FreeRespon
 from epsmesh.solve.contact.found import FoundContact
 from epsmesh.solve.contact.frictional import add_friction
 from epsmesh.solve.contact.geometry import Touch
-from epsmesh.solve.contact.in_time import PressedTool
+from epsmesh.solve.contact.in_time import ToolIndentation
 from epsmesh.solve.contact.large import LargeContact
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.surface import Candidates
@@ -120,10 +120,10 @@ class ContactSearch:
             self._large = LargeContact(self._surface, self._elements, self._tool, asked)
         return self._large.solve(asked, stack)
 
-    def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> PressedTool:
+    def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> ToolIndentation:
         """Return the tissue that the tool presses in time steps; the ``stack`` frees it; collective."""
         depth = found.movement.amounts[0]
-        return PressedTool(self._surface, self._elements, self._tool, asked.law, depth, stack)
+        return ToolIndentation(self._surface, self._elements, self._tool, asked.law, depth, stack)
 
     # ---- far field ------------------------------------------------------------------------------------
 

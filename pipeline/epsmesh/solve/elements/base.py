@@ -14,6 +14,7 @@ from petsc4py import PETSc
 from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.conditions import Front
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.crack import Release
 from epsmesh.solve.elements.fields import Column, ElementFields, Fields
 from epsmesh.solve.elements.tangent import Tangent
@@ -23,7 +24,7 @@ from epsmesh.solve.linear_solver import Level
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.points.state import State
-from epsmesh.solve.response import Contact, LoadResponse, Response
+from epsmesh.solve.response import LoadResponse, Response
 from epsmesh.solve.spaces import ElasticSpace
 
 
@@ -93,7 +94,7 @@ class Equilibrium:
     iterations: int
     response: Response
     load_response: LoadResponse | None = None
-    contact: Contact | None = None
+    contact: ContactResult | None = None
 
 
 class Solver(ABC):

@@ -22,12 +22,12 @@ from epsmesh.arrays import FloatArray
 from epsmesh.mesh.elliptic_meridian import EllipticMeridian
 from epsmesh.mesh.meridian import Grading
 from epsmesh.solve import SolveError
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.meridian.problem import DEGREE, Answer, MeridianSolver, error_bar
 from epsmesh.solve.meridian.punch import POWERS, Punches, Rings, RoundTool
 from epsmesh.solve.meridian.signs import LiftsOff, check_signs
 from epsmesh.solve.meridian.system import HalfPlane, max_strain
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.solve.response import Contact
 from epsmesh.stages import stage
 
 # Tolerance on the depth of a trial radius (F errs by its square), and most trials.
@@ -190,6 +190,6 @@ class _Search:
             dofs=fine.forms.dofs,
             cells=len(arrays.cells),
             iterations=self.punches.count,
-            contact=Contact(patch.area(radius), of_area),
+            contact=ContactResult(patch.area(radius), of_area),
             energy=pi * float(solution @ residual),
         )

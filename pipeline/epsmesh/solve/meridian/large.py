@@ -29,7 +29,7 @@ from epsmesh.solve.meridian.system import HalfPlane, System, max_strain, meshes_
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.path import SHORTEST, Path, Stage, follow
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.solve.time_steps import Pressed
+from epsmesh.solve.time_steps import Indentation
 from epsmesh.stages import stage
 
 DEGREE = 4
@@ -121,7 +121,7 @@ class LargeSystem(System):
         raise LargeError("tissue is turned inside out")
 
 
-class PressedSystem(Pressed):
+class MeridianIndentation(Indentation):
     """A ``system`` of relaxing tissue whose probe moves to a ``depth`` (units of the mesh, ``unit``, m)."""
 
     is_found = False
@@ -227,7 +227,7 @@ class LargeMeridian(LargeSolver):
             cells=len(arrays.cells),
             iterations=coarse.iterations + fine.iterations,
             energy=energy * arrays.unit**2,
-            in_time=lambda: PressedSystem(fine, law, deep, arrays.unit),
+            in_time=lambda: MeridianIndentation(fine, law, deep, arrays.unit),
         )
 
 

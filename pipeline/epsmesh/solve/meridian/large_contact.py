@@ -23,7 +23,8 @@ from epsmesh.mesh.elliptic_meridian import EllipticMeridian
 from epsmesh.mesh.meridian import Grading
 from epsmesh.solve.contact.checks import check_support
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool
-from epsmesh.solve.contact.in_time import PressedTissue
+from epsmesh.solve.contact.in_time import ContactIndentation
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.meridian.in_time import RelaxingHalfPlane
 from epsmesh.solve.meridian.large import LargeSolver, stopped
 from epsmesh.solve.meridian.problem import Answer
@@ -32,7 +33,6 @@ from epsmesh.solve.meridian.system import HalfPlane, max_strain
 from epsmesh.solve.meridian.touch import MeridianTouch
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.solve.response import Contact
 
 # Bar: these multiples of the differences of the degrees, on one mesh, and of two meshes, and the square of the distance
 # of nodes at the edge.
@@ -106,14 +106,14 @@ class LargeMeridianContact(LargeSolver):
             contact=self._contact(fine, bars, error),
             energy=fine.energy * arrays.unit**2,
             touch=fine,
-            in_time=lambda: PressedTouch(replace(fine, touched=None), deep),
+            in_time=lambda: RoundToolIndentation(replace(fine, touched=None), deep),
         )
 
-    def _contact(self, fine: MeridianTouch, bars: FloatArray, error: float) -> Contact:
+    def _contact(self, fine: MeridianTouch, bars: FloatArray, error: float) -> ContactResult:
         """Return the contact with ``bars`` on its results (4,); ``error`` is the relative bar of the force."""
         _, friction, area, slip_area = fine.results.tolist()
         _, of_friction, of_area, of_slip = (_OF_RESULTS * bars).tolist()
-        found = Contact(area, of_area / area + _OF_EDGE * fine.resolution)
+        found = ContactResult(area, of_area / area + _OF_EDGE * fine.resolution)
         if not self._tool.friction:
             return found
         # Too few steps make friction too large, which then errs by more than by its share of itself.
@@ -169,7 +169,7 @@ class LargeMeridianContact(LargeSolver):
         return fine, bars + _BETWEEN_DEGREES * np.abs(coarse.results - fine.results)
 
 
-class PressedTouch(PressedTissue):
+class RoundToolIndentation(ContactIndentation):
     """Relaxing tissue below a round tool, ``at_rest``, that is pressed in to a ``depth`` (units of the mesh)."""
 
     def __init__(self, at_rest: MeridianTouch, depth: float):

@@ -17,14 +17,14 @@ from epsmesh.mesh.elliptic_meridian import EllipticMeridian
 from epsmesh.mesh.meridian import Grading, Meridian, meridian_mesh
 from epsmesh.solve import SolveError
 from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.laws import LAWS
 from epsmesh.solve.meridian.forms import MeridianForms
 from epsmesh.solve.meridian.system import HalfPlane, RefinedSolution, System, Unbalanced, max_strain, meshes_of
 from epsmesh.solve.physics import MaterialLaw, Parameters
-from epsmesh.solve.response import Contact, reaction
+from epsmesh.solve.response import reaction
 from epsmesh.solve.solution import Problem, Request, Solution
-from epsmesh.solve.time_steps import Pressed as InTime
-from epsmesh.solve.time_steps import TimeSteps, follow_course
+from epsmesh.solve.time_steps import Indentation, TimeSteps, follow_course
 from epsmesh.stages import recorded, stage
 from epsmesh.viscoelastic import Terms
 
@@ -53,9 +53,9 @@ class Answer:
     dofs: int
     cells: int
     iterations: int
-    contact: Contact | None = None
+    contact: ContactResult | None = None
     energy: float | None = None
-    in_time: Callable[[], InTime] | None = None
+    in_time: Callable[[], Indentation] | None = None
 
 
 class MeridianSolver(Problem):

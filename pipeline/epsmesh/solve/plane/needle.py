@@ -10,12 +10,12 @@ from math import nan
 
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.meridian.problem import Answer, MeridianSolver
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.plane.crack import LEVELS, open_crack
 from epsmesh.solve.plane.cut import Cut, Cuts
 from epsmesh.solve.plane.opening import Opening
-from epsmesh.solve.response import Contact
 
 # Two meshes may have the same results by chance: round-off errs by less than this many times the balance.
 _ROUND_OFF = 3.0
@@ -58,7 +58,7 @@ class NeedleSolver(MeridianSolver):
             dofs=0,
             cells=0,
             iterations=fine.steps,
-            contact=Contact(
+            contact=ContactResult(
                 touched,
                 of_touched,
                 slip_area=touched,
