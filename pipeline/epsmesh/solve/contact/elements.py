@@ -5,6 +5,7 @@ displacement is v + s φ + w, where v belongs to the reactions r alone. Since v 
 The amplitude s of the far field follows from k s = φ·r, where k is twice the energy of φ on both sides of the cut.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -36,6 +37,8 @@ Unknowns = tuple[FloatArray, ...]
 # The far field's amplitude has converged when it changes by less than this, in units of the solver's tolerance.
 _SETTLED = 10.0
 _MOST_ROUNDS = 20
+# Times that a set is solved to a tolerance that is not the last one.
+_MOST_ROUGH = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,9 +328,10 @@ class ContactElements:
 class LinearTissue:
     """A linear body with the candidates' displacement along z: see :class:`.deformed.Tissue`. Methods are collective.
 
-    The ``tolerances`` are used in turn: a set is solved to the first one, and to the next one when the loop asks for a
-    set again. Each is an energy norm of the error, relative to the root of ``energy`` (J), of which an estimate will
-    do. The body is in balance once a set is solved to the last one.
+    The ``tolerances`` are used in turn: a set is solved to the first one, and to the next one when the loop asks for it
+    again at once, or for the third time, since sets may repeat where solutions are rough. Each is an energy norm of the
+    error, relative to the root of ``energy`` (J), of which an estimate will do. The body is in balance once a set is
+    solved to the last one.
     """
 
     def __init__(self, elements: ContactElements, tolerances: Sequence[float], energy: float | None):
@@ -337,7 +341,7 @@ class LinearTissue:
         self._moved = elements.moved()
         self._reactions = np.zeros(len(self._moved))
         self._active: BoolArray | None = None
-        self._solved = set[bytes]()
+        self._solved = Counter[bytes]()
 
     def positions(self) -> FloatArray:
         """Return the displacement along z (n, 1), in m."""
@@ -359,11 +363,11 @@ class LinearTissue:
         """
         active, elements = constraint.held[:, -1], self._elements
         bounds = self._moved + constraint.frames[:, -1, -1] * constraint.values[:, -1]
-        key = active.tobytes()
-        if key in self._solved:
-            self._tolerances, self._solved = self._tolerances[1:] or self._tolerances, set()
-        self._solved.add(key)
-        if self._active is None or not np.array_equal(active, self._active):
+        key, is_same = active.tobytes(), self._active is not None and np.array_equal(active, self._active)
+        if is_same or self._solved[key] == _MOST_ROUGH:
+            self._tolerances = self._tolerances[1:] or self._tolerances
+        self._solved[key] += 1
+        if not is_same:
             elements.hold(active)
         elements.improve(bounds, self._tolerances[0], self._energy)
         state = elements.state()
