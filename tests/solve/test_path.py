@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from epsmesh.solve.newton import LargeError
-from epsmesh.solve.path import Path, Stage, follow
+from epsmesh.solve.path import Path, PathPoint, follow
 
 
 def along(to, *, can=inf, is_easy=True, end=inf, path=None, **steps):
     """Return a path and the amounts tried; the solver fails beyond ``end``, and in longer steps than it ``can``."""
-    path, tried = path or Path(Stage(0.0, np.zeros(1))), []
+    path, tried = path or Path(PathPoint(0.0, np.zeros(1))), []
 
     def solve_at(amount):
         tried.append(amount)
         if amount - path.reached > can or amount > end:
             raise LargeError("no equilibrium")
-        return Stage(amount, np.array([amount**2])), is_easy
+        return PathPoint(amount, np.array([amount**2])), is_easy
 
     try:
         follow(path, solve_at, to, **steps)

@@ -23,7 +23,7 @@ from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Loads
 from epsmesh.solve.newton import EASY, LEFT, ON_THE_WAY, HyperelasticBody, LargeError
-from epsmesh.solve.path import Path, Stage, follow
+from epsmesh.solve.path import Path, PathPoint, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import whole_force
 from epsmesh.solve.spaces import Spaces
@@ -42,13 +42,13 @@ def load_in_steps(body: HyperelasticBody, applied: Applied | None, state: PETSc.
     Raises:
         LargeError: if a load step becomes too small.
     """
-    path, goal = Path(Stage(0.0, state.array.copy())), body.held_of(state)
+    path, goal = Path(PathPoint(0.0, state.array.copy())), body.held_of(state)
 
-    def solve_at(share: float) -> tuple[Stage, bool]:
+    def solve_at(share: float) -> tuple[PathPoint, bool]:
         state.array[:] = path.last.state
         body.carry(applied, share)
         iterations = body.equilibrate(state, goal, LEFT if share == 1.0 else ON_THE_WAY)
-        return Stage(share, state.array.copy()), iterations <= EASY
+        return PathPoint(share, state.array.copy()), iterations <= EASY
 
     try:
         follow(path, solve_at, 1.0)

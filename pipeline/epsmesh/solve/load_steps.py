@@ -25,7 +25,7 @@ from epsmesh.solve.large_estimate import Decrements, FinerResiduals, combine, fo
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Motion, Movement
 from epsmesh.solve.newton import EASY, LEFT, ON_THE_WAY, HyperelasticBody, LargeError
-from epsmesh.solve.path import Path, Stage, follow
+from epsmesh.solve.path import Path, PathPoint, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import LoadResponse, Response, whole_force
 
@@ -37,10 +37,10 @@ _WORK, _ROUNDING = 3e-4, 1e-13
 
 
 @dataclass(eq=False)
-class LoadPath(Path[Stage]):
+class LoadPath(Path[PathPoint]):
     """A load path: how far a ``motion`` of the probe has proceeded in a body of a ``law``; amounts are depths (m).
 
-    ``work`` has depth (m), force (N) and energy (J) of each stage, of the modelled part, less that at the start. States
+    ``work`` has depth (m), force (N) and energy (J) of each point, of the modelled part, less that at the start. States
     have displacement, and in mixed elements pressure (owned dofs). Under dead loads, ``applied``, the path starts from
     the body that has sagged, and ``held`` is that with a tool that does not move, once it is known.
     """
@@ -261,7 +261,7 @@ class LoadSteps(Solver):
             self._put_unit(column, unit)
             held = body.held_of(unit)
 
-            def solve_at(there: float) -> tuple[Stage, bool]:
+            def solve_at(there: float) -> tuple[PathPoint, bool]:
                 state.array[:] = load_path.continued(there)
                 if not np.isfinite(body.energy(state)):
                     state.array[:] = load_path.last.state  # the first step of Newton's method then brings it there
@@ -269,7 +269,7 @@ class LoadSteps(Solver):
                 iterations = body.equilibrate(state, base + there * held, left)
                 body.forces(state, forces)
                 load_path.work.append((there, forces.dot(unit), body.energy(state) - begun))
-                return Stage(there, state.array.copy()), iterations <= EASY
+                return PathPoint(there, state.array.copy()), iterations <= EASY
 
             try:
                 follow(load_path, solve_at, depth, fewest=fewest)

@@ -18,63 +18,63 @@ from epsmesh.solve.newton import LargeError
 _SLIVER = 1e-6
 # The shortest step, as a share of the amount at the end, and how many times longer one after an easy one may be.
 SHORTEST, _LONGER = 1 / 100, 1.5
-# Stages that a path keeps.
+# Points that a path keeps.
 _KEPT = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class PathPoint:
     """Equilibrium at an ``amount``, with its ``state``."""
 
     amount: float
     state: FloatArray
 
 
-S = TypeVar("S", bound=Stage)
+P = TypeVar("P", bound=PathPoint)
 
 
 @dataclass(eq=False)
-class Path(Generic[S]):
-    """The last ``stages`` of a path from a ``start``, and the longest ``step`` that the solver is expected to take."""
+class Path(Generic[P]):
+    """The last ``points`` of a path from a ``start``, and the longest ``step`` that the solver is expected to take."""
 
-    start: S
+    start: P
     step: float = inf
-    stages: list[S] = field(init=False)
+    points: list[P] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.stages = [self.start]
+        self.points = [self.start]
 
     @property
-    def last(self) -> S:
-        """The last stage."""
-        return self.stages[-1]
+    def last(self) -> P:
+        """The last point."""
+        return self.points[-1]
 
     @property
     def reached(self) -> float:
-        """The amount of the last stage."""
+        """The amount of the last point."""
         return self.last.amount
 
-    def add(self, stage: S) -> None:
-        """Continue to a stage."""
-        self.stages = [*self.stages, stage][-_KEPT:]
+    def add(self, point: P) -> None:
+        """Continue to a point."""
+        self.points = [*self.points, point][-_KEPT:]
 
-    def return_to(self, stage: S) -> None:
-        """Let the path end at a ``stage``, from which no earlier one is continued."""
-        self.stages = [stage]
+    def return_to(self, point: P) -> None:
+        """Let the path end at a ``point``, from which no earlier one is continued."""
+        self.points = [point]
 
     def continued(self, amount: float, count: int = _KEPT) -> FloatArray:
-        """Return the polynomial through the states of the last stages, ``count`` at most, at an ``amount``."""
-        stages = self.stages[-count:]
+        """Return the polynomial through the states of the last points, ``count`` at most, at an ``amount``."""
+        points = self.points[-count:]
         weights = [
-            prod((amount - other.amount) / (stage.amount - other.amount) for other in stages if other is not stage)
-            for stage in stages
+            prod((amount - other.amount) / (point.amount - other.amount) for other in points if other is not point)
+            for point in points
         ]
-        return np.asarray(np.tensordot(weights, [stage.state for stage in stages], axes=1))
+        return np.asarray(np.tensordot(weights, [point.state for point in points], axes=1))
 
 
 def follow(
-    path: Path[S],
-    solve_at: Callable[[float], tuple[S, bool]],
+    path: Path[P],
+    solve_at: Callable[[float], tuple[P, bool]],
     to: float,
     *,
     fewest: float = 1.0,
@@ -82,11 +82,11 @@ def follow(
 ) -> None:
     """Continue a ``path`` to an amount; collective if ``solve_at`` is.
 
-    ``solve_at`` returns the stage at an amount, and whether it was found with ease. There are at least ``fewest`` steps
+    ``solve_at`` returns the point at an amount, and whether it was found with ease. There are at least ``fewest`` steps
     from zero on; the ``shortest`` one is a share of the amount.
 
     Raises:
-        LargeError: that of ``solve_at``, if a step becomes too short; the path keeps the stages before.
+        LargeError: that of ``solve_at``, if a step becomes too short; the path keeps the points before.
     """
     longest = path.step
     while (reached := path.reached) < to:
@@ -94,11 +94,11 @@ def follow(
         step = min(longest, to / fewest, left)
         there = to if step > (1 - _SLIVER) * left else reached + step
         try:
-            stage, is_easy = solve_at(there)
+            point, is_easy = solve_at(there)
         except LargeError:
             longest = (there - reached) / 2
             if longest < shortest * to:
                 raise
             continue
-        path.add(stage)
+        path.add(point)
         path.step = longest = max(longest, (there - reached) * (_LONGER if is_easy else 1.0))

@@ -21,7 +21,7 @@ from epsmesh.solve.elements.fields import Column, close_far
 from epsmesh.solve.load_steps import LoadPath, LoadSteps
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Motion, Movement
-from epsmesh.solve.path import Stage
+from epsmesh.solve.path import PathPoint
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import LoadResponse, Response, load_response_of, reaction
 from epsmesh.solve.solution import Request
@@ -131,7 +131,7 @@ class PrescribedMotion:
         load_path = self._load_path
         if load_path is None or not load_path.can_reach(law, movement, applied):
             start = start_under_loads(self._elements, law, movement.loads)
-            load_path = LoadPath(Stage(0.0, start), law=law, motion=movement.motions[0], applied=applied)
+            load_path = LoadPath(PathPoint(0.0, start), law=law, motion=movement.motions[0], applied=applied)
         self._load_path = load_path if self._shares_path else None
         return LoadSteps(self._elements, load_path, stack, direct=direct)
 

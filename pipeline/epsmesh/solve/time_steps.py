@@ -26,7 +26,7 @@ from epsmesh.solve.ended import ended
 from epsmesh.solve.history import Course, History, between
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.newton import HyperelasticBody, LargeError
-from epsmesh.solve.path import Path, Stage, follow
+from epsmesh.solve.path import Path, PathPoint, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.relaxing import HistoryVariables, Points
 from epsmesh.solve.response import whole_force
@@ -238,17 +238,17 @@ class TimeSteps:
         if time == begun and not rise:
             return
 
-        def solve_at(part: float) -> tuple[Stage, bool]:
+        def solve_at(part: float) -> tuple[PathPoint, bool]:
             before = 1 - part
             try:
                 self._step(time - before * (time - begun), share - before * rise)
             except LargeError:
                 place.changed = 0.0  # the tangent is a better guess than the last step
                 raise
-            return Stage(part, self._state.array), True
+            return PathPoint(part, self._state.array), True
 
         try:
-            follow(Path(Stage(0.0, self._state.array)), solve_at, 1.0, fewest=max(1.0, _FEWEST * abs(rise)))
+            follow(Path(PathPoint(0.0, self._state.array)), solve_at, 1.0, fewest=max(1.0, _FEWEST * abs(rise)))
         except LargeError as error:
             raise self._stopped(course, error) from error
 

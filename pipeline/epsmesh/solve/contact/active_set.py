@@ -15,7 +15,7 @@ from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
 from epsmesh.solve.contact.deformed import PlacedTool, solve_contact
-from epsmesh.solve.contact.elements import ContactElements, State
+from epsmesh.solve.contact.elements import ContactElements, SurfaceState
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.newton import LargeError
 from epsmesh.stages import stage
@@ -26,11 +26,11 @@ class ContactError(SolveError):
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SettledContact:
     """A converged active set and its solution; ``sets`` is the number of sets that were solved."""
 
     active: BoolArray
-    state: State
+    state: SurfaceState
     sets: int
 
 
@@ -67,7 +67,7 @@ def find_set(
     energy: float | None = None,
     *,
     roughly: bool = False,
-) -> Found:
+) -> SettledContact:
     """Return the converged active set from the initial guess ``active`` (n); collective.
 
     For ``tolerances`` and ``energy`` see :class:`.elements.LinearTissue`. With ``roughly`` a set from a repeating cycle
@@ -85,5 +85,5 @@ def find_set(
     except LargeError as error:
         if not roughly:
             raise ContactError(f"the contact area does not settle: {error}") from error
-        return Found(tissue.forces()[:, 0] != 0.0, elements.state(), 0)
-    return Found(touched.active, elements.state(), touched.iterations)
+        return SettledContact(tissue.forces()[:, 0] != 0.0, elements.state(), 0)
+    return SettledContact(touched.active, elements.state(), touched.iterations)

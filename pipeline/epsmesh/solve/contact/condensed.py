@@ -15,7 +15,7 @@ from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.solve import SolveError
 from epsmesh.solve.compiled import vector
 from epsmesh.solve.contact.constraint import Constraint, Sliding
-from epsmesh.solve.contact.elements import ContactElements, FarShare, State, Unknowns
+from epsmesh.solve.contact.elements import ContactElements, FarShare, SurfaceState, Unknowns
 from epsmesh.solve.contact.levels import Hierarchy, Surface
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.elements.base import Elements
@@ -173,14 +173,14 @@ class CondensedElements(ContactElements):
             compliance = compliance + np.outer(far.unit.moved, far.unit.moved) / far.stiffness
         self._tissue = CondensedTissue(compliance[:, None, :, None], np.zeros((count, 1)), self.is_fixed[:, None])
 
-    def state(self) -> State:
+    def state(self) -> SurfaceState:
         """Return displacements and reactions of the candidates; the far field takes the amplitude of these."""
         reactions, moved = self._tissue.state[..., 0]
         if self.far is not None:
             self.far.share = self.far.wanted(reactions)
-        return State(moved, reactions, float(moved @ reactions))
+        return SurfaceState(moved, reactions, float(moved @ reactions))
 
-    def begin(self, state: State, unknowns: Unknowns) -> None:
+    def begin(self, state: SurfaceState, unknowns: Unknowns) -> None:
         """Begin with forces and displacements of the candidates."""
         self._tissue.state = np.stack([state.reactions, state.moved])[..., None]
 

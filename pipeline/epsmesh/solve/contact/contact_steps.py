@@ -24,7 +24,7 @@ from epsmesh.solve.contact.deformed import (
 from epsmesh.solve.contact.friction_step import FrictionStep, meeting_places
 from epsmesh.solve.contact.surface import Neighbours
 from epsmesh.solve.newton import LargeError
-from epsmesh.solve.path import Path, Stage, follow
+from epsmesh.solve.path import Path, PathPoint, follow
 
 # Larger steps than this share, without friction, are given up soon.
 _LARGE = 1 / 8
@@ -41,18 +41,18 @@ _EASY = 8
 
 
 @dataclass(frozen=True, eq=False)
-class ContactStage(Stage):
+class ContactPathPoint(PathPoint):
     """Equilibrium at a depth (m) with its contact, None without any."""
 
     touched: ContactSolution | None = None
 
 
-class ContactPath(Path[ContactStage]):
+class ContactPath(Path[ContactPathPoint]):
     """A load path of contact; amounts are depths (m)."""
 
     def guess(self, depth: float) -> FloatArray:
-        """Return the last state, continued linearly to a ``depth`` (m) if there was contact at the stage before."""
-        count = sum(stage.touched is not None for stage in self.stages[-2:])
+        """Return the last state, continued linearly to a ``depth`` (m) if there was contact at the point before."""
+        count = sum(point.touched is not None for point in self.points[-2:])
         return self.continued(depth, max(count, 1))
 
 
@@ -89,7 +89,7 @@ def press(
     if start.touched is None and path.step == inf and friction is None:
         path.step = _first_step(tissue, tool_at, start.amount, depth)
 
-    def solve_at(there: float) -> tuple[ContactStage, bool]:
+    def solve_at(there: float) -> tuple[ContactPathPoint, bool]:
         nonlocal iterations
         is_patient = friction is not None or there - path.reached <= _LARGE * depth
         limit = _ON_THE_WAY if friction is None and there < depth else 0.0
@@ -99,7 +99,7 @@ def press(
             raise LargeError(str(error)) from error
         check_outside(tissue, touched, deepest)
         iterations += touched.iterations
-        return ContactStage(there, tissue.state, touched), touched.iterations <= _EASY
+        return ContactPathPoint(there, tissue.state, touched), touched.iterations <= _EASY
 
     try:
         follow(path, solve_at, depth)
@@ -135,7 +135,7 @@ def _end(
     tissue: SteppedTissue,
     tool_at: Callable[[float], PlacedTool],
     path: ContactPath,
-    start: ContactStage,
+    start: ContactPathPoint,
     friction: Friction | None,
 ) -> None:
     """Leave the tissue in equilibrium at the end of a ``path`` that goes no farther than from ``start``; collective."""
@@ -149,7 +149,7 @@ def _end(
         path.return_to(start)
         tissue.state = start.state
         return
-    path.stages[-1] = ContactStage(last.amount, tissue.state, touched)
+    path.points[-1] = ContactPathPoint(last.amount, tissue.state, touched)
 
 
 def press_with_friction(
@@ -175,13 +175,13 @@ def press_with_friction(
             tissue.state = path.last.state
             nothing = np.zeros(len(tissue.fixed), dtype=bool)
             if number < steps and not first_set(tissue, tool_at(there), nothing).any():
-                path.add(ContactStage(there, path.last.state))
+                path.add(ContactPathPoint(there, path.last.state))
                 continue
         path.step = inf
         try:
             iterations += press(tissue, tool_at, path, there, friction)
         except LargeError:  # few nodes touch, whose state does not settle: contact begins with the next step
-            farthest = max(farthest, path.last, key=lambda stage: stage.amount if stage.touched else 0.0)
+            farthest = max(farthest, path.last, key=lambda point: point.amount if point.touched else 0.0)
             if number > steps // 2:
                 path.return_to(farthest)
                 raise
@@ -190,9 +190,13 @@ def press_with_friction(
 
 
 def _friction_step(
-    tissue: SteppedTissue, tool_at: Callable[[float], PlacedTool], last: ContactStage, depth: float, friction: Friction
+    tissue: SteppedTissue,
+    tool_at: Callable[[float], PlacedTool],
+    last: ContactPathPoint,
+    depth: float,
+    friction: Friction,
 ) -> FrictionStep:
-    """Return the friction of a step from the ``last`` stage to a ``depth`` (m), whose state is predicted."""
+    """Return the friction of a step from the ``last`` point to a ``depth`` (m), whose state is predicted."""
     after, guess = tissue.positions(), tissue.state
     tissue.state = last.state
     before = tissue.positions()

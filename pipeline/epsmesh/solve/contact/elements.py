@@ -42,7 +42,7 @@ _MOST_ROUGH = 2
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class SurfaceState:
     """Displacements of the candidates along z (n, m), and their reactions (n, N), in one solution.
 
     ``energy`` (J) is twice the energy of the modelled part.
@@ -224,20 +224,20 @@ class ContactElements:
         moved = self.numbering.gather(self.fields[0].array)
         return moved if self.far is None else moved + self.far.share * self.far.unit.moved
 
-    def near_state(self) -> State:
+    def near_state(self) -> SurfaceState:
         """Return displacements and reactions of the candidates, without the far field."""
         with self.plug.fields() as forces:
             self._multiply(self.fields, forces)
             moved, reactions = (self.numbering.gather(part.array) for part in (self.fields[0], forces[0]))
-            return State(moved, self.unit * reactions, self._work(forces))
+            return SurfaceState(moved, self.unit * reactions, self._work(forces))
 
-    def state(self) -> State:
+    def state(self) -> SurfaceState:
         """Return displacements and reactions of the candidates."""
         state = self.near_state()
         if (far := self.far) is None:
             return state
         moved = state.moved + far.share * far.unit.moved
-        return State(moved, state.reactions, state.energy + far.share**2 * far.stiffness)
+        return SurfaceState(moved, state.reactions, state.energy + far.share**2 * far.stiffness)
 
     def energy(self) -> float:
         """Return twice the energy (J) of the modelled part, stationary at the solution, up to a constant.
@@ -265,7 +265,7 @@ class ContactElements:
         for field, values in zip(self.fields, unknowns, strict=True):
             field.array[:] = values
 
-    def begin(self, state: State, unknowns: Unknowns) -> None:
+    def begin(self, state: SurfaceState, unknowns: Unknowns) -> None:
         """Begin with a ``state`` of the candidates and its unknowns."""
         self.start_at(unknowns)
 

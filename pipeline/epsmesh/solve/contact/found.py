@@ -18,8 +18,8 @@ import numpy as np
 from epsmesh.arrays import BoolArray, Int32Array
 from epsmesh.solve.cell_values import plain_share
 from epsmesh.solve.compiled import global_sum, vector
-from epsmesh.solve.contact.active_set import Found, Obstacle, find_set
-from epsmesh.solve.contact.elements import ContactElements, FreeResponse, State
+from epsmesh.solve.contact.active_set import Obstacle, SettledContact, find_set
+from epsmesh.solve.contact.elements import ContactElements, FreeResponse, SurfaceState
 from epsmesh.solve.contact.geometry import Area, contact_area
 from epsmesh.solve.contact.levels import HeldOperator, normal_dofs
 from epsmesh.solve.contact.sweep import Sweep
@@ -52,7 +52,7 @@ class FoundContact:
 
     sweep: Sweep
     obstacle: Obstacle
-    found: Found
+    found: SettledContact
     loaded: FreeResponse | None
     obstacle_above: Callable[[], Obstacle]
 
@@ -142,12 +142,12 @@ class FoundContact:
         modulus = self.obstacle.candidates.from_regions(self.sweep.law.plane_moduli)
         return contact_area(self.obstacle, active, state, modulus, self._plug.body.mirrored)
 
-    def _touching(self) -> tuple[BoolArray, State]:
+    def _touching(self) -> tuple[BoolArray, SurfaceState]:
         """Return the active set, displacements and reactions of the contact."""
         return self.found.active, self.found.state
 
 
-def _force(found: Found) -> float:
+def _force(found: SettledContact) -> float:
     return float(-found.state.reactions[found.active].sum())
 
 
@@ -191,7 +191,7 @@ def _mixed_decrement(elements: ContactElements, facets: Int32Array) -> tuple[flo
         return before - finer.energy(), float(finer.solver.first_energies[0])
 
 
-def _found_again(elements: ContactElements, obstacle: Obstacle, found: Found) -> float:
+def _found_again(elements: ContactElements, obstacle: Obstacle, found: SettledContact) -> float:
     """Solve contact again in one degree more: return the share of the force that it removes; collective.
 
     ``obstacle`` is the obstacle of that degree, without the far field.

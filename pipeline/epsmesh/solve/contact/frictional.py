@@ -21,10 +21,10 @@ from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.active_set import ContactError
 from epsmesh.solve.contact.checks import force_of
 from epsmesh.solve.contact.condensed import CondensedTissue
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, Friction, press_with_friction
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, Friction, press_with_friction
 from epsmesh.solve.contact.coulomb import Slide, rubbing_of
 from epsmesh.solve.contact.deformed import SLACK, ContactSolution, PlacedTool
-from epsmesh.solve.contact.elements import State, Unknowns
+from epsmesh.solve.contact.elements import SurfaceState, Unknowns
 from epsmesh.solve.contact.estimators import half_the_steps
 from epsmesh.solve.contact.found import FoundContact
 from epsmesh.solve.contact.surface import Candidates, Neighbours
@@ -172,8 +172,8 @@ class FrictionalContact(FoundContact):
         self._plug.put(columns[0], self.frictional, depth)
         return half_the_steps(found, self.pressed, self.coarse, super().force)
 
-    def _touching(self) -> tuple[BoolArray, State]:
-        return self.pressed.active, State(self.moved[:, 2], self.pressed.forces[:, 2], 2 * self.stored)
+    def _touching(self) -> tuple[BoolArray, SurfaceState]:
+        return self.pressed.active, SurfaceState(self.moved[:, 2], self.pressed.forces[:, 2], 2 * self.stored)
 
 
 def add_friction(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: ExitStack) -> FrictionalContact:
@@ -243,7 +243,7 @@ def press(surface: Surface, depth: float, friction: float, steps: int = STEPS) -
     """
     tissue, dim = surface.tissue, surface.tissue.places.shape[1]
     tissue.state = np.zeros_like(tissue.state)
-    path = ContactPath(ContactStage(0.0, tissue.state))
+    path = ContactPath(ContactPathPoint(0.0, tissue.state))
     of = Friction(friction, _ADVANCE[-dim:], tissue.penalty, surface.neighbours, depth, is_linear=True)
     try:
         iterations = press_with_friction(tissue, surface.tool_at, path, depth, of, steps)

@@ -15,7 +15,7 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve.contact.active_set import Obstacle
-from epsmesh.solve.contact.elements import FreeResponse, State
+from epsmesh.solve.contact.elements import FreeResponse, SurfaceState
 from epsmesh.solve.contact.surface import FACET_CORNERS, Candidates
 
 # Search for the first touch: sampling points along an edge of each facet, rounds of refinement, the factor by which a
@@ -109,7 +109,7 @@ class Area:
 
 
 def contact_area(
-    obstacle: Obstacle, active: BoolArray, state: State, modulus: FloatArray, mirrored: tuple[int, ...] = ()
+    obstacle: Obstacle, active: BoolArray, state: SurfaceState, modulus: FloatArray, mirrored: tuple[int, ...] = ()
 ) -> Area:
     """Return the contact area of the modelled part, bounded by planes of symmetry normal to the axes ``mirrored``.
 

@@ -24,11 +24,11 @@ from epsmesh.solve.balance import check_balance
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.active_set import ContactError, Obstacle
 from epsmesh.solve.contact.checks import check_energy, check_support, force_of
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, check_outside, press, press_with_friction
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, check_outside, press, press_with_friction
 from epsmesh.solve.contact.corrections import Corrections
 from epsmesh.solve.contact.coulomb import rubbing_of
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
-from epsmesh.solve.contact.elements import State
+from epsmesh.solve.contact.elements import SurfaceState
 from epsmesh.solve.contact.estimators import half_the_steps
 from epsmesh.solve.contact.geometry import Area, contact_area
 from epsmesh.solve.contact.large_friction import friction_of
@@ -100,7 +100,7 @@ class LargeContact:
             self._sagged = sagged_body(body, self._tool, self._loads)
         tool = self._sagged.placed(self._tool, body)
         if self._path is None:
-            self._path = ContactPath(ContactStage(0.0, self._sagged.state))
+            self._path = ContactPath(ContactPathPoint(0.0, self._sagged.state))
         try:
             iterations = press(body, lambda there: placed_tool(body, tool, there), self._path, depth)
         except LargeError as error:
@@ -117,7 +117,7 @@ class LargeContact:
         body, depth, state, tool = smooth.body, smooth.depth, smooth.body.state, smooth.placed
         friction, found, iterations = friction_of(body, self._tool.friction, depth), list[ContactSolution](), 0
         for steps in (self.STEPS // 2, self.STEPS):
-            path = ContactPath(ContactStage(0.0, smooth.sagged.state))
+            path = ContactPath(ContactPathPoint(0.0, smooth.sagged.state))
             try:
                 iterations += press_with_friction(
                     body, lambda there: placed_tool(body, tool, there), path, depth, friction, steps
@@ -320,7 +320,7 @@ class LargeContactSolution:
                 touched = solve_contact(body, there, first, is_patient=False, limit=_FOUND_AGAIN)
                 check_outside(body, touched, self.depth)
                 return touched
-        path = ContactPath(ContactStage(0.0, sagged.state))
+        path = ContactPath(ContactPathPoint(0.0, sagged.state))
         press(body, tool_at, path, self.depth)
         assert path.last.touched is not None
         return path.last.touched
@@ -346,6 +346,6 @@ def touched_area(body: DeformedBody, touched: ContactSolution, depth: float) -> 
     if not body.law.is_linear:
         candidates = replace(candidates, points=body.positions())
     modulus = candidates.from_regions(body.law.plane_moduli)
-    state = State(np.zeros(len(candidates)), touched.forces[:, 2], nan)
+    state = SurfaceState(np.zeros(len(candidates)), touched.forces[:, 2], nan)
     obstacle = Obstacle(candidates, touched.gap, depth)
     return contact_area(obstacle, touched.active, state, modulus, body.elements.body.mirrored)

@@ -17,7 +17,7 @@ import numpy as np
 from epsmesh.arrays import BoolArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
-from epsmesh.solve.contact.active_set import ContactError, Found, Obstacle, find_set
+from epsmesh.solve.contact.active_set import ContactError, Obstacle, SettledContact, find_set
 from epsmesh.solve.contact.condensed import CondensedElements, suits
 from epsmesh.solve.contact.elements import ContactElements, FarShare, FreeResponse
 from epsmesh.solve.contact.found import FoundContact
@@ -150,7 +150,7 @@ class ContactSearch:
 
     def _find(
         self, sweep: Sweep, obstacle: Obstacle, tolerances: tuple[float, float], loaded: FreeResponse | None
-    ) -> tuple[int, Found]:
+    ) -> tuple[int, SettledContact]:
         """Return the number of active sets solved in lower degrees, and the contact found; collective."""
         try:
             found = sweep.find(obstacle, tolerances)
@@ -167,7 +167,7 @@ class ContactSearch:
 
     def _first_set(
         self, sweep: Sweep, depth: float, loaded: FreeResponse | None, stack: ExitStack
-    ) -> tuple[int, ContactElements, Found]:
+    ) -> tuple[int, ContactElements, SettledContact]:
         """Return the sets solved, the elements of one degree less, and the contact found on them; collective."""
         sets, found = 0, None
         elements: ContactElements | None = None

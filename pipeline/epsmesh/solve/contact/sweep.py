@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from epsmesh.arrays import BoolArray
-from epsmesh.solve.contact.active_set import Found, Obstacle, find_set
-from epsmesh.solve.contact.elements import ContactElements, State, Unknowns
+from epsmesh.solve.contact.active_set import Obstacle, SettledContact, find_set
+from epsmesh.solve.contact.elements import ContactElements, SurfaceState, Unknowns
 from epsmesh.solve.movement import FarField
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.stages import Times
@@ -27,14 +27,14 @@ class Guess:
     """An initial guess: active set (n), state of the candidates, and unknowns of the elements (owned dofs)."""
 
     active: BoolArray
-    state: State
+    state: SurfaceState
     unknowns: Unknowns
 
 
 @dataclass(frozen=True, eq=False)
 class _Known:
     depth: float
-    found: Found
+    found: SettledContact
     unknowns: Unknowns
 
 
@@ -57,7 +57,7 @@ class Sweep:
         """Free the elements."""
         self.stack.close()
 
-    def find(self, obstacle: Obstacle, tolerances: tuple[float, ...]) -> Found | None:
+    def find(self, obstacle: Obstacle, tolerances: tuple[float, ...]) -> SettledContact | None:
         """Return the contact from the initial guess of earlier depths; None without one; collective.
 
         On a condensed surface the initial guess is every candidate that the undeformed surface would touch.
@@ -97,9 +97,9 @@ class Sweep:
             for number in range(len(last.unknowns))
         )
         energy = last.found.state.energy * (obstacle.depth / last.depth) ** 2
-        return Guess(active, State(moved, reactions, energy), unknowns)
+        return Guess(active, SurfaceState(moved, reactions, energy), unknowns)
 
-    def keep(self, depth: float, found: Found, unknowns: Unknowns) -> None:
+    def keep(self, depth: float, found: SettledContact, unknowns: Unknowns) -> None:
         """Remember the contact ``found`` at a ``depth`` (m), and its unknowns."""
         others = [known for known in self._known if known.depth != depth]
         self._known = [*others, _Known(depth, found, unknowns)][-_REMEMBERED:]

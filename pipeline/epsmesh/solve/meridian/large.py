@@ -27,7 +27,7 @@ from epsmesh.solve.meridian.in_time import RelaxingHalfPlane
 from epsmesh.solve.meridian.problem import Answer, MeridianSolver, best_of, error_bar
 from epsmesh.solve.meridian.system import HalfPlane, System, max_strain, meshes_of
 from epsmesh.solve.newton import LargeError
-from epsmesh.solve.path import SHORTEST, Path, Stage, follow
+from epsmesh.solve.path import SHORTEST, Path, PathPoint, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.time_steps import Indentation
 from epsmesh.stages import stage
@@ -70,13 +70,13 @@ class LargeSystem(System):
         Raises:
             LargeError: if a step becomes too short; ``reached`` are the depth and force of the last one.
         """
-        path, work = Path(Stage(0.0, np.zeros(self.forms.dofs))), [(0.0, 0.0, 0.0)]
+        path, work = Path(PathPoint(0.0, np.zeros(self.forms.dofs))), [(0.0, 0.0, 0.0)]
 
-        def solve_at(there: float) -> tuple[Stage, bool]:
+        def solve_at(there: float) -> tuple[PathPoint, bool]:
             state = self.equilibrate(path.last.state, there)
             on_probe, _, energy = self.forces(state)
             work.append((there, -on_probe, energy))
-            return Stage(there, state), True
+            return PathPoint(there, state), True
 
         try:
             follow(path, solve_at, depth, fewest=_FEWEST, shortest=shortest)

@@ -75,7 +75,7 @@ class LargeMeridianContact(LargeSolver):
         return [(arrays.unit * places, arrays.unit * moved) for places, moved in found]
 
     def _solve_on(self, grading: Grading, law: MaterialLaw, depth: float, before: Answer | None) -> Answer:
-        touch = before.touch if isinstance(before, _Found) else None
+        touch = before.touch if isinstance(before, _ContactAnswer) else None
         if touch is None:
             radius, _ = self._tool.on_half_space(depth, min(self._tool.limit, 0.9 * self._kept))
         else:
@@ -93,7 +93,7 @@ class LargeMeridianContact(LargeSolver):
         fine.check()
         deep, force, balance = depth / arrays.unit, fine.force, fine.balance
         error = float(_OF_RESULTS[0] * bars[0]) / fine.results[0] + fine.resolution**2 + 3 * balance
-        return _Found(
+        return _ContactAnswer(
             stiffness=force / deep,
             on_probe=-force / deep,
             balance=balance,
@@ -196,7 +196,7 @@ class RoundToolIndentation(ContactIndentation):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Found(Answer):
+class _ContactAnswer(Answer):
     """An answer with its contact, from which that of a finer mesh begins."""
 
     touch: MeridianTouch

@@ -20,7 +20,7 @@ from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.contact.checks import check_energy, check_support, force_of
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, Friction, press, press_with_friction
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, Friction, press, press_with_friction
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
 from epsmesh.solve.contact.surface import Neighbours
 from epsmesh.solve.meridian.forms import Meshes
@@ -80,7 +80,7 @@ class MeridianTouch:
 
     def along(self, depths: Sequence[float]) -> Iterator["MeridianTouch"]:
         """Yield the contact without friction at rising ``depths`` (m) of one load path, as far as it goes."""
-        path = ContactPath(ContactStage(0.0, np.zeros_like(self.tissue.state)))
+        path = ContactPath(ContactPathPoint(0.0, np.zeros_like(self.tissue.state)))
         for depth in depths:
             try:
                 press(self.tissue, self.placed, path, depth / self.unit)
@@ -100,7 +100,7 @@ class MeridianTouch:
         )
 
     def _at_end(self, follow: Callable[[ContactPath, float], int], depth: float) -> "MeridianTouch":
-        path = ContactPath(ContactStage(0.0, np.zeros_like(self.tissue.state)))
+        path = ContactPath(ContactPathPoint(0.0, np.zeros_like(self.tissue.state)))
         self.tissue.state = path.last.state
         try:
             follow(path, depth / self.unit)

@@ -17,7 +17,7 @@ from epsmesh.mesh.cracked import ACROSS, AHEAD, FACE, CrackGrading, cracked_quar
 from epsmesh.mesh.meridian import meridian_mesh
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, press
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, press
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool
 from epsmesh.solve.meridian.forms import MeridianForms
 from epsmesh.solve.meridian.system import FreeSystem
@@ -50,8 +50,8 @@ def open_crack(law: MaterialLaw, toughness: float, grading: CrackGrading) -> Ope
     with stage("meshing"):
         mesh = meridian_mesh(cracked_quarter(_EXTENT * _LARGEST, grading))
     tissue = _tissue(mesh, law)
-    path, message = ContactPath(ContactStage(0.0, np.zeros_like(tissue.state))), ""
-    found: list[_State] = []
+    path, message = ContactPath(ContactPathPoint(0.0, np.zeros_like(tissue.state))), ""
+    found: list[_OpenCrack] = []
     ahead, ratio, balance = tissue.system.forms.on(AHEAD)[0][:, 1], _FIRST, 0.0
     while ratio < _LARGEST:
         try:
@@ -83,7 +83,7 @@ def section(law: MaterialLaw, ratio: float) -> tuple[FloatArray, FloatArray]:
     with stage("meshing"):
         mesh = meridian_mesh(cracked_quarter(_SHOWN * max(ratio, 1.0), LEVELS[-1]))
     tissue = _tissue(mesh, law)
-    path = ContactPath(ContactStage(0.0, np.zeros_like(tissue.state)))
+    path = ContactPath(ContactPathPoint(0.0, np.zeros_like(tissue.state)))
     steps = max(round(np.log(ratio / _FIRST) / np.log(_FACTOR)), 0)
     for each in np.geomspace(min(_FIRST, ratio), ratio, steps + 1):
         _open(tissue, path, float(each))
@@ -96,7 +96,7 @@ def _open(tissue: MeridianTissue, path: ContactPath, ratio: float) -> None:
         press(tissue, lambda radius: _cylinder(tissue, radius), path, share * ratio)
 
 
-class _State(NamedTuple):
+class _OpenCrack(NamedTuple):
     """One state of the crack: what an opening has of it."""
 
     ratio: float
@@ -106,9 +106,9 @@ class _State(NamedTuple):
     angle: float
 
 
-def _state(tissue: MeridianTissue, touched: ContactSolution, ratio: float) -> _State:
+def _state(tissue: MeridianTissue, touched: ContactSolution, ratio: float) -> _OpenCrack:
     x, z = tissue.positions()[np.flatnonzero(touched.active)[-1]]
-    return _State(
+    return _OpenCrack(
         ratio=ratio,
         energy=_QUARTERS * tissue.system.forms.energy(tissue.state),
         slope=_QUARTERS * float(touched.pressed.sum()),
@@ -117,7 +117,7 @@ def _state(tissue: MeridianTissue, touched: ContactSolution, ratio: float) -> _S
     )
 
 
-def _opening(found: list[_State]) -> Opening:
+def _opening(found: list[_OpenCrack]) -> Opening:
     ratios, energies, slopes, thrusts, angles = np.array(found).T
     return Opening(ratios, energies, slopes, thrusts, angles)
 

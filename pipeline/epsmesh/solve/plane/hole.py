@@ -17,7 +17,7 @@ from epsmesh.mesh.hole import LEVEL, slice_round_hole
 from epsmesh.mesh.meridian import meridian_mesh
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactStage, press
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, press
 from epsmesh.solve.contact.deformed import PlacedTool
 from epsmesh.solve.meridian.forms import MeridianForms
 from epsmesh.solve.meridian.system import FreeSystem
@@ -60,7 +60,10 @@ def open_hole(law: MaterialLaw, mesh: HoleMesh, is_enough: Callable[[Hole], bool
         SolveError: if a state before cannot be solved.
     """
     tissue = _slice(law, mesh)
-    path, found = ContactPath(ContactStage(0.0, np.zeros_like(tissue.state))), list[tuple[float, float, float, float]]()
+    path, found = (
+        ContactPath(ContactPathPoint(0.0, np.zeros_like(tissue.state))),
+        list[tuple[float, float, float, float]](),
+    )
     growth = _FIRST
     while len(found) < 2 or not is_enough(_hole(found)):
         try:
@@ -91,7 +94,7 @@ def section(law: MaterialLaw, across: float) -> tuple[FloatArray, FloatArray]:
         SolveError: if it cannot be opened so far.
     """
     tissue = _slice(law, HoleMesh(MESHES[0].columns, _SHOWN * across))
-    path = ContactPath(ContactStage(0.0, np.zeros_like(tissue.state)))
+    path = ContactPath(ContactPathPoint(0.0, np.zeros_like(tissue.state)))
     steps = max(round(np.log((across**2 - 1) / _FIRST) / np.log(_FACTOR)), 1)
     for growth in np.geomspace(_FIRST, across**2 - 1, steps + 1):
         press(tissue, lambda wider: _cylinder(tissue, wider), path, np.sqrt(1 + growth) - 1)
