@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from epsmesh.arrays import BoolArray, FloatArray
 
 
@@ -36,3 +38,8 @@ class Constraint:
     turning: FloatArray
     forces: FloatArray
     sliding: Sliding | None = None
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether frames or turns change the operator."""
+        return bool(self.turning.any() or (self.frames != np.eye(self.frames.shape[-1])).any())

@@ -31,6 +31,8 @@ from epsmesh.solve.newton import LargeError
 SLACK = 1e-6
 # Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
 LEFT, _CLOSED = 1e-8, 1e-8
+# Rounding of positions at which nodes are held, in units of the largest.
+_HELD = 1e-14
 # A residual below this that no longer falls is the rounding error of a body that is large compared with the contact.
 _ROUNDING = 1e-6
 # With friction: the residual of nodes that slide, where their friction is that of the iteration before, and of others.
@@ -174,6 +176,30 @@ def continue_linear(tissue: Tissue, tool: PlacedTool, touched: ContactSolution, 
     constraint = _constraint(place, there.normal, touched.pressed, touched.active)
     tissue.linearise(FrictionIteration(friction_step).constrain(constraint, there, touched.active))
     tissue.advance(1.0)
+
+
+def hold(tissue: Tissue, held: BoolArray, goal: FloatArray, *, limit: float, most: int, halvings: int) -> None:
+    """Find the equilibrium in which components ``held`` (n, d) are at positions ``goal`` (n, d); collective.
+
+    What is bonded is contact whose components are all active, whatever the reaction. The residual at the end is at most
+    ``limit``, in units of the forces that hold the nodes. A step that turns tissue inside out is halved.
+
+    Raises:
+        LargeError: if there is none after ``most`` iterations, or tissue is turned inside out.
+        SolveError: if a linear solver fails.
+    """
+    nodes, dim = held.shape
+    frames, nothing = np.broadcast_to(np.eye(dim), (nodes, dim, dim)), np.zeros((nodes, dim, dim))
+    for iteration in range(most + 1):
+        left, forces = np.where(held, goal - tissue.positions(), 0.0), tissue.forces()
+        residual = hypot(tissue.unbalanced(), float(np.linalg.norm(np.where(held, 0.0, forces))))
+        is_there = np.abs(left).max() <= _HELD * np.abs(goal).max()
+        if is_there and residual <= limit * float(np.linalg.norm(np.where(held, forces, 0.0))):
+            return
+        if iteration < most:
+            tissue.linearise(Constraint(frames, held, left, nothing, np.zeros_like(left)))
+            _advance(tissue, halvings)
+    raise LargeError(f"no equilibrium after {most} iterations")
 
 
 class _Loop:
@@ -333,13 +359,13 @@ def _with_care(tool: PlacedTool, active: BoolArray, following: BoolArray, repeat
     return following
 
 
-def _advance(tissue: Tissue) -> float:
+def _advance(tissue: Tissue, most: int = _HALVINGS) -> float:
     """Take the longest step, by halves, that leaves no tissue inside out; return it as a share of the whole one.
 
     Raises:
         LargeError: if there is none.
     """
-    for halvings in range(_HALVINGS):
+    for halvings in range(most):
         share = 0.5**halvings
         if tissue.advance(share):
             return share

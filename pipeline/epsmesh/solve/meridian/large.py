@@ -10,22 +10,25 @@ Lengths are in units of the disc's radius a, stresses in units of μ of region 0
 """
 
 from abc import abstractmethod
+from functools import cached_property
 from math import pi
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
-from epsmesh.arrays import FloatArray, IntArray
+from epsmesh.arrays import FloatArray
 from epsmesh.mesh.meridian import Grading, MeridianArrays
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.conditions import Conditions
+from epsmesh.solve.contact.deformed import hold
 from epsmesh.solve.ended import ended
 from epsmesh.solve.load_steps import check_path
 from epsmesh.solve.meridian.in_time import RelaxingHalfPlane
 from epsmesh.solve.meridian.problem import Answer, MeridianSolver, best_of, error_bar
 from epsmesh.solve.meridian.system import HalfPlane, System, max_strain, meshes_of
+from epsmesh.solve.meridian.tissue import MeridianTissue
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.path import SHORTEST, Path, PathPoint, follow
 from epsmesh.solve.physics import MaterialLaw
@@ -49,12 +52,10 @@ _ROUNDING = 1e-13
 
 
 class LargeSystem(System):
-    """A system of laws of large displacements; ``iterations`` counts linear solves.
+    """A system of laws of large displacements.
 
     A state is the vector of all dofs, with the values prescribed at the probe.
     """
-
-    iterations = 0
 
     def forces(self, state: FloatArray) -> tuple[float, float, float]:
         """Return F of the tissue on the probe and on the support, and the strain energy of a ``state``."""
@@ -90,35 +91,21 @@ class LargeSystem(System):
         Raises:
             LargeError: if Newton's method does not converge.
         """
-        unknown = np.setdiff1d(self.free, self.probe)
-        residual = self.forms.residual(state)
-        for _ in range(_MOST_ITERATIONS):
-            change = self._newton(state, residual, unknown, -depth - state[self.probe])
-            share = self._share(state, change)
-            state = state + share * change
-            residual = self.forms.residual(state)
-            left = np.linalg.norm(residual[unknown]) / np.linalg.norm(residual[self.probe])
-            if share == 1.0 and left < _LEFT:
-                return state
-        raise LargeError(f"no equilibrium after {_MOST_ITERATIONS} iterations")
+        tissue = self._tissue
+        tissue.state, pressed = state, np.zeros(tissue.fixed.shape, dtype=bool)
+        pressed[:, -1] = True
+        hold(tissue, pressed, tissue.places - [0.0, depth], limit=_LEFT, most=_MOST_ITERATIONS, halvings=_HALVINGS)
+        return tissue.state
 
-    def _newton(self, state: FloatArray, residual: FloatArray, unknown: IntArray, moved: FloatArray) -> FloatArray:
-        """Return Newton's change of a ``state`` with a ``residual``, whose probe is ``moved``."""
-        with stage("assembly"):
-            rows = self.forms.stiffness(state)[unknown]
-        change = np.zeros_like(state)
-        change[self.probe] = moved
-        with self.inverse(rows[:, unknown], is_definite=False) as solve, stage("solve"):
-            change[unknown] = -solve(residual[unknown] + rows @ change)
-        self.iterations += 1
-        return change
+    @cached_property
+    def _tissue(self) -> MeridianTissue:
+        places = np.column_stack([self.radii, np.zeros_like(self.radii)])
+        return MeridianTissue(self, np.column_stack([self.slide, self.probe]), places)
 
-    def _share(self, state: FloatArray, change: FloatArray) -> float:
-        """Return the share of a ``change`` that turns no tissue inside out."""
-        for halvings in range(_HALVINGS):
-            if np.isfinite(self.forms.energy(state + 0.5**halvings * change)):
-                return 0.5**halvings
-        raise LargeError("tissue is turned inside out")
+    @property
+    def iterations(self) -> int:
+        """Linear solves so far."""
+        return self._tissue.iterations
 
 
 class MeridianIndentation(Indentation):

@@ -19,7 +19,10 @@ class MeridianTissue:
     def __init__(self, system: FreeSystem, dofs: IntArray, places: FloatArray):
         """Begin at rest."""
         self.system, self.places = system, places
-        self._dofs, self._free = dofs, system.free
+        self._dofs = dofs
+        self._is_free = np.zeros(system.forms.dofs, dtype=bool)
+        self._is_free[system.free] = True
+        self._beside = np.setdiff1d(system.free, dofs)
         self.fixed = ~np.isin(dofs, system.free)
         self._now = self._from = self._change = np.zeros(system.forms.dofs)
         self._residual: FloatArray | None = None
@@ -50,7 +53,7 @@ class MeridianTissue:
 
     def unbalanced(self) -> float:
         """Return the norm of the residual at all other free dofs."""
-        return float(np.linalg.norm(self.residual()[np.setdiff1d(self._free, self._dofs)]))
+        return float(np.linalg.norm(self.residual()[self._beside]))
 
     def linearise(self, constraint: Constraint) -> FloatArray:
         """Find the increment under a ``constraint``; return the nodal forces (n, 2) that it predicts.
@@ -61,18 +64,22 @@ class MeridianTissue:
         self._from, dofs = self._now, self._dofs
         with stage("assembly"):
             tangent = self.system.forms.stiffness(self._now)
-            turn = self._blocks(constraint.frames) + sp.diags(self._apart())
-            turned = (turn.T @ (tangent - self._blocks(constraint.turning)) @ turn).tocsr()
+            turn, turned = None, tangent
+            if constraint.is_turned:
+                turn = self._blocks(constraint.frames) + sp.diags(self._apart())
+                turned = (turn.T @ (tangent - self._blocks(constraint.turning)) @ turn).tocsr()
         change: FloatArray = np.zeros_like(self._now)
         held = dofs[constraint.held]
         change[held] = constraint.values[constraint.held]
         load = -self.residual()
         load[dofs] += constraint.forces
-        unknown = np.setdiff1d(self._free, held)
+        is_unknown = self._is_free.copy()
+        is_unknown[held] = False
+        unknown = np.flatnonzero(is_unknown)
         rows = turned[unknown]
         with self.system.inverse(rows[:, unknown], is_definite=False) as solve, stage("solve"):
-            change[unknown] = solve((turn.T @ load)[unknown] - rows @ change)
-        self._change = turn @ change
+            change[unknown] = solve((load if turn is None else turn.T @ load)[unknown] - rows @ change)
+        self._change = change if turn is None else turn @ change
         self.iterations += 1
         return np.where(self.fixed, 0.0, (self.residual() + tangent @ self._change)[dofs])
 
