@@ -112,7 +112,7 @@ def test_cases_whose_reduced_basis_fails_are_solved(monkeypatch):
         def __init__(self, *_):
             raise SolveError("the basis fell apart")
 
-    ratios = {"material": {"poisson": [0.05 * i for i in range(8)]}}
+    ratios = {"material": {"poisson": [0.035 * i for i in range(12)]}}
     solved = solve(WORLD, **ratios, plan={"without": ["axisymmetric", "reduced"]})
     monkeypatch.setattr("epsmesh.run.basis.ReducedBasis", Broken)
     found = solve(WORLD, **ratios)
@@ -129,13 +129,13 @@ def test_a_bound_that_is_none_is_not_relied_on(monkeypatch):
             return replace(super().evaluate(t), bound=-1e-9)
 
     monkeypatch.setattr("epsmesh.run.basis.ReducedBasis", Doubtful)
-    records = solve(WORLD, material={"poisson": [0.05 * i for i in range(8)]})
+    records = solve(WORLD, material={"poisson": [0.035 * i for i in range(12)]})
     assert {record.origin for record in records.values()} == {"symmetric"}
 
 
 @pytest.mark.mpi
 def test_without_memory_for_a_reduced_basis_every_case_is_solved(monkeypatch):
-    ratios = {"poisson": [0.05 * i for i in range(8)]}
+    ratios = {"poisson": [0.035 * i for i in range(12)]}
     monkeypatch.setattr("epsmesh.plan.estimate.basis_memory", lambda *_: 1e18)
     solved = solve(WORLD, material=ratios)
     assert {record.origin for record in solved.values()} == {"symmetric"}

@@ -159,7 +159,7 @@ def test_f_is_proportional_to_stress_alone(tool):
     each modulus. There is no basis in Poisson's ratios, and the plan says why.
     """
     probe = TOOLS.get(tool, {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "unilateral"})
-    ratios = [round(0.30 + 0.01 * n, 2) for n in range(9)]
+    ratios = [round(0.30 + 0.01 * n, 2) for n in range(12)]
     materials = {"young": ["10 kPa", "20 kPa"], "poisson": ratios}
     found = study(probe=probe | {"depth": ["0.1 mm", "0.2 mm"]}, material=materials)
     plan = make_plan(found)

@@ -98,7 +98,7 @@ def test_no_incision():
 
 def test_depth_has_no_effect_without_bond_in_a_slit():
     """The study warns of it. Each Poisson's ratio is solved: a reduced basis gives the work only."""
-    poisson = [0.1, 0.2, 0.25, 0.3, 0.35, 0.4, 0.42]
+    poisson = [0.035 * n for n in range(12)]
     sliding = parse(raw(probe={**SLIT, "contact": "frictionless"}, material={"poisson": poisson}))
     assert any("no effect" in warning for warning in sliding.warnings)
     assert not any(solve.reduced for solve in make_plan(sliding).solves)
