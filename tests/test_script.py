@@ -37,14 +37,15 @@ def box(comm: MPI.Comm = MPI.COMM_SELF) -> tuple[Any, Any]:
     """Return dolfinx's own mesh of a box of 40 × 40 × 20 mm, a tool's footprint of 24 × 24 mm, and its bottom."""
     ends = [np.array([-20e-3, -20e-3, -20e-3]), np.array([20e-3, 20e-3, 0.0])]
     mesh = dolfinx.mesh.create_box(comm, ends, [10, 10, 5])
-    top, bottom = (
+    top, bottom, side = (
         dolfinx.mesh.locate_entities_boundary(mesh, 2, where)
         for where in (
             lambda x: (x[2] > -1e-9) & (np.abs(x[:2]).max(axis=0) < 12.1e-3),
             lambda x: x[2] < -20e-3 + 1e-9,
+            lambda x: x[0] > 20e-3 - 1e-9,
         )
     )
-    return mesh, tags_of(mesh, {1: top, 2: bottom})
+    return mesh, tags_of(mesh, {1: top, 2: bottom, 3: side})
 
 
 @pytest.mark.parametrize("law", ["linear", "neo-hookean"])
@@ -122,6 +123,11 @@ def test_ranks_agree(contact):
         ({"degree": 1}, "must be 2 or 3"),
         ({"tool": {"shape": "ball"}}, "must be one of"),
         ({"tool": BALL, "at": (0.0, 0.0, -2e-3)}, "inside the body"),
+        ({"tool": BALL, "at": (0.0, 0.0, 1e-3)}, "0.001 m above its facets"),
+        ({"tool": BALL | {"motion": "all"}}, "motion is a key of studies"),
+        ({"tool": {"shape": "disc", "radius": "6 mm"}}, "mark those below it"),
+        ({"tool": {"shape": "disc", "radius": "20 mm"}}, "mark those below it"),
+        ({"groups": GROUPS | {"mirror_x": 3}}, "must lie in the plane x = 0"),
     ],
 )
 def test_what_cannot_work_is_refused(changes, message):
@@ -136,3 +142,11 @@ def test_millimetres_are_refused():
     mesh.geometry.x[:] *= 1e3
     with pytest.raises(ValueError, match="coordinates are metres"):
         epsmesh.Problem(mesh, tags, GROUPS, LAW)
+
+
+def test_tags_of_another_dimension_are_refused():
+    mesh, tags = box()
+    for wrong in ({"facets": dolfinx.mesh.meshtags(mesh, 1, tags.indices, tags.values)}, {"cells": tags}):
+        given = {"facets": tags, "law": LAW} | wrong | ({"law": {1: LAW}} if "cells" in wrong else {})
+        with pytest.raises(ValueError, match="are tags of dimension"):
+            epsmesh.Problem(mesh, given.pop("facets"), GROUPS, given.pop("law"), **given)

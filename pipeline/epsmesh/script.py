@@ -14,7 +14,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from epsmesh.arrays import Int32Array
+from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.mesh.distribute import BodyMesh, exterior_facets
 from epsmesh.run.problem import tool_at
 from epsmesh.scene.model import FIXED, FREE, MIRROR, PROBE
@@ -41,8 +41,30 @@ Energy = Callable[[Any], Any]
 _SMALLEST, _LARGEST = 1e-6, 10.0
 # Names of facet groups, and those of the solver.
 _GROUPS = {"tool": PROBE, "fixed": FIXED, "mirror_x": MIRROR["x"], "mirror_y": MIRROR["y"]}
-# How far the tool may be inside the body at depth 0, in units of its extent.
-_INSIDE = 1e-6
+# How far the tool may be inside the body at depth 0, and a mirror's facets off their plane, in units of the extent.
+_OFF = 1e-6
+# Keys of a tool that say how it moves and where: of those a problem has its own.
+_OF_STUDIES = frozenset(
+    {
+        "at",
+        "axis",
+        "contact",
+        "depth",
+        "depth_range",
+        "force",
+        "history",
+        "incision",
+        "insertion",
+        "motion",
+        "name",
+        "path",
+    }
+)
+# Points along an edge of a facet at which its distance to the tool is found, and how far the tool may then be above it,
+# in units of the edge.
+_ALONG, _ABOVE = 20, 2e-3
+# The area of the facets of a flat tool with a sharp edge, in units of its own: they are the footprint, and a polygon.
+_LEAST_AREA, _MOST_AREA = 0.8, 1.0 + 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +94,9 @@ class Problem:
     further parameters; with tags of ``cells`` it has such a table for each value.
 
     Without a ``tool`` the displacement of the group "tool" is prescribed. A ``tool`` has the keys of [probe] in a
-    study, such as ``{"shape": "sphere", "radius": "5 mm"}``; it touches the surface first ``at`` a point (m), and its
-    contact is found within the group.
+    study that tell its shape and friction, such as ``{"shape": "sphere", "radius": "5 mm"}``; it touches the surface
+    first ``at`` a point (m), and its contact is found within the group, which is the face of a flat tool with a sharp
+    edge.
 
     ``terms`` are further energies: functions of the displacement u that return a form of UFL (J) with measures of the
     mesh. Loads are such terms, −∫ t·u ds. With terms a linear law is solved by Newton's method, too.
@@ -176,19 +199,46 @@ class Problem:
         shape = keys.get("shape")
         if shape not in PROBES:
             raise ValueError(f"tool: shape = {shape!r}: must be one of {', '.join(PROBES)}")
+        if unknown := _OF_STUDIES & set(self._tool or {}):
+            raise ValueError(
+                f"tool: {min(unknown)} is a key of studies: a problem has at and depth, and moves along -z"
+            )
         probe = specialised(PROBES[str(shape)].model_validate(keys))
         assert isinstance(probe, Probe)
         return probe
 
     def _check_place(self) -> None:
-        """Raise an error if the tool at depth 0 is inside the body, or touches none of its facets."""
+        """Raise an error if the tool at depth 0 is inside the body or above it, or its face is not its facets."""
         body, extent = self.body, _extent(self.body.mesh)
         probe = self._probe(1e-3 * extent)
-        places = boundary_of(body, (PROBE,)).corners.reshape(-1, 3)
-        gaps = tool_at(probe, Frame(self._at), 0.0).height(places)
+        corners = boundary_of(body, (PROBE,)).corners
+        shares = np.array([(i, j, _ALONG - i - j) for i in range(_ALONG + 1) for j in range(_ALONG + 1 - i)]) / _ALONG
+        points = np.einsum("kc,ncd->nkd", shares, corners).reshape(-1, 3)
+        gaps = tool_at(probe, Frame(self._at), 0.0).height(points)
         least = body.comm.allreduce(float(gaps.min(initial=np.inf)), op=MPI.MIN)
-        if least < -_INSIDE * extent:
+        edges = np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2)
+        edge = body.comm.allreduce(float(edges.max(initial=0.0)), op=MPI.MAX)
+        if least < -_OFF * extent:
             raise ValueError(f"at = {self._at}: the tool is {-least:.3g} m inside the body: it must touch the surface")
+        if least > _ABOVE * edge:
+            raise ValueError(f"at = {self._at}: the tool is {least:.3g} m above its facets: it must touch them")
+        if probe.has_singular_edge:
+            self._check_footprint(probe, corners)
+
+    def _check_footprint(self, probe: Probe, corners: FloatArray) -> None:
+        """Raise an error unless the tool's facets, by their ``corners`` (n, 3, 3), are its face."""
+        outline = probe.outline()
+        reach = np.abs(corners[..., :2] - np.array(self._at[:2])) - np.abs(outline).max(axis=0)
+        beyond = self.body.comm.allreduce(float(reach.max(initial=-np.inf)), op=MPI.MAX)
+        sides = corners[:, 1:, :2] - corners[:, :1, :2]
+        own = float(np.abs(np.linalg.det(sides)).sum()) / 2
+        area = 2.0 ** len(self.body.mirrored) * self.body.comm.allreduce(own)
+        known = float(np.abs(np.cross(outline, np.roll(outline, -1, axis=0)).sum())) / 2
+        if beyond > _OFF * _extent(self.body.mesh) or not _LEAST_AREA <= area / known <= _MOST_AREA:
+            raise ValueError(
+                f'group "tool": its facets have {area:.3g} m², the face of the {probe.shape} has {known:.3g} m²: with '
+                "a sharp edge it is known by its facets alone; mark those below it, or give the tool a rounded edge"
+            )
 
 
 def _term(energy: Energy) -> EnergyTerm:
@@ -242,6 +292,9 @@ def _body_of(
         raise ValueError(f"group {min(unknown)!r}: must be one of {', '.join(_GROUPS)}")
     if "tool" not in groups or not ("fixed" in groups or has_terms):
         raise ValueError('groups need "tool" and "fixed"; without "fixed", a term must hold the body')
+    for name, tags, dimension in (("facets", facets, 2), ("cells", cells, 3)):
+        if tags is not None and tags.dim != dimension:
+            raise ValueError(f"{name}: are tags of dimension {tags.dim}: must be {dimension}")
     exterior, _ = exterior_facets(mesh)
     found: dict[str, Int32Array] = {}
     for name, value in groups.items():
@@ -250,7 +303,13 @@ def _body_of(
             raise ValueError(f"group {name!r}: no facet of the boundary has the tag {value}")
     found.setdefault(FIXED, np.empty(0, dtype=np.int32))
     found[FREE] = np.setdiff1d(exterior, np.concatenate([*found.values()])).astype(np.int32)
-    return BodyMesh(mesh, found, topology.index_map(3).size_global, _regions(mesh, cells, values))
+    body = BodyMesh(mesh, found, topology.index_map(3).size_global, _regions(mesh, cells, values))
+    for axis, name in enumerate("xy"):
+        if f"mirror_{name}" in groups:
+            away = np.abs(boundary_of(body, (MIRROR[name],)).corners[..., axis]).max(initial=0.0)
+            if mesh.comm.allreduce(float(away), op=MPI.MAX) > _OFF * extent:
+                raise ValueError(f'group "mirror_{name}": its facets must lie in the plane {name} = 0')
+    return body
 
 
 def _regions(mesh: Any, cells: Any, values: Sequence[Any]) -> Int32Array | None:
