@@ -237,3 +237,14 @@ def test_forces_that_do_not_rise_between_near_depths_ask_for_one_that_is_farther
     depth = next_depth(1.81693993611e-3, near, 2.84758410162e-3, None)
     assert isinstance(depth, float)
     assert depth < 0.95 * 0.3054e-3
+
+
+def test_a_force_between_depths_that_are_as_near_as_trials_may_be_is_reached():
+    """The bar of a meridian is smaller than what F does between two such depths."""
+    trials, depth, force = [], 1e-3, (1e-3 * (1 + 0.9e-6)) ** 1.5
+    while not isinstance(depth, FoundDepth):
+        trials.append(Trial(depth, depth**1.5, 1e-7))
+        depth = next_depth(force, trials, 1e-2, 1.5)
+    assert not depth.message
+    assert depth.depth == pytest.approx(force ** (1 / 1.5), rel=1e-9)
+    assert abs(depth.depth / force ** (1 / 1.5) - 1) <= depth.error / depth.depth

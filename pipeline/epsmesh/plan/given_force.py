@@ -85,9 +85,11 @@ def next_depth(force: float, trials: Sequence[Trial], most: float, exponent: flo
     if _is_tried(depth, trials) or len(trials) >= _MOST_TRIALS:
         # Forces of meshes of their own need not rise from one depth to a near one.
         left, beside = abs(log(force / best.force)), canonical(_BESIDE * best.depth)
-        if slope and left <= best.bar:
+        # Or the depths that are left differ by less than trials do, whatever F does over them.
+        is_near = left <= best.bar or abs(log(depth / best.depth)) < _LEAST
+        if slope and is_near:
             return _found(force, best, slope, further=left)
-        if left <= best.bar and not _is_tried(beside, trials) and len(trials) < _MOST_TRIALS:
+        if is_near and not _is_tried(beside, trials) and len(trials) < _MOST_TRIALS:
             return beside
         reason = f"the depth was not found in {len(trials)} trials"
         return FoundDepth(force, best.depth, solved=best.depth, message=reason, reached=best.force)
