@@ -234,3 +234,24 @@ def test_friction_that_slides_is_the_law_times_the_force():
     assert slides.friction_force == pytest.approx(0.02 * slides.force, rel=0.05)
     assert slides.torque == 0.0
     assert record("stick").friction_force > 0
+
+
+def test_few_nodes_touch_and_have_friction():
+    """The corner below the tip is inside the tool, which is no error at small displacements."""
+    tool = {"shape": "cone", "angle": "86 deg", "radius": "4 mm", "depth": "0.02 mm", "depth_range": ["5 um", "0.2 mm"]}
+    body = {"shape": "cylinder", "radius": "60 mm", "height": "60 mm"}
+    mesh = {"fine": "20 mm", "coarse": "20 mm", "rim": "0.3 mm", "growth": 0.5}
+    smooth, rough = (
+        solve(MPI.COMM_SELF, body=body, probe=tool | {"friction": mu}, material={"poisson": 0.1}, mesh=mesh)[()]
+        for mu in (0.0, 0.4)
+    )
+    assert smooth.force < rough.force < 1.1 * smooth.force
+
+
+def test_a_rounded_edge_with_friction_settles():
+    """Many nodes of its flat face stick and slide in turn before they settle."""
+    tool = {"shape": "disc", "radius": "4 mm", "edge": "1 mm", "depth": "0.2 mm", "contact": "unilateral"}
+    body = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}
+    mesh = {"epsilon": "8 mm", "fine": "3 mm", "coarse": "8 mm", "rim": "0.3 mm", "growth": 0.8}
+    smooth, rough = (record(mu, tool, mesh, body=body).force for mu in (0.0, 0.3))
+    assert smooth < rough < 1.05 * smooth

@@ -181,8 +181,9 @@ class CondensedElements(ContactElements):
         return SurfaceState(moved, reactions, float(moved @ reactions))
 
     def begin(self, state: SurfaceState, unknowns: Unknowns) -> None:
-        """Begin with forces and displacements of the candidates."""
-        self._tissue.state = np.stack([state.reactions, state.moved])[..., None]
+        """Begin with forces of the candidates; the far field may be another one than that of the ``state``."""
+        forces = state.reactions[:, None]
+        self._tissue.state = np.stack([forces, self._tissue.moved(forces)])
 
     def unknowns(self) -> Unknowns:
         """Return the displacement (m) of the whole body, owned dofs, under the current reactions."""

@@ -39,6 +39,8 @@ _ROUNDING = 1e-6
 _LEFT_WITH_FRICTION, _LEFT_BESIDE = 1e-4, 1e-7
 # Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
 _MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
+# Most iterations with friction on linear tissue, where directions of slip settle last, and each is a small solve.
+_MOST_LINEAR = 60
 # Without patience: the least share of the first increment that may be taken, and the number of iterations after which
 # gaps of active nodes are at most so large, in units of the depth.
 _WHOLE, _SOON, _NEARLY_CLOSED = 0.5, 10, 1e-3
@@ -158,12 +160,13 @@ def solve_contact(
         SolveError: if a linear solver fails.
     """
     loop = _Loop(tissue, tool, active, friction_step, is_patient=is_patient, limit=limit, scale=scale)
-    for iteration in range(_MOST + 1):
+    most = _MOST_LINEAR if friction_step is not None and friction_step.is_linear else _MOST
+    for iteration in range(most + 1):
         found = loop.judge(iteration)
         if found is not None:
             return found
         loop.step(iteration)
-    raise LargeError(f"no equilibrium after {_MOST} iterations")
+    raise LargeError(f"no equilibrium after {most} iterations")
 
 
 def continue_linear(tissue: Tissue, tool: PlacedTool, touched: ContactSolution, friction_step: FrictionStep) -> None:
