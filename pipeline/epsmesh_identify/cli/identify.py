@@ -59,7 +59,7 @@ def identify(
 
     Of a curve without a study (CSV, TXT, LVM), it prints what is in the file, and a [[measurement]] to paste into one.
 
-    With --design it reads no curves. It ranks further tests, such as a second radius, from the study's declared values.
+    With --design it fits no curves. It ranks further tests, such as a second radius, from the study's declared values.
 
     Example: epsmesh identify studies/identify-punch.toml
 
