@@ -69,5 +69,8 @@ class BodyTerm(Section):
         """Return the energy (J) as a form of UFL."""
 
     def is_mirrored(self, normal: tuple[float, float, float]) -> bool:
-        """Tell whether it is its own image in the plane through the origin with that unit normal, as the body is."""
-        return True
+        """Tell whether it is its own image in the plane through the origin with that unit normal, as the body is.
+
+        Only a term that says so is solved on a half or a quarter of the body.
+        """
+        return False
