@@ -233,7 +233,8 @@ class Problem:
         sides = corners[:, 1:, :2] - corners[:, :1, :2]
         own = float(np.abs(np.linalg.det(sides)).sum()) / 2
         area = 2.0 ** len(self.body.mirrored) * self.body.comm.allreduce(own)
-        known = float(np.abs(np.cross(outline, np.roll(outline, -1, axis=0)).sum())) / 2
+        (x, y), (after_x, after_y) = outline.T, np.roll(outline, -1, axis=0).T
+        known = float(np.abs((x * after_y - y * after_x).sum())) / 2
         if beyond > _OFF * _extent(self.body.mesh) or not _LEAST_AREA <= area / known <= _MOST_AREA:
             raise ValueError(
                 f'group "tool": its facets have {area:.3g} m², the face of the {probe.shape} has {known:.3g} m²: with '
