@@ -23,7 +23,7 @@ from epsmesh.scene.model import FIXED, PROBE
 from epsmesh.shapes.rounded import Rounded
 from epsmesh.solve.contact.checks import force_of
 from epsmesh.solve.contact.condensed import CondensedTissue
-from epsmesh.solve.contact.frictional import Surface, press
+from epsmesh.solve.contact.frictional import CondensedSurface, press_condensed
 from epsmesh.solve.contact.surface import Neighbours
 from epsmesh.solve.meridian.forms import MeridianForms
 from epsmesh.solve.meridian.system import meshes_of
@@ -70,12 +70,12 @@ def true_ratio(scene: Scene, friction: float, radius: float) -> float:
     law = MaterialLaw((Parameters.of_moduli(_YOUNG, case.material.poisson),))
     surface = _condensed(MeridianForms(meshes_of(arrays), 2, law), case.probe.section, arrays.unit)  # type: ignore[attr-defined]
     depth = case.probe.depth
-    smooth = force_of(press(surface, depth, 0.0, 1))
-    coarse, fine = (force_of(press(surface, depth, friction, count)) for count in (_STEPS, 2 * _STEPS))
+    smooth = force_of(press_condensed(surface, depth, 0.0, 1))
+    coarse, fine = (force_of(press_condensed(surface, depth, friction, count)) for count in (_STEPS, 2 * _STEPS))
     return (2 * fine - coarse) / smooth
 
 
-def _condensed(forms: MeridianForms, section: Rounded, unit: float) -> Surface:
+def _condensed(forms: MeridianForms, section: Rounded, unit: float) -> CondensedSurface:
     """Return the surface below the tool; components are along the radius and the axis."""
     dofs, places = forms.on(PROBE)
     order = np.argsort(places[:, 0], kind="stable")
@@ -90,7 +90,9 @@ def _condensed(forms: MeridianForms, section: Rounded, unit: float) -> Surface:
     moved = np.where((components.ravel() >= 0)[:, None], factors.solve(loads)[components.ravel()], 0.0)
     is_axis = np.arange(len(components)) == 0  # its reaction means nothing, like a corner's
     tissue = CondensedTissue(moved, places[order] * unit, components < 0)
-    return Surface(tissue, section.height(places[order, 0] * unit), Neighbours(is_axis, np.array([[0, 1]]), is_axis))
+    return CondensedSurface(
+        tissue, section.height(places[order, 0] * unit), Neighbours(is_axis, np.array([[0, 1]]), is_axis)
+    )
 
 
 def row_of(seed: int) -> Scene:

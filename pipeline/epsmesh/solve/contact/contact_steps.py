@@ -1,4 +1,4 @@
-"""Load steps of contact at large displacements: the whole depth at once, or as many steps as the loop needs.
+"""Load steps of contact: the whole depth at once, or as many steps as the loop needs.
 
 The initial guess of a step continues the last one linearly, and is dropped where it turns tissue inside out. Without
 friction the equilibrium does not depend on the path: steps on the way are solved roughly.
@@ -30,8 +30,8 @@ from epsmesh.solve.path import Path, PathPoint, follow
 _LARGE = 1 / 8
 # Residual and gaps of steps on the way to the depth, without friction.
 _ON_THE_WAY = 1e-2
-# Depth of inactive nodes inside the tool, in units of the depth at the end. Corners beside active nodes are less deep,
-# even on a coarse mesh.
+# Depth of inactive nodes inside the tool, in units of the depth at the end, at large displacements. A corner beside
+# active nodes is less deep, but where only a few nodes touch.
 _INSIDE = 0.25
 # The first step ends where the tool's normals at the nodes that it penetrates have this mean part along its way, after
 # so many halvings at most: nodes beside the flank of a ball do not stay in contact, and would fold the tissue.

@@ -1,4 +1,4 @@
-"""Unilateral contact at large displacements: one Newton loop for the law and the active set together.
+"""Unilateral contact, of linear and other tissue: one Newton loop for the law and the active set together.
 
 With the tissue's nodal forces R(w), and the tool's signed distance g and outward normal n at the deformed nodes,
 

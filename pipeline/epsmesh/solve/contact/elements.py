@@ -177,8 +177,8 @@ class ContactElements:
         hierarchy = self.hierarchy_of(stack, direct=False) if self._direct else self.hierarchy
         return hierarchy.hold_facets(facets)
 
-    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
-        """Move the active nodes to ``bounds`` (n, m), solve for the others, and return the iterations.
+    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> None:
+        """Move the active nodes to ``bounds`` (n, m), and solve for the others.
 
         Iterations end when the energy norm of the error is ``tolerance`` times the root of ``energy`` (J). Without
         ``energy`` the norm is relative to the initial error.
@@ -187,20 +187,21 @@ class ContactElements:
             SolveError: if the solver or the far field does not converge.
         """
         if (far := self.far) is None:
-            return self.approach(bounds, tolerance, energy)
-        iterations, before, wanted_before = 0, None, 0.0
+            self.approach(bounds, tolerance, energy)
+            return
+        before, wanted_before = None, 0.0
         for _ in range(_MOST_ROUNDS):
-            iterations += self.approach(bounds - far.share * far.unit.moved, tolerance, energy)
+            self.approach(bounds - far.share * far.unit.moved, tolerance, energy)
             state = self.near_state()
             energy, share = state.energy, far.share
             wanted = far.wanted(np.where(self._active, state.reactions, 0.0))
             if abs(wanted - share) <= _SETTLED * tolerance * abs(wanted):
-                return iterations
+                return
             far.follow(before, wanted, wanted_before)
             before, wanted_before = share, wanted
         raise SolveError(f"the amplitude of the far field does not converge in {_MOST_ROUNDS} rounds")
 
-    def approach(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
+    def approach(self, bounds: FloatArray, tolerance: float, energy: float | None) -> None:
         """Move the active nodes to ``bounds`` (n, m) and solve, without the far field: see ``improve``."""
         self.numbering.put(self.fields[0].array, bounds, self._active)
         with self.plug.fields() as rest, self.plug.fields() as correction:
@@ -214,10 +215,9 @@ class ContactElements:
             target = None if energy is None else tolerance * (energy / self.unit) ** 0.5
             column = Column(prescribed=np.empty(0), applied=None, right=rest, unknown=correction)
             assert self.solver is not None
-            iterations = self.solver.solve([column], tolerance, target)
+            self.solver.solve([column], tolerance, target)
             for whole, part in zip(self.fields, correction, strict=True):
                 whole.axpy(1.0, part)
-        return iterations
 
     def moved(self) -> FloatArray:
         """Return the displacements (n, m) of the candidates."""

@@ -1,4 +1,4 @@
-"""Friction of contact at large displacements, as a term of the loop of :mod:`epsmesh.solve.contact.deformed`.
+"""Friction of contact, as a term of the loop of :mod:`epsmesh.solve.contact.deformed`.
 
 Nodes that stick are held at a place of the tool, their reference; those that slide carry friction along the tool's
 surface, which the next iteration corrects. The law is that of :mod:`epsmesh.solve.contact.coulomb`. Of a new node, the

@@ -194,8 +194,8 @@ def add_friction(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: Exi
     while True:
         nodes = np.flatnonzero(_around(candidates, touched) & reachable)
         tissue = CondensedTissue(body.compliance(nodes, is_free), candidates.points[nodes], ~is_free[nodes])
-        surface = Surface(tissue, obstacle.bounds[nodes] + obstacle.depth, candidates.neighbours.of(nodes))
-        both = [press(surface, obstacle.depth, tool.friction, count) for count in (STEPS, STEPS // 2)]
+        surface = CondensedSurface(tissue, obstacle.bounds[nodes] + obstacle.depth, candidates.neighbours.of(nodes))
+        both = [press_condensed(surface, obstacle.depth, tool.friction, count) for count in (STEPS, STEPS // 2)]
         pressed, coarse = (_of_all(candidates, nodes, one) for one in both)
         moved, frictional = body.moved(pressed.forces)
         through = (moved[:, 2] - obstacle.bounds > SLACK * obstacle.depth) & ~pressed.active & reachable
@@ -218,7 +218,7 @@ def _around(candidates: Candidates, active: BoolArray) -> BoolArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class CondensedSurface:
     """Condensed ``tissue`` below a tool, whose ``heights`` (n) above the nodes, m, are those at first touch."""
 
     tissue: CondensedTissue
@@ -235,7 +235,7 @@ class Surface:
         return PlacedTool(distance, self.neighbours.complete, self.neighbours.followers, depth)
 
 
-def press(surface: Surface, depth: float, friction: float, steps: int = STEPS) -> ContactSolution:
+def press_condensed(surface: CondensedSurface, depth: float, friction: float, steps: int = STEPS) -> ContactSolution:
     """Return the equilibrium at a ``depth`` (m), reached in ``steps``; infinite ``friction`` sticks.
 
     Raises:
