@@ -21,8 +21,10 @@ MUTANTS_ARGS ?=
 # A selection of tests may have none for 2 ranks (pytest's status 5); the whole suite may not.
 NONE_OK = $(if $(PYTEST_ARGS),|| [ $$? -eq 5 ])
 
-# One test process per core, each with whole files, so that a file's fixtures are made once.
-SIDE_BY_SIDE := -n logical --maxprocesses 8 --dist loadfile
+# One test process per core, each with whole files, so that a file's fixtures are made once; the slowest files first.
+SIDE_BY_SIDE := -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder
+# Suites that no change concerns are not run by day, unless asked for by their path.
+UNCONCERNED = $(if $(findstring tests/,$(PYTEST_ARGS)),,$$($(PYTHON) -m tests.suites))
 
 # Tests and documentation start hundreds of processes: each would compile the package again.
 unexport PYTHONDONTWRITEBYTECODE
@@ -64,13 +66,14 @@ docs: setup ## build the documentation; a warning is an error
 	$(PYTHON) -m sphinx -W --keep-going -n -q -E -a -b html docs $(DOCS)
 	@echo $(DOCS)/index.html
 
-# Only the tests of the report need a browser; without one they are skipped.
-test: ## run the tests, serially and on 2 ranks
-	@scripts/setup.sh chromium
-	$(PYTHON) -m pytest $(SIDE_BY_SIDE) $(PYTEST_ARGS) </dev/null
-	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m "mpi and not nightly" -p no:cacheprovider $(PYTEST_ARGS) </dev/null $(NONE_OK)
+test: ## run the day's tests: those with the marker `mpi` on 2 ranks, the others serially
+	@scripts/setup.sh
+	$(PYTHON) -m pytest $(SIDE_BY_SIDE) -m "not slurm and not nightly and not mpi" $(UNCONCERNED) $(PYTEST_ARGS) </dev/null
+	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m "mpi and not nightly" -p no:cacheprovider \
+		$(UNCONCERNED) $(PYTEST_ARGS) </dev/null $(NONE_OK)
 
-test-all: ## run all tests, with the long ones (marker `nightly`)
+# Only the tests of pages need a browser; without one they are skipped.
+test-all: ## run all tests, with the long ones (marker `nightly`) and all suites
 	@scripts/setup.sh chromium
 	$(PYTHON) -m pytest $(SIDE_BY_SIDE) -m "not slurm" $(PYTEST_ARGS) </dev/null
 	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m mpi -p no:cacheprovider $(PYTEST_ARGS) </dev/null $(NONE_OK)

@@ -9,7 +9,7 @@ import pytest
 from epsmesh.run import store
 from epsmesh.shapes.files import checked
 from epsmesh.study import case
-from tests import commands
+from tests import commands, suites
 from tests.studies import small_text
 
 if importlib.util.find_spec("dolfinx_solver") is not None:  # the wheels' dolfinx loads only after MPI
@@ -26,6 +26,16 @@ def pytest_ignore_collect(collection_path):
     ranks = int(os.environ.get("OMPI_COMM_WORLD_SIZE") or os.environ.get("PMI_SIZE") or 1)
     is_test = collection_path.name.startswith("test_") and collection_path.suffix == ".py"
     return True if is_test and ranks > 1 and "mark.mpi" not in collection_path.read_text() else None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark what runs by night (:mod:`tests.suites`), and put slow files first, so that workers end together."""
+    cost = suites.costs()
+    for item in items:
+        if suites.is_nightly(item.nodeid, getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.nightly)
+    items.sort(key=lambda item: -cost.get(item.nodeid.partition("::")[0], 0))
 
 
 @pytest.fixture(scope="session", autouse=True)

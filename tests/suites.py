@@ -1,0 +1,122 @@
+"""What runs by day, what by night, and in which order.
+
+``make test`` runs the day's tests, ``make test-all`` all of them. Identification and real time are suites of their own:
+
+    python -m tests.suites
+
+prints, as options of pytest, the suites that no change concerns: neither their package and tests nor what these import
+from ``epsmesh`` and ``tests`` differs from the main branch. It names each on stderr. Where git cannot tell, no suite is
+left out.
+"""
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+COSTS = ROOT / "benchmarks" / "results" / "tests.md"
+
+# Folders, files and tests that run by night, beside those with the mark: what takes long and guards what seldom breaks.
+NIGHTLY = (
+    "tests/benchmarks",
+    "tests/docs/test_blocks.py::test_blocks_of_a_page_run",
+    "tests/report/test_notebook.py",
+    "tests/cli/test_start.py",
+    "tests/cli/test_loading.py",
+    "tests/run/test_cold_start.py",
+    "tests/test_installed.py",
+    "tests/test_same.py::test_what_may_not_matter_does_not",
+    "tests/fuzz/test_large.py",
+    "tests/cluster",
+)
+# Fixtures whose tests run by night: a real browser.
+NIGHTLY_FIXTURES = frozenset({"browser"})
+
+# Suites: the packages that each is about, and its tests.
+SUITES = {
+    "identification": ("pipeline/epsmesh_identify", "tests/identify"),
+    "real time": ("pipeline/epsmesh_realtime", "tests/realtime", "tests/export", "tests/touch"),
+}
+# What says how all packages are built, loaded and tested.
+_ALWAYS = ("pyproject.toml", "setup.py", "tests/conftest.py")
+_SOURCES = (ROOT / "pipeline", ROOT)
+# A row of the table of files in COSTS.
+_COST = re.compile(r"^\| `(tests/\S+\.py)` \| (\d+) \|", re.MULTILINE)
+
+
+def is_nightly(name: str, fixtures: Iterable[str] = ()) -> bool:
+    """Tell whether the test with the node id ``name`` and these ``fixtures`` runs by night."""
+    bare = name.partition("[")[0]
+    listed = any(bare == place or bare.startswith((f"{place}/", f"{place}::")) for place in NIGHTLY)
+    return listed or not NIGHTLY_FIXTURES.isdisjoint(fixtures)
+
+
+def costs() -> dict[str, int]:
+    """Return the recorded seconds of the slowest test files."""
+    return {name: int(seconds) for name, seconds in _COST.findall(COSTS.read_text(encoding="utf-8"))}
+
+
+def imported(file: Path) -> Iterator[Path]:
+    """Yield the files of this checkout that ``file`` imports, and the packages that hold them."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        for name in names:
+            parts = name.split(".")
+            for count in range(1, len(parts) + 1):
+                for source in _SOURCES:
+                    path = source.joinpath(*parts[:count])
+                    yield from (found for found in (path.with_suffix(".py"), path / "__init__.py") if found.is_file())
+
+
+def concerns(places: Iterable[str]) -> set[str]:
+    """Return the files of this checkout that the Python files in ``places`` import."""
+    files = [file for place in places for file in (ROOT / place).rglob("*.py")]
+    return {str(found.relative_to(ROOT)) for file in files for found in imported(file)}
+
+
+def changed() -> set[str] | None:
+    """Return the files that differ from the main branch, uncommitted and new ones too; on it, those of its last commit.
+
+    None where git cannot tell.
+    """
+    base = next(filter(None, (_git("merge-base", "HEAD", name) for name in ("origin/main", "main"))), None)
+    if base is not None and base == _git("rev-parse", "HEAD"):
+        base = _git("rev-parse", "HEAD^")
+    committed = base and _git("diff", "--name-only", "--no-renames", base)
+    new = _git("ls-files", "--others", "--exclude-standard")
+    return None if not base or committed is None or new is None else {*committed.splitlines(), *new.splitlines()}
+
+
+def left_out() -> Iterator[str]:
+    """Yield the names of the suites that no change concerns."""
+    differ = changed()
+    for name, places in SUITES.items() if differ is not None else ():
+        mine = concerns(places) | {*_ALWAYS}
+        if not any(file in mine or file.startswith(tuple(f"{place}/" for place in places)) for file in differ or ()):
+            yield name
+
+
+def main() -> None:
+    """Print the options of pytest that leave out what no change concerns."""
+    for name in left_out():
+        print(f"{name}: not tested, unchanged against the main branch (make test-all tests it)", file=sys.stderr)
+        print(*(f"--ignore={place}" for place in SUITES[name] if place.startswith("tests/")))
+
+
+def _git(*words: str) -> str | None:
+    try:
+        done = subprocess.run(["git", "-C", str(ROOT), *words], capture_output=True, text=True, check=False)
+    except OSError:
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
+
+
+if __name__ == "__main__":
+    main()
