@@ -163,7 +163,7 @@ def dataset_page() -> str:
     lines += [
         "",
         "Values are missing (NaN; -1 for counts) where a case failed, was skipped or has not been run. Where a "
-        "path is off the body, `status` is `lost` and `force` 0.",
+        "path is off the body, `status` is `no contact` and `force` 0.",
         "",
         "Attributes of the dataset: the study's text (`study`) and its hash, versions of the program and its "
         "libraries, git commit, host, ranks, start and end.",

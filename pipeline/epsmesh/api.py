@@ -155,8 +155,8 @@ class RunnableStudy:
         from epsmesh.states import FAILURES  # noqa: PLC0415
 
         case = the_case(self.declared, {**(labels or {}), **more})
-        if case.lost_contact:
-            raise ValueError(f"{case}: {case.lost_contact}")
+        if case.no_contact:
+            raise ValueError(f"{case}: {case.no_contact}")
         comm = workflow.world() if comm is None else comm
         cache, agreed = MeshCache(Path(meshes)) if meshes else None, (CaseFailure, MeshError, SolveError)
         try:

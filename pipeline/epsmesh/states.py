@@ -5,16 +5,16 @@ from collections.abc import Collection
 OK = "ok"
 FAILED = "failed"
 SKIPPED = "skipped"  # a smaller ε is close enough to F_exact, or the tool does not fit
-LOST = "lost"  # the tool does not touch the body
+NO_CONTACT = "no contact"  # the tool does not touch the body
 PENDING = "pending"  # not yet run
 PARTIAL = "partial"  # the solve ended before its depth
 
 # In the order of their flags in a file: new ones are added at the end.
-STATES = (OK, FAILED, SKIPPED, LOST, PENDING, PARTIAL)
+STATES = (OK, FAILED, SKIPPED, NO_CONTACT, PENDING, PARTIAL)
 # Those of a case that was computed, without a force at its depth.
 FAILURES = (FAILED, PARTIAL)
 # By how much they matter: a case with several solves has the first of their states.
-WORST_FIRST = (FAILED, PARTIAL, PENDING, SKIPPED, LOST, OK)
+WORST_FIRST = (FAILED, PARTIAL, PENDING, SKIPPED, NO_CONTACT, OK)
 
 
 def worst(states: Collection[str]) -> str:

@@ -117,8 +117,8 @@ class Model:
     def foot(self, tip: Sequence[float]) -> tuple[str, Array, float]:
         """Return "ok", the place (3,) of the face for a tool's lowest point ``tip`` (m), and its depth (m) below it.
 
-        Otherwise "lost" above the face, "outside" beside the region of a curved face, or "deep" if the place is not
-        unique.
+        Otherwise "no contact" above the face, "outside" beside the region of a curved face, or "deep" if the place is
+        not unique.
         """
         return self.evaluator.foot(tip)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 SENTENCES = {
     "ok": "",
-    "lost": "The tool does not touch.",
+    "no contact": "The tool does not touch.",
     "outside": "The place is outside the model's region: move the tool into it; `print(model)` tells its size.",
     "large": "The tool, or its contact, is too large here: a side, the bottom or other tissue is too near.",
     "deep": "The depth exceeds the model's range.",
@@ -29,7 +29,7 @@ SENTENCES = {
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """The answer of a query; all numbers are NaN unless ``status`` is "ok" or "lost", and ``message`` says why.
+    """The answer of a query; all numbers are NaN unless ``status`` is "ok" or "no contact", and ``message`` says why.
 
     ``force`` (3,), in N, is the force of the tissue on the tool, in the body's coordinates. ``relative_error`` is its
     error bar in units of its normal component; it also covers the lateral force on a bonded disc. ``stiffness`` (N/m)

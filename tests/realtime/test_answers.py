@@ -44,7 +44,7 @@ def test_answers_are_those_of_another_program(stored, name):
     surface = surface_of(stored[f"model_{name}"].tobytes())
     model, patches = surface.model, {}
     queries, statuses = zip(*asked["single"], strict=True)
-    assert {*statuses} >= {"ok", "lost", "outside", "large", "poisson", "input", "tool"}
+    assert {*statuses} >= {"ok", "no contact", "outside", "large", "poisson", "input", "tool"}
     assert_same([model.query(**query) for query in queries], [*statuses], stored[f"{name}_single"])
     touches = [touch for tools, more, _ in asked["many"] for touch in model.query_all(tools, **more)]
     assert len(touches) > (0 if name != "curved" else -1)

@@ -63,7 +63,7 @@ def test_contact_that_grows_and_shrinks_is_that_of_lee_radok_and_ting(tool, expo
     known = follow(motion, TERMS, times[asked], nodes, exponent).weights @ elastic
     np.testing.assert_allclose(forces(touches)[asked], known, rtol=3e-5, atol=1e-6 * np.abs(known).max())
     assert {touch.status for touch in touches[:1500]} == {"ok"}
-    assert touches[-2].status == "lost"  # before the tool is back
+    assert touches[-2].status == "no contact"  # before the tool is back
 
 
 @pytest.mark.parametrize("tool", [BALL, CONE])
@@ -102,7 +102,7 @@ def test_closed_loops_dissipate(tool):
         times = (moments[:-1, None] + np.diff(moments)[:, None] * spread).ravel()
         depths = (corners[:-1, None] + np.diff(corners)[:, None] * spread).ravel()
         touches = pressed(tool, times, depths, tuple(zip(shares.tolist(), taus.tolist(), strict=True)))
-        assert {touch.status for touch in touches} <= {"ok", "lost"}
+        assert {touch.status for touch in touches} <= {"ok", "no contact"}
         force = forces(touches)[:, 2]
         work = np.cumsum(force * (np.diff(corners)[:, None] * np.r_[weights / 2, 0.0]).ravel())
         stored = force.max() * depths.max() / 2
@@ -117,7 +117,7 @@ def test_a_disc_waits_in_its_dent_until_the_tissue_has_come_back_to_it():
     depths = np.r_[4e-4, 4e-4, np.full(901, 1e-4)]
     touches = pressed(DISC, times, depths)
     force, rest = forces(touches)[:, 2], relaxing().query(**DISC, depth=1e-4).force[2]
-    assert touches[2].status == "lost"
+    assert touches[2].status == "no contact"
     back = next(number for number in range(3, 903) if touches[number].status == "ok")
     assert back > 3
     assert np.all(force[2:back] == 0)
@@ -136,8 +136,8 @@ def test_what_changes_in_contact_is_refused_until_tissue_is_at_rest(change):
     assert history.query(0.1, **BALL, depth=1e-4).status == "past"
     history = History(relaxing())
     assert history.query(0.1, **BALL, depth=1e-4).status == "ok"
-    assert history.query(0.1, **BALL, depth=-1e-4).status == "lost"
-    assert history.query(2000.0, **BALL, depth=-1e-4).status == "lost"
+    assert history.query(0.1, **BALL, depth=-1e-4).status == "no contact"
+    assert history.query(2000.0, **BALL, depth=-1e-4).status == "no contact"
     assert history.query(0.1, **BALL | change, depth=1e-4).status == "ok"
 
 

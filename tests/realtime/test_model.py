@@ -168,7 +168,7 @@ def test_force_goes_with_the_modulus_and_the_frame(name, sizes, tmp_path):
 def test_contact_is_lost_and_regained(name, sizes):
     model = random_model()
     lost = model.query(name, at=AT, depth=-1e-4, **sizes)
-    assert lost.status == "lost"
+    assert lost.status == "no contact"
     assert not lost.force.any()
     forces = [deep(model, name, sizes, depth).force[2] for depth in (1e-9, 1e-6, 1e-4)]
     assert 0 < forces[0] < forces[1] < forces[2]
@@ -235,7 +235,7 @@ def test_a_damaged_file_is_no_model_or_answers_with_a_status(tmp_path, kind):
         for tool, sizes in TOOLS:
             touch = model.query(tool, at=model.origin, depth=1e-4, **sizes)
             assert touch.message or touch.status == "ok"
-            assert np.isfinite(touch.force).all() == (touch.status in ("ok", "lost"))
+            assert np.isfinite(touch.force).all() == (touch.status in ("ok", "no contact"))
     assert loaded > 20
 
 
@@ -309,7 +309,7 @@ def test_many_queries_in_one_call_are_those_of_many_calls(name, sizes):
     }
     asked = sizes | ({"along": rng.standard_normal((count, 3))} if name == "blade" else {})
     touches = model.query_each(name, **varied, **asked, poisson=0.4)
-    assert set(touches.status) >= {"ok", "lost", "input"}
+    assert set(touches.status) >= {"ok", "no contact", "input"}
     for number, status in enumerate(touches.status):
         own = {key: np.asarray(value)[number] if np.ndim(value) else value for key, value in (varied | asked).items()}
         touch = model.query(name, **own, poisson=0.4)

@@ -161,7 +161,7 @@ def test_settings_that_lack_a_case_are_not_judged(state):
     lacking = next(v for v in found.verdicts if v.labels == {"outside": "coarse", "epsilon": 4e-3})
     assert not lacking.is_judged
     assert lacking.missing == 2
-    assert not found.lost
+    assert not found.uncovered
     assert "Incomplete: 1 mesh setting without a result for every scene" in str(found)
     text = found.text(verbose=True)
     assert "incomplete: 2 of 4 scenes have no result" in settings(found).to_string()
@@ -172,7 +172,7 @@ def test_scenes_that_were_never_computed_are_left_out_and_named():
     data = dataset(exact=lambda case: case.material.poisson < 0.35)
     found = guide(data, "5%")
     assert found.scenes == 2
-    assert {scene["poisson"] for scene in found.lost} == {0.4}
+    assert {scene["poisson"] for scene in found.uncovered} == {0.4}
     assert "Not covered: 2 scenes without results (ν = 0.4, needle; ν = 0.4, scalpel)" in str(found)
     assert "F_exact is not known" in found.text(verbose=True)
     assert all(v.limit["poisson"] == 0.3 for v in found.verdicts)
@@ -205,7 +205,7 @@ def test_whatever_fails_the_answer_holds_for_every_scene_that_it_claims(seed):
     computed = int((chosen["status"] == "ok").sum())
     assert computed == found.scenes
     assert float(error.max()) <= accuracy
-    assert found.scenes + len(found.lost) == 4
+    assert found.scenes + len(found.uncovered) == 4
 
 
 def test_constancy_is_told_apart_by_parameter():

@@ -55,12 +55,12 @@ def test_labels_of_a_fine_raster_do_not_overlap():
         assert all(one.x1 < other.x0 for one, other in itertools.pairwise(boxes))
 
 
-def test_where_contact_is_lost_the_map_says_so_and_keeps_its_colours():
-    wide = mapped({"raster": {"x": ["0 mm", "9 mm", "30 mm"], "y": ["0 mm", "19 mm"]}, "off": "lost"})
+def test_without_contact_the_map_says_so_and_keeps_its_colours():
+    wide = mapped({"raster": {"x": ["0 mm", "9 mm", "30 mm"], "y": ["0 mm", "19 mm"]}, "off": "no contact"})
     (ax, *_) = figure(wide, "map").axes
     found = {mark.get_label(): mark.get_xydata() for mark in ax.lines}
     seen = wide.isel(body=0).transpose("y", "x", ...)
-    for label, states in {"contact lost": ["lost"], "no force": ["failed", "skipped", "pending"]}.items():
+    for label, states in {"no contact": ["no contact"], "no force": ["failed", "skipped", "pending"]}.items():
         rows, columns = np.nonzero(np.isin(seen["status"], states))
         assert len(rows)
         np.testing.assert_allclose(found[label], 1e3 * np.stack([seen["x"][columns], seen["y"][rows]], axis=1))

@@ -16,7 +16,7 @@ from tests.report.synthetic import dataset
 
 LINE = {"from": ["-10 mm", "0 mm"], "to": ["10 mm", "0 mm"], "steps": 5}
 GRID = {"x": ["-5 mm", "5 mm"], "y": {"from": "-6 mm", "to": "6 mm", "steps": 3}}
-OFF = {"line": LINE | {"to": ["30 mm", "0 mm"]}, "off": "lost"}  # at -10, 0, 10, 20 and 30 mm of a box 40 mm wide
+OFF = {"line": LINE | {"to": ["30 mm", "0 mm"]}, "off": "no contact"}  # at -10, 0, 10, 20 and 30 mm of a box 40 mm wide
 
 
 def along(path, **changes):
@@ -68,7 +68,7 @@ def test_tools_in_several_tables_go_the_same_path():
 
 WRONG = {
     "no table": ([1], ["probe.path = [1]", "must be a table"]),
-    "no form": ({"off": "lost"}, ["probe.path", "give one of line, circle, raster, points"]),
+    "no form": ({"off": "no contact"}, ["probe.path", "give one of line, circle, raster, points"]),
     "two forms": ({"line": LINE, "raster": GRID}, ["has line and raster"]),
     "unknown form": ({"lines": LINE}, ["probe.path.lines", "did you mean `line`?"]),
     "unknown key": ({"line": LINE | {"step": 3}}, ["probe.path.line.step = 3", "did you mean `steps`?"]),
@@ -84,9 +84,10 @@ WRONG = {
     "no length at all": ({"line": LINE | {"to": LINE["from"]}}, ["probe.path.line", "more than once"]),
     "falling": ({"raster": GRID | {"x": ["5 mm", "-5 mm"]}}, ["probe.path.raster.x", "must rise"]),
     "a raster's list": ({"raster": GRID | {"x": "5 mm"}}, ['probe.path.raster.x = "5 mm"', "two lengths"]),
-    "off the body": (OFF | {"off": "refuse"}, ["probe.path", "30 mm", "inside the top face", 'off = "lost"']),
-    "wrong word": ({"line": LINE, "off": "void"}, ['probe.path.off = "void"', "'refuse' or 'lost'"]),
-    "never on the body": ({"line": {"from": ["50 mm", "0 mm"], "to": ["60 mm", "0 mm"], "steps": 2}, "off": "lost"},
+    "off the body": (OFF | {"off": "refuse"}, ["probe.path", "30 mm", "inside the top face", 'off = "no contact"']),
+    "wrong word": ({"line": LINE, "off": "void"}, ['probe.path.off = "void"', "'refuse' or 'no contact'"]),
+    "never on the body": ({"line": {"from": ["50 mm", "0 mm"], "to": ["60 mm", "0 mm"], "steps": 2},
+                           "off": "no contact"},
                           ["probe.path", "misses the body"]),
 }  # fmt: skip
 
@@ -109,20 +110,20 @@ def test_where_the_tool_is_clear_of_the_body_there_is_no_force_and_over_the_edge
     assert len(made.solves) == 2  # those at -10 and 10 mm are images
     assert any("does not touch" in struck.reason for struck in made.struck)
     found = dataset(probe={"path": OFF})
-    assert found["status"].values.tolist() == ["ok", "ok", "ok", "skipped", "lost"]
+    assert found["status"].values.tolist() == ["ok", "ok", "ok", "skipped", "no contact"]
     assert np.isfinite(found["force"][:3]).all()
     assert np.isnan(found["force"][3])
     assert found["force"].values[4] == 0
     assert "inside the top face" in str(found["message"].values[3])
     assert np.isnan(found["at_x"].values[3:]).all()
-    assert count_states(made, {}) == {"ok": 0, "skipped": 1, "failed": 0, "pending": 3, "lost": 1}
+    assert count_states(made, {}) == {"ok": 0, "skipped": 1, "failed": 0, "pending": 3, "no contact": 1}
     assert build(made, {})["status"].values[0] == "pending"
 
 
-@pytest.mark.parametrize(("y", "state"), [("31 mm", "skipped"), ("34 mm", "lost")])
+@pytest.mark.parametrize(("y", "state"), [("31 mm", "skipped"), ("34 mm", "no contact")])
 def test_beside_an_ellipsoid_contact_is_lost_once_all_of_the_tool_is_beside_it(y, state):
     body = {"shape": "ellipsoid", "axes": ["40 mm", "30 mm", "20 mm"], "fixed": {"below": "-8 mm"}}
-    path = {"points": [["0 mm", "0 mm"], ["0 mm", y]], "off": "lost"}
+    path = {"points": [["0 mm", "0 mm"], ["0 mm", y]], "off": "no contact"}
     found = build(make_plan(study(body=body, probe={"path": path}, mesh={"degree": 2})), {})
     assert found["status"].values.tolist() == ["pending", state]
 

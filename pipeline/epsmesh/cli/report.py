@@ -161,7 +161,7 @@ def _scene_at_hand(dataset: "xr.Dataset") -> str:
         case = _of_answer(dataset, study)
     except DatasetError:
         return ""
-    if case.lost_contact:
+    if case.no_contact:
         return ""
     from epsmesh import workflow
 

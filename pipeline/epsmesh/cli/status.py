@@ -23,7 +23,7 @@ from epsmesh.cli.words import (
 )
 from epsmesh.files import STORE_NAME
 from epsmesh.printable import counted
-from epsmesh.states import FAILED, LOST, OK, PARTIAL, PENDING, SKIPPED
+from epsmesh.states import FAILED, NO_CONTACT, OK, PARTIAL, PENDING, SKIPPED
 
 if TYPE_CHECKING:
     from epsmesh.run.record import Record
@@ -69,7 +69,7 @@ def status(
 ) -> None:
     """Count a study's cases by state, or show all runs and check the case store.
 
-    Cases are ok, failed, skipped, lost (no contact) or pending. For a run with --without, give the same --without here.
+    Cases are ok, failed, skipped, no contact or pending. For a run with --without, give the same --without here.
 
     --merge first copies the records of the study's shards into the store, then writes dataset and figure. If a case
     has two records, the one with a force is kept, else the later one. Shards stay unchanged; merging twice is harmless.
@@ -131,7 +131,7 @@ def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) ->
     records |= skipped(plan, records)
     counts, failed = count_states(plan, records), failures(plan, records)
     totals = f"{counts[OK]} ok, {counts[FAILED]} failed"
-    totals += "".join(f", {counts[state]} {state}" for state in (PARTIAL, SKIPPED, LOST) if counts.get(state))
+    totals += "".join(f", {counts[state]} {state}" for state in (PARTIAL, SKIPPED, NO_CONTACT) if counts.get(state))
     lines = [f"{file}: {totals}, {counts[PENDING]} pending{axes_of(study)}"]
     lines += [f"  failed: {case}: {message}" for case, message in failed]
     if counts[PENDING] and (shards := len(stores_of(output, study))):

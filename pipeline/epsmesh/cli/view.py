@@ -159,8 +159,8 @@ def fields_of(
     from epsmesh.solve import SolveError
     from epsmesh.view.compute import compute_fields
 
-    if case.lost_contact:
-        why, howto = case.lost_contact, "docs/guide/path.md"
+    if case.no_contact:
+        why, howto = case.no_contact, "docs/guide/path.md"
         fail(Fault(f"{case}: {why}", key="CASE", value=str(case), allowed=why, howto=howto))
     note = error if comm.rank == 0 else lambda _: None
     note(str(case))

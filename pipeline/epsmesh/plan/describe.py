@@ -78,7 +78,7 @@ def _notes(plan: Plan) -> list[str]:
 def _of_place(case: Case) -> list[str]:
     """Return the extent of a body from a file, and the point and direction of contact of its first case."""
     notes = []
-    if isinstance(case.body, Scanned) and not case.lost_contact:
+    if isinstance(case.body, Scanned) and not case.no_contact:
         ends = zip("xyz", *case.body.triangles.bounds, strict=True)
         extent = ", ".join(f"{name} from {in_mm(low)} to {in_mm(high)}" for name, low, high in ends)
         point, axis = np.multiply(1e3, case.frame.point).round(2), np.round(case.frame.axis, 3)
@@ -137,8 +137,8 @@ def story(plan: Plan, index: tuple[int, ...]) -> dict[str, Any]:
     """Return one case's steps, the cases that share them, and the cost of changing each input."""
     position = next(i for i, case in enumerate(plan.study.cases()) if case.index == index)
     case, key = plan.study.case(index), plan.keys[position]
-    if case.lost_contact:
-        return {"case": str(case), "key": key, "steps": [f"none: {case.lost_contact}"]}
+    if case.no_contact:
+        return {"case": str(case), "key": key, "steps": [f"none: {case.no_contact}"]}
     solve = next((s for s in plan.solves if s.key == key), None)
     same = [c for c, k in zip(plan.study.cases(), plan.keys, strict=True) if k == key and c.index != index]
     step = next((s for s in plan.meshes if solve in s.solves), None)

@@ -43,15 +43,15 @@ _SEEKS = (
     "Forces are given: these solves are at the expected depths. Further ones follow, until the depth of each case is "
     "found: none where F is proportional to the depth, else mostly three to five. F_exact is at the depths found."
 )
-_LOST = "Places where the tool does not touch the body need no solve."
+_OFF_BODY = "Places where the tool does not touch the body need no solve."
 
 
 def declare(study: Study) -> Plan:
     """Return the plan that solves every case of ``study`` by itself."""
-    found = [None if case.lost_contact else _declared(case) for case in study.cases()]
+    found = [None if case.no_contact else _declared(case) for case in study.cases()]
     keys = tuple(solve.key if solve else NO_RECORD for solve in found)
     plan = Plan(study, tuple(solve for solve in found if solve), keys)
-    return plan.struck_by("lost", keys.count(NO_RECORD), _LOST)
+    return plan.struck_by("no contact", keys.count(NO_RECORD), _OFF_BODY)
 
 
 def _declared(case: Case) -> Solve:
@@ -162,11 +162,11 @@ def _exact_of(
 ) -> tuple[str, Solve | None]:
     """Return the solve for F_exact of the case at ``index``, whose force is that of ``source``; or why there is none.
 
-    There is no reason to tell where the tool has lost contact.
+    There is no reason to report where the tool does not touch the body.
     """
     case = study.case(index)
-    if case.lost_contact or (reason := obstacle("F_exact", case)):
-        return "" if case.lost_contact else reason, None
+    if case.no_contact or (reason := obstacle("F_exact", case)):
+        return "" if case.no_contact else reason, None
     case = study.case(source)
     enough = max(accuracy, EXACT_OF_SLIT) if case.way.motion is Motion.SLIT else accuracy
     return "", Solve(reference_key(case, enough), case, goal=enough, is_reference=True)

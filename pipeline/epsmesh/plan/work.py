@@ -15,7 +15,7 @@ from epsmesh.plan.steps import MeshStep, Solve, Solves, mesh_steps
 from epsmesh.study.case import Case, Scale
 from epsmesh.study.sweep import Study
 
-# The key of a case without record: the tool has lost contact, or F_exact is not computed.
+# The key of a case without record: the tool does not touch the body, or F_exact is not computed.
 NO_RECORD = ""
 
 
@@ -34,7 +34,7 @@ class Plan:
 
     Attributes:
         solves: the cases to solve.
-        keys: for each case in order, the key of its record; ``NO_RECORD`` if the tool has lost contact.
+        keys: for each case in order, the key of its record; ``NO_RECORD`` if the tool does not touch the body.
         reference_keys: for each case, the key of its scene's F_exact.
         struck: the work that each reduction struck out.
         used: the reductions that were applied, even if they found nothing.

@@ -26,7 +26,7 @@ from epsmesh.run.outcome import without_contact
 from epsmesh.run.record import Record
 from epsmesh.shapes.frame import Frame, PlaceError
 from epsmesh.shapes.scanned import Scanned
-from epsmesh.states import LOST, OK, PENDING
+from epsmesh.states import NO_CONTACT, OK, PENDING
 from epsmesh.study.axis import Axis
 from epsmesh.study.case import Case
 from epsmesh.study.sweep import Study
@@ -124,7 +124,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
         coordinates |= _motions()
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
     dataset = along_path(over_time(dataset, study, cases, flat), plan, records)
-    if any(case.is_closed for case in cases if not case.lost_contact):
+    if any(case.is_closed for case in cases if not case.no_contact):
         dataset["force_error"].attrs["comment"] = _OF_CLOSURE
     # At a given force each mesh has its own depth.
     alike = {} if study.gives_force else _shared(study, reference_keys)
@@ -167,7 +167,7 @@ def _value(record: Record | None, case: Case, name: str, dims: Sequence[str]) ->
     value, own = nan, name.replace("_exact", "")
     if record and name in _OF_LOADS and record.is_ok and not case.load.acts:
         value = 0.0
-    elif record and (record.is_ok or record.status == LOST or own in _OF_FAILURES):
+    elif record and (record.is_ok or record.status == NO_CONTACT or own in _OF_FAILURES):
         value = record.largest.get(own, nan) if own in LARGEST else getattr(record, _IN_RECORD.get(own, own))
         if own in _RELATIVE:
             value *= abs(getattr(record, own.removesuffix("_error")))
@@ -316,7 +316,7 @@ def _imaged(record: Record | None, image: EquivalentPlace | None) -> Record | No
 
 def _frame(case: Case) -> Frame | None:
     """Return where the probe touches; None where it has left the body, or what describes no surface cannot tell."""
-    if case.lost_contact:
+    if case.no_contact:
         return None
     try:
         return case.frame

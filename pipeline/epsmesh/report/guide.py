@@ -52,7 +52,7 @@ def guide(dataset: xr.Dataset, accuracy: str | float | None = None, budget: str 
     wanted = quantity("accuracy", accuracy, "") if accuracy is not None else inf
     seconds = quantity("budget", budget, "s") if budget is not None else inf
     table = arrange(dataset)
-    if table.lost.all():
+    if table.uncovered.all():
         reasons = "; ".join(f"{count} {why}" for why, count in Counter(table.why.ravel()).most_common())
         raise DatasetError(f"no case can be judged: {reasons}")
     if len(table.settings) == 1 and table.reference != EXACT:

@@ -115,16 +115,16 @@ def details(guide: Guideline) -> list[tuple[str, str]]:
 def scenes(guide: Guideline) -> str:
     """Return how many scenes the answer is for, and what differs between them."""
     axes = " × ".join(f"{length} {symbol(name)}" for name, length in guide.axes.items() if length > 1)
-    return f"{counted(guide.scenes, 'scene')}{f' ({axes})' if axes and not guide.lost else ''}"
+    return f"{counted(guide.scenes, 'scene')}{f' ({axes})' if axes and not guide.uncovered else ''}"
 
 
 def gaps(guide: Guideline) -> list[str]:
     """Return which scenes the answer does not cover, and how many settings lack a force, a sentence each."""
     found = []
-    if guide.lost:
-        names = [choices(guide.coordinates, scene) for scene in guide.lost[:_MOST_NAMED]]
-        names += ["…"] if len(guide.lost) > _MOST_NAMED else []
-        found.append(f"Not covered: {counted(len(guide.lost), 'scene')} without results ({'; '.join(names)}).")
+    if guide.uncovered:
+        names = [choices(guide.coordinates, scene) for scene in guide.uncovered[:_MOST_NAMED]]
+        names += ["…"] if len(guide.uncovered) > _MOST_NAMED else []
+        found.append(f"Not covered: {counted(len(guide.uncovered), 'scene')} without results ({'; '.join(names)}).")
     if guide.unjudged:
         count = sum(not v.is_judged for v in guide.verdicts)
         found.append(f"Incomplete: {counted(count, 'mesh setting')} without a result for every scene.")

@@ -32,7 +32,7 @@ class Guideline:
     ``answer`` is the chosen setting, ``corrected`` the one with F_exact ≈ F / r, ``carried`` the one with the best law
     for other tools on the same tissue; ``best``, ``best_corrected`` and ``best_carried`` are the most accurate within
     the budget; None if there is none. ``lean`` has the fewest unknowns of those that keep the accuracy. ``left_out``
-    counts the cases of the scenes ``lost`` to every setting, by reason, ``unjudged`` those that keep settings from
+    counts the cases of the scenes ``uncovered`` by every setting, by reason, ``unjudged`` those that keep settings from
     being judged, ``no_law`` the scenes in which no law adds compliances. ``tools`` are those that laws were fitted to.
     ``reference`` names what F is compared with; ``parts`` are the answers by depth and law. ``tissue`` says what is not
     known of the material, if it was identified.
@@ -43,9 +43,9 @@ class Guideline:
         self.accuracy, self.budget, self.reference = accuracy, budget, table.reference
         self.timing, self.doubts, self.tissue = _timing(dataset), doubts(dataset), unknowns(dataset)
         self.axes = {name: len(np.unique(labels)) for name, labels in table.axes.items()}
-        self.scenes = int((~table.lost).sum())
-        self.lost = [scene for scene, lost in zip(table.scenes, table.lost, strict=True) if lost]
-        self.left_out, self.unjudged = _counts(table.why[:, table.lost]), _counts(table.why[:, ~table.lost])
+        self.scenes = int((~table.uncovered).sum())
+        self.uncovered = [scene for scene, uncovered in zip(table.scenes, table.uncovered, strict=True) if uncovered]
+        self.left_out, self.unjudged = _counts(table.why[:, table.uncovered]), _counts(table.why[:, ~table.uncovered])
         self.has_full = bool(np.isfinite(table.share).any())
         reasons = table.sinking["why_not"]
         self.no_law = _counts(reasons)

@@ -30,7 +30,7 @@ def parameters_of(case: Case, tool: Probe | None = None) -> Parameters:
         del found["probe.depth"]  # it is found
     if _FILE in found:
         found[_FILE] = (*_rounded(case.body.heights), *_rounded((case.body.volume, case.body.extent)))
-    if case.lost_contact:
+    if case.no_contact:
         return found  # off the body there is no frame to tell what is kept
     if case.is_truncated or case.is_closed:
         found["kept.epsilon"] = found["mesh.epsilon"]

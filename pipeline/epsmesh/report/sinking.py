@@ -19,8 +19,8 @@ _ROUNDING = 1e-9
 def why_not(case: Case) -> str:
     """Return why compliances of a scene cannot be added, "" if they can."""
     probe = case.probe
-    if case.lost_contact:
-        return case.lost_contact
+    if case.no_contact:
+        return case.no_contact
     if getattr(case.material, "law", "linear") != "linear":
         return "F is not proportional to E d where elasticity is not linear"
     if probe.slit:

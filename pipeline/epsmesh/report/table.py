@@ -70,14 +70,14 @@ class Table:
         return np.asarray(self.why == "")
 
     @cached_property
-    def lost(self) -> np.ndarray:
+    def uncovered(self) -> np.ndarray:
         """The scenes that no setting can be judged on: claims leave them out."""
         return np.asarray(~self.is_judged.any(axis=0))
 
     @cached_property
     def missing(self) -> np.ndarray:
-        """For each setting, the number of scenes, of those that are not lost, that it cannot be judged on."""
-        return np.asarray((~self.is_judged & ~self.lost).sum(axis=1))
+        """For each setting, the number of scenes, of those that are covered, that it cannot be judged on."""
+        return np.asarray((~self.is_judged & ~self.uncovered).sum(axis=1))
 
 
 def arrange(dataset: xr.Dataset) -> Table:

@@ -118,10 +118,16 @@ def at_full_order(values: xr.DataArray) -> xr.DataArray:
 
 
 def with_flags(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with ``status`` as the integer flags of a file; :func:`with_words` is the inverse."""
+    """Return a dataset with ``status`` as the integer flags of a file; :func:`with_words` is the inverse.
+
+    Blanks within a word are underscores in a file, as CF asks: its words are separated by blanks.
+    """
     status = dataset["status"]
     flags = np.array([STATES.index(str(word)) for word in status.values.ravel()], dtype=np.int8)
-    texts = {"flag_values": np.arange(len(STATES), dtype=np.int8), "flag_meanings": " ".join(STATES)}
+    texts = {
+        "flag_values": np.arange(len(STATES), dtype=np.int8),
+        "flag_meanings": " ".join(state.replace(" ", "_") for state in STATES),
+    }
     return dataset.assign(status=(status.dims, flags.reshape(status.shape), status.attrs | texts))
 
 
@@ -130,7 +136,8 @@ def with_words(dataset: xr.Dataset) -> xr.Dataset:
     if "status" not in dataset or "flag_meanings" not in dataset["status"].attrs:
         return dataset
     status = dataset["status"]
-    words = dict(zip(status.attrs["flag_values"], status.attrs["flag_meanings"].split(), strict=True))
+    meanings = [word.replace("_", " ") for word in status.attrs["flag_meanings"].split()]
+    words = dict(zip(status.attrs["flag_values"], meanings, strict=True))
     texts = np.array([words[flag] for flag in status.values.ravel()], dtype=object).reshape(status.shape)
     attributes = {name: text for name, text in status.attrs.items() if not name.startswith("flag_")}
     return dataset.assign(status=(status.dims, texts, attributes))

@@ -79,8 +79,8 @@ class Verdict:
 
 
 def judge(table: Table, row: int) -> Verdict:
-    """Judge the setting of one row on the scenes that are not lost."""
-    use = table.is_judged[row] & ~table.lost
+    """Judge the setting of one row on the scenes that are covered."""
+    use = table.is_judged[row] & ~table.uncovered
     labels, mesh, missing = table.settings[row], table.meshes[row], int(table.missing[row])
     if not use.any():
         return Verdict(labels, mesh, missing)

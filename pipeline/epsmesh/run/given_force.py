@@ -40,7 +40,7 @@ def with_depths(plan: Plan, records: Mapping[str, Record]) -> Plan:
     found: dict[tuple[int, ...], FoundDepth] = {}
     trials: dict[tuple[int, ...], list[Trial]] = {}
     current = _Round({}, plan)
-    cases = [case for case in study.cases() if not case.lost_contact]
+    cases = [case for case in study.cases() if not case.no_contact]
     numbers = {index: number for number, index in enumerate(study.indices())}
     while True:
         depths = dict(current.depths)

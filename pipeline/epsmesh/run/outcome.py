@@ -7,7 +7,7 @@ from epsmesh.plan.plan import Plan
 from epsmesh.quantities import LARGEST
 from epsmesh.run.given_force import at_force, with_depths
 from epsmesh.run.record import Record
-from epsmesh.states import FAILED, FAILURES, LOST, OK, PARTIAL, PENDING, SKIPPED, worst
+from epsmesh.states import FAILED, FAILURES, NO_CONTACT, OK, PARTIAL, PENDING, SKIPPED, worst
 from epsmesh.study.case import Case
 from epsmesh.study.place import CLEAR
 
@@ -20,14 +20,14 @@ def without_contact(case: Case) -> Record | None:
 
     A tool over an edge touches the body, and its force is unknown: the case is skipped.
     """
-    if not (why := case.lost_contact):
+    if not (why := case.no_contact):
         return None
     if why != CLEAR:
         return Record("", SKIPPED, why)
     none = (0.0, 0.0, 0.0)
     return Record(
         "",
-        LOST,
+        NO_CONTACT,
         why,
         force=0.0,
         force_error=0.0,
@@ -67,7 +67,7 @@ def count_states(plan: Plan, records: Mapping[str, Record]) -> dict[str, int]:
 
 def _counted(states: Sequence[str]) -> dict[str, int]:
     counts = {state: states.count(state) for state in (OK, SKIPPED, FAILED, PENDING)}
-    return counts | {state: states.count(state) for state in (PARTIAL, LOST) if state in states}
+    return counts | {state: states.count(state) for state in (PARTIAL, NO_CONTACT) if state in states}
 
 
 def failures(plan: Plan, records: Mapping[str, Record]) -> tuple[tuple[str, str], ...]:

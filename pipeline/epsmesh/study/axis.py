@@ -19,7 +19,7 @@ class Axis:
     piece: str = ""  # of an array of tables within the section, such as layer[2]
     owner: str = ""  # the name of that piece
     is_stage: bool = False  # what is solved on the way of a history, or of an insertion, which is one case
-    off: str = ""  # of a path: what becomes of places off the body, "refuse" or "lost"
+    off: str = ""  # of a path: what becomes of places off the body, "refuse" or "no contact"
 
     @property
     def name(self) -> str:

@@ -114,9 +114,9 @@ class Case:
 
     @property
     @of_scene
-    def lost_contact(self) -> str:
+    def no_contact(self) -> str:
         """Why there is no contact at this place of a path that may leave the body; "" if there is."""
-        if not any(axis.off == "lost" for axis in self.axes):
+        if not any(axis.off == "no contact" for axis in self.axes):
             return ""
         error = place_error(self.body, self.probe)
         return "" if error is None else CLEAR if is_clear(self.body, self.probe) else f"the tool does not fit: {error}"

@@ -42,7 +42,7 @@ from epsmesh.study.stages import check_history
 
 # Forces of all cases and times: a dataset then has a few hundred megabytes.
 _MOST_FORCES = 2_000_000
-_OR_LOST = '. To go on without contact at such places, write `off = "lost"` in [probe.path]'
+_OR_NO_CONTACT = '. To go on without contact at such places, write `off = "no contact"` in [probe.path]'
 
 
 def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -146,7 +146,9 @@ def _placed(
         places = [[in_mm(x) for x in probe.at] for probe in lost]
         more = f"; the same for {len(places) - 1} more places, up to {', '.join(places[-1])}" if len(places) > 1 else ""
         with problems.about(body=_named(bodies, body_name), probe=_named(probes, probe_name)):
-            problems.error(way.path if way else "probe.at", places[0], f"{why}{more}{'' if lost[0].slit else _OR_LOST}")
+            problems.error(
+                way.path if way else "probe.at", places[0], f"{why}{more}{'' if lost[0].slit else _OR_NO_CONTACT}"
+            )
     _check_way(way, probes, placed, problems)
     for body, probe in placed:
         with problems.about(body=body, probe=probe):
@@ -243,7 +245,7 @@ def _check_place(
         problems.error(f"probe.{error.key}", found and list(found), str(error))
     elif way is None:
         problems.error("probe.at", [in_mm(x) for x in found], str(error))
-    elif way.off != "lost":
+    elif way.off != "no contact":
         refused.setdefault((body.name, probe.name, str(error)), []).append(probe)
     return False
 
@@ -252,7 +254,7 @@ def _check_way(
     way: Axis | None, probes: Sequence[Probe], placed: Sequence[tuple[Body, Probe]], problems: Problems
 ) -> None:
     """Report a path that misses the body, and a slit on a path that may leave the body."""
-    if way is None or way.off != "lost" or problems.errors:
+    if way is None or way.off != "no contact" or problems.errors:
         return
     if any(probe.slit for probe in probes):
         problems.error("probe.path.off", way.off, "a blade in a slit does not leave the body: omit `off`")

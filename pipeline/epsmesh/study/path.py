@@ -129,11 +129,11 @@ class Path(_Table):
         ),
     ] = None
     off: Annotated[
-        Literal["refuse", "lost"],
+        Literal["refuse", "no contact"],
         Words(
-            "Places off the body. refuse: an error. lost: no contact there, F is 0. A tool across an edge has "
+            "Places off the body. refuse: an error. no contact: F is 0 there. A tool across an edge has "
             "no F; `message` has the reason.",
-            '"lost"',
+            '"no contact"',
         ),
     ] = "refuse"
 

@@ -12,7 +12,7 @@ from epsmesh.shapes.from_file import FromFile
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.section import in_mm
 
-CLEAR = "contact is lost: the tool is clear of the body"
+CLEAR = "no contact: the tool is clear of the body"
 _MANY = 10_000  # places of a large study
 # A footprint this near the edge, in units of the body, touches it: the rest is rounding.
 _TOUCHING = 1e-9

@@ -33,7 +33,7 @@ enum { STEPS = 60, TERMS = 40, FOOT_STEPS = 30, SETTLE_STEPS = 40 };
 #include "src/values.c"
 
 const char *epsmesh_word(epsmesh_status status) {
-    static const char *const words[] = {"ok",      "lost",   "outside", "large", "deep",    "tool",
+    static const char *const words[] = {"ok",      "no contact", "outside", "large", "deep",    "tool",
                                         "input",   "poisson", "tilted", "off",   "damaged", "no model",
                                         "near",    "others", "alone", "past"};
     return (int)status >= 0 && status < EPSMESH_STATUSES ? words[status] : "";

@@ -19,21 +19,21 @@ enum { EPSMESH_MOST_MODES = 96, EPSMESH_MOST_LINKS = 3, EPSMESH_MOST_SEEN = 512,
 
 typedef enum {
     EPSMESH_OK,
-    EPSMESH_LOST,     /* the tool does not touch: all numbers are 0 */
-    EPSMESH_OUTSIDE,  /* the place is outside the model's region */
-    EPSMESH_LARGE,    /* tool or contact too large here: a side, the bottom or other tissue is too near */
-    EPSMESH_DEEP,     /* the depth exceeds the model's range */
-    EPSMESH_TOOL,     /* unknown tool, or a size is missing, or the model has no tables for it */
-    EPSMESH_INPUT,    /* a number is not finite, or must be positive */
-    EPSMESH_POISSON,  /* Poisson's ratio is outside the model's range */
-    EPSMESH_TILTED,   /* the tool must press along the face's inward normal */
-    EPSMESH_OFF,      /* the place is not on the face */
-    EPSMESH_DAMAGED,  /* the model's numbers are inconsistent here */
-    EPSMESH_NO_MODEL, /* the file is of another kind or version, cut short, or inconsistent */
-    EPSMESH_NEAR,     /* two contacts' middles are closer than twice the sum of their radii */
-    EPSMESH_OTHERS,   /* another tool, on whose force this one depends, has no answer */
-    EPSMESH_ALONE,    /* one tool at a time: the file has no pair_modes */
-    EPSMESH_PAST,     /* the force depends on a past that is not known: epsmesh_relaxation.h */
+    EPSMESH_NO_CONTACT, /* the tool does not touch: all numbers are 0 */
+    EPSMESH_OUTSIDE,    /* the place is outside the model's region */
+    EPSMESH_LARGE,      /* tool or contact too large here: a side, the bottom or other tissue is too near */
+    EPSMESH_DEEP,       /* the depth exceeds the model's range */
+    EPSMESH_TOOL,       /* unknown tool, or a size is missing, or the model has no tables for it */
+    EPSMESH_INPUT,      /* a number is not finite, or must be positive */
+    EPSMESH_POISSON,    /* Poisson's ratio is outside the model's range */
+    EPSMESH_TILTED,     /* the tool must press along the face's inward normal */
+    EPSMESH_OFF,        /* the place is not on the face */
+    EPSMESH_DAMAGED,    /* the model's numbers are inconsistent here */
+    EPSMESH_NO_MODEL,   /* the file is of another kind or version, cut short, or inconsistent */
+    EPSMESH_NEAR,       /* two contacts' middles are closer than twice the sum of their radii */
+    EPSMESH_OTHERS,     /* another tool, on whose force this one depends, has no answer */
+    EPSMESH_ALONE,      /* one tool at a time: the file has no pair_modes */
+    EPSMESH_PAST,       /* the force depends on a past that is not known: epsmesh_relaxation.h */
     EPSMESH_STATUSES
 } epsmesh_status;
 
@@ -99,14 +99,14 @@ typedef struct {
 epsmesh_status epsmesh_load(epsmesh_model *model, const void *data, size_t size);
 
 /* Find the place `at` of the face for a tool whose lowest point is at `tip` (m), and its `depth` (m) along the inward
- * normal there. Returns EPSMESH_OK; EPSMESH_LOST if the tool is above the face; EPSMESH_OUTSIDE beside the region of a
+ * normal there. Returns EPSMESH_OK; EPSMESH_NO_CONTACT if the tool is above the face; EPSMESH_OUTSIDE beside the region of a
  * curved face; EPSMESH_DEEP if the normals of several places meet at the tip, so that the place is not unique. */
 epsmesh_status epsmesh_foot(const epsmesh_model *model, const double tip[3], double at[3], double *depth);
 
 /* Return a query with the model's E and nu, along the inward normal; all else is unset. */
 epsmesh_query epsmesh_ask(const epsmesh_model *model);
 
-/* Answer a query; all numbers are NaN unless the status is EPSMESH_OK or EPSMESH_LOST. */
+/* Answer a query; all numbers are NaN unless the status is EPSMESH_OK or EPSMESH_NO_CONTACT. */
 epsmesh_touch epsmesh_touch_at(const epsmesh_model *model, const epsmesh_query *query);
 
 /* Answer `count` queries, each by itself. */

@@ -82,7 +82,7 @@ static void on_face(double x, double at[3]) {
     for (i = 0; i < 80; i++) {
         double z = 0.5 * (low + high);
         for (axis = 0; axis < 3; axis++) at[axis] = model.origin[axis] + x * model.axes[0][axis] + z * model.axes[2][axis];
-        if (epsmesh_foot(&model, at, foot, &depth) == EPSMESH_LOST) high = z;
+        if (epsmesh_foot(&model, at, foot, &depth) == EPSMESH_NO_CONTACT) high = z;
         else low = z;
     }
 }

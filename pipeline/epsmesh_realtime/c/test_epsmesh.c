@@ -41,7 +41,7 @@ static void ask_around(const epsmesh_model *model, int times) {
         query.depth = within(-1e-5, 5e-4);
         if (i % 17 == 0) query.depth = (double)NAN;
         touch = epsmesh_touch_at(model, &query);
-        if (touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) {
+        if (touch.status == EPSMESH_OK || touch.status == EPSMESH_NO_CONTACT) {
             expect(isfinite(touch.force[0] + touch.force[1] + touch.force[2]), "a force is finite");
             expect(isfinite(touch.relative_error + touch.stiffness + touch.contact_radius), "an answer is finite");
             expect(touch.relative_error >= 0, "a bar is none of less than nothing");
@@ -66,7 +66,7 @@ static void ask_surface(const epsmesh_model *model, int times) {
         query.depth = within(-1e-5, 2e-4);
         touch = epsmesh_surface_press(model, &query, room, moved);
         for (j = 0; j < 3 * model->vertices; j++) sum += moved[j];
-        expect((touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) == (isfinite(sum) != 0) || !model->vertices,
+        expect((touch.status == EPSMESH_OK || touch.status == EPSMESH_NO_CONTACT) == (isfinite(sum) != 0) || !model->vertices,
                "the surface moves, or nothing is known of it");
     }
 }
@@ -88,7 +88,7 @@ static void ask_several(const epsmesh_model *model, int times) {
         }
         epsmesh_touch_all(model, n, queries, touches);
         for (answers = 0, j = 0; j < n; j++) {
-            int has = touches[j].status == EPSMESH_OK || touches[j].status == EPSMESH_LOST;
+            int has = touches[j].status == EPSMESH_OK || touches[j].status == EPSMESH_NO_CONTACT;
             answers += has;
             expect(has == (isfinite(touches[j].force[0] + touches[j].relative_error + touches[j].stiffness) != 0),
                    "an answer of several is finite, a refusal is not");
@@ -115,7 +115,7 @@ static void ask_after(const epsmesh_model *model, int times) {
         for (k = 0; k < 12; k++) {
             query.depth = within(-1e-5, 2e-4);
             touch = epsmesh_touch_after(&relaxing, &query, k % 4 ? within(0, 0.1) : 0, &memory);
-            expect((touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) == (isfinite(touch.force[2]) != 0),
+            expect((touch.status == EPSMESH_OK || touch.status == EPSMESH_NO_CONTACT) == (isfinite(touch.force[2]) != 0),
                    "an answer after others is finite, a refusal is not");
             expect(touch.status != EPSMESH_OK || touch.relative_error >= 0, "a bar after others is none of less than nothing");
         }

@@ -41,7 +41,7 @@ _UNITS = {
 # In the order of epsmesh_shape and epsmesh_status.
 SHAPES = ("disc", "sphere", "cone", "blade", "bonded disc")
 STATUSES = (
-    "ok", "lost", "outside", "large", "deep", "tool", "input", "poisson", "tilted", "off", "damaged", "no model",
+    "ok", "no contact", "outside", "large", "deep", "tool", "input", "poisson", "tilted", "off", "damaged", "no model",
     "near", "others", "alone", "past",
 )  # fmt: skip
 
@@ -96,7 +96,7 @@ def variables(model: Model) -> list[Variable]:
         Variable("contact_radius", "output", "m", "radius of the contact"),
         Variable("depth", "output", "m", "depth below the undeformed face, along its normal"),
         Variable("shape", "parameter", "", "kind of the tool", SHAPES.index("sphere"), "Enumeration"),
-        Variable("status", "output", "", "ok, lost (no contact), or why there is no answer", kind="Enumeration"),
+        Variable("status", "output", "", "ok, no contact, or why there is no answer", kind="Enumeration"),
     ]
     return found
 

@@ -22,7 +22,7 @@ from epsmesh.report.figures.style import STYLE, add_note, save
 from epsmesh.report.table import study_of, warnings_of
 from epsmesh.report.values import at_peak, has_path, of_path
 from epsmesh.report.words import is_numeric, without_shared
-from epsmesh.states import FAILED, LOST, PARTIAL, PENDING, SKIPPED
+from epsmesh.states import FAILED, NO_CONTACT, PARTIAL, PENDING, SKIPPED
 from epsmesh.study.vocabulary import FIGURES
 
 __all__ = ["KINDS", "STYLE", "choose", "describe", "draw", "figure", "files", "lacks", "save"]
@@ -176,7 +176,7 @@ def _missing(dataset: xr.Dataset) -> str:
         PARTIAL: "ended before the depth (×)",
         SKIPPED: "skipped",
         PENDING: "not yet run",
-        LOST: "contact lost",
+        NO_CONTACT: "no contact",
     }
     counts = {word: int((dataset["status"] == state).sum()) for state, word in words.items()}
     text = ", ".join(f"{count} {word}" for word, count in counts.items() if count)

@@ -11,7 +11,7 @@ from matplotlib.ticker import AutoLocator, FixedLocator, Locator
 from epsmesh.report.figures.facets import arrange
 from epsmesh.report.figures.style import CLAIM, FAILED, LINE, finish, look, new_figure
 from epsmesh.report.words import choices, heading, scale
-from epsmesh.states import FAILURES, LOST, OK, PENDING, SKIPPED
+from epsmesh.states import FAILURES, NO_CONTACT, OK, PENDING, SKIPPED
 
 PLACES = ("x", "y")
 _MOST_PANELS = 3
@@ -24,7 +24,7 @@ _LETTERS = 30
 def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """The force (mN) seen from above, and its error bar (mN); a column for each value of one other quantity.
 
-    Places where contact is lost have a ring, those without a force a cross.
+    Places without contact have a ring, those without a force a cross.
     """
     facets = arrange(dataset, ("force",), None, flat=PLACES, most=(_MOST_PANELS, 1, 1))
     parts = [dataset.sel(facets.at | curve).transpose("y", "x", ...) for curve in facets.curves]
@@ -34,7 +34,7 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     figure = new_figure(_PANEL * len(parts) + 1.2, 2 * panel + 1.3)
     axes = figure.subplots(2, len(parts), squeeze=False, sharex=True, sharey=True)
     for row, (name, label) in enumerate((("force", heading(dataset["force"])), ("force_error", "error bar of F, mN"))):
-        # Zero where contact is lost would leave no colours for the others.
+        # Zero where there is no contact would leave no colours for the others.
         maps = [1e3 * part[name].where(part["status"] == "ok").values for part in parts]
         known = np.concatenate([values[np.isfinite(values)] for values in maps])
         limits = {"vmin": known.min(), "vmax": known.max()} if known.size else {}
@@ -56,7 +56,7 @@ def draw_map(ax: Axes, part: xr.Dataset, values: np.ndarray, **look: Any) -> Any
     x, y = (factor * part[name].values for name in PLACES)
     drawn = ax.pcolormesh(x, y, np.ma.masked_invalid(values), shading="nearest", **{"cmap": _COLOURS} | look)
     for state, marker, colour, label in (
-        ([LOST], "o", LINE, "contact lost"),
+        ([NO_CONTACT], "o", LINE, "no contact"),
         ([*FAILURES, SKIPPED, PENDING], "x", FAILED, "no force"),
     ):
         rows, columns = np.nonzero(np.isin(part["status"].values.astype(str), state))

@@ -17,7 +17,7 @@ from epsmesh.report.insertion import answer
 from epsmesh.report.times import doubts
 from epsmesh.report.values import at_peak, by_case, relative
 from epsmesh.report.words import choices
-from epsmesh.states import FAILED, LOST, OK, PARTIAL, PENDING, SKIPPED
+from epsmesh.states import FAILED, NO_CONTACT, OK, PARTIAL, PENDING, SKIPPED
 
 # Of git, with a sign for changes that were not committed.
 _COMMIT = re.compile(r"[0-9a-f]{7,64}\+?")
@@ -29,7 +29,7 @@ _STATES = {
     FAILED: "failed",
     PARTIAL: "ended before the depth",
     SKIPPED: "skipped",
-    LOST: "without contact",
+    NO_CONTACT: "without contact",
     PENDING: "not yet run",
 }
 

@@ -27,7 +27,7 @@ class Tool:
 
     def __init__(self, model: str, name: str, radius: float):
         self.model, self.radius = epsmesh_realtime.read(model), radius
-        self.force = epsmesh_realtime.Touch("lost", np.zeros(3))
+        self.force = epsmesh_realtime.Touch("no contact", np.zeros(3))
         self._node = slicer.util.getNode(name)
         self._line = slicer.mrmlScene.AddNewNodeByClass("vtkMRMLMarkupsLineNode", "Force")
         for _ in range(2):

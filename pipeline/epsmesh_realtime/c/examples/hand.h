@@ -53,7 +53,7 @@ static const char *hand_load(hand *h, const char *path, double radius, double mo
     }
     h->tool = epsmesh_ask(&h->model);
     h->tool.shape = EPSMESH_SPHERE, h->tool.radius = radius;
-    h->most = most, h->share = 1, h->stiffness = h->error = 0, h->status = EPSMESH_LOST;
+    h->most = most, h->share = 1, h->stiffness = h->error = 0, h->status = EPSMESH_NO_CONTACT;
     h->last[0] = h->last[1] = h->last[2] = 0;
     return NULL;
 }
@@ -64,15 +64,15 @@ static void hand_feel(hand *h, const double tip[3], double force[3]) {
     epsmesh_touch touch;
     int i;
     touch.status = epsmesh_foot(&h->model, tip, h->tool.at, &h->tool.depth);
-    if (touch.status == EPSMESH_LOST) {
+    if (touch.status == EPSMESH_NO_CONTACT) {
         /* Nothing touches, inside the region or outside it. */
-        h->status = EPSMESH_LOST, h->share = 1, h->stiffness = h->error = 0;
+        h->status = EPSMESH_NO_CONTACT, h->share = 1, h->stiffness = h->error = 0;
         for (i = 0; i < 3; i++) h->last[i] = force[i] = 0;
         return;
     }
     if (touch.status == EPSMESH_OK) touch = epsmesh_touch_at(&h->model, &h->tool);
     h->status = touch.status;
-    if (touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) {
+    if (touch.status == EPSMESH_OK || touch.status == EPSMESH_NO_CONTACT) {
         h->share = fmin(1, h->share + HAND_RETURNS);
         h->stiffness = touch.stiffness, h->error = touch.relative_error;
         for (i = 0; i < 3; i++) h->last[i] = touch.force[i];

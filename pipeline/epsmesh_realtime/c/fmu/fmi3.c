@@ -96,7 +96,7 @@ static fmi3Status evaluate(unit *u, double time) {
     query.length = v[LENGTH], query.width = v[WIDTH], query.young = v[YOUNG], query.poisson = v[POISSON];
     for (i = 0; i < 3; i++) query.axis[i] = v[AXIS + i], query.along[i] = v[ALONG + i];
     touch.status = epsmesh_foot(&u->model, v + TIP, query.at, &query.depth);
-    if (touch.status == EPSMESH_LOST && u->now.memory.phase != EPSMESH_RESTED) {
+    if (touch.status == EPSMESH_NO_CONTACT && u->now.memory.phase != EPSMESH_RESTED) {
         /* Below a tool in the air, relaxing tissue recovers. */
         memcpy(query.at, u->now.memory.query.at, sizeof query.at);
         query.depth = 0, touch.status = EPSMESH_OK;
@@ -104,9 +104,9 @@ static fmi3Status evaluate(unit *u, double time) {
     if (touch.status == EPSMESH_OK) {
         touch = epsmesh_touch_after(&u->model, &query, time - u->now.evaluated, &u->now.memory);
     } else {
-        double none = touch.status == EPSMESH_LOST ? 0 : (double)NAN;
+        double none = touch.status == EPSMESH_NO_CONTACT ? 0 : (double)NAN;
         /* After a place that is not known, the past is not known; a tool beside the region of a face at rest is no touch. */
-        if (touch.status != EPSMESH_LOST && (touch.status != EPSMESH_OUTSIDE || u->now.memory.phase != EPSMESH_RESTED)) {
+        if (touch.status != EPSMESH_NO_CONTACT && (touch.status != EPSMESH_OUTSIDE || u->now.memory.phase != EPSMESH_RESTED)) {
             query.depth = (double)NAN;
             epsmesh_touch_after(&u->model, &query, time - u->now.evaluated, &u->now.memory);
         }
@@ -117,7 +117,7 @@ static fmi3Status evaluate(unit *u, double time) {
     v[RELATIVE_ERROR] = touch.relative_error, v[STIFFNESS] = touch.stiffness;
     v[CONTACT_RADIUS] = touch.contact_radius, v[DEPTH] = query.depth, u->now.status = touch.status;
     u->now.evaluated = time;
-    if (touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) return fmi3OK;
+    if (touch.status == EPSMESH_OK || touch.status == EPSMESH_NO_CONTACT) return fmi3OK;
     if (before != touch.status) say(u, fmi3Warning, "logStatusWarning", epsmesh_word(touch.status));
     return fmi3Warning;
 }
@@ -137,7 +137,7 @@ static void begin(unit *u) {
     memcpy(v + TIP, u->model.origin, sizeof u->model.origin);
     v[YOUNG] = u->model.young, v[POISSON] = u->model.poisson, v[ANGLE] = START_ANGLE;
     v[RADIUS] = OF_ROOM[0] * room, v[LENGTH] = OF_ROOM[1] * room, v[WIDTH] = OF_ROOM[2] * room;
-    u->now.shape = EPSMESH_SPHERE, u->now.status = EPSMESH_LOST;
+    u->now.shape = EPSMESH_SPHERE, u->now.status = EPSMESH_NO_CONTACT;
 }
 
 /* ---- common functions ---- */

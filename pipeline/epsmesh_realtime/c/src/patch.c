@@ -330,7 +330,7 @@ epsmesh_touch epsmesh_patch_touch(epsmesh_patch *t, const epsmesh_model *m, cons
     int i, j;
     q.shape = EPSMESH_DISC, q.radius = SMALLEST;
     status = t->is_made ? misfit(m, &q, local, edge, &f) : EPSMESH_TOOL;
-    if (status == EPSMESH_LOST) return all(status, 0.0);
+    if (status == EPSMESH_NO_CONTACT) return all(status, 0.0);
     if (status != EPSMESH_OK) return all(status, (double)NAN);
     if (!isfinite(turn)) return all(EPSMESH_INPUT, (double)NAN);
     if (!m->is_flat) return all(EPSMESH_TOOL, (double)NAN);

@@ -70,7 +70,7 @@ static epsmesh_status misfit(const epsmesh_model *m, const epsmesh_query *q, dou
     if (!(fabs(local[2] - f->height) <= m->off)) return EPSMESH_OFF;
     if (!(m->poisson_range[0] <= q->poisson && q->poisson <= m->poisson_range[1])) return EPSMESH_POISSON;
     if (q->depth >= m->thickness) return EPSMESH_DEEP;
-    return q->depth <= TOUCHING ? EPSMESH_LOST : EPSMESH_OK;
+    return q->depth <= TOUCHING ? EPSMESH_NO_CONTACT : EPSMESH_OK;
 }
 
 /* Move a place to about the nearest one of the region; return whether it was outside. */
@@ -91,7 +91,7 @@ static epsmesh_status curved_foot(const epsmesh_model *m, const double tip[3], d
     for (steps = 0; steps < FOOT_STEPS; steps++) {
         spot f = face_at(m, place[0], place[1]);
         double above = tip[2] - f.height, off[2], k[2][2], det, step[2];
-        if (steps == 0 && !cuts && above >= 0) return EPSMESH_LOST;
+        if (steps == 0 && !cuts && above >= 0) return EPSMESH_NO_CONTACT;
         for (i = 0; i < 2; i++) {
             off[i] = tip[i] - place[i] + above * f.slope[i];
             for (j = 0; j < 2; j++) k[i][j] = (i == j) + f.slope[i] * f.slope[j] - above * f.second[i][j];
@@ -102,7 +102,7 @@ static epsmesh_status curved_foot(const epsmesh_model *m, const double tip[3], d
         if (fabs(step[0]) <= FOOT_SAME * m->reach[0] && fabs(step[1]) <= FOOT_SAME * m->reach[1]) {
             foot[0] = place[0], foot[1] = place[1], foot[2] = f.height;
             *depth = -above / f.normal[2];
-            return above < 0 ? EPSMESH_OK : EPSMESH_LOST;
+            return above < 0 ? EPSMESH_OK : EPSMESH_NO_CONTACT;
         }
         for (i = 0; i < 2; i++) place[i] += step[i];
         /* If steps end at the border several times, the place is outside. */
@@ -119,7 +119,7 @@ epsmesh_status epsmesh_foot(const epsmesh_model *m, const double tip[3], double 
     into_face(m, tip, local);
     if (!(isfinite(local[0]) && isfinite(local[1]) && isfinite(local[2]))) return EPSMESH_INPUT;
     if (m->is_flat) {
-        if (local[2] >= 0) return EPSMESH_LOST;
+        if (local[2] >= 0) return EPSMESH_NO_CONTACT;
         foot[0] = local[0], foot[1] = local[1], foot[2] = 0, *depth = -local[2];
     } else {
         status = curved_foot(m, local, foot, depth);
@@ -208,7 +208,7 @@ epsmesh_touch epsmesh_touch_at(const epsmesh_model *m, const epsmesh_query *q) {
     asked a;
     contact k;
     epsmesh_status status = misfit(m, q, a.local, a.edge, &a.f);
-    if (status == EPSMESH_LOST) return all(status, 0.0);
+    if (status == EPSMESH_NO_CONTACT) return all(status, 0.0);
     if (status != EPSMESH_OK) return all(status, (double)NAN);
     if (!surveyed(m, q, &a)) return all(EPSMESH_DAMAGED, (double)NAN);
     if (!press(m, q, &a, &k)) return all(EPSMESH_LARGE, (double)NAN);

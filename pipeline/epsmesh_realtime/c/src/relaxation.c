@@ -131,16 +131,16 @@ static epsmesh_touch in_the_air(const epsmesh_model *m, epsmesh_memory *memory, 
     memory->phase = EPSMESH_FREE;
     if (memory->away > RESTS * longest || left <= REST * memory->deepest)
         epsmesh_memory_begin(memory, memory->moments, memory->room);
-    return all(EPSMESH_LOST, 0.0);
+    return all(EPSMESH_NO_CONTACT, 0.0);
 }
 
 /* A disc or a blade: in contact if its depth is not less than that of the free surface. */
 static epsmesh_touch after_same(const epsmesh_model *m, const epsmesh_query *q, double step, epsmesh_memory *memory) {
-    epsmesh_touch touch = epsmesh_touch_at(m, q), none = all(EPSMESH_LOST, 0.0);
+    epsmesh_touch touch = epsmesh_touch_at(m, q), none = all(EPSMESH_NO_CONTACT, 0.0);
     epsmesh_moment next = memory->now;
     double share, soft = stays(m);
     int i;
-    if (touch.status != EPSMESH_OK && touch.status != EPSMESH_LOST) return forgotten(memory, touch.status);
+    if (touch.status != EPSMESH_OK && touch.status != EPSMESH_NO_CONTACT) return forgotten(memory, touch.status);
     go_on(m, &next, step, q->depth, &touch);
     share = felt_depth(m, &next) / q->depth;
     if (touch.status == EPSMESH_OK && share > 0) {
@@ -209,11 +209,11 @@ static int shrunk(const epsmesh_model *m, epsmesh_memory *memory, double whole, 
 static epsmesh_touch after_growing(const epsmesh_model *m, const epsmesh_query *q, double step, epsmesh_memory *memory) {
     epsmesh_moment *now = &memory->now, from, *top;
     epsmesh_query then = *q;
-    epsmesh_touch touch = all(EPSMESH_LOST, 0.0);
+    epsmesh_touch touch = all(EPSMESH_NO_CONTACT, 0.0);
     double whole, share, slope;
     if (memory->phase <= EPSMESH_GROWING && q->depth >= now->depth) {
         touch = epsmesh_touch_at(m, q);
-        if (touch.status == EPSMESH_LOST && memory->phase == EPSMESH_RESTED) return touch;
+        if (touch.status == EPSMESH_NO_CONTACT && memory->phase == EPSMESH_RESTED) return touch;
         if (touch.status != EPSMESH_OK) return forgotten(memory, touch.status);
         if (memory->used + 2 > memory->room) return forgotten(memory, EPSMESH_PAST);
         top = memory->used > 1 ? &memory->moments[memory->used - 1] : NULL;
@@ -236,7 +236,7 @@ static epsmesh_touch after_growing(const epsmesh_model *m, const epsmesh_query *
     if (!shrunk(m, memory, whole, &from, &share)) return in_the_air(m, memory, step);
     then.depth = from.depth + share * (memory->contact.depth - from.depth);
     touch = epsmesh_touch_at(m, &then);
-    if (touch.status == EPSMESH_LOST) return in_the_air(m, memory, step);
+    if (touch.status == EPSMESH_NO_CONTACT) return in_the_air(m, memory, step);
     if (touch.status != EPSMESH_OK) return forgotten(memory, touch.status);
     grow_on(m, &then, &from, share * (memory->contact.time - from.time), &touch);
     memory->contact = from;

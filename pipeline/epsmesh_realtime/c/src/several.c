@@ -331,10 +331,10 @@ void epsmesh_touch_all(const epsmesh_model *m, int n, const epsmesh_query *q, ep
     }
     for (i = 0; i < n; i++) {
         status[i] = misfit(m, &q[i], a[i].local, a[i].edge, &a[i].f);
-        refused |= status[i] != EPSMESH_OK && status[i] != EPSMESH_LOST;
+        refused |= status[i] != EPSMESH_OK && status[i] != EPSMESH_NO_CONTACT;
     }
     for (i = 0; i < n && refused; i++) {
-        found = status[i] == EPSMESH_OK || status[i] == EPSMESH_LOST ? EPSMESH_OTHERS : status[i];
+        found = status[i] == EPSMESH_OK || status[i] == EPSMESH_NO_CONTACT ? EPSMESH_OTHERS : status[i];
         t[i] = all(found, (double)NAN);
     }
     if (refused) return;
@@ -357,7 +357,7 @@ void epsmesh_touch_all(const epsmesh_model *m, int n, const epsmesh_query *q, ep
     doubts(m, n, q, a, &g, &s, errors);
     for (i = 0; i < n; i++) {
         contact k = s.k[i];
-        if (!(k.force > 0)) t[i] = all(EPSMESH_LOST, 0.0);
+        if (!(k.force > 0)) t[i] = all(EPSMESH_NO_CONTACT, 0.0);
         k.stiffness *= s.inverse[i][i], k.aside[0] = s.aside[i][0], k.aside[1] = s.aside[i][1];
         if (k.force > 0) t[i] = told(m, q[i].young, q[i].depth, &a[i], &k, errors[i]);
         which[i] = t[i].status == EPSMESH_DAMAGED, refused |= which[i];

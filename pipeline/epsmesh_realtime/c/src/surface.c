@@ -204,7 +204,7 @@ epsmesh_status epsmesh_surface_move(const epsmesh_model *m, const epsmesh_query 
     spot s;
     size_t n;
     int i, j;
-    for (n = 0; n < 3 * count && t->status != EPSMESH_OK; n++) moved[n] = t->status == EPSMESH_LOST ? 0 : (double)NAN;
+    for (n = 0; n < 3 * count && t->status != EPSMESH_OK; n++) moved[n] = t->status == EPSMESH_NO_CONTACT ? 0 : (double)NAN;
     if (t->status != EPSMESH_OK) return t->status;
     foot_of(m, q, t, at, &f);
     s = face_at(m, at[0], at[1]);

@@ -261,7 +261,7 @@ class Page {
       whisker.style.left = `${(100 * normal * (1 - touch.error)) / full}%`;
       whisker.style.width = `${(200 * normal * touch.error) / full}%`;
     }
-    const known = touch.status === "ok" || touch.status === "lost";
+    const known = touch.status === "ok" || touch.status === "no contact";
     // One unit for what is compared.
     const [factor, unit] = Math.abs(normal) < 1 ? [1e3, "mN"] : [1, "N"];
     say("reading", isIn ? `F = ${short(factor * normal)} ${unit} ± ${short(100 * touch.error, 2)} %` : "");
