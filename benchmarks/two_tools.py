@@ -120,7 +120,7 @@ def _solved(
                     hypot(x - to_x, y - to_y) / (a + b),
                     1 - force / float(single.force[2]),
                     float(touch.force[2]) / force - 1,
-                    touch.relative_error,
+                    touch.force_error / touch.force[2],
                 )
                 for force, single, touch in zip(truth.tolist(), own, told, strict=True)
             ],

@@ -18,7 +18,8 @@ class History:
     The depth is linear in time from call to call; a tool that was above tissue at rest touches it from the call before
     on. Place, tool, E and ν stay the same until the tissue is at rest again.
     A disc or a blade may move up and down, and leave the tissue. The contact of a sphere or a cone may grow, and then
-    shrink, once. All else has the status "past". ``room`` is the largest number of calls in which such a contact grows.
+    shrink, once. All else has the status "history". ``room`` is the largest number of calls in which such a contact
+    grows.
     """
 
     model: Model

@@ -22,8 +22,9 @@ SENTENCES = {
     "near": "Two tools are too close: the distance of their middles must be twice the sum of both contact radii.",
     "others": "There is no answer for another tool, on whose force this one depends.",
     "alone": "The model answers for one tool at a time: its file has no pair_modes.",
-    "past": "The force depends on a past that is not known. Place, tool or tissue have changed while it remembers; the "
-    "contact of a round tool has grown again, or too often; or a query in contact was refused: begin a new History.",
+    "history": "The force depends on an earlier contact that is not known. Place, tool or tissue have changed while it "
+    "remembers; the contact of a round tool has grown again, or too often; or a query in contact was refused: begin a "
+    "new History.",
 }
 
 
@@ -31,14 +32,14 @@ SENTENCES = {
 class Touch:
     """The answer of a query; all numbers are NaN unless ``status`` is "ok" or "no contact", and ``message`` says why.
 
-    ``force`` (3,), in N, is the force of the tissue on the tool, in the body's coordinates. ``relative_error`` is its
-    error bar in units of its normal component; it also covers the lateral force on a bonded disc. ``stiffness`` (N/m)
-    is dF/dd at a fixed place; ``contact_radius`` is in m.
+    ``force`` (3,), in N, is the force of the tissue on the tool, in the body's coordinates. ``force_error`` (N)
+    is the 95 % error bar of its normal component; it also covers the lateral force on a bonded disc. ``stiffness``
+    (N/m) is dF/dd at a fixed place; ``contact_radius`` is in m.
     """
 
     status: str
     force: NDArray[np.float64]
-    relative_error: float = nan
+    force_error: float = nan
     stiffness: float = nan
     contact_radius: float = nan
 
@@ -47,9 +48,7 @@ class Touch:
             return f"Touch({self.status!r}: {self.message})"
         x, y, z = self.force
         of_contact = f"{self.stiffness:.6g} N/m, contact radius {self.contact_radius:.6g} m"
-        return (
-            f"Touch({self.status!r}: ({x:.6g}, {y:.6g}, {z:.6g}) N ± {100 * self.relative_error:.2g} %, {of_contact})"
-        )
+        return f"Touch({self.status!r}: ({x:.6g}, {y:.6g}, {z:.6g}) ± {self.force_error:.2g} N, {of_contact})"
 
     @property
     def message(self) -> str:
@@ -63,6 +62,6 @@ class Touches:
 
     status: NDArray[np.str_]
     force: NDArray[np.float64]
-    relative_error: NDArray[np.float64]
+    force_error: NDArray[np.float64]
     stiffness: NDArray[np.float64]
     contact_radius: NDArray[np.float64]

@@ -76,7 +76,7 @@ def test_a_host_finds_the_unit_valid_and_gets_the_evaluators_forces(made):
             # Places and depths are sums of coordinates of 0.2 m, each rounded to 3e-17 m.
             within = 1e-12 * np.linalg.norm(touch.force) + 1e-15 * touch.stiffness
             np.testing.assert_allclose(force, touch.force, atol=within, rtol=0)
-            assert given["relative_error"] == pytest.approx(touch.relative_error, rel=1e-9)
+            assert given["force_error"] == pytest.approx(touch.force_error, rel=1e-9)
             largest = max(largest, float(np.linalg.norm(force)))
         else:
             assert np.all(force == 0) if status == "no contact" else np.isnan(force).all()
@@ -139,7 +139,7 @@ def test_relaxing_tissue_remembers_from_step_to_step(tmp_path):
     statuses = [STATUSES[int(status)] for status in simulated()["status"]]
     assert "ok" in statuses[:150]
     assert statuses[151] == "input"
-    assert {*statuses[153:]} == {"past"}
+    assert {*statuses[153:]} == {"history"}
 
 
 def test_its_sources_build_a_library_with_every_function_of_the_standard(made, tmp_path):

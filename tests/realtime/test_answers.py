@@ -27,7 +27,7 @@ def stored():
 
 
 def numbers(touch):
-    return [*touch.force, touch.relative_error, touch.stiffness, touch.contact_radius]
+    return [*touch.force, touch.force_error, touch.stiffness, touch.contact_radius]
 
 
 def assert_same(touches, statuses, known):

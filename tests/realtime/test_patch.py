@@ -39,7 +39,7 @@ def test_round_tips_are_those_of_the_formulas(tip, name, sizes):
         assert found.force[2] == pytest.approx(known.force[2], rel=5e-3)
         assert np.linalg.norm(found.force - known.force) < 5e-3 * known.force[2]
         assert found.stiffness == pytest.approx(known.stiffness, rel=0.06)
-        assert found.relative_error > known.relative_error
+        assert found.force_error > known.force_error
         assert found.contact_radius == pytest.approx(known.contact_radius, rel=0.12)
 
 
@@ -138,7 +138,7 @@ def rounded():
 def test_what_a_patch_does_not_know_it_refuses(asked, status):
     touch = Patch(random_model(), LONG).query(**({"at": AT, "depth": 1e-4} | asked))
     assert touch.status == status
-    assert status == "no contact" or np.isnan([*touch.force, touch.relative_error]).all()
+    assert status == "no contact" or np.isnan([*touch.force, touch.force_error]).all()
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ enum { STEPS = 60, TERMS = 40, FOOT_STEPS = 30, SETTLE_STEPS = 40 };
 const char *epsmesh_word(epsmesh_status status) {
     static const char *const words[] = {"ok",      "no contact", "outside", "large", "deep",    "tool",
                                         "input",   "poisson", "tilted", "off",   "damaged", "no model",
-                                        "near",    "others", "alone", "past"};
+                                        "near",    "others", "alone", "history"};
     return (int)status >= 0 && status < EPSMESH_STATUSES ? words[status] : "";
 }
 

@@ -33,7 +33,7 @@ typedef enum {
     EPSMESH_NEAR,       /* two contacts' middles are closer than twice the sum of their radii */
     EPSMESH_OTHERS,     /* another tool, on whose force this one depends, has no answer */
     EPSMESH_ALONE,      /* one tool at a time: the file has no pair_modes */
-    EPSMESH_PAST,       /* the force depends on a past that is not known: epsmesh_relaxation.h */
+    EPSMESH_HISTORY,    /* the force depends on an earlier contact that is not known: epsmesh_relaxation.h */
     EPSMESH_STATUSES
 } epsmesh_status;
 
@@ -90,7 +90,7 @@ typedef struct {
 typedef struct {
     epsmesh_status status;
     double force[3];       /* N: force of the tissue on the tool, in the body's coordinates */
-    double relative_error; /* 95 % error bar, in units of the force along the normal */
+    double force_error;    /* N: 95 % error bar of the force along the normal */
     double stiffness;      /* N/m: dF/dd at a fixed place */
     double contact_radius; /* m */
 } epsmesh_touch;

@@ -15,7 +15,7 @@ extern "C" {
 
 /* A moment of growing contact: what each term of the relaxation has kept of the depth and of the elastic force until then. */
 typedef struct {
-    double time, depth, force[3], error; /* s, m, N, relative */
+    double time, depth, force[3], error; /* s, m, N, share of the force */
     double of_depth[EPSMESH_MOST_RELAXING], of_force[EPSMESH_MOST_RELAXING][3];
     double doubt[EPSMESH_MOST_RELAXING]; /* N: error of of_force, where steps are long */
 } epsmesh_moment;
@@ -38,7 +38,7 @@ void epsmesh_memory_begin(epsmesh_memory *memory, epsmesh_moment *moments, size_
 
 /* Answer a query, `step` (s) after the last one. Without relaxation this is epsmesh_touch_at.
  *
- * EPSMESH_PAST: the force depends on a past that is not known. Place, tool or tissue have changed during contact, or before
+ * EPSMESH_HISTORY: the force depends on an earlier contact that is not known. Place, tool or tissue have changed during contact, or before
  * the tissue was at rest again; the contact of a round tool has grown again after it had shrunk, or has used up its room;
  * or an earlier query in contact was refused. Begin again. */
 epsmesh_touch epsmesh_touch_after(const epsmesh_model *model, const epsmesh_query *query, double step,

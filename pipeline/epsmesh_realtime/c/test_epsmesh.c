@@ -43,8 +43,8 @@ static void ask_around(const epsmesh_model *model, int times) {
         touch = epsmesh_touch_at(model, &query);
         if (touch.status == EPSMESH_OK || touch.status == EPSMESH_NO_CONTACT) {
             expect(isfinite(touch.force[0] + touch.force[1] + touch.force[2]), "a force is finite");
-            expect(isfinite(touch.relative_error + touch.stiffness + touch.contact_radius), "an answer is finite");
-            expect(touch.relative_error >= 0, "a bar is none of less than nothing");
+            expect(isfinite(touch.force_error + touch.stiffness + touch.contact_radius), "an answer is finite");
+            expect(touch.force_error >= 0, "a bar is none of less than nothing");
         } else {
             expect(isnan(touch.force[0]) && isnan(touch.stiffness), "a refusal has no numbers");
         }
@@ -90,9 +90,9 @@ static void ask_several(const epsmesh_model *model, int times) {
         for (answers = 0, j = 0; j < n; j++) {
             int has = touches[j].status == EPSMESH_OK || touches[j].status == EPSMESH_NO_CONTACT;
             answers += has;
-            expect(has == (isfinite(touches[j].force[0] + touches[j].relative_error + touches[j].stiffness) != 0),
+            expect(has == (isfinite(touches[j].force[0] + touches[j].force_error + touches[j].stiffness) != 0),
                    "an answer of several is finite, a refusal is not");
-            expect(!has || touches[j].relative_error >= 0, "a bar of several is none of less than nothing");
+            expect(!has || touches[j].force_error >= 0, "a bar of several is none of less than nothing");
         }
         expect(answers == 0 || answers == n, "all tools have an answer, or none has");
     }
@@ -117,7 +117,7 @@ static void ask_after(const epsmesh_model *model, int times) {
             touch = epsmesh_touch_after(&relaxing, &query, k % 4 ? within(0, 0.1) : 0, &memory);
             expect((touch.status == EPSMESH_OK || touch.status == EPSMESH_NO_CONTACT) == (isfinite(touch.force[2]) != 0),
                    "an answer after others is finite, a refusal is not");
-            expect(touch.status != EPSMESH_OK || touch.relative_error >= 0, "a bar after others is none of less than nothing");
+            expect(touch.status != EPSMESH_OK || touch.force_error >= 0, "a bar after others is none of less than nothing");
         }
     }
 }

@@ -149,7 +149,8 @@ def with_bar(model: Model, check: Check) -> Check:
     if check.tool.contact == "bonded" and check.vector:
         off = touch.force - np.array(check.vector)
         aside = float(np.linalg.norm(off - (off @ normal) * normal)) / check.full
-    return replace(check, force=float(touch.force @ normal), bar=touch.relative_error, aside=aside)
+    force = float(touch.force @ normal)
+    return replace(check, force=force, bar=touch.force_error / force, aside=aside)
 
 
 def on_face(model: Model, x: float, y: float) -> tuple[FloatArray, FloatArray]:

@@ -42,7 +42,7 @@ _UNITS = {
 SHAPES = ("disc", "sphere", "cone", "blade", "bonded disc")
 STATUSES = (
     "ok", "no contact", "outside", "large", "deep", "tool", "input", "poisson", "tilted", "off", "damaged", "no model",
-    "near", "others", "alone", "past",
+    "near", "others", "alone", "history",
 )  # fmt: skip
 
 
@@ -91,7 +91,7 @@ def variables(model: Model) -> list[Variable]:
     ]
     found += [Variable(f"force.{c}", "output", "N", f"force of the tissue on the tool, {c} of the body") for c in "xyz"]
     found += [
-        Variable("relative_error", "output", "", "95 % error bar, in units of the force along the normal"),
+        Variable("force_error", "output", "N", "95 % error bar of the force along the normal"),
         Variable("stiffness", "output", "N/m", "dF/dd at a fixed place"),
         Variable("contact_radius", "output", "m", "radius of the contact"),
         Variable("depth", "output", "m", "depth below the undeformed face, along its normal"),

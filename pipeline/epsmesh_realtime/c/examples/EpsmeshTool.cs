@@ -19,7 +19,7 @@ public sealed class EpsmeshTool : IDisposable
         if (tool == IntPtr.Zero) throw new ArgumentException(path + " is no model, or radius or force is not positive");
     }
 
-    // N; error is relative. A status other than 0 (ok) or 1 (no contact) means that the force fades: see epsmesh.h.
+    // Force and its error bar, in N. A status other than 0 (ok) or 1 (no contact) means that the force fades: see epsmesh.h.
     public double[] Feel(double[] tip, out double error, out int status)
     {
         status = epsmesh_unity_feel(tool, tip, force, out error);

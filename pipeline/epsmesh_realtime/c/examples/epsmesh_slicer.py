@@ -46,7 +46,7 @@ class Tool:
         self._line.SetNthControlPointPositionWorld(0, *(MM * c for c in centre))
         self._line.SetNthControlPointPositionWorld(1, *tip)
         size = float((force**2).sum() ** 0.5)
-        text = touch.message or f"F = {size:.3g} N ± {100 * touch.relative_error:.2g} %"
+        text = touch.message or f"F = {size:.3g} N ± {touch.force_error:.2g} N"
         view = slicer.app.layoutManager().threeDWidget(0).threeDView()
         view.cornerAnnotation().SetText(vtk.vtkCornerAnnotation.UpperRight, text)
         view.scheduleRender()

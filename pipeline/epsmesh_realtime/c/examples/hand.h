@@ -24,7 +24,7 @@ typedef struct {
     double share;          /* of the force that is rendered: 1, but after a refusal */
     double last[3];        /* N: the last force that the model gave */
     double stiffness;      /* N/m, for whoever watches it */
-    double error;          /* relative */
+    double error;          /* N: bar of the model's force */
     epsmesh_status status; /* of the last call */
 } hand;
 
@@ -74,7 +74,7 @@ static void hand_feel(hand *h, const double tip[3], double force[3]) {
     h->status = touch.status;
     if (touch.status == EPSMESH_OK || touch.status == EPSMESH_NO_CONTACT) {
         h->share = fmin(1, h->share + HAND_RETURNS);
-        h->stiffness = touch.stiffness, h->error = touch.relative_error;
+        h->stiffness = touch.stiffness, h->error = touch.force_error;
         for (i = 0; i < 3; i++) h->last[i] = touch.force[i];
     } else {
         /* No number is made up: what there was fades, so that the hand feels no blow. */

@@ -30,7 +30,7 @@ static const char *const FILE_NAME = "model.epsm";
 
 /* Doubles come first, then integers. */
 enum { TIME, TIP, AXIS = TIP + 3, ALONG = AXIS + 3, YOUNG = ALONG + 3, POISSON, RADIUS, ANGLE, LENGTH, WIDTH };
-enum { FORCE = WIDTH + 1, RELATIVE_ERROR = FORCE + 3, STIFFNESS, CONTACT_RADIUS, DEPTH, SHAPE, STATUS };
+enum { FORCE = WIDTH + 1, FORCE_ERROR = FORCE + 3, STIFFNESS, CONTACT_RADIUS, DEPTH, SHAPE, STATUS };
 enum { FIRST_OUTPUT = FORCE, DOUBLES = SHAPE };
 
 typedef enum { INSTANTIATED, INITIALIZING, STEPPING, TERMINATED } mode;
@@ -105,16 +105,16 @@ static fmi3Status evaluate(unit *u, double time) {
         touch = epsmesh_touch_after(&u->model, &query, time - u->now.evaluated, &u->now.memory);
     } else {
         double none = touch.status == EPSMESH_NO_CONTACT ? 0 : (double)NAN;
-        /* After a place that is not known, the past is not known; a tool beside the region of a face at rest is no touch. */
+        /* After a place that is not known, earlier contact is not known; a tool beside the region of a face at rest is no touch. */
         if (touch.status != EPSMESH_NO_CONTACT && (touch.status != EPSMESH_OUTSIDE || u->now.memory.phase != EPSMESH_RESTED)) {
             query.depth = (double)NAN;
             epsmesh_touch_after(&u->model, &query, time - u->now.evaluated, &u->now.memory);
         }
         touch.force[0] = touch.force[1] = touch.force[2] = none;
-        touch.relative_error = touch.stiffness = touch.contact_radius = query.depth = none;
+        touch.force_error = touch.stiffness = touch.contact_radius = query.depth = none;
     }
     for (i = 0; i < 3; i++) v[FORCE + i] = touch.force[i];
-    v[RELATIVE_ERROR] = touch.relative_error, v[STIFFNESS] = touch.stiffness;
+    v[FORCE_ERROR] = touch.force_error, v[STIFFNESS] = touch.stiffness;
     v[CONTACT_RADIUS] = touch.contact_radius, v[DEPTH] = query.depth, u->now.status = touch.status;
     u->now.evaluated = time;
     if (touch.status == EPSMESH_OK || touch.status == EPSMESH_NO_CONTACT) return fmi3OK;

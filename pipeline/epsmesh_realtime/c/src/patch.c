@@ -320,7 +320,7 @@ epsmesh_status epsmesh_patch_make_of(epsmesh_patch *t, epsmesh_heights heights, 
 double epsmesh_patch_deepest(const epsmesh_patch *t) { return t->depths[EPSMESH_DEPTHS - 1]; }
 
 epsmesh_touch epsmesh_patch_touch(epsmesh_patch *t, const epsmesh_model *m, const epsmesh_query *query, double turn) {
-    double local[3], edge[2], room, share, bent, force[3];
+    double local[3], edge[2], room, share, bent, error, force[3];
     epsmesh_query q = *query;
     epsmesh_status status;
     epsmesh_touch found;
@@ -342,12 +342,13 @@ epsmesh_touch epsmesh_patch_touch(epsmesh_patch *t, const epsmesh_model *m, cons
     share = (s.k.radius / room) * (s.k.radius / room);
     bent = fabs(p.h) + 2 * sqrt(p.bent[0] * p.bent[0] + p.bent[1] * p.bent[1]);
     found.status = EPSMESH_OK, found.stiffness = q.young * s.k.stiffness, found.contact_radius = s.k.radius;
-    found.relative_error = GOOD + m->bar[3] + s.k.stiffness * ((m->bar[0] + m->bar[2] * share * share) / room +
-                                                            m->bar[1] * bent * s.k.mean_square);
+    error = GOOD + m->bar[3] + s.k.stiffness * ((m->bar[0] + m->bar[2] * share * share) / room +
+                                                m->bar[1] * bent * s.k.mean_square);
+    found.force_error = error * q.young * s.k.force;
     force[0] = s.k.aside[0], force[1] = s.k.aside[1], force[2] = s.k.force;
     for (i = 0; i < 3; i++)
         for (found.force[i] = 0, j = 0; j < 3; j++) found.force[i] += q.young * force[j] * m->axes[j][i];
-    if (!(s.k.force > 0 && is_positive(found.stiffness) && found.relative_error >= 0 && isfinite(found.relative_error) &&
+    if (!(s.k.force > 0 && is_positive(found.stiffness) && found.force_error >= 0 && isfinite(found.force_error) &&
           isfinite(found.force[0]) && isfinite(found.force[1]) && isfinite(found.force[2])))
         return all(EPSMESH_DAMAGED, (double)NAN);
     return found;

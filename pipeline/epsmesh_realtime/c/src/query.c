@@ -133,7 +133,7 @@ epsmesh_status epsmesh_foot(const epsmesh_model *m, const double tip[3], double 
 static epsmesh_touch all(epsmesh_status status, double number) {
     epsmesh_touch t;
     t.status = status;
-    t.force[0] = t.force[1] = t.force[2] = t.relative_error = t.stiffness = t.contact_radius = number;
+    t.force[0] = t.force[1] = t.force[2] = t.force_error = t.stiffness = t.contact_radius = number;
     return t;
 }
 
@@ -169,6 +169,7 @@ static int press(const epsmesh_model *m, const epsmesh_query *q, const asked *a,
     return q->radius <= most;
 }
 
+/* The error bar of a force, as a share of it. */
 static double bar_of(const epsmesh_model *m, const epsmesh_query *q, const asked *a, const contact *k) {
     double share = (k->radius / a->room) * (k->radius / a->room), error;
     double bent = fabs(a->p.h) + 2 * sqrt(a->p.bent[0] * a->p.bent[0] + a->p.bent[1] * a->p.bent[1]);
@@ -193,12 +194,13 @@ static epsmesh_touch told(const epsmesh_model *m, double young, double depth, co
     epsmesh_touch t;
     double force[3];
     int i, j;
-    t.status = EPSMESH_OK, t.stiffness = young * k->stiffness, t.contact_radius = k->radius, t.relative_error = error;
+    t.status = EPSMESH_OK, t.stiffness = young * k->stiffness, t.contact_radius = k->radius;
+    t.force_error = error * young * k->force;
     if (k->sticks) reaction_at(&a->f, k->force, k->aside, force);
     else force_at(&a->f, k->force, k->aside, depth, force);
     for (i = 0; i < 3; i++)
         for (t.force[i] = 0, j = 0; j < 3; j++) t.force[i] += young * force[j] * m->axes[j][i];
-    if (!(k->force > 0 && is_positive(t.stiffness) && t.relative_error >= 0 && isfinite(t.relative_error) &&
+    if (!(k->force > 0 && is_positive(t.stiffness) && t.force_error >= 0 && isfinite(t.force_error) &&
           isfinite(t.force[0]) && isfinite(t.force[1]) && isfinite(t.force[2])))
         return all(EPSMESH_DAMAGED, (double)NAN);
     return t;

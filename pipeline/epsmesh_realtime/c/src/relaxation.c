@@ -44,8 +44,11 @@ static double felt(const epsmesh_model *m, double whole, const double *of, size_
 
 static double felt_depth(const epsmesh_model *m, const epsmesh_moment *at) { return felt(m, at->depth, at->of_depth, 1); }
 
+static double length_of(const double v[3]) { return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
 /* Go on for a step to a depth and an elastic touch there. */
 static void go_on(const epsmesh_model *m, epsmesh_moment *at, double step, double depth, const epsmesh_touch *elastic) {
+    double size = length_of(elastic->force);
     int i, k;
     for (i = 0; i < m->relaxing; i++) {
         double x = step / m->time[i], left = exp(-x), rise = risen(x);
@@ -54,7 +57,7 @@ static void go_on(const epsmesh_model *m, epsmesh_moment *at, double step, doubl
     }
     for (k = 0; k < 3; k++) at->force[k] = elastic->force[k];
     at->time += step, at->depth = depth;
-    if (elastic->relative_error > at->error) at->error = elastic->relative_error;
+    if (elastic->force_error > at->error * size) at->error = elastic->force_error / size;
 }
 
 /* The same, if contact grows: the force is quadratic in the step, and through that at half of it. */
@@ -62,17 +65,15 @@ static void grow_on(const epsmesh_model *m, const epsmesh_query *q, epsmesh_mome
                     const epsmesh_touch *elastic) {
     epsmesh_query half = *q;
     epsmesh_touch middle;
-    double bend[3] = {0, 0, 0}, size = 0;
+    double bend[3] = {0, 0, 0}, size;
     int i, k;
     half.depth = 0.5 * (at->depth + q->depth);
     if (q->depth - at->depth > SHORT * q->depth) {
         middle = epsmesh_touch_at(m, &half);
-        for (k = 0; k < 3; k++) {
+        for (k = 0; k < 3; k++)
             bend[k] = 2 * (at->force[k] + elastic->force[k] - 2 * (middle.status == EPSMESH_OK ? middle.force[k] : 0));
-            size += bend[k] * bend[k];
-        }
-        size = sqrt(size);
     }
+    size = length_of(bend);
     go_on(m, at, step, q->depth, elastic);
     for (i = 0; i < m->relaxing; i++) {
         double x = step / m->time[i], more = bent_more(x);
@@ -83,18 +84,15 @@ static void grow_on(const epsmesh_model *m, const epsmesh_query *q, epsmesh_mome
 
 /* The force at a moment, and its bar, some time (s) `since`. */
 static void feel(const epsmesh_model *m, epsmesh_moment *at, double since, epsmesh_touch *touch) {
-    double size = 0, doubt = 0;
+    double doubt = 0;
     int i, k;
     for (i = 0; i < m->relaxing; i++) {
         double left = exp(-since / m->time[i]);
         for (k = 0; k < 3; k++) at->of_force[i][k] *= left;
         doubt += m->share[i] * left * at->doubt[i];
     }
-    for (k = 0; k < 3; k++) {
-        touch->force[k] = felt(m, at->force[k], at->of_force[0] + k, 3);
-        size += touch->force[k] * touch->force[k];
-    }
-    touch->relative_error = at->error + (doubt > 0 ? doubt / sqrt(size) : 0);
+    for (k = 0; k < 3; k++) touch->force[k] = felt(m, at->force[k], at->of_force[0] + k, 3);
+    touch->force_error = at->error * length_of(touch->force) + doubt;
 }
 
 void epsmesh_memory_begin(epsmesh_memory *memory, epsmesh_moment *moments, size_t room) {
@@ -147,6 +145,7 @@ static epsmesh_touch after_same(const epsmesh_model *m, const epsmesh_query *q, 
         memory->now = next, memory->phase = EPSMESH_GROWING;
         if (q->depth > memory->deepest) memory->deepest = q->depth;
         for (i = 0; i < 3; i++) touch.force[i] *= share;
+        touch.force_error *= share;
         return touch;
     }
     next = memory->now;
@@ -215,7 +214,7 @@ static epsmesh_touch after_growing(const epsmesh_model *m, const epsmesh_query *
         touch = epsmesh_touch_at(m, q);
         if (touch.status == EPSMESH_NO_CONTACT && memory->phase == EPSMESH_RESTED) return touch;
         if (touch.status != EPSMESH_OK) return forgotten(memory, touch.status);
-        if (memory->used + 2 > memory->room) return forgotten(memory, EPSMESH_PAST);
+        if (memory->used + 2 > memory->room) return forgotten(memory, EPSMESH_HISTORY);
         top = memory->used > 1 ? &memory->moments[memory->used - 1] : NULL;
         grow_on(m, q, now, step, &touch);
         if (top && top->depth == now->depth && top[-1].depth == now->depth) *top = *now; /* it is held */
@@ -229,10 +228,10 @@ static epsmesh_touch after_growing(const epsmesh_model *m, const epsmesh_query *
     /* A tool above the face at rest is above the surface, which never rises beyond it. */
     go_on(m, now, step, q->depth > 0 ? q->depth : 0, &touch);
     whole = felt_depth(m, now);
-    if (memory->phase == EPSMESH_FREE) return whole > 0 ? forgotten(memory, EPSMESH_PAST) : in_the_air(m, memory, step);
+    if (memory->phase == EPSMESH_FREE) return whole > 0 ? forgotten(memory, EPSMESH_HISTORY) : in_the_air(m, memory, step);
     memory->phase = EPSMESH_SHRINKING;
     if (until(m, &memory->contact, &memory->contact, 0, now->time, &slope) < whole - REGROWN * memory->deepest)
-        return forgotten(memory, EPSMESH_PAST);
+        return forgotten(memory, EPSMESH_HISTORY);
     if (!shrunk(m, memory, whole, &from, &share)) return in_the_air(m, memory, step);
     then.depth = from.depth + share * (memory->contact.depth - from.depth);
     touch = epsmesh_touch_at(m, &then);
@@ -251,7 +250,7 @@ epsmesh_touch epsmesh_touch_after(const epsmesh_model *m, const epsmesh_query *q
     if (!(isfinite(step) && step >= 0)) return forgotten(memory, EPSMESH_INPUT);
     if (!isfinite(q->depth)) return forgotten(memory, EPSMESH_INPUT);
     if (memory->phase == EPSMESH_RESTED) memory->query = *q;
-    else if (memory->phase == EPSMESH_UNKNOWN || !is_same(m, q, &memory->query)) return forgotten(memory, EPSMESH_PAST);
+    else if (memory->phase == EPSMESH_UNKNOWN || !is_same(m, q, &memory->query)) return forgotten(memory, EPSMESH_HISTORY);
     asked = memory->query, asked.depth = q->depth;
     memcpy(asked.axis, q->axis, sizeof asked.axis);
     if (memory->phase == EPSMESH_RESTED && q->depth <= TOUCHING) return epsmesh_touch_at(m, &asked);

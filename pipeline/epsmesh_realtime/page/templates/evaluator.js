@@ -64,7 +64,7 @@ class Model {
     // Without a direction C takes the face's x; a direction without length is none.
     const edge = along === undefined ? [0, 0, 0] : along.some(Boolean) ? along : [NaN, NaN, NaN];
     const status = this.c.page_ask(kind, radius, angle, length, width, ...at, ...edge, depth, young, poisson);
-    const [fx, fy, fz, error, stiffness, size] = this.numbers(this.c.page_touch(), 6);
-    return { status: this.word(status), force: [fx, fy, fz], error, stiffness, radius: size };
+    const [fx, fy, fz, forceError, stiffness, size] = this.numbers(this.c.page_touch(), 6);
+    return { status: this.word(status), force: [fx, fy, fz], forceError, stiffness, radius: size };
   }
 }

@@ -217,12 +217,12 @@ class Page {
     }
   }
   // Draw the force, from the tool's tip.
-  point({ depth }, { force, error }) {
+  point({ depth }, { force, forceError }) {
     const { spot, at } = this.foothold;
     const local = vector(this.model.axes.map((axis) => inner(axis, force)));
     this.largest = Math.max(this.largest, local.length());
     const length = (ARROW * this.size * local.length()) / this.largest;
-    this.stage.fill(this.arrow, arrow(length, error, THICK * this.size));
+    this.stage.fill(this.arrow, arrow(length, forceError / local.length(), THICK * this.size));
     this.arrow.position.copy(vector(at)).addScaledVector(vector(spot.turn[2]), -MM * depth);
     this.arrow.quaternion.setFromUnitVectors(vector([0, 0, 1]), local.normalize());
   }
@@ -250,23 +250,24 @@ class Page {
     document.body.dataset.status = touch.status;
     const local = this.model.axes.map((axis) => inner(axis, touch.force));
     const normal = inner(this.foothold.spot.turn[2], local);
+    const share = touch.forceError / normal;
     const aside = Math.sqrt(Math.max(inner(local, local) - normal ** 2, 0));
     const bar = document.querySelector("#gauge .bar");
     const whisker = document.querySelector("#gauge .whisker");
     const full = this.largest * 1.1 || 1;
     bar.style.width = isIn ? `${(100 * normal) / full}%` : "0";
-    document.querySelector("#doubt .bar").style.width = isIn ? `${Math.min(100, (100 * touch.error) / DOUBT)}%` : "0";
+    document.querySelector("#doubt .bar").style.width = isIn ? `${Math.min(100, (100 * share) / DOUBT)}%` : "0";
     whisker.hidden = !isIn;
     if (isIn) {
-      whisker.style.left = `${(100 * normal * (1 - touch.error)) / full}%`;
-      whisker.style.width = `${(200 * normal * touch.error) / full}%`;
+      whisker.style.left = `${(100 * normal * (1 - share)) / full}%`;
+      whisker.style.width = `${(200 * normal * share) / full}%`;
     }
     const known = touch.status === "ok" || touch.status === "no contact";
     // One unit for what is compared.
     const [factor, unit] = Math.abs(normal) < 1 ? [1e3, "mN"] : [1, "N"];
-    say("reading", isIn ? `F = ${short(factor * normal)} ${unit} ± ${short(100 * touch.error, 2)} %` : "");
+    say("reading", isIn ? `F = ${short(factor * normal)} ${unit} ± ${short(100 * share, 2)} %` : "");
     say("force", known ? `${short(factor * normal)} ${unit}` : "–");
-    say("error", isIn ? `± ${short(100 * touch.error, 2)} %` : "");
+    say("error", isIn ? `± ${short(100 * share, 2)} %` : "");
     say("aside", known ? `${short(factor * aside, 2)} ${unit}` : "–");
     say("stiffness", known ? `${short(touch.stiffness)} N/m` : "–");
     say("contact", known ? `${short(MM * touch.radius)} mm` : "–");
