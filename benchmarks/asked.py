@@ -22,7 +22,7 @@ from epsmesh.run.execute import compute
 from epsmesh.run.record import Record
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
-from epsmesh.verify.sections import Section
+from tests.verification.sections import Section
 
 ASKED = (2e-2, 1e-2, 5e-3, 3e-3, 1e-3)
 SEED, COUNT = 5101, 5

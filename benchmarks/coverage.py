@@ -24,7 +24,7 @@ from epsmesh.run.execute import compute
 from epsmesh.run.record import Record
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
-from epsmesh.verify.sections import Section
+from tests.verification.sections import Section
 
 SEED, COUNT = 2026, 160
 # A mesh is naive if its elements at the probe's edge are larger than this, in units of the half width of contact.

@@ -17,8 +17,8 @@ from scipy.optimize import brentq
 
 from epsmesh.arrays import FloatArray
 from epsmesh.shapes.rounded import Rounded
-from epsmesh.verify.sections import Section
-from epsmesh.verify.star import directions, star_file
+from tests.verification.sections import Section
+from tests.verification.star import directions, star_file
 
 Range = tuple[float, float]
 Thrown = tuple[Section, Section]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any, Literal
 
-from epsmesh.verify.sections import Section, blade, box, cylinder, disc, mesh, mm, study
+from tests.verification.sections import Section, blade, box, cylinder, disc, mesh, mm, study
 
 Against = Literal["truth", "base"]
 Expect = Literal["right", "refused", "either"]

@@ -33,7 +33,7 @@ from epsmesh.solve.meridian.problem import MeridianProblem
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.study.read import parse
-from epsmesh.verify import known
+from tests.verification import known
 
 NAME = "work_precision"
 POISSON = (0.3, 0.49)

@@ -1,7 +1,7 @@
 """The pressure on a needle that cuts, over the toughness: ``python docs/draw_needles.py``, ten minutes.
 
 Cracks are solved as a run solves them, on the finer mesh, those of flat punches at a few places. They are drawn with
-closed forms of ``pipeline/epsmesh/verify/known.py`` into ``docs/figures/needle_pressure.png``.
+closed forms of ``tests/verification/known.py`` into ``docs/figures/needle_pressure.png``.
 """
 
 from collections.abc import Iterator
@@ -21,8 +21,8 @@ from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.plane.crack import LEVELS, open_crack
 from epsmesh.solve.plane.opening import Opening
 from epsmesh.solve.plane.ring import ring_cuts
-from epsmesh.verify.known import thin_needle, tough_needle
-from epsmesh.verify.needles import shaft_pressure
+from tests.verification.known import thin_needle, tough_needle
+from tests.verification.needles import shaft_pressure
 
 PICTURE = Path(__file__).parent / "figures" / "needle_pressure.png"
 DPI = 130

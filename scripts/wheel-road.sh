@@ -101,7 +101,7 @@ cd "$work/source"
     tests/solve/test_without_hypre.py -k "locking or inclusion" </dev/null # one mesh on both ranks
 if [[ ! $short ]]; then
     cd "$work/away"
-    "$epsmesh" verify --quick
+    "$epsmesh" verify
     say "verification"
 fi
 say "done: ${short:-all}"

@@ -23,7 +23,6 @@ import xarray as xr
 
 from epsmesh.extensions import Forecast, Kind, Sections
 from epsmesh.shapes.section import Section, Words
-from epsmesh.verify.row import Row
 
 
 class Note(Section):
@@ -49,10 +48,6 @@ def noted(study, end="."):
 
 def opened(path):
     return xr.Dataset({"note": len(path.read_text())})
-
-
-def rows(comm, *, quick=False):
-    yield Row("note", "by hand", 1.0, "a book", 1.0, 0.0)
 
 
 def draw(dataset, stem):
@@ -92,9 +87,6 @@ note = notes:opened
 
 [epsmesh.methods]
 noted = notes:noted
-
-[epsmesh.truths]
-notes = notes:rows
 """
 
 
@@ -157,12 +149,6 @@ def test_a_kind_of_dataset_has_its_page_and_is_not_replaced(epsmesh, tmp_path):
     (tmp_path / "wet.note").write_text("wet")
     assert package.open(tmp_path / "wet.note")["note"] == 3
     assert "is a note, not a study's dataset" in epsmesh("guide", path, "--accuracy", "5%").stderr
-
-
-@pytest.mark.usefixtures("_notes")
-def test_its_known_forces_are_compared():
-    (rows,) = (target.load() for name, target in extensions.found("truths").items() if name == "notes")
-    assert [row.is_right for row in rows(None)] == [True]
 
 
 @pytest.mark.usefixtures("_alone")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import sqrt
 
-from epsmesh.verify import known
+from tests.verification import known
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,6 @@ A distribution declares them, and epsmesh finds them wherever they are installed
 - ``epsmesh.packages``: under the name ``realtime``, the package that ``epsmesh.realtime`` is.
 - ``epsmesh.methods``: a method of what ``epsmesh.read`` returns, by its name: a function of the study, an
   :class:`epsmesh.api.RunnableStudy`.
-- ``epsmesh.truths``: known forces, by any name: a function of the communicator and of ``quick`` that yields rows for
-  `epsmesh verify`, each an :class:`epsmesh.verify.row.Row`.
 
 Names are read without an import of the target; it is imported when it is asked for. Of two entry points with one name
 the first on Python's path counts.

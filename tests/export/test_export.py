@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.study.read import parse
-from epsmesh.verify.compare import solve
 from epsmesh_realtime.export.checks import check_touches, margin, narrowest, random_touches, with_bar, with_full
 from epsmesh_realtime.export.compliance import coarse_mesh, compliances
 from epsmesh_realtime.export.curved import curved_model, upright
@@ -28,6 +27,7 @@ from tests.commands import epsmesh
 from tests.organs import sphere, write_stl
 from tests.realtime.synthetic import of_place, random_model
 from tests.studies import small_text
+from tests.verification.compare import solve
 
 DISC = {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "frictionless"}
 BALL = {"shape": "sphere", "radius": "6 mm", "depth": "0.1 mm", "contact": "unilateral"}

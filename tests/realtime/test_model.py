@@ -10,12 +10,12 @@ import xarray as xr
 from scipy.special import ellipe, ellipk
 
 import epsmesh
-from epsmesh.verify import known
 from epsmesh_realtime import Model, ModelError
 from epsmesh_realtime.file import pack, unpack
 from epsmesh_realtime.model import about, model_of
 from epsmesh_realtime.query import Query, packed_each
 from tests.realtime.synthetic import of_place, random_model, write_random, write_surface
+from tests.verification import known
 
 TOOLS = (
     ("disc", {"radius": 2e-3}),

@@ -105,11 +105,11 @@ def test_a_rounded_cone_is_that_of_a_full_solve(rounded):
 @pytest.fixture(scope="module")
 def rounded():
     """The middle of a cylinder as a model, and F of a full solve with its bar."""
-    from epsmesh.verify.compare import solve
     from epsmesh_realtime.export.compliance import Region, coarse_mesh, compliances
     from epsmesh_realtime.export.scope import scope_of
     from tests.export.test_export import BALL as UNILATERAL
     from tests.export.test_export import CYLINDER, SOFT, study
+    from tests.verification.compare import solve
 
     probe = UNILATERAL | {"shape": "cone", "angle": "60 deg", "tip": "1.5 mm", "radius": "5 mm", "depth": "1 mm"}
     force, bar, message = solve(MPI.COMM_SELF, "2D", {"body": CYLINDER, "material": SOFT, "probe": probe})

@@ -14,9 +14,9 @@ from epsmesh.report.dataset import build
 from epsmesh.run.execute import compute
 from epsmesh.run.measure import is_graded_to_contact
 from epsmesh.study.read import parse
-from epsmesh.verify import known
 from tests.cases import BLADE, raw
 from tests.sampling import sampled
+from tests.verification import known
 
 EXACT = {(contact, nu): value for (contact, nu), value in known.CYLINDER.items() if nu <= 0.49}
 

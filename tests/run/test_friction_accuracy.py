@@ -11,7 +11,7 @@ from epsmesh.run.execute import compute
 from epsmesh.solve.convergence import Convergence
 from epsmesh.solve.estimate import extrapolate_found
 from epsmesh.study.read import parse
-from epsmesh.verify import known
+from tests.verification import known
 
 
 def solved(friction, accuracy, law="linear", *, flat=False):

@@ -10,8 +10,8 @@ from epsmesh.plan.plan import make_plan
 from epsmesh.shapes.parabola import Parabola
 from epsmesh.shapes.rounded import Rounded, quarter_turn
 from epsmesh.study.problems import StudyError
-from epsmesh.verify import known
 from tests.cases import probe, study
+from tests.verification import known
 
 SPHERE = {"shape": "sphere", "radius": "3 mm", "depth": "0.1 mm", "contact": "unilateral"}
 CONE = {"shape": "cone", "angle": "80 deg", "radius": "3 mm", "depth": "0.1 mm", "contact": "unilateral"}

@@ -13,8 +13,8 @@ from epsmesh.solve.conditions import Conditions
 from epsmesh.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from epsmesh.solve.movement import Motion, Movement
 from epsmesh.solve.physics import MaterialLaw, Parameters
-from epsmesh.verify import known
 from tests.sampling import sampled
+from tests.verification import known
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -16,8 +16,8 @@ from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.problems import StudyError
-from epsmesh.verify import known
 from tests.cases import solve, study
+from tests.verification import known
 
 SMALL = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm"}
 LARGE = {"shape": "cylinder", "radius": "60 mm", "height": "60 mm"}

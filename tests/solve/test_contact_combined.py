@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from epsmesh.verify.known import half_space_ball
 from tests.cases import solve
+from tests.verification.known import half_space_ball
 
 BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}
 MESH = {"fine": "3 mm", "coarse": "6 mm", "rim": "0.4 mm", "growth": 0.6}

@@ -13,8 +13,8 @@ from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.problems import StudyError
-from epsmesh.verify import known
 from tests.cases import solve, study
+from tests.verification import known
 
 BODY = {"shape": "cylinder", "radius": "60 mm", "height": "60 mm"}
 SPHERE = {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"}

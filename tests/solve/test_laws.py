@@ -18,9 +18,9 @@ from epsmesh.solve.laws import LAWS
 from epsmesh.solve.laws.law import Shape
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.study.schema import Material
-from epsmesh.verify.laws import FURTHER, YOUNG, Cube, Stress
 from tests.cases import solve, study
 from tests.sampling import sampled
+from tests.verification.laws import FURTHER, YOUNG, Cube, Stress
 
 LARGE = tuple(FURTHER)
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}

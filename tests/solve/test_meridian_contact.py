@@ -22,8 +22,8 @@ from epsmesh.solve.meridian.punch import TRIAL_DEGREE, RoundTool
 from epsmesh.solve.meridian.signs import LiftsOff, check_signs
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.verify.known import half_space_contact
 from tests.cases import study
+from tests.verification.known import half_space_contact
 
 LAW = MaterialLaw.of(0.3 / 1.3 / 0.4, 0.5 / 1.3)  # E = 1, ν = 0.3
 

@@ -15,9 +15,9 @@ from epsmesh.solve.meridian.large_contact import DEGREE_OF_STEPS, LargeMeridianC
 from epsmesh.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from epsmesh.solve.meridian.punch import RoundTool
 from epsmesh.solve.movement import Movement
-from epsmesh.verify import known
 from tests.cases import solve
 from tests.solve.test_meridian_large_contact import BALL, BODY, law, round_tool
+from tests.verification import known
 
 FLAT = RoundTool(lambda radii: 0 * radii, 1.0)
 SHARP = round_tool(Rounded(1.5, 1e-4), 4.0)

@@ -17,9 +17,9 @@ from epsmesh.solve.meridian.system import meshes_of
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw, Parameters
-from epsmesh.verify.laws import FURTHER
 from tests.cases import study
 from tests.sampling import sampled
+from tests.verification.laws import FURTHER
 
 BODY, BONDED = Meridian(20 / 3, 20 / 3, 1.0), Conditions(bonded=True)
 

@@ -18,9 +18,9 @@ from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.solution import Solution
 from epsmesh.solve.spaces import Spaces
-from epsmesh.verify import known
 from tests.cases import study
 from tests.sampling import sampled
+from tests.verification import known
 
 DEPTH = 0.2e-3
 YOUNG = 10e3

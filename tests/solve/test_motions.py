@@ -18,9 +18,9 @@ from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.case import Scale
-from epsmesh.verify import known
 from tests.cases import BLADE, solve, study
 from tests.solve.test_mixed import law, make_mesh
+from tests.verification import known
 
 TRAVEL = (0.1e-3, 0.05e-3, -0.2e-3)
 OFF = {"probe": {"at": ["4 mm", "2 mm"]}}

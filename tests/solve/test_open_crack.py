@@ -8,8 +8,8 @@ import pytest
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.plane.crack import LEVELS, open_crack, section
 from epsmesh.solve.plane.opening import Opening
-from epsmesh.verify.known import thin_needle
-from epsmesh.verify.needles import shaft_pressure
+from tests.verification.known import thin_needle
+from tests.verification.needles import shaft_pressure
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,9 @@ from math import pi
 
 import pytest
 
-from epsmesh.verify import known
 from tests.cases import BLADE, force, solve
 from tests.sampling import sampled
+from tests.verification import known
 
 CAP = {"around": ["9 mm", "0 mm", "0 mm"], "radius": "3 mm"}
 BALL = {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"}

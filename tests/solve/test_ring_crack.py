@@ -13,7 +13,7 @@ from epsmesh.solve.plane.cut import Cut
 from epsmesh.solve.plane.hole import MESHES, open_hole
 from epsmesh.solve.plane.needle import NeedleSolver
 from epsmesh.solve.plane.ring import Ring, ring_cuts
-from epsmesh.verify import known
+from tests.verification import known
 
 INCOMPRESSIBLE = MaterialLaw.of_moduli(3.0, 0.5, "neo-hookean")
 COMPRESSIBLE = MaterialLaw.of_moduli(2.6, 0.3, "neo-hookean")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from epsmesh.shapes.rounded import Rounded
-from epsmesh.verify.known import LAYER, LAYER_ERROR
 from epsmesh_identify.layered.body import LayeredBody
 from epsmesh_identify.layered.compliance import Layer, Solid
 from epsmesh_identify.layered.contact import Profile, flat
+from tests.verification.known import LAYER, LAYER_ERROR
 
 E, NU, R = 1e4, 0.3, 8e-3
 PLANE = E / (1 - NU**2)

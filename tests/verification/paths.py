@@ -8,11 +8,10 @@ from epsmesh.plan.plan import make_plan
 from epsmesh.run.execute import compute
 from epsmesh.run.record import Record
 from epsmesh.study.read import parse
-from epsmesh.verify import known
-from epsmesh.verify.compare import force_row
-from epsmesh.verify.far_fields import LEFT_OUT, OF_BODY, OFF_MIDDLE
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, box, cylinder, disc, mesh, mm, study
+from epsmesh.verify import Row, force_row
+from tests.verification import known
+from tests.verification.far_fields import LEFT_OUT, OF_BODY, OFF_MIDDLE
+from tests.verification.sections import Section, box, cylinder, disc, mesh, mm, study
 
 _YOUNG, _DEPTH, _UNIT = 10e3, 1e-5, 1e-3
 # The last place is NGSolve's, or its image.

@@ -7,14 +7,14 @@ import numpy as np
 from mpi4py import MPI
 
 from epsmesh.shapes.rounded import Rounded
-from epsmesh.verify import known
-from epsmesh.verify.compare import against, force_row, solved
-from epsmesh.verify.forces import FAR
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, cylinder, disc, layers, tissue
+from epsmesh.verify import Row, force_row, solved
 from epsmesh_identify.layered.body import LayeredBody
 from epsmesh_identify.layered.compliance import Layer, Solid
 from epsmesh_identify.layered.contact import Profile
+from tests.verification import known
+from tests.verification.compare import against
+from tests.verification.forces import FAR
+from tests.verification.sections import Section, cylinder, disc, layers, tissue
 
 _DEPTH = 1e-5
 # Relative effect of a side twelve thicknesses away on a disc on a layer on a rigid base, measured.

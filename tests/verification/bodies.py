@@ -11,11 +11,11 @@ import gmsh
 from mpi4py import MPI
 
 from epsmesh import compat
-from epsmesh.verify import known
-from epsmesh.verify.compare import against, against_meridian, solve
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, box, disc, mm, tissue
-from epsmesh.verify.star import directions, star_file
+from epsmesh.verify import Row
+from tests.verification import known
+from tests.verification.compare import against, against_meridian, solve
+from tests.verification.sections import Section, box, disc, mm, tissue
+from tests.verification.star import directions, star_file
 
 # Semi-axes (mm) of a round and a general ellipsoid; height below which they are fixed; number of points of a file.
 _ROUND, _AXES, _BELOW, _POINTS = (60.0, 60.0, 45.0), (60.0, 45.0, 30.0), -10.0, 7000

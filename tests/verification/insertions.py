@@ -12,7 +12,7 @@ from epsmesh.plan.plan import Plan, make_plan
 from epsmesh.run.execute import compute
 from epsmesh.run.record import Record
 from epsmesh.study.read import parse
-from epsmesh.verify.row import Row
+from epsmesh.verify import Row
 
 _STUDY: dict[str, dict[str, Any]] = {
     "body": {"shape": "box", "size": ["30 mm", "30 mm", "16 mm"], "fixed": "bottom"},

@@ -21,8 +21,8 @@ from epsmesh.solve.compiled import form, scalar_space, vector_space
 from epsmesh.solve.forms import ElasticForms, MixedForms
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.study.read import parse
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import cylinder, disc, study
+from epsmesh.verify import Row
+from tests.verification.sections import cylinder, disc, study
 
 _ROUND_OFF = 1e-10
 # Meshes of 2 and 4 cubes a side are coarse for a rate, so it may differ by 15 % from theory.

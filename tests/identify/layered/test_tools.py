@@ -5,11 +5,11 @@ from math import radians, tan
 import numpy as np
 import pytest
 
-from epsmesh.verify import known
 from epsmesh_identify.layered.body import LayeredBody
 from epsmesh_identify.layered.compliance import Layer
 from epsmesh_identify.layered.contact import Profile
 from tests.cases import probe
+from tests.verification import known
 
 YOUNG, NU = 10e3, 0.3
 PLANE = YOUNG / (1 - NU**2)

@@ -6,11 +6,7 @@ from epsmesh.plan.plan import make_plan
 from epsmesh.run.execute import compute
 from epsmesh.run.record import Record
 from epsmesh.study.read import parse
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section
-
-# The accuracy of each path. In 2D the error bar is usually far below it.
-ACCURACY = {"2D": "0.1 %", "3D": "0.3 %"}
+from epsmesh.verify import Row, Section, force_row, solved
 
 
 def record_of(comm: MPI.Comm, study: Section, without: tuple[str, ...] = ()) -> Record:
@@ -19,26 +15,10 @@ def record_of(comm: MPI.Comm, study: Section, without: tuple[str, ...] = ()) -> 
     return record
 
 
-def solved(comm: MPI.Comm, path: str, scene: Section, mesh: Section | None = None) -> Record:
-    """Return the record of a ``scene``, a study's sections without its mesh.
-
-    ``path`` is "2D" (on the meridian, if the scene is axisymmetric) or "3D". Without a ``mesh`` an accuracy chooses it.
-    Collective.
-    """
-    study = {**scene, "mesh": mesh or {"accuracy": ACCURACY[path]}, "solve": {"exact": False}}
-    return record_of(comm, study, ("axisymmetric",) if path == "3D" else ())
-
-
 def solve(comm: MPI.Comm, path: str, scene: Section, mesh: Section | None = None) -> tuple[float, float, str]:
     """Return force (N), relative error bar and message of a scene, as :func:`solved` does; collective."""
     record = solved(comm, path, scene, mesh)
     return record.force, record.force_error, record.message
-
-
-def force_row(name: str, path: str, known: tuple[float, str, float], record: Record) -> Row:
-    """Return the row of a force that is ``known``: force (N), source, relative error."""
-    reference, source, bar = known
-    return Row(name, path, reference, source, record.force, record.force_error, bar, record.message)
 
 
 def against(comm: MPI.Comm, name: str, path: str, known: tuple[float, str, float], scene: Section) -> Row:

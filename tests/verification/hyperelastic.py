@@ -5,10 +5,10 @@ from itertools import product
 
 from mpi4py import MPI
 
-from epsmesh.verify.compare import solve
-from epsmesh.verify.laws import FURTHER
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import cylinder, disc, mesh, mm, study
+from epsmesh.verify import Row
+from tests.verification.compare import solve
+from tests.verification.laws import FURTHER
+from tests.verification.sections import cylinder, disc, mesh, mm, study
 
 # F over F of linear elasticity by (ν, depth over radius), cylinder R = H = 20 a / 3, from axisymmetric elements. At
 # ν = 0.3: linear elements with constant volume change, down to 0.002 a at the edge; elements of a fifth of that size

@@ -15,7 +15,7 @@ from epsmesh.shapes.tissue import MOST_TERMS
 from epsmesh.solve.compiled import vector_space
 from epsmesh.solve.forms import ElasticForms, HyperelasticForms
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.verify.row import Row
+from epsmesh.verify import Row
 
 # Parameters besides Young's modulus and Poisson's ratio with which each law is verified.
 FURTHER: dict[str, dict[str, Any]] = {

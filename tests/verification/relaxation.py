@@ -14,9 +14,9 @@ from epsmesh.plan.plan import make_plan
 from epsmesh.report.dataset import build
 from epsmesh.run.execute import compute
 from epsmesh.study.read import parse
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, cylinder, disc, study
+from epsmesh.verify import Row
 from epsmesh.viscoelastic import moduli
+from tests.verification.sections import Section, cylinder, disc, study
 
 # Shares and times (s).
 _TERMS = ((0.4, 2.0), (0.2, 30.0))

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from math import inf
 from typing import Any
 
-Section = dict[str, Any]
+from epsmesh.verify import Section
 
 
 def mm(length: float) -> str:

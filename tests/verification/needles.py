@@ -9,8 +9,8 @@ from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.plane.crack import LEVELS, open_crack
 from epsmesh.solve.plane.opening import Opening
 from epsmesh.solve.plane.ring import ring_cuts
-from epsmesh.verify import known
-from epsmesh.verify.row import Row
+from epsmesh.verify import Row
+from tests.verification import known
 
 _INCOMPRESSIBLE = MaterialLaw.of_moduli(3.0, 0.5, "neo-hookean")
 # G/(μ R) up to which the crack is opened, and the number of the small opening that is compared.

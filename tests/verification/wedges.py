@@ -16,9 +16,9 @@ from epsmesh.scene.model import FREE, MIRROR
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.case import Case
 from epsmesh.study.read import parse
-from epsmesh.verify.layer_wedge import layer_wedge
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import box, mesh, mm, study
+from epsmesh.verify import Row
+from tests.verification.layer_wedge import layer_wedge
+from tests.verification.sections import box, mesh, mm, study
 
 _YOUNG, _ANGLE = 10e3, 80.0
 # Half the width of contact and the strip's length along the wedge (m); distance of the strip's sides from the contact,

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 
 from mpi4py import MPI
 
-from epsmesh.verify import known
-from epsmesh.verify.compare import solve
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import cylinder, disc, tissue
+from epsmesh.verify import Row
 from epsmesh_identify.layered.body import LayeredBody
 from epsmesh_identify.layered.compliance import Layer
+from tests.verification import known
+from tests.verification.compare import solve
+from tests.verification.sections import cylinder, disc, tissue
 
 _YOUNG, _DEPTH, _RADIUS = 10e3, 1e-5, 1e-3
 # Order of the terms left out of c, in a/h: fourth for frictionless contact, whose second is known; second for bonded

@@ -2,9 +2,9 @@
 
 import pytest
 
-from epsmesh.verify import known
 from epsmesh_identify.layered.body import LayeredBody
 from epsmesh_identify.layered.compliance import Layer, Solid
+from tests.verification import known
 
 
 def test_layers_on_half_spaces_meet_their_limits():

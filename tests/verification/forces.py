@@ -4,11 +4,11 @@ from collections.abc import Iterator
 
 from mpi4py import MPI
 
-from epsmesh.verify import known
-from epsmesh.verify.boundary import rectangle_stiffness
-from epsmesh.verify.compare import against, against_meridian
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, blade, cylinder, disc, ellipse, tissue
+from epsmesh.verify import Row
+from tests.verification import known
+from tests.verification.boundary import rectangle_stiffness
+from tests.verification.compare import against, against_meridian
+from tests.verification.sections import Section, blade, cylinder, disc, ellipse, tissue
 
 # A body so many times as large as the probe is a half-space, up to a few 1e-5 of F.
 FAR = 20_000

@@ -8,10 +8,10 @@ from mpi4py import MPI
 from epsmesh.run.record import Record
 from epsmesh.shapes.parabola import Parabola
 from epsmesh.shapes.rounded import Rounded
-from epsmesh.verify import known
-from epsmesh.verify.compare import ACCURACY, against_meridian, force_row, solve, solved
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, cylinder
+from epsmesh.verify import ACCURACY, Row, force_row, solved
+from tests.verification import known
+from tests.verification.compare import against_meridian, solve
+from tests.verification.sections import Section, cylinder
 
 _YOUNG, _POISSON = 10e3, 0.3
 # A body so many times as large as the contact radius is a half-space, up to a few 1e-5 of F.

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 
 from mpi4py import MPI
 
-from epsmesh.verify import known
-from epsmesh.verify.compare import solve
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, cylinder, tissue
+from epsmesh.verify import Row
+from tests.verification import known
+from tests.verification.compare import solve
+from tests.verification.sections import Section, cylinder, tissue
 
 _MESH = {"epsilon": "full", "fine": "20 mm", "coarse": "20 mm", "rim": "0.2 mm", "growth": 0.5, "degree": 2}
 _BALL = {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"}

@@ -16,10 +16,10 @@ from epsmesh.solve.loads import apply_loads
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.read import parse
-from epsmesh.verify.compare import record_of
-from epsmesh.verify.forces import FAR
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, box, cylinder, disc, mesh, mm, tissue
+from epsmesh.verify import Row
+from tests.verification.compare import record_of
+from tests.verification.forces import FAR
+from tests.verification.sections import Section, box, cylinder, disc, mesh, mm, tissue
 
 _YOUNG, _SIZE, _DENSITY, _GRAVITY, _STRESS = 10e3, (40e-3, 30e-3, 20e-3), 1060.0, 9.81, 100.0
 _HEAVY = {"density": f"{_DENSITY:g} kg/m^3"}

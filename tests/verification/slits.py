@@ -19,9 +19,9 @@ from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.read import parse
-from epsmesh.verify.compare import record_of
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, blade, box, mm, study
+from epsmesh.verify import Row
+from tests.verification.compare import record_of
+from tests.verification.sections import Section, blade, box, mm, study
 
 _QUARTER = ("x", "y")
 _YOUNG = 10e3

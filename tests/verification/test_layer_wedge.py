@@ -4,7 +4,7 @@ from math import log, pi
 
 import pytest
 
-from epsmesh.verify.layer_wedge import layer_wedge
+from tests.verification.layer_wedge import layer_wedge
 
 
 def test_a_very_thick_strip_is_a_half_plane():

@@ -5,9 +5,9 @@ from math import pi
 
 from mpi4py import MPI
 
-from epsmesh.verify.compare import against_meridian, solve
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, cylinder, disc, layers, tissue
+from epsmesh.verify import Row
+from tests.verification.compare import against_meridian, solve
+from tests.verification.sections import Section, cylinder, disc, layers, tissue
 
 # Thickness (mm), Young's modulus (kPa) and Poisson's ratio, from the top down.
 _Stack = Sequence[tuple[float, float, float]]

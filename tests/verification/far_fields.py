@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 from mpi4py import MPI
 
-from epsmesh.verify import known
-from epsmesh.verify.compare import force_row, record_of
-from epsmesh.verify.row import Row
-from epsmesh.verify.sections import Section, box, cylinder, disc, mesh, study
+from epsmesh.verify import Row, force_row
+from tests.verification import known
+from tests.verification.compare import record_of
+from tests.verification.sections import Section, box, cylinder, disc, mesh, study
 
 # Relative errors at ε = 8a, measured on converged meshes: of a point force as the far field; of the Green's function's
 # mesh; away from the middle, of the lateral force of a bonded disc, which the far field leaves out.

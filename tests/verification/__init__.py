@@ -1,0 +1,1 @@
+"""Verification of F: closed forms, published tables, manufactured solutions, and other ways through the program."""
