@@ -37,8 +37,8 @@ _BALL = {"shape": "sphere", "radius": "10 mm", "contact": "unilateral"}
 _DEPTHS = [f"{0.05 + 0.2 * n / 11:.6g} mm" for n in range(12)]
 # Ways to solve many depths: reductions left out, and whether all depths have one mesh.
 _WAYS: dict[str, tuple[tuple[str, ...], bool]] = {
-    "a mesh for each depth": (("reuse", "condensed"), False),
-    "one mesh, each depth by itself": (("reuse", "condensed"), True),
+    "a mesh for each depth": (("initial-guess", "condensed"), False),
+    "one mesh, each depth by itself": (("initial-guess", "condensed"), True),
     "initial guess from neighbouring depths": (("condensed",), True),
     "condensed": ((), True),
 }

@@ -74,10 +74,10 @@ class Campaign:
     cases: int
     dice: random.Random
     lost: float = 0.0  # processor seconds of programs whose notes were lost
-    struck: list[str] = field(default_factory=list)
+    killed: list[str] = field(default_factory=list)
     starts: int = 0
 
-    def strike(self, way: str) -> bool:
+    def kill(self, way: str) -> bool:
         """Kill a random running job; return whether there was one."""
         alive = [run for run in runs() if run.state == RUNNING and run.shard and run.done < run.total]
         if not alive:
@@ -92,8 +92,8 @@ class Campaign:
                 self.lost += used.user + used.system
                 full = ["--full"] if way == SCRIPT else []
                 self.cluster.call("scancel", "--signal=KILL", *full, run.job)
-            self.struck.append(f"{way} of shard {run.shard} ({run.done} of {run.total} done)")
-            print(f"killed: {self.struck[-1]}", flush=True)
+            self.killed.append(f"{way} of shard {run.shard} ({run.done} of {run.total} done)")
+            print(f"killed: {self.killed[-1]}", flush=True)
             return True
         return False
 
@@ -172,7 +172,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ]
         text = "\n".join([table, *lines, ""])
         print(text)
-        write("many_machines", asked.output, {"rows": rows, "struck": campaign.struck, **further, "wrong": same}, text)
+        write("many_machines", asked.output, {"rows": rows, "killed": campaign.killed, **further, "wrong": same}, text)
     return int(bool(same) or state != "COMPLETED" or told != asked.jobs)
 
 
@@ -205,7 +205,7 @@ def _campaign(campaign: Campaign, study: Path, jobs: int) -> str:
             if events[0][1] == "drain":
                 campaign.drain()
                 events.pop(0)
-            elif campaign.strike(events[0][1]):
+            elif campaign.kill(events[0][1]):
                 events.pop(0)
         if time.monotonic() - told > _TELL:
             told = time.monotonic()

@@ -41,7 +41,7 @@ def probe(**keys: Any) -> Probe:
 
 def solve(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> dict[tuple[int, ...], Record]:
     """Run the base study with changes and return the record of every case, each place's own, by index."""
-    plan = make_plan(study(**changes), without=("images", "moved"))
+    plan = make_plan(study(**changes), without=("mirrored", "translated"))
     records = compute(plan, comm)
     return {
         case.index: records[key].scaled(plan.scale_of(case))

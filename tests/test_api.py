@@ -98,7 +98,7 @@ def test_plan_says_what_a_run_would_do(tmp_path):
     assert (study.name, study.title, study.warnings) == ("small", "small", ())
     plan = study.plan()
     assert isinstance(plan, Plan)
-    assert {"scaling", "symmetry"} <= {struck.name for struck in plan.struck}
+    assert {"scaling", "symmetry"} <= {skipped.name for skipped in plan.skipped}
     assert len(study.plan(without=["scaling"]).solves) == 2 * 2 + 1
     assert study.summary(store=tmp_path / "none.sqlite")["solves"] == len(plan.solves) == 3
     assert not (tmp_path / "none.sqlite").exists()

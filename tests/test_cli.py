@@ -184,7 +184,7 @@ def test_run_killed_at_random_moments_yields_the_same_dataset(epsmesh, small, wh
 def test_plan_story_and_store(epsmesh, small, whole, tmp_path):
     planned = json.loads(epsmesh("plan", small, "--output", tmp_path, "--json").stdout)
     assert planned["cases"] == 12
-    assert {"full", "symmetry", "sharing"} <= {struck["name"] for struck in planned["struck"]}
+    assert {"full", "symmetry", "shared-mesh"} <= {skipped["name"] for skipped in planned["skipped"]}
     assert "Body, support and probe" in epsmesh("plan", small, "--output", tmp_path).stdout
     without = json.loads(epsmesh("plan", small, "--output", tmp_path, "--without", "all", "--json").stdout)
     assert without["solves"] > planned["solves"]

@@ -42,7 +42,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--first", type=int, default=0)
     options = parser.parse_args(arguments)
-    wrong, struck, longest, start = 0, Counter[str](), 0.0, time.monotonic()
+    wrong, stopped, longest, start = 0, Counter[str](), 0.0, time.monotonic()
     with TemporaryDirectory(prefix="epsmesh-faults-") as folder:
         whole = undisturbed(Path(folder))
         for number in range(options.first, options.moments):
@@ -50,13 +50,13 @@ def main(arguments: list[str]) -> int:
             left, after = one(Path(folder) / str(number), whole, moment, random.Random(f"{options.seed} {number}"))
             faults = (*left.faults, *after)
             wrong += bool(faults)
-            struck[f"{moment.phase}: {left.stage or 'over before'}"] += 1
+            stopped[f"{moment.phase}: {left.stage or 'over before'}"] += 1
             longest = max(longest, left.seconds if left.stage else 0.0)
             told = f"{number:4} {moment} -> {left.stage or '-'}, status {left.status}, quiet in {left.seconds:.1f} s"
             print(told, *faults, sep="\n     WRONG: ", flush=True)
     seconds, count = time.monotonic() - start, options.moments - options.first
-    print(f"{count} moments in {seconds:.0f} s, {wrong} with faults, quiet in {longest:.1f} s at most; struck")
-    print(*(f"  {name} {count}" for name, count in sorted(struck.items())), sep="\n")
+    print(f"{count} moments in {seconds:.0f} s, {wrong} with faults, quiet in {longest:.1f} s at most; stopped in")
+    print(*(f"  {name} {count}" for name, count in sorted(stopped.items())), sep="\n")
     return int(wrong > 0)
 
 
@@ -72,7 +72,7 @@ def undisturbed(folder: Path) -> Scene:
 def one(folder: Path, whole: Scene, moment: Moment, dice: random.Random) -> tuple[Left, list[str]]:
     """Disturb one run; return what it left, and the faults of the next run."""
     scene = Scene(folder, STUDY, whole.folder / "cache", _MISSING, dice)
-    left = scene.strike(moment)
+    left = scene.stop_at(moment)
     ranks = 1 if moment.ranks > 1 and dice.random() < 0.5 else moment.ranks
     status = scene.run_on(ranks)
     if status == 1 and moment.number == signal.SIGKILL and _BLAMED in (folder / "said").read_text():

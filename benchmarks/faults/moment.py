@@ -142,7 +142,7 @@ class Scene:
             _end(self._alive())
             return process.wait()
 
-    def strike(self, moment: Moment) -> Left:
+    def stop_at(self, moment: Moment) -> Left:
         """Begin a run, send the signal, and check what is left."""
         process, before = self.start(moment.ranks), dict[str, str]()
         stage = self._await(moment, process)

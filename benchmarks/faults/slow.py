@@ -179,7 +179,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--ended", action="store_true", help="run each command to its end after its last kill")
     options = parser.parse_args(arguments)
-    wrong, struck, total = 0, Counter[str](), 0
+    wrong, stopped, total = 0, Counter[str](), 0
     with TemporaryDirectory(prefix="epsmesh-slow-") as folder:
         (Path(folder) / "forms").mkdir()
         every, last = commands(), dict[Command, Slow]()
@@ -193,7 +193,7 @@ def main(arguments: list[str]) -> int:
             lost, done = scene.lost()
             wrong += lost > 0  # a case is told to be finished microseconds before it is kept
             total += lost
-            struck[f"{command.kind} on {command.ranks}: {who}"] += 1
+            stopped[f"{command.kind} on {command.ranks}: {who}"] += 1
             print(
                 f"{number:3} {command.kind} on {command.ranks}, {who} after {seconds:.1f} s: {done - before} finished, "
                 f"{lost} lost{' WRONG' if lost else ''}",
@@ -205,8 +205,8 @@ def main(arguments: list[str]) -> int:
             print(f"{command.kind} on {command.ranks} to its end: status {status}", flush=True)
             if command.name == "run" and status == 0:
                 assert set(read_file(scene.dataset)["status"].values.ravel()) <= {"ok", "skipped"}
-    print(f"{options.moments} moments, {wrong} with faults, {total} finished results lost; struck")
-    print(*(f"  {name} {count}" for name, count in sorted(struck.items())), sep="\n")
+    print(f"{options.moments} moments, {wrong} with faults, {total} finished results lost; stopped in")
+    print(*(f"  {name} {count}" for name, count in sorted(stopped.items())), sep="\n")
     return int(wrong > 0)
 
 

@@ -65,7 +65,7 @@ class RunnableStudy:
         return self.declared.warnings
 
     def plan(self, *, store: str | Path | None = None, without: Collection[str] = ()) -> Plan:
-        """Return what a run has to do, and what was struck out and why; nothing is computed.
+        """Return what a run has to do, and what was skipped and why; nothing is computed.
 
         What is on record in ``store``, if it exists, need not be done; ``without`` names reductions not to use.
 

@@ -96,7 +96,7 @@ def test_tissue_is_pierced_where_the_intact_body_has_the_energy_of_the_cut_one(p
     assert path.status == OK
     assert path.punctures[0].depth == pytest.approx(depth, rel=1e-4)
     plan, records = solved(scene())
-    assert all(struck.name != "duplicates" for struck in plan.struck)  # its stages are one state
+    assert all(skipped.name != "duplicates" for skipped in plan.skipped)  # its stages are one state
     told = of_paths(build(plan, records))
     assert (
         told.startswith(f"Puncture at {1e3 * path.punctures[0].depth:.4g}")

@@ -1,4 +1,4 @@
-"""Places that are each other's image on a body are solved once, and their forces are images of each other."""
+"""Of places that a symmetry of the body maps onto each other one is solved, and it maps the forces, too."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def solves(path, probe=None, **changes):
         (4, CORNERS, {"body": {"inclusion": [LUMP | {"at": ["0 mm", "3 mm", "-8 mm"]}]}}),
         (6, CORNERS, {"body": {"inclusion": [LUMP | {"at": ["2 mm", "3 mm", "-8 mm"]}]}}),
         (6, CORNERS, {"probe": {"motion": "all"}}),
-        (6, CORNERS, {"plan": {"without": ["images"]}}),
+        (6, CORNERS, {"plan": {"without": ["mirrored"]}}),
         (4, CORNERS, {"material": {"poisson": [0.3, 0.4]}}),
         (3, RING, {}),
         (1, RING, {"body": ROUND}),
@@ -56,7 +56,7 @@ COLUMN = {"outside": "free", "epsilon": "8 mm"}
         (5, {"outside": "coarse", "epsilon": "8 mm"}, {}),
         (5, {"outside": "green", "epsilon": "8 mm"}, {}),
         (5, COLUMN, {"body": {"inclusion": [LUMP | {"at": ["2 mm", "3 mm", "-8 mm"]}]}}),
-        (5, COLUMN, {"plan": {"without": ["moved"]}}),
+        (5, COLUMN, {"plan": {"without": ["translated"]}}),
     ],
 )
 def test_what_is_cut_out_of_flat_tissue_is_the_same_anywhere(expected, mesh, changes):
@@ -79,10 +79,10 @@ def test_forces_on_images_are_images():
     """Held to solutions of their own, on meshes that differ: within the error bars."""
     path = {"points": [["12 mm", "0 mm"], ["0 mm", "-12 mm"]]}
     changes = {"body": ROUND | {"fixed": "sides"}, "mesh": {"rim": "0.7 mm"}, "probe": {"path": path}}
-    plans = [make_plan(study(**changes), without=without) for without in ((), ("images",))]
+    plans = [make_plan(study(**changes), without=without) for without in ((), ("mirrored",))]
     once, each = (build(plan, compute(plan, MPI.COMM_SELF)) for plan in plans)
     assert [len(plan.solves) for plan in plans] == [1, 2]
-    assert once["origin"].values.tolist()[1] == "image"
+    assert once["origin"].values.tolist()[1] == "mirrored"
     np.testing.assert_allclose(once["force"], each["force"], atol=2 * float(each["force_error"].max()))
     vectors = once["force_vector"].values
     np.testing.assert_allclose(vectors[1], [vectors[0][1], -vectors[0][0], vectors[0][2]], atol=1e-15)

@@ -125,9 +125,9 @@ def test_forces_that_are_not_smooth_are_all_solved():
 def test_what_is_planned_and_what_may_follow():
     study = scene()
     plan = make_plan(study)
-    (struck,) = (one for one in plan.struck if one.name == "path")
-    assert len(plan.solves) + struck.count == 41
-    assert len(possible(plan, {}).solves) == struck.count
+    (skipped,) = (one for one in plan.skipped if one.name == "path")
+    assert len(plan.solves) + skipped.count == 41
+    assert len(possible(plan, {}).solves) == skipped.count
     assert len(make_plan(study, without=("path",)).solves) == len(make_plan(scene(error=None)).solves) == 41
     (unsolved, *_) = set(plan.keys) - {solve.key for solve in plan.solves}
     assert "interpolated" in story(plan, (plan.keys.index(unsolved),))["steps"][0]
@@ -144,7 +144,7 @@ def test_what_is_planned_and_what_may_follow():
 def test_results_that_need_each_solution_have_it_with_the_reason(changes, reason):
     plan = make_plan(scene(**changes))
     assert len({solve.key for solve in plan.solves if not solve.is_reference}) == 41
-    assert any(reason in one.reason for one in plan.struck if one.name == "path")
+    assert any(reason in one.reason for one in plan.skipped if one.name == "path")
 
 
 def test_the_error_is_for_a_path():

@@ -1,4 +1,4 @@
-"""The plan: every case gets its record, nothing is solved twice, timing strikes nothing."""
+"""The plan: every case gets its record, nothing is solved twice, timing skips nothing."""
 
 import pytest
 
@@ -17,7 +17,7 @@ def test_full_order_is_one_case_whatever_is_outside():
     assert sorted(index for solve in plan.solves for index in solve.serves) == [
         case.index for case in plan.study.cases()
     ]
-    assert {struck.name: struck.count for struck in plan.struck}["full"] == 2
+    assert {skipped.name: skipped.count for skipped in plan.skipped}["full"] == 2
 
 
 def test_epsilon_past_the_body_is_full_order():
@@ -50,7 +50,7 @@ def test_timing_strikes_nothing():
     plan = make_plan(timed, declare(timed).keys)
     assert len(plan.solves) == 8
     assert len(plan.meshes) == 8
-    assert not plan.struck
+    assert not plan.skipped
     assert not any(solve.mirrors for solve in plan.solves)
 
 
@@ -89,7 +89,7 @@ def test_one_mesh_for_many_depths_is_not_recommended_where_it_is_refused():
     mesh = {"accuracy": "5 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
     for changes, is_told in (({}, True), ({"mesh": mesh}, False)):
         plan = make_plan(study(probe=sphere, **changes))
-        assert any("depth_range" in struck.reason for struck in plan.struck) == is_told
+        assert any("depth_range" in skipped.reason for skipped in plan.skipped) == is_told
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,8 @@ STUDIES = {
     "duplicates": {"probe": [{"name": name, **raw()["probe"]} for name in ("here", "there")]},
     "scaling": {"material": {"young": ["1 kPa", "30 MPa"]}, "probe": BLADE | {"depth": ["0.1 mm", "0.2 mm"]}},
     "symmetry": {"probe": {"at": [["0 mm", "0 mm"], ["4 mm", "0 mm"]]}},
-    "sharing": {"material": {"poisson": [0.2, 0.4, 0.47]}, "probe": {"contact": ["bonded", "frictionless"]}},
-    "reuse": {"material": {"poisson": [0.2, 0.25, 0.3, 0.4]}, "solve": {"method": "iterative", "exact": False}},
+    "shared-mesh": {"material": {"poisson": [0.2, 0.4, 0.47]}, "probe": {"contact": ["bonded", "frictionless"]}},
+    "initial-guess": {"material": {"poisson": [0.2, 0.25, 0.3, 0.4]}, "solve": {"method": "iterative", "exact": False}},
 }
 
 
@@ -36,7 +36,7 @@ def test_reduced_basis_keeps_its_tolerance():
     ratios = [round(0.02 * i, 2) for i in range(0, 23)]
     changes = {"material": {"poisson": ratios}, "mesh": {"rim": "0.8 mm"}}
     (plan, reduced), (_, solved) = (run(("axisymmetric", *more), **changes) for more in ((), ("reduced",)))
-    assert {struck.name: struck.count for struck in plan.struck}["reduced"] == len(ratios)
+    assert {skipped.name: skipped.count for skipped in plan.skipped}["reduced"] == len(ratios)
     counts = dict(zip(*np.unique(reduced["origin"], return_counts=True), strict=True))
     assert counts["symmetric"] <= 7
     assert counts["reduced"] == len(ratios) - counts["symmetric"]
@@ -61,10 +61,10 @@ def test_reduced_basis_of_tissues_with_moduli_of_their_own():
 def test_force_with_and_without(name):
     more = ("axisymmetric",) if name != "axisymmetric" else ()
     reduced, whole = run(more, **STUDIES[name]), run((*more, name), **STUDIES[name])
-    struck = {s.name: s for s in reduced[0].struck}
-    assert struck[name].count > 0
-    assert struck[name].reason.endswith(".")
-    assert name not in {s.name for s in whole[0].struck}
+    skipped = {s.name: s for s in reduced[0].skipped}
+    assert skipped[name].count > 0
+    assert skipped[name].reason.endswith(".")
+    assert name not in {s.name for s in whole[0].skipped}
     for variable in ("force", "energy", "force_error"):
         tolerance = {"force": 1e-8, "energy": 1e-8, "force_error": 0.05}[variable]
         np.testing.assert_allclose(reduced[1][variable], whole[1][variable], rtol=tolerance)
@@ -74,7 +74,7 @@ def test_all_at_once():
     changes = STUDIES["full"] | {"material": {"young": ["1 kPa", "5 kPa"], "poisson": [0.3, 0.4]}}
     reduced, whole = run(("axisymmetric",), **changes), run(("all",), **changes)
     assert len(whole[0].solves) == len(whole[0].meshes) == whole[1]["force"].size
-    assert not whole[0].struck
+    assert not whole[0].skipped
     assert len(reduced[0].solves) * 3 < len(whole[0].solves)
     np.testing.assert_allclose(reduced[1]["force"], whole[1]["force"], rtol=1e-8)
 
@@ -111,7 +111,7 @@ def test_studies_of_the_mesh_and_scenes_that_are_not_round_stay_in_three_dimensi
 def test_names_are_checked():
     with pytest.raises(ValueError, match="unknown reduction symetry"):
         make_plan(study(), without=("symetry",))
-    assert {"full", "scaling", "axisymmetric", "symmetry", "sharing"} <= set(REDUCTIONS)
+    assert {"full", "scaling", "axisymmetric", "symmetry", "shared-mesh"} <= set(REDUCTIONS)
 
 
 def test_study_file_leaves_reductions_out():
@@ -145,7 +145,7 @@ def test_summary_and_story():
     [
         ((), "nothing: F is proportional", "same mesh"),
         (("scaling",), "one solve, on the same mesh", "same mesh"),
-        (("sharing",), "nothing: F is proportional", "mesh, assembly and solve"),
+        (("shared-mesh",), "nothing: F is proportional", "mesh, assembly and solve"),
         (("all",), "mesh, assembly and solve", "mesh, assembly and solve"),
     ],
 )

@@ -18,7 +18,7 @@ STOP = {"plan": {"without": ["axisymmetric"], "stop_near_exact": "1 %"}}
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 50])
-@pytest.mark.parametrize("changes", [{}, {"plan": {"without": ["sharing"]}}, {"plan": {"without": ["all"]}}, STOP])
+@pytest.mark.parametrize("changes", [{}, {"plan": {"without": ["shared-mesh"]}}, {"plan": {"without": ["all"]}}, STOP])
 def test_every_solve_is_dealt_once_and_meshes_stay_whole(count, changes):
     plan = make_plan(study(**SWEEP | changes))
     parts = deal(plan, count)

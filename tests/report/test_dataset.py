@@ -61,11 +61,11 @@ def test_swept_accuracy_and_reached_accuracy_are_told_apart():
     assert np.isfinite(data["force_exact_ratio"]).all()
 
 
-def test_what_was_struck_out_and_why_is_kept():
+def test_what_was_skipped_and_why_is_kept():
     data = dataset(material={"young": ["1 kPa", "2 kPa", "4 kPa"]})
-    struck = {item["name"]: item for item in json.loads(data.attrs["reductions"])}
-    assert struck["scaling"]["count"] == 2
-    assert "proportional" in struck["scaling"]["reason"]
+    skipped = {item["name"]: item for item in json.loads(data.attrs["reductions"])}
+    assert skipped["scaling"]["count"] == 2
+    assert "proportional" in skipped["scaling"]["reason"]
     assert data.attrs["study_file"] == "study"
 
 

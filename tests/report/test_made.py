@@ -57,7 +57,7 @@ def test_another_record_study_or_reduction_makes_other_results():
             (plan, {}),
             (replace(plan, study=other), records),
             (replace(plan, study=replace(plan.study, warnings=("too thin",))), records),
-            (plan.struck_by("images", 1, "the same"), records),
+            (plan.skipping("mirrored", 1, "the same"), records),
         )
     }
     assert len(found) == 7

@@ -411,7 +411,7 @@ def _reductions(study: Study, dice: random.Random) -> Pair | None:
         return None
     first, at = swept
     name = dice.choice([*REDUCTIONS])
-    one_mesh = name not in ("axisymmetric", "symmetry", "images", "moved", "reduced", "sharing")
+    one_mesh = name not in ("axisymmetric", "symmetry", "mirrored", "translated", "reduced", "shared-mesh")
     return Pair(first, copied(first, plan={"without": [name]}), one_mesh, at=at, at_first=at, common=True)
 
 

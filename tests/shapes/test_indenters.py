@@ -165,7 +165,7 @@ def test_f_is_proportional_to_stress_alone(tool):
     plan = make_plan(found)
     assert len(set(plan.keys)) == (1 if tool == "disc" else 2) * len(ratios)
     assert not any(solve.reduced for solve in plan.solves)
-    reasons = {struck.name: struck.reason for struck in plan.struck}
+    reasons = {skipped.name: skipped.reason for skipped in plan.skipped}
     assert "mostly to the depth" in reasons["scaling"]
     assert "contact area changes" in reasons["reduced"]
     shallow, deep = (found.case((0, 0, depth)) for depth in (0, 1))

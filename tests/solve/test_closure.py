@@ -64,7 +64,7 @@ def test_young_and_depth_scale_and_each_poisson_is_solved():
     ratios = [0.02 * n for n in range(12)]
     plan = make_plan(study(material={"young": ["1 kPa", "2 kPa"], "poisson": ratios}, mesh=MESH))
     assert len(plan.solves) == len(ratios) and not any(solve.reduced for solve in plan.solves)
-    assert any("far field changes" in struck.reason for struck in plan.struck)
+    assert any("far field changes" in skipped.reason for skipped in plan.skipped)
     both = make_plan(study(mesh={**MESH, "outside": ["halfspace", "fixed"]}))
     assert len(both.solves) == len(both.meshes) == 2
 
@@ -86,7 +86,7 @@ def test_half_balls_of_a_path_share_one_mesh():
         [shared[key].force for key in plan.keys[1:]], rel=1e-8
     )  # fmt: skip
     far_field._known.clear()
-    apart = make_plan(study(**changes), without=("sharing",))
+    apart = make_plan(study(**changes), without=("shared-mesh",))
     alone = compute(apart, MPI.COMM_SELF)
     assert not set(apart.keys) & set(plan.keys)  # another mesh of the far field is another force
     found = ((plan, shared), (apart, alone))

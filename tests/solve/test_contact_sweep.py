@@ -41,14 +41,14 @@ def run(depths, without=(), stored=(), **changes):
 @pytest.fixture(scope="module")
 def plainly():
     """Return the forces of depths solved separately."""
-    return run(DEPTHS, ("condensed", "reuse"))[1]
+    return run(DEPTHS, ("condensed", "initial-guess"))[1]
 
 
 @pytest.mark.parametrize("without", [(), ("condensed",)], ids=["condensed", "from neighbours"])
 def test_force_is_that_of_each_depth_by_itself(plainly, without):
     plan, found = run(DEPTHS, without)
-    counts = {struck.name: struck.count for struck in plan.struck}
-    assert counts["reuse"] == len(DEPTHS) - 1
+    counts = {skipped.name: skipped.count for skipped in plan.skipped}
+    assert counts["initial-guess"] == len(DEPTHS) - 1
     assert counts.get("condensed", 0) == (0 if without else len(DEPTHS))
     np.testing.assert_allclose(found["force"], plainly["force"], rtol=1e-8)
     for name in ("contact_area", "energy", "max_strain"):
@@ -72,7 +72,7 @@ def test_some_of_the_depths_have_the_forces_of_all(plainly):
     """As in a run that continues an interrupted one: other neighbours, too few depths to condense."""
     some = [8, 3, 5]
     plan, found = run([DEPTHS[number] for number in some])
-    assert "condensed" not in {struck.name for struck in plan.struck}
+    assert "condensed" not in {skipped.name for skipped in plan.skipped}
     by_depth = dict(zip(found["depth"].values, found["force"].values, strict=True))
     for number in some:
         depth = float(plainly["depth"][number])
@@ -81,7 +81,7 @@ def test_some_of_the_depths_have_the_forces_of_all(plainly):
 
 def test_mixed_elements_and_two_materials_start_from_their_own_neighbours():
     depths, changes = DEPTHS[:2], {"material": {"poisson": [0.45, 0.5]}, "mesh": {"element": "mixed", "rim": "0.6 mm"}}
-    (_, found), (_, alone) = (run(depths, without, **changes) for without in ((), ("reuse",)))
+    (_, found), (_, alone) = (run(depths, without, **changes) for without in ((), ("initial-guess",)))
     np.testing.assert_allclose(found["force"], alone["force"], rtol=1e-8)
 
 
@@ -91,7 +91,7 @@ def test_flat_tools_on_curved_bodies_share_their_mesh_as_it_is():
     disc = {"shape": "disc", "radius": "1.5 mm", "contact": "unilateral", "depth": DEPTHS[:2]}
     found, alone = (
         compute(make_plan(study(body=ball, probe=disc, mesh=MESH | {"rim": "0.6 mm"}), without=without), MPI.COMM_SELF)
-        for without in (("axisymmetric",), ("axisymmetric", "reuse"))
+        for without in (("axisymmetric",), ("axisymmetric", "initial-guess"))
     )
     for key, record in found.items():
         assert record.force == pytest.approx(alone[key].force, rel=1e-8)
@@ -101,13 +101,13 @@ def test_flat_tools_on_curved_bodies_share_their_mesh_as_it_is():
 def test_plan_tells_why_depths_are_solved_alone():
     plan = make_plan(study(body=SMALL, probe=sphere(DEPTHS, on_one_mesh=False), mesh=MESH))
     assert len(plan.meshes) == len(DEPTHS)
-    (reason,) = (struck.reason for struck in plan.struck if struck.name == "reuse")
+    (reason,) = (skipped.reason for skipped in plan.skipped if skipped.name == "initial-guess")
     assert "depth_range" in reason
     together = make_plan(study(body=SMALL, probe=sphere(DEPTHS), mesh=MESH))
     assert len(together.meshes) == 1
     assert "condensed to the contact surface for 10 depths" in " ".join(story(together, (3,))["steps"])
     timed = make_plan(study(body=SMALL, probe=sphere(DEPTHS), mesh=MESH, solve={"timing": True, "exact": False}))
-    assert not timed.struck
+    assert not timed.skipped
     assert len(timed.meshes) == len(DEPTHS)
 
 

@@ -171,7 +171,7 @@ def test_places_of_a_path_begin_from_the_others():
     mesh = {"epsilon": "5 mm", "fine": "5 mm", "rim": "1 mm", "growth": 2.0, "outside": "green"}
     changes = {"probe": {"radius": "2 mm", "path": {"points": points}}, "mesh": mesh, "solve": {"method": "iterative"}}
     found = []
-    for without in ((), ("reuse",)):
+    for without in ((), ("initial-guess",)):
         far_field._known.clear()
         plan = make_plan(study(**changes), without=without)
         records = compute(plan, MPI.COMM_SELF)

@@ -108,7 +108,7 @@ def test_a_path_stands_in_place_of_at():
 def test_where_the_tool_is_clear_of_the_body_there_is_no_force_and_over_the_edge_none_is_known():
     made = make_plan(along(OFF))
     assert len(made.solves) == 2  # those at -10 and 10 mm are images
-    assert any("does not touch" in struck.reason for struck in made.struck)
+    assert any("does not touch" in skipped.reason for skipped in made.skipped)
     found = dataset(probe={"path": OFF})
     assert found["status"].values.tolist() == ["ok", "ok", "ok", "skipped", "no contact"]
     assert np.isfinite(found["force"][:3]).all()

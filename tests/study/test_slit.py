@@ -83,7 +83,7 @@ def test_depths_are_not_scaled():
     """The reason for which moduli are scaled does not promise it of depths: F has a part that does not grow with it."""
     probe = {**SLIT, "depth": ["0.1 mm", "0.2 mm"]}
     plan = make_plan(parse(raw(probe=probe, material={"young": ["1 kPa", "2 kPa"]})))
-    (scaling,) = (struck for struck in plan.struck if struck.name == "scaling")
+    (scaling,) = (skipped for skipped in plan.skipped if skipped.name == "scaling")
     assert scaling.count > 0
     assert "mostly to the depth" in scaling.reason
 

@@ -205,8 +205,8 @@ def _show(study: "Study", found: dict[str, Any], forecasts: "list[Forecast]", *,
         return
     warn(study)
     print(f"{study.title}: {counted(found['cases'], 'case')}{axes_of(study)}")
-    for struck in found["struck"]:
-        print(f"  {struck['name']:13} {struck['count']:6}  {struck['reason']}")
+    for skipped in found["skipped"]:
+        print(f"  {skipped['name']:13} {skipped['count']:6}  {skipped['reason']}")
     if (unasked := found["exact_unasked"])["scenes"]:
         more = format_seconds(unasked["seconds"])
         print(f"  {'exact':13} {unasked['scenes']:6}  F_exact is not computed: `exact = true` would add {more}.")

@@ -164,7 +164,7 @@ def _progress(first: "Plan", plan: "Plan", *, is_told: bool, verbose: bool) -> "
 
 
 def _announce(plan: "Plan", opened: "Opened", *, quiet: bool, verbose: bool) -> None:
-    """Print, before the run, the work to do, and what is struck out and why."""
+    """Print, before the run, the work to do, and what is skipped and why."""
     for notice in opened.notices:
         error(notice)
     if quiet:
@@ -172,12 +172,10 @@ def _announce(plan: "Plan", opened: "Opened", *, quiet: bool, verbose: bool) -> 
     study = plan.study
     warn(study)
     print(f"{study.title}: {counted(len(plan.study), 'case')}{axes_of(study)}")
-    for struck in plan.struck:
-        print(f"  {struck.name:13} {struck.count:6}  {struck.reason}")
+    for skipped in plan.skipped:
+        print(f"  {skipped.name:13} {skipped.count:6}  {skipped.reason}")
     if study.solve.timing:
-        print(
-            f"  timing study: each case is computed alone {study.solve.repeats} times (median); nothing is struck out"
-        )
+        print(f"  timing study: each case is computed alone {study.solve.repeats} times (median); nothing is skipped")
     if plan.solves:
         print(f"  to do: {_to_do(plan)}", flush=True)
         for number, step in enumerate(plan.meshes if verbose else (), start=1):

@@ -1,1 +1,1 @@
-"""What a study needs done, after everything avoidable is struck out. Knows nothing of dolfinx or gmsh."""
+"""What a study needs done, after everything avoidable is skipped. Knows nothing of dolfinx or gmsh."""

@@ -1,4 +1,4 @@
-"""A plan in words and numbers: work to do, work struck out and why, time and memory."""
+"""A plan in words and numbers: work to do, work skipped and why, time and memory."""
 
 import heapq
 from collections.abc import Iterable
@@ -58,7 +58,7 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
         "solves": len(plan.solves),
         "exact": sum(solve.is_reference for solve in plan.solves),
         "exact_unasked": _unasked(plan),
-        "struck": [{"name": s.name, "count": s.count, "reason": s.reason} for s in plan.struck],
+        "skipped": [{"name": s.name, "count": s.count, "reason": s.reason} for s in plan.skipped],
         "notes": _notes(plan),
         "seconds": seconds,
         "memory": max((step["memory"] for step in steps), default=0.0),

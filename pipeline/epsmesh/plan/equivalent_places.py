@@ -1,7 +1,7 @@
-"""Equivalent places: images of each other on one body, by reflection in its planes or rotation about its axis.
+"""Equivalent places: a reflection of the body in its planes, or a rotation about its axis, maps one onto the other.
 
-The force at one place is the image of the force at the other. A column, or a half ball with the far field of a
-half-space, is the same anywhere on flat tissue away from the sides, although the whole body is not.
+It maps the forces, too. A column, or a half ball with the far field of a half-space, is the same anywhere on flat
+tissue away from the sides, although the whole body is not.
 """
 
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ _UNITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class EquivalentPlace:
     """The index of the case that is solved instead, and the matrix (3, 3), by rows, from its vectors to this case's.
 
-    ``of_scene``: the whole body is the other's image, not only the part that is meshed.
+    ``of_scene``: the whole body is mapped onto itself, not only the part that is meshed.
     """
 
     of: tuple[int, ...]
@@ -41,29 +41,29 @@ class EquivalentPlace:
     of_scene: bool = True
 
     def vector(self, values: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Return the image of a vector."""
+        """Return a vector of the other case for this one."""
         x, y, z = (sum(t * v for t, v in zip(row, values, strict=True) if abs(t) > _SAME) for row in self.rows)
         return x, y, z
 
     def bars(self, values: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Return the error bars of the image's components: for each, the sum over its contributions."""
+        """Return the error bars of this case's components: for each, the sum over its contributions."""
         x, y, z = (sum(abs(t) * v for t, v in zip(row, values, strict=True) if abs(t) > _SAME) for row in self.rows)
         return x, y, z
 
     @property
     def handedness(self) -> float:
-        """The sign of the image of a torque about an axis: −1 for a reflection."""
+        """The sign of a torque about an axis: −1 for a reflection."""
         (a, b, c), (d, e, f), (g, h, i) = self.rows
         return 1.0 if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0 else -1.0
 
 
-def image_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
-    """Return a key that all images share, and the matrix (3, 3) from the case to their common frame.
+def mirrored_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
+    """Return a key that all equivalent places share, and the matrix (3, 3) from the case to their common frame.
 
     ``scaled`` leaves out the inputs that F is proportional to. The result is None for bodies without symmetry, for
     ``motion = "all"``, and with loads, which distinguish the sides.
     """
-    if obstacle("images", case):
+    if obstacle("mirrored", case):
         return None
     found = max(_compared(case), key=lambda pair: pair[0], default=None)
     if found is None:
@@ -75,7 +75,7 @@ def image_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
     return digest("\n".join([case_key(elsewhere, scaled=scaled), str(case.is_full), str(place)])), matrix
 
 
-def moved_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
+def translated_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
     """Return a key that is the same for all places with the same part of the body, None if there are none.
 
     It exists for a column in horizontal layers, and for a half ball with a half-space's far field, away from the sides.
@@ -87,11 +87,11 @@ def moved_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
     if not is_level(body, frame) or body.gap(frame.point) <= (1 + _SAME) * case.column:
         return None
     elsewhere = replace(case, probe=case.probe.model_copy(update={"at": NOWHERE}))
-    return digest("\n".join([case_key(elsewhere, scaled=scaled), "moved"])), _UNITY
+    return digest("\n".join([case_key(elsewhere, scaled=scaled), "translated"])), _UNITY
 
 
 def _compared(case: Case) -> Iterator[tuple[tuple[float, ...], Matrix]]:
-    """Yield each image of a case's place, as numbers, with the matrix from the case to the image."""
+    """Yield each place that a case's is mapped onto, as numbers, with the matrix from the case to it."""
     probe, frame, extent = case.probe, case.frame, case.body.extent
     along = (0.0, 0.0, 0.0) if probe.is_round else frame.along
     turn, planes = _UNITY, body_planes(case.body)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from epsmesh.plan.key import mesh_key
 from epsmesh.plan.place_path import FEWEST, PlacePath
 from epsmesh.plan.steps import Solve
-from epsmesh.plan.work import Plan, Struck, reason_of
+from epsmesh.plan.work import Plan, Skipped, reason_of
 from epsmesh.study.capabilities.obstacles import obstacle
 
 
@@ -26,13 +26,13 @@ def interpolate_path(plan: Plan) -> Plan:
     reasons = {obstacle("path", solve.case) for found in ways.values() for solve in found} - {""}
     if reasons:
         reason = f"No interpolation along the path: {sorted(reasons)[0]}; each place is solved."
-        return replace(plan, struck=(*plan.struck, Struck("path", 0, reason)))
+        return replace(plan, skipped=(*plan.skipped, Skipped("path", 0, reason)))
     found = tuple(PlacePath(tuple(solves)) for solves in ways.values() if len(solves) > FEWEST)
     first = {solve.key for solve in together(found, [solve for path in found for solve in path.first])}
-    struck = {solve.key for path in found for solve in path.solves} - first
-    solves = tuple(solve for solve in plan.solves if solve.key not in struck)
+    skipped = {solve.key for path in found for solve in path.solves} - first
+    solves = tuple(solve for solve in plan.solves if solve.key not in skipped)
     plan = replace(plan, solves=solves, place_paths=found)
-    return plan.struck_by("path", len(struck), reason_of(interpolate_path))
+    return plan.skipping("path", len(skipped), reason_of(interpolate_path))
 
 
 def together(paths: Sequence[PlacePath], wanted: Sequence[Solve]) -> list[Solve]:

@@ -1,4 +1,4 @@
-"""The plan of a study: the steps that compute its cases, and what each reduction struck out, and why."""
+"""The plan of a study: the steps that compute its cases, and what each reduction skipped, and why."""
 
 from collections import Counter
 from collections.abc import Collection, Hashable
@@ -8,12 +8,12 @@ from operator import is_
 
 from epsmesh.plan.key import case_key, normalised, reference_key
 from epsmesh.plan.recipe import rungs_for
-from epsmesh.plan.reductions import REDUCTIONS, strike_stored
+from epsmesh.plan.reductions import REDUCTIONS, skip_stored
 from epsmesh.plan.shard import Shard, take
 from epsmesh.plan.steps import Solve
 from epsmesh.plan.symmetry import is_round, model_planes
 from epsmesh.plan.thin import refuse_thin
-from epsmesh.plan.work import NO_RECORD, EndPlans, Plan, Struck
+from epsmesh.plan.work import NO_RECORD, EndPlans, Plan, Skipped
 from epsmesh.study.capabilities.obstacles import obstacle
 from epsmesh.study.capabilities.refusals import STEPS_IN_SPACE
 from epsmesh.study.case import Case
@@ -26,7 +26,7 @@ from epsmesh.study.way import Motion
 __all__ = [
     "EXACT",
     "Plan",
-    "Struck",
+    "Skipped",
     "ask_for_exact",
     "declare",
     "first_attempts",
@@ -51,7 +51,7 @@ def declare(study: Study) -> Plan:
     found = [None if case.no_contact else _declared(case) for case in study.cases()]
     keys = tuple(solve.key if solve else NO_RECORD for solve in found)
     plan = Plan(study, tuple(solve for solve in found if solve), keys)
-    return plan.struck_by("no contact", keys.count(NO_RECORD), _OFF_BODY)
+    return plan.skipping("no contact", keys.count(NO_RECORD), _OFF_BODY)
 
 
 def _declared(case: Case) -> Solve:
@@ -67,7 +67,7 @@ def make_plan(
     """Return the plan of ``study`` after all reductions; ``stored`` are the keys of stored records.
 
     ``without`` names reductions not to use, besides those of the study; "all" is all of them. A timing study uses none:
-    each case is computed alone. ``shard`` selects a part before stored cases are struck out, so that all shards split
+    each case is computed alone. ``shard`` selects a part before stored cases are skipped, so that all shards split
     the study in the same way.
 
     Raises:
@@ -97,13 +97,13 @@ def make_plan(
 
 def _seeking(plan: Plan) -> Plan:
     """Return the plan of the first trials of depths at given forces. F_exact follows, at the depths that are found."""
-    return replace(plan, struck=(*plan.struck, Struck("depths", 0, _SEEKS)))
+    return replace(plan, skipped=(*plan.skipped, Skipped("depths", 0, _SEEKS)))
 
 
 def leave_out_stored(plan: Plan, stored: Collection[str], without: Collection[str] = ()) -> Plan:
     """Return ``plan`` without the solves whose records are ``stored``, unless ``without`` or the study keeps them."""
     kept = {"stored", "all"} & {*without, *plan.study.planning.without}
-    return plan if kept else strike_stored(plan, frozenset(stored))
+    return plan if kept else skip_stored(plan, frozenset(stored))
 
 
 def first_attempts(plan: Plan) -> Plan:
@@ -135,7 +135,7 @@ def ask_for_exact(plan: Plan) -> Plan:
     # Meshes of a scene share F_exact, and what keeps it from the scene.
     of_scenes: dict[Hashable, tuple[str, Solve | None]] = {}
     for index in study.indices():
-        source = image.of if (image := plan.equivalent.get(index)) and image.of_scene else index
+        source = place.of if (place := plan.equivalent.get(index)) and place.of_scene else index
         source = deeper.of if (deeper := plan.proportional.get(source)) else source
         scenes = study.scene(index), study.scene(source)
         if scenes not in of_scenes:
@@ -150,7 +150,7 @@ def ask_for_exact(plan: Plan) -> Plan:
         keys.append(solve.key if is_wanted else NO_RECORD)
         (found if is_wanted else unasked).setdefault(solve.key, solve)
     for reason, count in without.items():
-        plan = plan.struck_by("exact", count, f"F_exact is not computed: {reason}.")
+        plan = plan.skipping("exact", count, f"F_exact is not computed: {reason}.")
     plan = replace(plan, unasked=tuple(unasked.values()))
     if not any(keys):
         return plan

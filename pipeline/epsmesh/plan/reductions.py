@@ -1,17 +1,17 @@
-"""Reductions: functions from plan to plan that strike out work. Users read their docstrings as the reasons."""
+"""Reductions: functions from plan to plan that skip work. Users read their docstrings as the reasons."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from epsmesh.plan import estimate
-from epsmesh.plan.equivalent_places import EquivalentPlace, Matrix, from_place, image_key, moved_key
+from epsmesh.plan.equivalent_places import EquivalentPlace, Matrix, from_place, mirrored_key, translated_key
 from epsmesh.plan.far_fields import far_regions
 from epsmesh.plan.interpolation import interpolate_path
 from epsmesh.plan.key import case_key, digest
 from epsmesh.plan.proportional_depths import ProportionalDepth, depth_key, proportional_to_depth
 from epsmesh.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve
 from epsmesh.plan.symmetry import is_round, model_planes
-from epsmesh.plan.work import Plan, Struck, reason_of
+from epsmesh.plan.work import Plan, Skipped, reason_of
 from epsmesh.shapes.body import Body
 from epsmesh.study.capabilities.obstacles import obstacle
 from epsmesh.study.case import Case
@@ -25,18 +25,18 @@ _LONE_DEPTHS = (
 )
 
 
-def strike_past_body(plan: Plan) -> Plan:
+def skip_beyond_body(plan: Plan) -> Plan:
     """If ε extends beyond the body, the case is the full order, for every `outside`."""
     keys = [case_key(solve.case, folded=True) if solve.case.is_full else solve.key for solve in plan.solves]
-    return _merged(plan, keys, "full", reason_of(strike_past_body))
+    return _merged(plan, keys, "full", reason_of(skip_beyond_body))
 
 
-def strike_duplicates(plan: Plan) -> Plan:
+def skip_duplicates(plan: Plan) -> Plan:
     """Equal cases are solved once. Histories of the depth and relaxation need no solve of their own."""
-    return _merged(plan, [solve.key for solve in plan.solves], "duplicates", reason_of(strike_duplicates))
+    return _merged(plan, [solve.key for solve in plan.solves], "duplicates", reason_of(skip_duplicates))
 
 
-def strike_scaled(plan: Plan) -> Plan:
+def skip_scaled(plan: Plan) -> Plan:
     """F is proportional to Young's modulus and mostly to the depth: cases that differ only in these are solved once.
 
     It is proportional to the depth if the contact area is constant, displacements are small and there is no slit.
@@ -51,20 +51,20 @@ def strike_scaled(plan: Plan) -> Plan:
         if case.probe.depth != solve.case.probe.depth:
             deeper |= dict.fromkeys(solve.serves, proportional_to_depth(solve.case, case))
         keys.append(case_key(case, folded=True, scaled=True))
-    return _merged(replace(plan, proportional=deeper), keys, "scaling", reason_of(strike_scaled))
+    return _merged(replace(plan, proportional=deeper), keys, "scaling", reason_of(skip_scaled))
 
 
-def strike_images(plan: Plan) -> Plan:
-    """Places that are images of each other, by reflection or rotation of the body, are solved once."""
-    return _struck_places(plan, "images", strike_images, image_key, of_scene=True)
+def skip_mirrored(plan: Plan) -> Plan:
+    """Of places that a reflection or rotation of the body maps onto each other, one is solved."""
+    return _without_places(plan, "mirrored", skip_mirrored, mirrored_key, of_scene=True)
 
 
-def strike_moved(plan: Plan) -> Plan:
+def skip_translated(plan: Plan) -> Plan:
     """A column, or a half ball in a half-space, is the same anywhere on flat tissue: it is solved once."""
-    return _struck_places(plan, "moved", strike_moved, moved_key, of_scene=False)
+    return _without_places(plan, "translated", skip_translated, translated_key, of_scene=False)
 
 
-def _struck_places(
+def _without_places(
     plan: Plan,
     name: str,
     reduction: Callable[[Plan], Plan],
@@ -74,7 +74,7 @@ def _struck_places(
 ) -> Plan:
     """Solve only the first of all cases with the same ``key_of``, which also returns the matrix to a common frame.
 
-    ``of_scene``: the whole body is the other's image, too.
+    ``of_scene``: the whole body is mapped onto itself, too.
     """
     first: dict[str, tuple[Solve, Matrix]] = {}
     places: dict[tuple[int, ...], EquivalentPlace] = {}
@@ -104,7 +104,7 @@ def use_axisymmetry(plan: Plan) -> Plan:
         return plan
     solves = tuple(map(_on_meridian, plan.solves))
     count = sum(solve.axisymmetric for solve in solves)
-    return plan.with_solves(solves).struck_by("axisymmetric", count, reason_of(use_axisymmetry))
+    return plan.with_solves(solves).skipping("axisymmetric", count, reason_of(use_axisymmetry))
 
 
 def _on_meridian(solve: Solve) -> Solve:
@@ -118,7 +118,7 @@ def use_symmetry(plan: Plan) -> Plan:
     """Body, support and probe are symmetric: half or a quarter of the body is solved."""
     solves = tuple(_mirrored(solve) for solve in plan.solves)
     count = sum(bool(solve.mirrors) for solve in solves)
-    return replace(plan, solves=solves).struck_by("symmetry", count, reason_of(use_symmetry))
+    return replace(plan, solves=solves).skipping("symmetry", count, reason_of(use_symmetry))
 
 
 def share_meshes(plan: Plan) -> Plan:
@@ -128,7 +128,7 @@ def share_meshes(plan: Plan) -> Plan:
     """
     regions = far_regions([solve.case for solve in plan.solves])
     plan = replace(plan.with_solves([_with_far_region(solve, regions) for solve in plan.solves]), shared=True)
-    return plan.struck_by("sharing", len(plan.solves) - len(plan.meshes), reason_of(share_meshes))
+    return plan.skipping("shared-mesh", len(plan.solves) - len(plan.meshes), reason_of(share_meshes))
 
 
 def _with_far_region(solve: Solve, regions: Mapping[Body, FarRegion]) -> Solve:
@@ -140,7 +140,7 @@ def _with_far_region(solve: Solve, regions: Mapping[Body, FarRegion]) -> Solve:
     return replace(solve, key=key, case=replace(solve.case, far_region=region))
 
 
-def reuse_solutions(plan: Plan) -> Plan:
+def start_from_neighbours(plan: Plan) -> Plan:
     """Solves start from the solutions of neighbouring cases (ν, places, or depths) as the initial guess.
 
     Depths are neighbours if contact is found or displacements are large; else Poisson's ratios or places.
@@ -149,8 +149,8 @@ def reuse_solutions(plan: Plan) -> Plan:
     operators = [operator for step in plan.meshes for operator in step.operators if not step.axisymmetric]
     count = sum(len(operator.solves) - _fresh(operator) for operator in operators)
     if not count and _has_lone_depths(operators) and not any(solve.goal for solve in plan.solves):
-        return replace(plan, struck=(*plan.struck, Struck("reuse", 0, _LONE_DEPTHS)))
-    return plan.struck_by("reuse", count, reason_of(reuse_solutions))
+        return replace(plan, skipped=(*plan.skipped, Skipped("initial-guess", 0, _LONE_DEPTHS)))
+    return plan.skipping("initial-guess", count, reason_of(start_from_neighbours))
 
 
 def use_reduced_basis(plan: Plan) -> Plan:
@@ -168,14 +168,14 @@ def use_reduced_basis(plan: Plan) -> Plan:
     }
     if operators and not many:
         reason = f"No reduced basis: {obstacles[0]}; each case is solved."
-        return replace(plan, struck=(*plan.struck, Struck("reduced", 0, reason)))
+        return replace(plan, skipped=(*plan.skipped, Skipped("reduced", 0, reason)))
     plan = plan.with_solves(
         [
             replace(s, key=digest(f"{s.key} reduced {tolerance!r}"), reduced=True) if s.key in many else s
             for s in plan.solves
         ]
     )
-    return plan.struck_by("reduced", len(many), reason_of(use_reduced_basis))
+    return plan.skipping("reduced", len(many), reason_of(use_reduced_basis))
 
 
 def _sweeps_ratios(operator: OperatorStep) -> bool:
@@ -204,30 +204,30 @@ def condense_sweeps(plan: Plan) -> Plan:
     plan = replace(plan, condensed=True)
     steps = [step for step in plan.meshes if not step.axisymmetric and _is_small(step)]
     count = sum(len(operator.solves) for step in steps for operator in step.operators if operator.is_condensed)
-    return plan.struck_by("condensed", count, reason_of(condense_sweeps))
+    return plan.skipping("condensed", count, reason_of(condense_sweeps))
 
 
-def strike_stored(plan: Plan, stored: frozenset[str]) -> Plan:
+def skip_stored(plan: Plan, stored: frozenset[str]) -> Plan:
     """Stored cases are read, not computed again."""
     if plan.study.solve.timing:
         stored &= plan.all_keys - frozenset(plan.keys)
     found = frozenset(solve.key for solve in plan.solves) & stored
     kept = tuple(solve for solve in plan.solves if solve.key not in found) if found else plan.solves
     plan = replace(plan, solves=kept, stored=found)
-    return plan.struck_by("stored", len(found), reason_of(strike_stored))
+    return plan.skipping("stored", len(found), reason_of(skip_stored))
 
 
 # In the order of their application.
 REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
-    "duplicates": strike_duplicates,
-    "full": strike_past_body,
-    "scaling": strike_scaled,
-    "images": strike_images,
-    "moved": strike_moved,
+    "duplicates": skip_duplicates,
+    "full": skip_beyond_body,
+    "scaling": skip_scaled,
+    "mirrored": skip_mirrored,
+    "translated": skip_translated,
     "axisymmetric": use_axisymmetry,
     "symmetry": use_symmetry,
-    "sharing": share_meshes,
-    "reuse": reuse_solutions,
+    "shared-mesh": share_meshes,
+    "initial-guess": start_from_neighbours,
     "reduced": use_reduced_basis,
     "condensed": condense_sweeps,
     "path": interpolate_path,
@@ -243,7 +243,7 @@ def _merged(plan: Plan, keys: Sequence[str], name: str, reason: str) -> Plan:
     merged = tuple(_joined(key, solves) for key, solves in same.items())
     of_cases = tuple(changed.get(key, key) for key in plan.keys) if changed else plan.keys
     count = sum(_of_paths(plan, solves) - 1 for solves in same.values())
-    return replace(plan, solves=merged, keys=of_cases).struck_by(name, count, reason)
+    return replace(plan, solves=merged, keys=of_cases).skipping(name, count, reason)
 
 
 def _of_paths(plan: Plan, solves: Sequence[Solve]) -> int:

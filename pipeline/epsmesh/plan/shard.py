@@ -68,7 +68,7 @@ def take(plan: Plan, shard: Shard) -> Plan:
     part = deal(plan, shard.count)[shard.number - 1]
     solves = tuple(solve for solve in plan.solves if solve.key in part)
     reason = f"This is shard {shard}; other shards compute these."
-    return replace(plan, solves=solves, part=part).struck_by("shard", len(plan.solves) - len(solves), reason)
+    return replace(plan, solves=solves, part=part).skipping("shard", len(plan.solves) - len(solves), reason)
 
 
 def deal(plan: Plan, count: int) -> tuple[frozenset[str], ...]:

@@ -20,8 +20,8 @@ NO_RECORD = ""
 
 
 @dataclass(frozen=True)
-class Struck:
-    """Work that a reduction struck out: the number of solves, and the reason."""
+class Skipped:
+    """Work that a reduction skipped: the number of solves, and the reason."""
 
     name: str
     count: int
@@ -36,7 +36,7 @@ class Plan:
         solves: the cases to solve.
         keys: for each case in order, the key of its record; ``NO_RECORD`` if the tool does not touch the body.
         reference_keys: for each case, the key of its scene's F_exact.
-        struck: the work that each reduction struck out.
+        skipped: the work that each reduction skipped.
         used: the reductions that were applied, even if they found nothing.
         stored: the keys of stored records.
         shared: whether solves share meshes and assembly.
@@ -57,7 +57,7 @@ class Plan:
     solves: tuple[Solve, ...]
     keys: tuple[str, ...]
     reference_keys: tuple[str, ...] = ()
-    struck: tuple[Struck, ...] = ()
+    skipped: tuple[Skipped, ...] = ()
     used: frozenset[str] = frozenset()
     stored: frozenset[str] = frozenset()
     shared: bool = False
@@ -104,9 +104,9 @@ class Plan:
         key = {old.key: new.key for old, new in zip(self.solves, solves, strict=True)}
         return replace(self, solves=tuple(solves), keys=tuple(key.get(old, old) for old in self.keys))
 
-    def struck_by(self, name: str, count: int, reason: str) -> "Plan":
-        """Return the plan with a record of a reduction, if it struck out anything."""
-        return replace(self, struck=(*self.struck, Struck(name, count, reason))) if count else self
+    def skipping(self, name: str, count: int, reason: str) -> "Plan":
+        """Return the plan with a record of a reduction, if it skips anything."""
+        return replace(self, skipped=(*self.skipped, Skipped(name, count, reason))) if count else self
 
 
 @dataclass(frozen=True)

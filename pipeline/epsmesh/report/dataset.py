@@ -98,7 +98,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     study = plan.study
     cases = list(study.cases())
     flat = _records_of(plan, cases, plan.keys, records)
-    flat = [_imaged(record, plan.equivalent.get(case.index)) for record, case in zip(flat, cases, strict=True)]
+    flat = [_mirrored(record, plan.equivalent.get(case.index)) for record, case in zip(flat, cases, strict=True)]
     reference_keys = plan.reference_keys or [""] * len(cases)
     exact = _records_of(plan, cases, reference_keys, records, is_exact=True)
     variables, of_scene = {}, ["force_exact_message"]
@@ -301,17 +301,19 @@ def _linked(dataset: xr.Dataset) -> xr.Dataset:
     return dataset
 
 
-def _imaged(record: Record | None, image: EquivalentPlace | None) -> Record | None:
-    """Return the record of the image of a case's place for the case itself."""
-    if record is None or image is None or not record.is_ok:
+def _mirrored(record: Record | None, place: EquivalentPlace | None) -> Record | None:
+    """Return a case's record from that of an equivalent place."""
+    if record is None or place is None or not record.is_ok:
         return record
-    vector, bars = image.vector(record.force_vector), image.bars(record.force_vector_error)
+    vector, bars = place.vector(record.force_vector), place.bars(record.force_vector_error)
     course = dict(record.course)
     if course:
-        moved = [image.vector(one) for one in zip(*(course[name] for name in "xyz"), strict=True)]
-        course |= dict(zip("xyz", zip(*moved, strict=True), strict=True))
-    torque = image.handedness * record.torque
-    return replace(record, origin="image", force_vector=vector, force_vector_error=bars, torque=torque, course=course)
+        turned = [place.vector(one) for one in zip(*(course[name] for name in "xyz"), strict=True)]
+        course |= dict(zip("xyz", zip(*turned, strict=True), strict=True))
+    torque = place.handedness * record.torque
+    return replace(
+        record, origin="mirrored", force_vector=vector, force_vector_error=bars, torque=torque, course=course
+    )
 
 
 def _frame(case: Case) -> Frame | None:
@@ -365,7 +367,7 @@ def _attributes(plan: Plan, records: list[Record | None], run: Mapping[str, Any]
         "study_hash": digest(study.text),
         "study_file": Path(study.file).name,
         "study_folder": str(Path(study.file).absolute().parent),
-        "reductions": json.dumps([vars(struck) for struck in plan.struck], ensure_ascii=False),
+        "reductions": json.dumps([vars(skipped) for skipped in plan.skipped], ensure_ascii=False),
         "epsilon_is_full": int(all(isinf(epsilon) for epsilon in epsilons)),
         "timing": int(study.solve.timing),
         **({"warnings": "\n".join(study.warnings)} if study.warnings else {}),

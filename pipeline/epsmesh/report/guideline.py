@@ -142,7 +142,7 @@ def _timing(dataset: xr.Dataset) -> str:
     ranks = str(dataset.attrs.get("ranks", 1))  # "1, 2" where groups of ranks differed
     where = f"{counted(int(ranks), 'rank') if ranks.isdigit() else f'{ranks} ranks'}"
     where += f" of {dataset.attrs.get('host', 'an unnamed machine')}"
-    struck = json.loads(str(dataset.attrs.get("reductions", "[]")))
-    if any(one["name"] == "axisymmetric" for one in struck):
+    skipped = json.loads(str(dataset.attrs.get("reductions", "[]")))
+    if any(one["name"] == "axisymmetric" for one in skipped):
         where += ", round scenes on their meridian, with elements of its own"
     return f"{where}, {'every case afresh and alone' if dataset.attrs.get('timing') else 'no timing study'}"

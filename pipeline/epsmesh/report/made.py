@@ -36,7 +36,7 @@ def inputs_of(plan: Plan, records: Mapping[str, Record]) -> str:
         study.warnings,
         plan.keys,
         plan.reference_keys,
-        [struck for struck in plan.struck if struck.name != "stored"],
+        [skipped for skipped in plan.skipped if skipped.name != "stored"],
         *(record for _, record in sorted(records.items())),
     )
     for part in parts:

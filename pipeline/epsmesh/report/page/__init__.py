@@ -22,8 +22,8 @@ from epsmesh.report.page.facts import (
     of_paths,
     origins,
     provenance,
+    reductions,
     reproduce,
-    struck,
     summary,
     without_exact,
 )
@@ -84,7 +84,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         many_cases=counted(len(table.order), "case"),
         main=next((name for name in _MAIN if name in varying), answer_of(dataset)),
         first_rows=FIRST_ROWS,
-        struck=struck(dataset),
+        reductions=reductions(dataset),
         origins=origins(dataset),
         skipped=by_status(dataset, SKIPPED),
         study=study,

@@ -38,7 +38,7 @@ _ORIGINS = {
     "symmetric": "solved on a half or a quarter of the body",
     "axisymmetric": "solved on the meridian of a round scene",
     "scaled": "F of another case, in proportion to Young's modulus and depth",
-    "image": "F of another place, of which this one is the image",
+    "mirrored": "F of another place, onto which a symmetry of the body maps this one",
     "reduced": "from a reduced basis in Poisson's ratio, with a bound on the error",
     "interpolated": "interpolated between solved places of the path, with an error bar",
     "stored": "read back from the case store",
@@ -130,8 +130,8 @@ def without_exact(dataset: xr.Dataset) -> list[dict[str, Any]]:
     return _by_message(dataset, "", "force_exact_message")
 
 
-def struck(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return what the run's plan struck out: name, how many solves, reason."""
+def reductions(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return what the run's plan skipped: name, how many solves, reason."""
     return list(json.loads(dataset.attrs["reductions"]))
 
 

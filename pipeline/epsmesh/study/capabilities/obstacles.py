@@ -41,7 +41,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "terms": "F is not proportional to modulus and depth",
         "outputs": "outputs of a function need the solution of each case",
     },
-    "images": {
+    "mirrored": {
         "fibres": "the direction of the fibres differs in a mirror image",
         "six motions": "the 6 × 6 stiffness differs in a mirror image",
         "loads": "loads break the symmetry",
