@@ -10,7 +10,7 @@ import pytest
 from tests.commands import ENVIRONMENT, ROOT
 
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-RUN = """
+STUDIES = """
 import json, sys
 import epsmesh.shapes.terms
 epsmesh.shapes.terms.__path__.append(sys.argv[1])
@@ -32,6 +32,8 @@ def study(tool, **more):
     return {"body": box, "material": material, "probe": tools[tool], "mesh": mesh, "load": springs} | more
 
 
+"""
+RUN = """
 found = {"keys": [key.name for key in keys_of("load.spring")], "about": text_of("load.spring")}
 found["schema"] = list(study_schema()["$defs"]["Spring"]["properties"])
 for tool in tools:
@@ -49,20 +51,48 @@ for name, changes in {
         found[name] = str(error)
 print(json.dumps(found))
 """
+PLAN = """
+from epsmesh.plan.cost import kind_of
+from epsmesh.plan.estimate import case_memory
+from epsmesh.plan.key import case_key
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.compile import _forms
+from epsmesh.study.read import read_mapping
+
+springs, none = (make_plan(read_mapping(study("found", load=load), "planned")).solves[0] for load in (
+    {"spring": [{"on": "bottom", "stiffness": "1 kPa/mm"}]}, {}
+))
+print(json.dumps({
+    "key": case_key(springs.case),
+    "kinds": [kind_of(springs), kind_of(none)],
+    "memory": [case_memory(springs.case), case_memory(none.case)],
+    "forms": [_forms(springs).is_nonlinear, _forms(none).is_nonlinear],
+}))
+"""
+
+
+def spring(folder, changed=""):
+    """Write the page's term into a folder, with a line more."""
+    (text,) = re.findall(r'```python\n("""Springs.*?)```', PAGE, re.DOTALL)
+    (folder / "spring.py").write_text(text + changed, encoding="utf-8")
+
+
+def printed(script, folder):
+    """Return what a script prints in a process that finds the folder's term."""
+    command = [sys.executable, "-c", STUDIES + script, str(folder), str(folder)]
+    done = subprocess.run(
+        command, capture_output=True, text=True, env=ENVIRONMENT, cwd=folder, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
 
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     """Return what studies with the page's term give, in a process that finds its file."""
-    terms, output = tmp_path_factory.mktemp("terms"), tmp_path_factory.mktemp("results")
-    (text,) = re.findall(r'```python\n("""Springs.*?)```', PAGE, re.DOTALL)
-    (terms / "spring.py").write_text(text, encoding="utf-8")
-    command = [sys.executable, "-c", RUN, str(terms), str(output)]
-    done = subprocess.run(
-        command, capture_output=True, text=True, env=ENVIRONMENT, cwd=output, timeout=300, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    folder = tmp_path_factory.mktemp("terms")
+    spring(folder)
+    return printed(RUN, folder)
 
 
 def test_its_keys_are_those_of_its_class(found):
@@ -82,3 +112,13 @@ def test_pairs_that_it_and_all_terms_exclude_are_refused(found):
     assert "a slit with springs" in found["slit"]
     assert "springs that relax are not computed" in found["history"]
     assert "no such face" in found["face"]
+
+
+def test_a_term_is_planned_as_what_newtons_method_solves_and_its_file_is_part_of_the_key(tmp_path):
+    spring(tmp_path)
+    first = printed(PLAN, tmp_path)
+    assert first["kinds"] == ["linear 2 found", "displacement 2 found"]
+    assert first["forms"] == [True, False]
+    assert first["memory"][0] >= first["memory"][1]
+    spring(tmp_path, "\n\n# Stiffer now.\n")
+    assert printed(PLAN, tmp_path)["key"] != first["key"]

@@ -119,7 +119,8 @@ def test_the_limit_is_known_better_on_small_elements(element):
     near, narrow = extrapolated(s, bar, element, is_fine=True)
     assert narrow < 0.85 * left
     assert factor * (1 - left) < near * (1 - narrow) < near * (1 + narrow) < factor * (1 + left)
-    assert extrapolated(s, bar, element, is_fine=True, is_large=True) == extrapolated(s, bar, element, is_large=True)
+    plain = extrapolated(s, bar, element, is_nonlinear=True)
+    assert extrapolated(s, bar, element, is_fine=True, is_nonlinear=True) == plain
     stiffness, decrements, bars = (value * np.eye(2) for value in (1.0, s, bar))
     several = (
         extrapolate(stiffness, decrements, bars, Convergence(degree=2, element=element, is_fine=fine))
@@ -202,7 +203,7 @@ def test_limit_of_a_ball_at_large_displacements():
 
     def limit(share, at_edge, **options):
         decrement, bar = found_again_bar(share, at_edge, 0.15)
-        known = Convergence(degree=2, element="displacement", is_large=True, at_edge=at_edge, **options)
+        known = Convergence(degree=2, element="displacement", is_nonlinear=True, at_edge=at_edge, **options)
         values = (np.full((1, 1), value) for value in (1.0, decrement, bar))
         return [found.item() for found in extrapolate_found(*values, known)], bar
 

@@ -29,7 +29,8 @@ _SOLVE = {1: (0.04, 0.75), 2: (0.165, 0.75), 3: (0.4, 0.8)}
 _BAR = {1: (0.03, 0.8), 2: (0.105, 0.8), 3: (0.3, 0.85)}
 # Tetrahedra above which time grows in proportion to them. Measured from 20,000 to two million.
 _PROPORTIONAL = {"mesh": 27_000.0, "solve": 5_000.0, "bar": 5_000.0}
-# Large strains, all load steps and Newton iterations together; their error bar. Factor of mixed elements.
+# Large displacements or terms, all load steps and Newton iterations together; their error bar. Factor of mixed
+# elements.
 _LARGE, _MIXED_LARGE = {"solve": (9.7, 1.1), "bar": (0.48, 0.8)}, 2.5
 # A body with _FOLDED times the curvature of a ball of its volume counts as folded: its surface mesh intersects itself
 # at first. A liver has 1.8, a folded brain 7; the bodies of this factor's timing had 9 to 31.
@@ -60,7 +61,7 @@ _MISSED, _MISSED_BY_SEVERAL = 0.08, 0.19
 _LOCKING = -0.35
 # Time of each further movement of the probe, in units of the first.
 _MOVEMENT = 1.0
-# Typical factor of the prior's error, and at large displacements, where the number of load steps is unknown.
+# Typical factor of the prior's error, and with Newton's method, where the number of load steps is unknown.
 _PRIOR_ERROR, _PRIOR_ERROR_LARGE = 2.0, 4.0
 # Weight of the prior in observations: for the factor, and for both exponents.
 _WEIGHT = (0.5, 5.0, 5.0)
@@ -110,8 +111,8 @@ class CostModel:
     def error_for(self, solves: Iterable[Solve]) -> float:
         """Return the typical factor of the error for ``solves``; kinds without stored times have that of the prior."""
         unknown = self.unknown(solves)
-        large = any(solve.case.way.is_large for solve in unknown)
-        return max(self.error, *((_PRIOR_ERROR_LARGE if large else _PRIOR_ERROR,) if unknown else ()), 1.0)
+        is_nonlinear = any(solve.case.way.is_nonlinear for solve in unknown)
+        return max(self.error, *((_PRIOR_ERROR_LARGE if is_nonlinear else _PRIOR_ERROR,) if unknown else ()), 1.0)
 
     def seconds(self, stage: str, kind: str, cells: float, poisson: float) -> float:
         """Return the seconds on one rank of a stage."""
@@ -277,7 +278,7 @@ def _prior(stage: str, kind: str) -> _Numbers:
     if stage == "mesh":
         seconds, power = _MESH
         return log(seconds * _MESHED.get(words[-1] if words else "", 1.0)), power, 0.0
-    if element not in ("displacement", "mixed"):  # the name of a hyperelastic law
+    if element not in ("displacement", "mixed"):  # the names of laws: Newton's method
         seconds, power = _LARGE[stage]
         seconds *= _COURSE_LARGE if stage == "solve" and "steps" in words else 1.0
         is_mixed = element.endswith("-mixed")

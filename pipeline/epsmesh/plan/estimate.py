@@ -8,7 +8,7 @@ from epsmesh.study.way import PLAIN, Way
 
 # Mean volume of gmsh's tetrahedra, in units of the cube of the element size: measured, benchmarks/results/solvers.md.
 _TETRAHEDRON = 0.21
-# Peak bytes per dof, at small or large displacements, by element and degree: of a multigrid solve; of an error bar,
+# Peak bytes per dof, without and with Newton's method, by element and degree: of a multigrid solve; of an error bar,
 # which needs little accuracy; of a factorisation with 50,000 dofs. Measured: benchmarks/results/solvers.md.
 _BYTES_PER_DOF = {
     (False, "displacement"): {1: 3000, 2: 620, 3: 400, 4: 400},
@@ -157,13 +157,13 @@ def solving_memory(dofs: float, degree: int, way: Way = PLAIN, *, direct: bool) 
     if direct or way.is_factorised:
         # The fill of a 3D factorisation grows like dofs^(4/3); _OF_FACTOR is for 50,000 dofs.
         return _BASE + _OF_FACTOR[degree] * (dofs / 50_000) ** (1 / 3) * dofs
-    return _BASE + _BYTES_PER_DOF[way.is_large, way.element][degree] * dofs
+    return _BASE + _BYTES_PER_DOF[way.is_nonlinear, way.element][degree] * dofs
 
 
 def error_bar_memory(dofs: float, degree: int, way: Way = PLAIN) -> float:
     """Return the estimated bytes of an error bar: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
-    return _BASE + _OF_BAR[way.is_large, way.element][degree + 1] * growth * dofs
+    return _BASE + _OF_BAR[way.is_nonlinear, way.element][degree + 1] * growth * dofs
 
 
 def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, reduced: bool = False) -> float:

@@ -210,8 +210,10 @@ def _time_text(case: Case) -> str:
 
 @lru_cache(_MANY)
 def _load_text(load: Load, densities: tuple[float | None, ...]) -> str:
-    """Return loads in canonical form, with the densities if there is gravity."""
-    content = load.model_dump(exclude={name for name in TERMS if not getattr(load, name)})
+    """Return loads in canonical form, with the densities if there is gravity, and the files of terms that act."""
+    files = {name: digest(TERMS.source(name)) for name in TERMS if getattr(load, name)}
+    content = load.model_dump(exclude={name for name in TERMS if name not in files})
+    content |= {"files": files} if files else {}
     return _text({**content, "densities": densities if any(load.gravity) else ()})
 
 

@@ -82,13 +82,13 @@ def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
 def _ladder(case: Case) -> tuple[Recipe, ...]:
     """Return the recipes for a probe, cheapest first."""
     if not case.probe.is_flat:
-        if not case.way.is_large:
+        if not case.way.is_nonlinear:
             return ladders.BALL if has_sure_contact(case) else ladders.FOUND[case.way.element]
         ball = case.probe.hertz_radius if is_ball(case) and case.is_plain and not case.way.rubs else None
         return ladders.FOUND_LARGE if ball is None or case.probe.depth > _SHALLOW * ball else ladders.BALL_LARGE
     if not case.has_quarter_points:
         return ladders.DEEP
-    if case.way.is_large:
+    if case.way.is_nonlinear:
         return ladders.LARGE
     if case.way.is_found:
         return ladders.FLAT
@@ -116,7 +116,7 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
         shape *= _ELSEWHERE[case.way.element]
     if case.is_plain and not case.way.is_found:
         shape *= _near(case)
-    if case.way.is_large and case.has_quarter_points and not case.way.is_found:
+    if case.way.is_nonlinear and case.has_quarter_points and not case.way.is_found:
         shape *= _OF_LARGE * (1 + _BY_DEPTH * case.probe.depth / half_width_of(case))
     locking = 1.0 if case.way.is_mixed else ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
     if not case.probe.is_flat:  # elements in a thin body are small anyway
@@ -124,7 +124,7 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
     is_even = ladder is ladders.EVEN
     thin = min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
     shape *= locking * (1 + (_THICKNESS_EVEN if is_even else _THICKNESS) * thin)
-    of_degree = _MIXED_LARGE if case.way.is_large else _MIXED
+    of_degree = _MIXED_LARGE if case.way.is_nonlinear else _MIXED
     if case.way.element == "displacement":
         of_degree = dict.fromkeys(_MIXED, 1.0)
     if is_even and not has_sure_limit(case):
@@ -142,7 +142,7 @@ def has_sure_limit(case: Case) -> bool:
 
 def is_ball(case: Case) -> bool:
     """Return whether F has the limit of balls; at large displacements not in histories, nor close to a held side."""
-    if (radius := case.probe.hertz_radius) is None or not case.way.is_large:
+    if (radius := case.probe.hertz_radius) is None or not case.way.is_nonlinear:
         return radius is not None
     gaps = held_gaps(case.body, case.probe, case.mesh).values()
     return not case.way.in_time and all(gap >= _FROM_HELD * radius for gap in gaps)

@@ -36,6 +36,7 @@ class _Body:
     element: str
     laws: tuple[str, ...]
     of_regions: bool
+    is_nonlinear: bool
     of_contact: bool
     of_steps: bool
     of_slit: bool
@@ -109,7 +110,8 @@ def _forms(solve: Solve) -> _Forms:
             way.element,
             way.laws,
             of_regions=bool(body.regions) or case.is_linear_beyond,
-            of_contact=way.is_found and way.is_large,
+            is_nonlinear=way.is_nonlinear,
+            of_contact=way.is_found,
             of_steps=way.in_time,
             of_slit=way.motion is Motion.SLIT,
         )

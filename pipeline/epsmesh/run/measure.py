@@ -60,7 +60,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
             is_graded=is_graded_to_contact(case),
             is_fine=is_plain and has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
             has_others=not is_plain,
-            is_large=case.way.is_large,
+            is_nonlinear=case.way.is_nonlinear,
             is_ball=is_ball(case),
         )
         solution = solution.extrapolated(known)
@@ -173,10 +173,10 @@ def is_graded_to_contact(case: Case) -> bool:
         *beside, _ = first_touch(case.body, case.probe, case.frame)
         if hypot(*beside) > _BESIDE * half_width_of(case):
             return False
-        if is_ball(case) and not case.way.is_large and is_thin(case):
+        if is_ball(case) and not case.way.is_nonlinear and is_thin(case):
             return False
     sure = has_sure_contact(case) and case.mesh.degree == 2
-    return is_graded(rim, case.mesh.growth, found=found, large=case.way.is_large, sure=sure)
+    return is_graded(rim, case.mesh.growth, found=found, large=case.way.is_nonlinear, sure=sure)
 
 
 def _rim(case: Case) -> float:

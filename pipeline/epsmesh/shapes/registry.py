@@ -6,6 +6,7 @@ A shape is imported when its class is first used: a study loads only the shapes 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from importlib import import_module
+from inspect import getsource
 from pathlib import Path
 from typing import Any, Generic, TypeVar, get_args
 
@@ -52,6 +53,10 @@ class Terms(Shapes[BodyTerm]):
 
     def _kind_of(self, path: str, name: str) -> Any:
         return next(kind for kind in _classes(path) if issubclass(kind, BodyTerm))
+
+    def source(self, name: str) -> str:
+        """Return the text of a term's file."""
+        return getsource(import_module(self[name].__module__))
 
 
 def _kind(path: str, shape: str) -> Any:

@@ -9,8 +9,8 @@ class Convergence:
 
     ``degree`` and ``element``, "displacement" or "mixed", are those of F. Of the mesh, ``is_graded`` says that it is
     graded to the expected edge of contact, and ``is_fine`` that elements are small at the edge of a disc on a plain
-    body. ``has_others`` says that F has errors from other places than the probe's edge, ``is_large`` that displacements
-    are large, and ``is_ball`` that the tool is a ball in unilateral contact.
+    body. ``has_others`` says that F has errors from other places than the probe's edge, ``is_nonlinear`` that
+    Newton's method solves it, as at large displacements, and ``is_ball`` that the tool is a ball in unilateral contact.
 
     The solve adds the share ``plain`` of edges at the rim without quarter points. ``is_solved`` says
     that decrements at large displacements are not those of a linearisation, and ``is_ended`` that the tool's own edge
@@ -23,7 +23,7 @@ class Convergence:
     is_graded: bool = True
     is_fine: bool = False
     has_others: bool = False
-    is_large: bool = False
+    is_nonlinear: bool = False
     is_ball: bool = False
     plain: float = 0.0
     is_solved: bool = False

@@ -145,12 +145,12 @@ def extrapolate(
     wider where ``unseen`` (n), N of a mixed element in units of the diagonal stiffnesses, demands it.
     """
     theta, is_one = _theta(known.degree), len(stiffness) == 1
-    is_fine = known.is_fine and is_one and not known.is_large and not is_plain(known.plain)
+    is_fine = known.is_fine and is_one and not known.is_nonlinear and not is_plain(known.plain)
     is_fine = is_fine and (known.element, known.degree) in _LIMITS_FINE
     centre, spread = _LIMITS_FINE[known.element, known.degree] if is_fine else _limits(known, several=not is_one)
-    if known.is_large and known.is_solved and known.degree > 1:
+    if known.is_nonlinear and known.is_solved and known.degree > 1:
         centre, spread = _LIMITS_SOLVED
-    elif known.is_large:
+    elif known.is_nonlinear:
         most = centre + spread
         least = min(_LEAST_LARGE, centre - spread)
         centre, spread = (most + least) / 2, (most - least) / 2
@@ -224,7 +224,7 @@ def extrapolate_found(
     The middle of its known error is subtracted from F; where one degree more raises F, F and its bar stay. At large
     displacements the limit is known for balls only.
     """
-    if known.is_large:
+    if known.is_nonlinear:
         return _extrapolate_found_large(stiffness, decrements, bars, known)
     which = known.element, known.degree
     centre, spread = _FOUND_BALL[which] if known.is_ball and which in _FOUND_BALL else _FOUND_LIMITS[which]

@@ -241,12 +241,14 @@ def compile_forms(
     *,
     straight: bool = False,
     of_regions: bool = False,
+    is_nonlinear: bool = False,
     of_contact: bool = False,
     of_steps: bool = False,
 ) -> None:
     """Compile the forms for elements of ``degree``, for all lower degrees, and for the next one (error bar).
 
-    ``of_contact``: with those of contact at large displacements; ``of_steps``: with those of time steps.
+    ``is_nonlinear``: with those of Newton's method, ``of_contact`` at the next degree, too; ``of_steps``: with those of
+    time steps.
     """
     regions = np.zeros(1, dtype=np.int32) if of_regions else None
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
@@ -257,15 +259,11 @@ def compile_forms(
         if element == "mixed" and level > 1:  # the search for contact begins at the lowest degree
             mixed = MixedForms(elastic.displacement, scalar_space(mesh, level - 1))
             _ = mixed.mass, mixed.coupling, mixed.dilation, mixed.pull
-        if set(laws) != {"linear"} and level >= degree:
+        if is_nonlinear and level >= degree:
             pressure = (mixed.pressure, elastic.by_region((1.0,))) if mixed is not None else None
             large = HyperelasticForms(space, elastic, laws, pressure)
             _ = large.residuals, large.products
-            if of_contact:
-                _ = large.energy
-                for law in sorted(set(laws)):
-                    PointLaw(mesh, law, is_mixed=mixed is not None).compile()
-            if level == degree:
+            if of_contact or level == degree:
                 _ = large.energy
                 for law in sorted(set(laws)):
                     PointLaw(mesh, law, is_mixed=mixed is not None).compile()

@@ -118,8 +118,8 @@ class Way:
 
     @property
     def formulation(self) -> str:
-        """What is solved: the element, at large displacements the names of the laws, and -mixed if the element is."""
-        return "+".join(self.laws) + ("-mixed" if self.is_mixed else "") if self.is_large else self.element
+        """What is solved: the element; by Newton's method, the names of the laws, and -mixed if the element is."""
+        return "+".join(self.laws) + ("-mixed" if self.is_mixed else "") if self.is_nonlinear else self.element
 
     @property
     def on_meridian(self) -> "Way":
