@@ -66,17 +66,6 @@ def test_version_and_short_help(epsmesh):
     assert epsmesh("plan", "-h").stdout == epsmesh("plan", "--help").stdout
 
 
-@pytest.mark.parametrize(
-    "words",
-    ["validate", "merge", "plot x.nc", "store --prune", "version --json", "evaluator c", "benchmark", "explain"],
-)
-def test_a_command_of_another_name_is_told_by_its_new_one(epsmesh, words):
-    done = epsmesh(*words.split())
-    assert (done.exit_code, done.stderr.count("\n")) == (2, 1)
-    assert f"`epsmesh {words.split()[0]}` is now `" in done.stderr
-    assert "--json" not in words or json.loads(done.stdout)["errors"][0]["allowed"] == "epsmesh --version --verbose"
-
-
 def test_commands_are_few():
     assert len(COMMANDS) <= 13
 

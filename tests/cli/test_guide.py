@@ -24,6 +24,7 @@ def test_answer_from_a_dataset_and_from_its_study(results):
     assert done.exit_code == 0
     assert "ε = 4 mm, outside coarse is the smallest ε that suffices: F is within 2.5 % of F_exact" in done.stdout
     assert call("anywhere/known.toml", "--accuracy", "5%", "--output", results).stdout == done.stdout
+    assert call(results / "known.nc").stdout == done.stdout  # as the report answers
 
 
 def test_json_is_for_scripts(results):
@@ -52,7 +53,6 @@ def test_corrections_are_for_those_who_ask(results):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("known.nc",), "give --accuracy, such as 5%, or --budget, such as 10ms"),
         (("known.nc", "--budget", "10"), "--budget = '10': must be a time, such as \"10 ms\"; the unit is missing"),
         (("old.nc", "--accuracy", "5%"), "old.nc: the dataset holds no F_exact"),
     ],

@@ -12,7 +12,6 @@ from epsmesh.study.json_schema import schema_text
 from epsmesh.study.keys import all_sections, keys_of, shapes_of, text_of, words_of
 from epsmesh.study.named import SCHEMA, SHORT, examples
 from epsmesh.study.read import parse, read_study
-from epsmesh.study.renamed import RENAMED
 from epsmesh.study.starter import starter
 from tests.commands import epsmesh
 
@@ -110,69 +109,6 @@ def test_the_schema_for_editors_is_beside_every_study_and_up_to_date(elsewhere):
     new("deep/second.toml", "--like", "deep/first.toml")
     assert schema.read_text() == schema_text()
     assert (elsewhere / "deep" / "second.toml").read_text().count("#:schema") == 1
-
-
-OLD = """title = "solve.tolerance = 1" # tolerance = 2
-[body] # layers
-shape = "box"
-size = ["40 mm", "40 mm", "20 mm"]
-
-[[body.layers]]   # the skin
-name = "layers"
-thickness = "2 mm"
-young = "60 kPa"
-poisson = 0.45
-[[ body.layers ]]
-name = "fat"
-young = "3 kPa"
-poisson = 0.45
-[probe]
-shape = "disc"
-radius = "2 mm"
-depth = "0.2 mm"
-[mesh]
-accuracy = "5 %"
-[solve]
-  tolerance=1e-8 # tolerance of the solver
-[plan]
-stop_when = "1 %" # stop_when
-tolerance = 1e-5
-"""
-
-
-def test_an_old_study_is_converted_with_its_comments(elsewhere):
-    (elsewhere / "old.toml").write_text(OLD)
-    done = new("mine", "--from", "old.toml")
-    assert done.exit_code == 0, done.stderr
-    for before, after in RENAMED.items():
-        assert f"{before} is now {after}" in done.stdout
-    text = (elsewhere / "studies" / "mine.toml").read_text()
-    expected = OLD.replace("[[body.layers]]", "[[body.layer]]").replace("[[ body.layers ]]", "[[ body.layer ]]")
-    expected = expected.replace("  tolerance=", "  energy_tolerance=").replace(
-        "\ntolerance = 1e-5", "\nreduced_basis_error = 1e-5"
-    )
-    assert text == _SCHEMA + expected.replace("\nstop_when = ", "\nstop_near_exact = ")
-    study = read_study(elsewhere / "studies" / "mine.toml")
-    assert (study.solve.energy_tolerance, study.planning.reduced_basis_error) == (1e-8, 1e-5)
-
-
-@pytest.mark.parametrize("line", ["solve.tolerance = 1e-8", "solve = {method = 'direct', tolerance = 1e-8}"])
-def test_dotted_keys_and_tables_in_line_are_converted_too(elsewhere, line):
-    (elsewhere / "old.toml").write_text(line)
-    assert new("mine", "--from", "old.toml").exit_code == 0
-    text = (elsewhere / "studies" / "mine.toml").read_text()
-    assert text == _SCHEMA + line.replace("tolerance", "energy_tolerance")
-
-
-def test_what_is_not_converted_is_refused_by_its_key(elsewhere):
-    (elsewhere / "old.toml").write_text('[solve]\n"tolerance" = 1e-8\n')
-    done = new("mine", "--from", "old.toml")
-    assert (done.exit_code, "`solve.energy_tolerance`" in done.stderr) == (2, True)
-    assert not (elsewhere / "studies").exists()
-    assert new("mine", "--from", "none.toml").exit_code == 2
-    (elsewhere / "new.toml").write_text("[solve]\nexact = true\n")
-    assert "no key has a new name" in new("mine", "--from", "new.toml").stdout
-    assert "exclude each other" in new("other", "--from", "new.toml", "--all").stderr
 
 
 def test_like_takes_a_path_and_a_study_of_the_folder(elsewhere):

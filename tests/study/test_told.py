@@ -11,7 +11,6 @@ from epsmesh.study.meant import OTHER_SHAPES
 from epsmesh.study.named import examples
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse, read_text
-from epsmesh.study.renamed import RENAMED
 from epsmesh.study.schema import SECTIONS
 from tests.cases import BLADE, raw, study
 
@@ -163,16 +162,6 @@ def test_a_needle_as_thick_as_a_thumb_is_doubted():
     text = examples()["needle-epsilon"].read_text(encoding="utf-8").replace('radius = "0.5 mm"', 'radius = "20 mm"')
     text = re.sub(r'"(40|8) mm"', lambda size: f'"{20 * int(size[1])} mm"', text)
     assert any("probe.radius" in told and "Is 2 mm meant" in told for told in read_text(text, "needle.toml").warnings)
-
-
-@pytest.mark.parametrize(("section", "old", "value"), [
-    ("solve", "tolerance", 1e-8), ("plan", "tolerance", 1e-6), ("plan", "stop_when", "1 %"), ("body", "layers", []),
-])  # fmt: skip
-def test_an_old_name_is_answered_with_the_new_one(section, old, value):
-    new = RENAMED[f"{section}.{old}"]
-    with pytest.raises(StudyError, match=f"`{section}.{old}` is now `{new}`.*--from"):
-        parse(raw(**{section: {old: value}}))
-    parse(raw(**{section: {new.split(".")[1]: value}}))
 
 
 @pytest.mark.parametrize(

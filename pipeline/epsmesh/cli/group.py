@@ -28,17 +28,6 @@ from epsmesh.printable import printable
 
 # Errors of a disk that cannot be written to; some appear only at the end.
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
-# Former commands, and what replaced them.
-_NOW = {
-    "validate": "epsmesh plan --check FILE...",
-    "explain": "epsmesh plan FILE CASE",
-    "merge": "epsmesh status FILE --merge",
-    "plot": "epsmesh report DATASET --figures",
-    "store": "epsmesh status --store FILE",
-    "version": "epsmesh --version --verbose",
-    "evaluator": "epsmesh export --evaluator FOLDER",
-    "benchmark": "python -m benchmarks.work_precision, in a checkout",
-}
 
 
 class Added(MutableMapping[str, Any]):
@@ -108,12 +97,6 @@ class Commands(TyperGroup):
         except Exception as wrong:
             _print_error(wrong, self.words)
             raise
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the command that the first word names; exit with the new name for a former one."""
-        if (now := _NOW.get(args[0])) is not None:
-            fail(Fault(f"`epsmesh {args[0]}` is now `{now}`", key="COMMAND", value=args[0], allowed=now))
-        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; print as JSON any error that ends it, and raise it again."""

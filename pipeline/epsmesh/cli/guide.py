@@ -14,7 +14,12 @@ _HOWTO = "docs/why/guideline.md"
 
 def guide(
     file: Dataset,
-    accuracy: Annotated[str | None, typer.Option(help='Largest relative distance of F from F_exact: "5%".')] = None,
+    accuracy: Annotated[
+        str | None,
+        typer.Option(
+            help="Largest relative distance of F from F_exact [default without --budget: 5%].", show_default=False
+        ),
+    ] = None,
     budget: Annotated[str | None, typer.Option(help='Longest run time of a case: "10ms".')] = None,
     verbose: Annotated[
         bool, typer.Option("--verbose", "-v", help="Also corrections of F, all values of outside, and missing cases.")
@@ -26,12 +31,12 @@ def guide(
 
     Exit status 1 if no mesh setting of the study suffices.
 
-    Example: epsmesh guide studies/figure3.toml --accuracy 5%
+    Example: epsmesh guide studies/figure3.toml
+
+    Example: epsmesh guide studies/figure3.toml --accuracy 1%
 
     Example: epsmesh guide results/figure3.nc --budget 500ms --json
     """
-    if accuracy is None and budget is None:
-        fail(Fault("give --accuracy, such as 5%, or --budget, such as 10ms, or both", key="--accuracy", howto=_HOWTO))
     from epsmesh.report.guide import guide as make_guide
     from epsmesh.report.guide import quantity
     from epsmesh.report.table import DatasetError

@@ -1,4 +1,4 @@
-"""The command that begins a study file: from an example, another study, or one with old key names."""
+"""The command that begins a study file: from an example or another study."""
 
 import json
 import os
@@ -12,7 +12,7 @@ import typer
 
 from epsmesh.class_maps import CLASS_MAPS
 from epsmesh.cli.console import say
-from epsmesh.cli.faults import Fault, fail, of_file, of_option, of_study
+from epsmesh.cli.faults import Fault, fail, of_file, of_option
 from epsmesh.cli.words import Json
 from epsmesh.files import atomic, matching, write_new, write_whole
 from epsmesh.study.named import NAME, SCHEMA, SHORT, examples, is_name
@@ -39,10 +39,6 @@ def new(
             autocompletion=_names,
         ),
     ] = None,
-    old: Annotated[
-        Path | None,
-        typer.Option("--from", metavar="FILE", help="Convert a study file with old key names.", show_default=False),
-    ] = None,
     every_key: Annotated[bool, typer.Option("--all", help="Write every key with its explanation.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -54,21 +50,16 @@ def new(
     Example: epsmesh new mine
 
     Example: epsmesh new mine --like organ
-
-    Example: epsmesh new mine --from old.toml
     """
     path = Path(name) if name.endswith(".toml") else _FOLDER / f"{name}.toml"
     if not is_name(path.name.removesuffix(".toml")):  # of "...toml" the stem is all of it since Python 3.14
         fail(_of_name(name, f"must be {NAME}"))
     if not name.endswith(".toml") and Path(name).name != name:
         fail(_of_name(name, f"a name has no folders: the file is {_FOLDER}/NAME.toml; a path ends in .toml"))
-    if (like is not None) + (old is not None) + every_key > 1:
-        fail("--like, --from and --all exclude each other: give one of them")
-    changed: dict[str, str] = {}
+    if like is not None and every_key:
+        fail("--like and --all exclude each other: give one of them")
     if every_key:
         text, source = _starter(path.stem), path
-    elif old is not None:
-        text, source, changed = _converted(old)
     else:
         text, source = _copy_of(like or SHORT[0])
         text = text if like else _titled(text, path.stem)
@@ -83,9 +74,7 @@ def new(
     data: dict[str, Any] = {"file": str(path)}
     data |= {"carried": [str(file) for file in carried]} if carried else {}
     say(
-        data | ({"renamed": changed} if old else {}),
-        *(f"{before} is now {after}" for before, after in changed.items()),
-        *(["no key has a new name: the copy is as it was"] if old and not changed else []),
+        data,
         *(f"{file}: copied with the study, which names it" for file in carried),
         f"{path}: edit it, then `epsmesh plan {path}` and `epsmesh run {path}`",
     )
@@ -107,21 +96,6 @@ def _titled(text: str, name: str) -> str:
         f"title = {json.dumps(name, ensure_ascii=False)}\n" if line.startswith("title = ") else line
         for line in text.splitlines(keepends=True)
     )
-
-
-def _converted(old: Path) -> tuple[str, Path, dict[str, str]]:
-    """Return the text of an old study file with new key names, its path, and the keys that have changed."""
-    from epsmesh.study.problems import StudyError
-    from epsmesh.study.renamed import converted
-    from epsmesh.study.text import read_toml
-
-    try:
-        text, changed = converted(read_toml(old)[0], str(old))
-    except StudyError as wrong:
-        fail(*of_study(wrong))
-    except ValueError as unknown_form:
-        fail(of_file(old, str(unknown_form)))
-    return text, old, changed
 
 
 def _with_schema(text: str) -> str:

@@ -16,7 +16,7 @@ from epsmesh.report.guideline import Guideline
 from epsmesh.report.table import EXACT, DatasetError, arrange
 from epsmesh.units import parse_quantity
 
-# The accuracy that the report asks for; `epsmesh guide` answers for any.
+# The accuracy that the report asks for, and who gives neither accuracy nor budget.
 USUAL_ACCURACY = "5 %"
 
 
@@ -41,14 +41,14 @@ def guide_if_any(dataset: xr.Dataset) -> Guide | None:
 
 
 def guide(dataset: xr.Dataset, accuracy: str | float | None = None, budget: str | float | None = None) -> Guide:
-    """Answer from ``dataset``; ``accuracy`` as "5 %" or a share, ``budget`` as "10 ms" or seconds.
+    """Answer from ``dataset``; ``accuracy`` as "5 %" or a share, ``budget`` as "10 ms" or seconds; 5 % without both.
 
     Raises:
         DatasetError: if nothing can be judged.
-        ValueError: if neither is given, or one makes no sense.
+        ValueError: if one makes no sense.
     """
     if accuracy is None and budget is None:
-        raise ValueError("give an accuracy such as '5 %', a budget such as '10 ms', or both")
+        accuracy = USUAL_ACCURACY
     wanted = quantity("accuracy", accuracy, "") if accuracy is not None else inf
     seconds = quantity("budget", budget, "s") if budget is not None else inf
     table = arrange(dataset)

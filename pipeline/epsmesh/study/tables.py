@@ -17,7 +17,6 @@ from epsmesh.study.meant import OTHER_SHAPES, other_name
 from epsmesh.study.path import Way, read_path
 from epsmesh.study.problems import MOST_ERRORS, Problems, closest, nearest, tuples
 from epsmesh.study.ranges import without_ranges
-from epsmesh.study.renamed import renamed
 from epsmesh.study.schema import NESTED, SECTIONS, SINGLE
 from epsmesh.study.swept import Place, axis_of, placed, sweeps, written
 from epsmesh.study.text import check_text
@@ -228,7 +227,7 @@ def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "
     model = models[str(shape)] if isinstance(models, Mapping) else models
     lacking = [key for key in raw if key not in model.model_fields]
     for key in lacking[:MOST_ERRORS]:
-        found = None if key in NESTED.get(name, {}) or renamed(name, key) else raw[key]
+        found = None if key in NESTED.get(name, {}) else raw[key]
         problems.unknown(f"{where or name}.{key}", found, _lacking(name, model, str(shape), key))
     if len(lacking) > MOST_ERRORS:
         problems.unknown(where or name, None, f"… and {len(lacking) - MOST_ERRORS} more")
@@ -236,10 +235,8 @@ def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "
 
 
 def _lacking(name: str, model: type[Section], shape: str, key: str) -> str:
-    """Return the message about an unknown key: its new name, shapes that have it, or a similar key."""
+    """Return the message about an unknown key: shapes that have it, or a similar key."""
     models = SECTIONS[name]
-    if new := renamed(name, key):
-        return new
     if told := other_name(name, key):
         return told
     if not isinstance(models, Mapping):
@@ -290,7 +287,7 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
         problems.error(
             f"{where}.{key}",
             raw[key],
-            renamed(name, key) or other_name(name, key) or f"unknown key; {nearest(key, known)}",
+            other_name(name, key) or f"unknown key; {nearest(key, known)}",
         )
     if len(unknown) > MOST_ERRORS:
         problems.error(where, None, f"… and {len(unknown) - MOST_ERRORS} more")
