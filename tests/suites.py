@@ -38,7 +38,13 @@ NIGHTLY_FIXTURES = frozenset({"browser"})
 # Suites: the packages that each is about, and its tests.
 SUITES = {
     "identification": ("pipeline/epsmesh_identify", "tests/identify"),
-    "real time": ("pipeline/epsmesh_realtime", "tests/realtime", "tests/export", "tests/touch"),
+    "real time": (
+        "pipeline/epsmesh_realtime",
+        "tests/realtime",
+        "tests/export",
+        "tests/touch",
+        "tests/cli/test_export.py",
+    ),
 }
 # What says how all packages are built, loaded and tested.
 _ALWAYS = ("pyproject.toml", "setup.py", "tests/conftest.py")
@@ -77,7 +83,8 @@ def imported(file: Path) -> Iterator[Path]:
 
 def concerns(places: Iterable[str]) -> set[str]:
     """Return the files of this checkout that the Python files in ``places`` import."""
-    files = [file for place in places for file in (ROOT / place).rglob("*.py")]
+    given = [ROOT / place for place in places]
+    files = [file for place in given for file in ([place] if place.is_file() else place.rglob("*.py"))]
     return {str(found.relative_to(ROOT)) for file in files for found in imported(file)}
 
 
@@ -99,7 +106,8 @@ def left_out() -> Iterator[str]:
     differ = changed()
     for name, places in SUITES.items() if differ is not None else ():
         mine = concerns(places) | {*_ALWAYS}
-        if not any(file in mine or file.startswith(tuple(f"{place}/" for place in places)) for file in differ or ()):
+        within = tuple(f"{place}/" for place in places)
+        if not any(file in mine or file in places or file.startswith(within) for file in differ or ()):
             yield name
 
 

@@ -170,7 +170,11 @@ def test_a_store_that_cannot_be_changed_is_told(epsmesh, results, tmp_path, monk
 
 @pytest.mark.parametrize(
     "words",
-    [("plan", "small.toml", "--json"), ("--version", "--verbose"), ("view", EXAMPLES / "../meshes/patient.nii.gz")],
+    [
+        ("plan", "small.toml", "--json"),
+        pytest.param(("--version", "--verbose"), marks=pytest.mark.nightly),
+        pytest.param(("view", EXAMPLES / "../meshes/patient.nii.gz"), marks=pytest.mark.nightly),
+    ],
 )
 def test_a_command_whose_reader_went_away_ends_with_0(results, words):
     """Some load PETSc, which takes the signal for a crash."""
@@ -182,6 +186,7 @@ def test_a_command_whose_reader_went_away_ends_with_0(results, words):
     assert (done.returncode, "Traceback" in done.stderr) == (0, False)
 
 
+@pytest.mark.nightly
 def test_streams_that_are_closed_are_none_of_a_commands_files(results, tmp_path):
     """What libraries print would else go into the case store, or into what takes its number next."""
     shutil.copy(results / "small.toml", tmp_path)

@@ -28,6 +28,7 @@ def reference(site, name):
     return (site / "reference" / f"{name}.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.nightly
 def test_formulas_are_shown_as_they_are_written(site):
     """Neither as source of TeX, nor with stars that were taken for emphasis."""
     for page in site.rglob("*.html"):

@@ -81,6 +81,7 @@ def test_a_second_run_reads_what_was_solved(ran, epsmesh):
     assert round(1e3 * float(read["puncture_depth"]), 5) == depth
 
 
+@pytest.mark.nightly
 def test_two_ranks_solve_the_same_states_of_the_path(ran, spawn, tmp_path):
     """Those besides its stages, too, which follow from what was solved before."""
     folder, _ = ran

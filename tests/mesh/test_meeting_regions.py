@@ -72,13 +72,16 @@ def test_regions_that_meet_are_meshed_with_their_volumes_below_a_tool_on_one_of_
     "probe",
     [
         {},
-        {
-            "shape": "blade",
-            "length": "9 mm",
-            "width": "3 mm",
-            "direction": [0, 1, 0],
-            "at": ["19.57 mm", "3 mm", "17 mm"],
-        },
+        pytest.param(
+            {
+                "shape": "blade",
+                "length": "9 mm",
+                "width": "3 mm",
+                "direction": [0, 1, 0],
+                "at": ["19.57 mm", "3 mm", "17 mm"],
+            },
+            marks=pytest.mark.nightly,
+        ),
     ],
     ids=["disc", "along a blade's side"],
 )
@@ -127,6 +130,7 @@ def test_a_border_of_an_image_has_the_force_of_a_layer_that_the_kernel_draws(tmp
     assert max(drawn.force_error, meshed.force_error) < 0.1
 
 
+@pytest.mark.nightly
 def test_a_map_across_a_border_has_the_force_of_every_place(given):
     """It grows from that of the softer tissue to that of the stiffer one."""
     sections = given(TUMOUR, LOBE | {"young": "40 kPa"})

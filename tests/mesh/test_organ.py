@@ -85,6 +85,7 @@ def on_border(mesh):
     return found
 
 
+@pytest.mark.nightly
 def test_same_file_same_mesh_in_another_process(file):
     code = (
         "import sys, hashlib; from tests.mesh.test_organ import *; s = scene(sys.argv[1]);"

@@ -115,6 +115,7 @@ def test_a_region_has_its_cells_and_its_volume(folder, which):
     assert sum(found.values()) == pytest.approx(1e9 * case.body.volume, rel=5e-3)
 
 
+@pytest.mark.nightly
 def test_an_ellipsoid_as_axes_as_surface_and_as_label_has_one_force(folder):
     """The body's surface is that of the same voxels."""
     found = []

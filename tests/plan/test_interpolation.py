@@ -160,6 +160,7 @@ def test_the_error_is_for_a_path():
         )
 
 
+@pytest.mark.nightly
 def test_shards_solve_the_first_places_and_a_run_on_two_ranks_the_rest(epsmesh, spawn, tmp_path):
     """Whole again, the dataset is that of one run; ``status --merge`` names the command that is lacking."""
     content = {"title": "map", "body": {"shape": "box", "size": ["20 mm", "20 mm", "10 mm"], "inclusion": [NEAR]}}

@@ -17,6 +17,7 @@ from tests.studies import small_text
 TINY = {"mesh": {"epsilon": ["4 mm", "full"], "degree": 1}, "solve": {"exact": False}}
 
 
+@pytest.mark.nightly
 def test_runs_of_one_study_and_of_another_share_a_store(epsmesh, tmp_path):
     """Three at once: each ends well, the store is sound, and the datasets are those of runs alone."""
     studies = {"one": small_text(**TINY), "two": small_text(material={"poisson": 0.4}, **TINY)}

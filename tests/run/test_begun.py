@@ -226,6 +226,7 @@ def test_a_damaged_file_blames_no_case(store: Store):
     assert fail_begun(store, {"a"}) == NONE
 
 
+@pytest.mark.nightly
 def test_a_case_that_ends_its_process_twice_fails_in_the_next_run_alone(epsmesh, tmp_path: Path):
     """The second run does it last. The fourth run tries it again. What another rank has finished is kept."""
     file = tmp_path / "small.toml"

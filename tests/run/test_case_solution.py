@@ -49,7 +49,7 @@ def force_of_stress(found: CaseSolution, height: float) -> float:
     return -parts * float(stress[:, 2, 2] @ volumes.reshape(-1)) / height
 
 
-@sampled("name", MATRIX, by_day=2)
+@sampled("name", MATRIX, by_day=1)
 def test_force_is_the_run_s_and_stresses_balance_it(name):
     found = solution(**MATRIX[name])
     (record,) = solve(**MATRIX[name]).values()

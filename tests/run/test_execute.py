@@ -40,6 +40,7 @@ for method in ("iterative", "direct"):
 """
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(WORLD.size > 1, reason="starts mpirun itself")
 def test_one_and_three_ranks_agree():
     """What two ranks compute, the tests with the mark mpi hold against one."""

@@ -66,7 +66,13 @@ def given(probe, force):
     return {key: value for key, value in probe.items() if key != "depth"} | {"force": force}
 
 
-@pytest.mark.parametrize("scene", SCENES)
+# Second variants of a way through the solver.
+BY_NIGHT = ("ball, meridian, large", "paraboloid, meridian", "cone, meridian", "ball, large")
+
+
+@pytest.mark.parametrize(
+    "scene", [pytest.param(name, marks=pytest.mark.nightly if name in BY_NIGHT else ()) for name in SCENES]
+)
 def test_depth_at_the_force_of_a_depth_is_this_depth(scene):
     body, law, probe = SCENES[scene]
     *_, there = solved(content(body, law, probe))

@@ -63,7 +63,7 @@ def test_more_friction_needs_more_force_and_slides_less():
     assert found[2].energy < found[2].force * 0.1e-3 / 2
 
 
-@pytest.mark.parametrize("of_law", ["linear", "large"])
+@pytest.mark.parametrize("of_law", ["linear", pytest.param("large", marks=pytest.mark.nightly)])
 def test_the_area_that_slides_and_the_friction_have_bars_that_hold_another_mesh(of_law):
     solved, friction, rim = (record, 0.2, "0.45 mm") if of_law == "linear" else (large, 0.3, "0.42 mm")
     found, coarse = solved(friction), solved(friction, mesh={"rim": rim})
@@ -89,10 +89,11 @@ def test_a_flat_punch_that_sticks_is_the_bonded_one():
         # Directions of slip contract by half in an iteration: halving steps nevertheless ended short of the law.
         ({"radius": "4 mm"}, {"epsilon": "10 mm", "fine": "3.8 mm"}, 0.49),
         # Two nodes next to sticking slide, and reversed in each iteration.
-        (
+        pytest.param(
             {"shape": "blade", "length": "8 mm", "width": "2 mm", "at": ["3 mm", "2 mm"]},
             {"epsilon": "10 mm", "fine": "2.9 mm"},
             0.3,
+            marks=pytest.mark.nightly,
         ),
     ],
     ids=["disc", "blade"],
@@ -184,7 +185,7 @@ def test_at_large_displacements_little_friction_is_none():
     assert large(1e-9).slip_area == pytest.approx(large(1e-9).contact_area)
 
 
-@pytest.mark.parametrize("rim", ["0.42 mm", "0.5 mm"])
+@pytest.mark.parametrize("rim", ["0.42 mm", pytest.param("0.5 mm", marks=pytest.mark.nightly)])
 def test_little_friction_settles_at_large_displacements(rim):
     forces = [large(friction, {"rim": rim}).force for friction in (0.0, 0.1, 0.3)]
     assert forces[0] < forces[1] < forces[2]

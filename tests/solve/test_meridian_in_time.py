@@ -58,7 +58,7 @@ def test_linear_tissue_is_the_convolution(changes):
     assert found.dissipated == pytest.approx(2 * static.energy * heat, rel=1e-6, abs=1e-9 * static.energy)
 
 
-@pytest.mark.parametrize("material", [{"poisson": 0.45}, LARGE])
+@pytest.mark.parametrize("material", [{"poisson": 0.45}, pytest.param(LARGE, marks=pytest.mark.nightly)])
 def test_regions_begin_elastic_and_end_with_what_is_left_of_each(material):
     changes = {"material": material, "probe": {"depth": "0.4 mm"}}
     left = {"layer": [SKIN["layer"][0] | {"young": "48 kPa"}]}

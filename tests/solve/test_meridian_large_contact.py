@@ -56,7 +56,7 @@ def pressed(tool, depth, poisson, body=BODY, **how):
     ("tool", "poisson", "depth"),
     [
         pytest.param(BALL, 0.3, 1e-3, marks=pytest.mark.nightly),
-        (BALL, 0.5, 1e-3),
+        pytest.param(BALL, 0.5, 1e-3, marks=pytest.mark.nightly),
         (CONE, 0.3, 1e-3),
         pytest.param(BALL, 0.3, 1e-4, marks=pytest.mark.nightly),
     ],
@@ -131,7 +131,7 @@ def test_a_study_tells_the_depth_that_a_path_reached():
     assert "unstable" in found.message
 
 
-@pytest.mark.parametrize(("tool", "depth"), [(BALL, 0.1), (CONE, 0.1)])
+@pytest.mark.parametrize(("tool", "depth"), [(BALL, 0.1), pytest.param(CONE, 0.1, marks=pytest.mark.nightly)])
 def test_the_area_has_a_bar_of_its_own(tool, depth):
     """F is stationary with respect to the area, which errs by more than F."""
     found, fine = (pressed(tool, depth, 0.3, accuracy=accuracy).contact for accuracy in (5e-3, 1e-9))
