@@ -103,7 +103,6 @@ COMMANDS = {
     "figures": ("out/small.svg", ("report", "out/small.nc", "--figures")),
     "report": ("out/small.html", ("report", "out/small.nc")),
     "report of a scene": ("out/small.html", ("report", "out/small.nc", "--scene", "0")),
-    "merge": ("more/small.png", ("status", "small.toml", "out/cases.sqlite", "--merge", "--output", "more")),
     "view as a page": ("more/small_0.html", ("view", "small.toml", "0", "--export", "html", "--output", "more")),
     "view for ParaView": ("more/small_0.vtu", ("view", "small.toml", "0", "--export", "vtu", "--output", "more")),
     "touch": ("more/page.html", ("touch", "none.epsm", "--output", "more/page.html")),

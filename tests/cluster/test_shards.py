@@ -68,23 +68,12 @@ def test_a_lost_shard_is_told_and_completed(whole, meshes, tmp_path):
         done = run(study, tmp_path, meshes, "--shard", f"{number}/3")
         assert done.exit_code == 0, done.output
         assert f"shard {number}/3" in done.stdout
-        assert "--merge" in done.stdout
+        assert "merge them: `epsmesh run" in done.stdout
     assert not (tmp_path / "small.nc").exists()
-    partial = epsmesh("status", study, "--merge", "--output", tmp_path, "--json")
-    assert partial.exit_code == 1
-    found = json.loads(partial.stdout)
-    assert found["pending"] > 0
-    assert found["again"][0] == f"epsmesh run {study} --shard 2/3"
-    assert found["again"][1] == f"SHARDS=3 sbatch --array=2 scripts/slurm/shards.sbatch {study}"
-    assert int((read_file(tmp_path / "small.nc")["status"] == "pending").sum()) == found["pending"]
-    told = epsmesh("status", study, "--merge", "--output", tmp_path)
-    assert f"{found['pending']} pending" in told.output
-    assert "--shard 2/3" in told.output
-    assert run(study, tmp_path, meshes, "--shard", "2/3").exit_code == 0
     for _ in range(2):
-        assert epsmesh("status", study, "--merge", "--output", tmp_path).exit_code == 0
+        assert run(study, tmp_path, meshes).exit_code == 0
         assert all_done(tmp_path / "small.nc")
-        assert_same(tmp_path / "small.nc", folder / "small.nc")
+        assert_same(tmp_path / "small.nc", folder / "small.nc", alike=False)
     # What is merged is not computed again, by no other deal.
     again = run(study, tmp_path, meshes, "--shard", "1/2")
     assert "to do" not in again.stdout
@@ -110,14 +99,13 @@ def test_a_shard_that_was_killed_goes_on_to_the_same_dataset(whole, meshes, tmp_
     (begun,) = shards_of(study, tmp_path)
     assert (begun["shard"], begun["state"], begun["left"] > 0) == ("1/2", "killed", True)
     assert len(read_rows(tmp_path / "shards" / "small.1-of-2.sqlite")) > 0
-    assert epsmesh("status", study, "--merge", "--output", tmp_path).exit_code == 1
     again = run(study, tmp_path, meshes, "--shard", "1/2")
     assert again.exit_code == 0, again.output
     assert "tried again, after the others" in again.stderr
     (ended,) = shards_of(study, tmp_path)
     assert (ended["shard"], ended["state"], ended["left"]) == ("1/2", "ended", 0)
     assert run(study, tmp_path, meshes, "--shard", "2/2").exit_code == 0
-    assert epsmesh("status", study, "--merge", "--output", tmp_path).exit_code == 0
+    assert "to do" not in run(study, tmp_path, meshes).stdout
     assert_same(tmp_path / "small.nc", folder / "small.nc", alike=False)
 
 
@@ -126,7 +114,7 @@ def test_more_shards_than_steps_and_a_run_of_the_whole_that_takes_them_in(whole,
     outputs = [run(study, tmp_path, meshes, "--shard", f"{number}/12").stdout for number in range(1, 13)]
     assert sum("nothing to do" in output for output in outputs) >= 3
     told = epsmesh("status", study, "--output", tmp_path).stdout
-    assert "12 shards in" in told and "--merge" in told
+    assert "12 shards in" in told and f"`epsmesh run {study}` merges them" in told
     whole_run = run(study, tmp_path, meshes)
     assert (whole_run.exit_code, "to do" in whole_run.stdout) == (0, False), whole_run.output
     assert_same(tmp_path / "small.nc", folder / "small.nc", alike=False)
@@ -139,35 +127,36 @@ def test_early_stop_in_shards(whole, meshes, tmp_path):
     study.write_text(SMALL.replace("exact = false", '[plan]\nstop_near_exact = "40 %"'))
     outputs = [run(study, tmp_path, meshes, "--shard", f"{number}/2") for number in (1, 2)]
     assert [output.exit_code for output in outputs] == [0, 0]
-    assert epsmesh("status", study, "--merge", "--output", tmp_path).exit_code == 0
+    assert "to do" not in run(study, tmp_path, meshes).stdout
     assert run(study, tmp_path / "whole", meshes).exit_code == 0
-    assert_same(tmp_path / "small.nc", tmp_path / "whole" / "small.nc")
+    assert_same(tmp_path / "small.nc", tmp_path / "whole" / "small.nc", alike=False)
     assert "skipped" in np.unique(read_file(tmp_path / "small.nc")["status"])
 
 
 def test_damaged_and_failed(whole, meshes, tmp_path):
     study, folder = whole
-    copy = tmp_path / "copy.sqlite"
-    shutil.copy(folder / "cases.sqlite", copy)
-    damaged = tmp_path / "damaged.sqlite"
+    shards = tmp_path / "shards"
+    shards.mkdir()
+    shutil.copy(folder / "cases.sqlite", shards / "small.1-of-2.sqlite")
+    damaged = shards / "small.2-of-2.sqlite"
     damaged.write_bytes(b"no database at all" * 99)
-    found = epsmesh("status", study, copy, damaged, "--merge", "--output", tmp_path)
-    assert found.exit_code == 1
-    assert f"{damaged}: damaged, left out" in found.output
+    found = run(study, tmp_path, meshes)
+    assert (found.exit_code, "to do" in found.stdout) == (0, False)
+    assert f"{damaged}: damaged, left out" in found.stderr
     assert damaged.read_bytes().startswith(b"no database")
-    assert_same(tmp_path / "small.nc", folder / "small.nc")
+    assert_same(tmp_path / "small.nc", folder / "small.nc", alike=False)
     # Elements that fit into no machine: their cases fail, in the shard and in what is merged.
     study = tmp_path / "failing.toml"
     study.write_text(SMALL.replace('["coarse", "free"]', '"coarse"').replace('"0.5 mm"', '["1e-9 mm", "0.5 mm"]'))
     assert 1 in {run(study, tmp_path, meshes, "--shard", f"{number}/2").exit_code for number in (1, 2)}
-    merged = epsmesh("status", study, "--merge", "--output", tmp_path)
+    merged = run(study, tmp_path, meshes)
     assert merged.exit_code == 1
     assert "GB of memory" in merged.output
     assert "pending" not in merged.output
 
 
 def test_wrong_input(whole, tmp_path):
-    study, folder = whole
+    study, _ = whole
     for text in ("0/3", "4/3", "three", "3"):
         wrong = epsmesh("run", study, "--output", tmp_path, "--shard", text)
         assert wrong.exit_code == 2
@@ -177,12 +166,4 @@ def test_wrong_input(whole, tmp_path):
     wrong = epsmesh("run", timed, "--output", tmp_path, "--shard", "1/2")
     assert wrong.exit_code == 2
     assert "one machine" in wrong.output
-    for stores, message in (
-        ([], "--shard 1/4"),
-        ([tmp_path / "absent.sqlite"], "there is no such store"),
-        ([folder / "cases.sqlite", "--store", folder / "cases.sqlite"], "cannot be one of them"),
-    ):
-        wrong = epsmesh("status", study, "--merge", "--output", tmp_path, *stores)
-        assert wrong.exit_code == 2
-        assert message in wrong.output
     assert {path.name for path in tmp_path.iterdir()} == {"timed.toml"}

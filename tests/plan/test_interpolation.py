@@ -162,7 +162,7 @@ def test_the_error_is_for_a_path():
 
 @pytest.mark.nightly
 def test_shards_solve_the_first_places_and_a_run_on_two_ranks_the_rest(epsmesh, spawn, tmp_path):
-    """Whole again, the dataset is that of one run; ``status --merge`` names the command that is lacking."""
+    """Whole again, the dataset is that of one run."""
     content = {"title": "map", "body": {"shape": "box", "size": ["20 mm", "20 mm", "10 mm"], "inclusion": [NEAR]}}
     content |= {
         "material": {"young": "10 kPa", "poisson": 0.3},
@@ -179,10 +179,6 @@ def test_shards_solve_the_first_places_and_a_run_on_two_ranks_the_rest(epsmesh, 
     for number in (1, 2):
         done = epsmesh("run", file, "--output", out, "--shard", f"{number}/2", "-q")
         assert done.exit_code == 0, done.output
-    merged = epsmesh("status", file, "--output", out, "--merge")
-    assert merged.exit_code == 1
-    assert f"epsmesh run {file}" in merged.output
-    assert "--shard" not in merged.output.split("compute them")[-1]
     spawn("run", file, "--output", out, "-q", ranks=2)
     assert epsmesh("status", file, "--output", out).exit_code == 0
     whole = xr.load_dataset(out / "map.nc")

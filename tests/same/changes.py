@@ -524,12 +524,6 @@ def _by_python(study: Study, dice: random.Random) -> Pair:
     return Pair(study, study, way="python")
 
 
-@change("two stores merged")
-def _merged(study: Study, dice: random.Random) -> Pair | None:
-    found = _swept(study)
-    return found and Pair(found[0], found[0], at=found[1], at_first=found[1], way="merged")
-
-
 # ---- outputs ------------------------------------------------------------------------------------------------
 
 

@@ -82,18 +82,10 @@ def _by_python(path: Path, _dice: random.Random) -> None:
     _start([sys.executable, "-c", program, path.name], path)
 
 
-def _merged(path: Path, _dice: random.Random) -> None:
-    """Two shards, whose stores are merged; nothing else is run."""
-    for shard in ("2/2", "1/2"):
-        _run(path, "--shard", shard)
-    _start([sys.executable, "-m", "epsmesh", "status", path.name, "--merge"], path)
-
-
 _WAYS: dict[str, Callable[[Path, random.Random], None]] = {
     "two ranks": _two_ranks,
     "two shards": _two_shards,
     "killed": _killed,
     "command": _by_command,
     "python": _by_python,
-    "merged": _merged,
 }

@@ -75,8 +75,9 @@ def run(
     Stored cases are read, not computed again: run the same command to continue after an interruption. With --json
     standard output gets one object at the end, and progress goes to standard error.
 
-    --shard I/N splits a study into N independent runs. A shard writes no dataset: afterwards `epsmesh status FILE
-    --merge` merges the shards and writes it. So does a run without --shard, which also computes missing cases.
+    --shard I/N splits a study into N independent runs. A shard writes no dataset: afterwards, a run without --shard
+    merges the shards, computes missing cases, and writes it. If a case has two records, the one with a force is kept,
+    else the later one. Shards stay unchanged.
 
     Example: epsmesh run studies/figure3.toml
 
@@ -256,7 +257,7 @@ def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, sh
         # A shard may have F_exact but no case; if there are fewer steps than shards, it may have nothing.
         found = found if sum(outcome.counts.values()) else "F_exact" if plan.part else "nothing to do"
         name = f"{name}, shard {shard}"
-        where = f"when all shards are done, merge them: `epsmesh status {quote(plan.study.file)} --merge`"
+        where = f"when all shards are done, merge them: `epsmesh run {quote(plan.study.file)}`"
     else:
         where = str(outcome.results)
     return f"{name}: {found}{read_back}; {where}; {format_seconds(seconds)}"

@@ -1,4 +1,4 @@
-"""The command that shows, merges, checks and prunes stored cases."""
+"""The command that shows runs, and counts, checks and prunes stored cases."""
 
 from collections import Counter
 from pathlib import Path
@@ -41,20 +41,9 @@ def status(
             show_default=False,
         ),
     ] = None,
-    stores: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="STORE",
-            help="With --merge: stores of shards [default: DIR/shards/<study>.*.sqlite].",
-            show_default=False,
-        ),
-    ] = None,
     output: Output = DEFAULT_OUTPUT,
     store: StoreFile = None,
     without: Without = None,
-    merge: Annotated[
-        bool, typer.Option("--merge", help="Merge the study's shards into the store, and write its dataset.")
-    ] = False,
     prune: Annotated[
         bool,
         typer.Option("--prune", help="List records to remove: unreadable ones, those of --days and --failed."),
@@ -71,18 +60,12 @@ def status(
 
     Cases are ok, failed, skipped, no contact or pending. For a run with --without, give the same --without here.
 
-    --merge first copies the records of the study's shards into the store, then writes dataset and figure. If a case
-    has two records, the one with a force is kept, else the later one. Shards stay unchanged; merging twice is harmless.
-    Exit status 1: cases failed or are pending, or a shard's store is damaged.
-
     Without a study, your runs of the last two weeks are shown, from any folder and machine with this home: done, left,
     the case in work, the last sign of life, and whether a run was killed. Then the store's records are checked, and
     counted by status, origin and versions. Exit status 1: a record cannot be read or is inconsistent. --prune --yes
     removes records; if the whole file is damaged, it is renamed, and a new store replaces it.
 
     Example: epsmesh status studies/figure3.toml
-
-    Example: epsmesh status studies/figure3.toml --merge
 
     Example: epsmesh status
 
@@ -92,16 +75,8 @@ def status(
         fail("--days, --failed and --yes need --prune: give it, too")
     if prune and file:
         fail("--prune applies to the whole store: leave the study out")
-    if merge and not file:
-        fail("--merge needs a study: give its file before the option")
-    if stores and not merge:
-        fail("stores after the study need --merge: give it, too")
     path = store or output / STORE_NAME
-    if file and merge:
-        from epsmesh.cli.shards import merge_shards
-
-        merge_shards(by_name(file), stores, output, path, without)
-    elif file:
+    if file:
         _of_study(by_name(file), output, path, check_names(without))
     else:
         runs = [] if prune else runs_of()
@@ -135,7 +110,9 @@ def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) ->
     lines = [f"{file}: {totals}, {counts[PENDING]} pending{axes_of(study)}"]
     lines += [f"  failed: {case}: {message}" for case, message in failed]
     if counts[PENDING] and (shards := len(stores_of(output, study))):
-        lines.append(f"  {counted(shards, 'shard')} in {output / 'shards'} not counted: --merge merges them")
+        lines.append(
+            f"  {counted(shards, 'shard')} in {output / 'shards'} not counted: `epsmesh run {file}` merges them"
+        )
     runs = runs_of(file)
     told = {"failures": [{"case": c, "message": m} for c, m in failed], "runs": as_data(runs)}
     say({"file": str(file), **counts, **told}, *lines, *lines_of(runs))

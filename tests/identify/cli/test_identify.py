@@ -152,7 +152,7 @@ def test_the_report_is_a_page_with_the_answer(folder, epsmesh, found):
     assert "if the body is as declared" in (folder / "results" / "punch.html").read_text()
 
 
-@pytest.mark.parametrize("command", [("run",), ("export",), ("view", "0"), ("status", "--merge")])
+@pytest.mark.parametrize("command", [("run",), ("export",), ("view", "0"), ("status",)])
 def test_what_curves_and_ranges_give_is_needed_for_cases(folder, epsmesh, command):
     result = epsmesh(command[0], folder / "punch.toml", *command[1:], "--output", folder / "results")
     assert result.exit_code == 2
