@@ -1,10 +1,10 @@
-"""Whether `epsmesh identify --design` foretells bars: fits of synthetic curves of the tests that it proposes.
+"""Whether `epsmesh identify --design` predicts bars: fits of synthetic curves of the tests that it proposes.
 
     python -m benchmarks.identify.design [--count N] [--seed N]
 
 Seven designs: a further ball, punch or specimen, longer air, a longer hold. Curves have forces of the integral equation
 of layered bodies at the declared values; fits have tables of forces over the whole ranges. The exit status is 1 if the
-median of a first bar is outside 0.6 to 1.7 times what was foretold, or less than 0.8 of all first bars hold.
+median of a first bar is outside 0.6 to 1.7 times what was predicted, or less than 0.8 of all first bars hold.
 """
 
 import sys
@@ -123,11 +123,11 @@ def _half(low: float, high: float, designer: Designer, name: str) -> float:
 
 
 def rows(planned: Planned, count: int, seed: int) -> list[dict[str, Any]]:
-    """Return for each unknown of a design the bars foretold and those of fits."""
+    """Return for each unknown of a design the bars predicted and those of fits."""
     study = planned.study
     designer = Designer(study, _never)
     trials = planned.trials(designer)
-    foretold = designer.widths(trials)
+    predicted = designer.widths(trials)
     tests = [exact(designer, number, trial) for number, trial in enumerate(trials)]
     hidden = _hidden(designer, trials, tests, study)
     made = []
@@ -136,7 +136,7 @@ def rows(planned: Planned, count: int, seed: int) -> list[dict[str, Any]]:
         made.append(identify([_noisy(one, rng) for one in hidden], designer.unknowns))
     found = [one for one in made if one.fits]
     result = []
-    for name, (first, second) in foretold.items():
+    for name, (first, second) in predicted.items():
         truth = designer.values[name]
         bars = [(one.low[(place := one.place(name))], one.high[place]) for one in found]
         wide = [(one.low_hidden[(place := one.place(name))], one.high_hidden[place]) for one in found]
@@ -144,10 +144,10 @@ def rows(planned: Planned, count: int, seed: int) -> list[dict[str, Any]]:
             {
                 "design": planned.name,
                 "unknown": name,
-                "foretold": first,
+                "predicted": first,
                 "fits": median(_half(*ends, designer, name) for ends in bars) / first,
                 "held": float(np.mean([low <= truth <= high for low, high in bars])),
-                "foretold, second": second,
+                "predicted, second": second,
                 "fits, second": median(_half(*ends, designer, name) for ends in wide) / second,
                 "fitted": len(found) / count,
             }
@@ -164,7 +164,7 @@ def _hidden(designer: Designer, trials: Sequence[Trial], tests: Sequence[Measure
 
 
 _COLUMNS = {
-    "design": "", "unknown": "", "foretold": ".4f", "fits": ".2f", "held": ".0%", "foretold, second": ".4f",
+    "design": "", "unknown": "", "predicted": ".4f", "fits": ".2f", "held": ".0%", "predicted, second": ".4f",
     "fits, second": ".2f", "fitted": ".0%",
 }  # fmt: skip
 

@@ -52,7 +52,7 @@ _LEAST = 24
 # A fit may be deeper than the true depth: forces are computed so much deeper, as in the command.
 _DEEPER = 1.6
 # Limits: coverage, median of bar over error, verdicts on wrong laws, and false ones.
-HELD, WIDE, TOLD, FALSE = 0.95, 4.0, 0.4, 0.02
+HELD, WIDE, NOTED, FALSE = 0.95, 4.0, 0.4, 0.02
 
 _BODY = {"shape": "cylinder", "radius": "60 mm", "height": "3 mm", "fixed": "bottom"}
 _TOOLS = {
@@ -218,7 +218,7 @@ def row(name: str, found: Sequence[Trial]) -> dict[str, object]:
         "bar / error": median(one.ratio for one in barred) if barred else inf,
         "second bar": sum(second) / max(len(second), 1),
         "its half width": median(wide) if wide else inf,
-        "told": 1 - len(barred) / len(found),
+        "noted": 1 - len(barred) / len(found),
         "seconds": median(one.seconds for one in found),
     }
 
@@ -231,7 +231,7 @@ _COLUMNS = {
     "bar / error": ".1f",
     "second bar": ".1%",
     "its half width": ".0%",
-    "told": ".1%",
+    "noted": ".1%",
     "seconds": ".2f",
 }
 
@@ -264,9 +264,9 @@ def main() -> int:
     is_good = (
         min(bars) >= HELD
         and rows["right law"]["bar / error"] <= WIDE
-        and rows["right law"]["told"] <= FALSE
+        and rows["right law"]["noted"] <= FALSE
         and rows["hidden, all"]["second bar"] >= HELD
-        and rows[WORN]["told"] >= TOLD
+        and rows[WORN]["noted"] >= NOTED
     )
     return 0 if is_good else 1
 

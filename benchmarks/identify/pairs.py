@@ -141,7 +141,7 @@ def row(pair: Pair, found: Sequence[Estimate], bounds: Sequence[FloatArray]) -> 
         "half width": half,
         "bar / bound": float(np.median(model_free)) if all(seen) else inf,
         "seen": float(np.mean(seen)),
-        "told": 1 - len(barred) / len(found),
+        "noted": 1 - len(barred) / len(found),
     }
 
 
@@ -158,7 +158,7 @@ def _coordinates(found: Estimate, count: int) -> FloatArray:
 
 _COLUMNS = {
     "tools": "", "unknown": "", "number": "d", "held": ".1%", "half width": ".1%", "bar / bound": ".2f",
-    "seen": ".0%", "told": ".0%",
+    "seen": ".0%", "noted": ".0%",
 }  # fmt: skip
 
 

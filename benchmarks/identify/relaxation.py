@@ -100,7 +100,7 @@ def row(name: str, trials: Sequence[Trial]) -> dict[str, object]:
         "half width of E": half[0],
         "of the share": half[1],
         "of the time": half[2],
-        "told": 1 - len(barred) / len(trials),
+        "noted": 1 - len(barred) / len(trials),
         "seconds": median(one.seconds for one in trials),
     }
 
@@ -111,7 +111,7 @@ def _holds(truth: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
 
 _COLUMNS = {
     "noise": "", "number": "d", "least squares": ".1%", "E": ".1%", "share": ".1%", "time": ".1%",
-    "half width of E": ".1%", "of the share": ".1%", "of the time": ".1%", "told": ".1%", "seconds": ".2f",
+    "half width of E": ".1%", "of the share": ".1%", "of the time": ".1%", "noted": ".1%", "seconds": ".2f",
 }  # fmt: skip
 
 

@@ -69,7 +69,7 @@ def trial(seed: tuple[int, int], air: tuple[float, float], *, drifts: bool) -> t
 def row(name: str, found: Sequence[tuple[Values, Estimate]]) -> dict[str, object]:
     """Return coverage and half widths of both unknowns, of experiments that have bars."""
     barred = [(truth, one) for truth, one in found if one.fits]
-    values: dict[str, object] = {"curves": name, "number": len(found), "told": 1 - len(barred) / len(found)}
+    values: dict[str, object] = {"curves": name, "number": len(found), "noted": 1 - len(barred) / len(found)}
     for place, unknown in enumerate(("young", "poisson")):
         held = [one.low[place] <= truth[unknown] <= one.high[place] for truth, one in barred]
         half = median((one.high[place] - one.low[place]) / 2 / truth[unknown] for truth, one in barred)
@@ -79,7 +79,7 @@ def row(name: str, found: Sequence[tuple[Values, Estimate]]) -> dict[str, object
 
 _COLUMNS = {
     "curves": "", "number": "d", "young held": ".1%", "young half width": ".1%", "poisson held": ".1%",
-    "poisson half width": ".1%", "told": ".1%",
+    "poisson half width": ".1%", "noted": ".1%",
 }  # fmt: skip
 
 

@@ -35,10 +35,10 @@ _TEXTS = {
     "measurement": "Measured force curves, one table each, for `epsmesh identify`. Forces do not depend on them. "
     "Optional; their lists are no sweeps.",
     "measurement.columns": "Columns of the file, by header or by number from 1. A header's unit is read: `depth / nm`, "
-    "`load (µN)`, `Z [mm]`. Optional; columns that are not named are found where unmistakable, and told.",
+    "`load (µN)`, `Z [mm]`. Optional; columns that are not named are found where unmistakable, and reported.",
     "measurement.units": "Units of columns whose headers have none. Optional; a unit that contradicts the header is "
     "an error.",
-    "measurement.sign": "Signs of recorded values. Optional; a sign that is not given is found, and told.",
+    "measurement.sign": "Signs of recorded values. Optional; a sign that is not given is found, and reported.",
     "identify": "Unknowns that `epsmesh identify` finds from the measurements. Besides the keys below, the name of a "
     "parameter is a key: `young`, `poisson`, `thickness`, `radius`, `friction`, `skin_young`, `skin_thickness`, a "
     "parameter of the law, `contact_point` (larger is deeper), `baseline`, `drift`, `machine_stiffness`, "

@@ -33,7 +33,7 @@ WORDS: dict[str, tuple[str, str]] = {
     "file": ("", "file of the curve"),
     "status": ("", "whether the file has been fitted: ok or failed"),
     "message": ("", "why a file has not been fitted"),
-    "told": ("", "what else is to be known of a file's values, in sentences"),
+    "notes": ("", "what else is to be known of a file's values, in sentences"),
     "profile_value": ("", "values of a parameter at which all others were fitted anew"),
     "profile": ("1", "twice the fall of the logarithm of the likelihood; 3.84 at the ends of a 95 % bar"),
     "depth": ("m", "depth of the tool below the surface"),
@@ -50,7 +50,7 @@ WORDS: dict[str, tuple[str, str]] = {
     "evidence": ("1", "logarithm of the evidence for a deviation from the law, relative to that for none"),
 }
 # Words of each of many files.
-_OF_FILES = ("verdict", "told", "status", "message")
+_OF_FILES = ("verdict", "notes", "status", "message")
 _OF_CURVES = ("depth", "force", "fit", "band", "residual")
 
 
@@ -92,8 +92,8 @@ def dataset_of(
     dataset = xr.Dataset(values, coordinates)
     for name in dataset.variables:
         dataset[name].attrs = _meaning(str(name))
-    told = {"told": "\n".join(found.told)} if found.told else {}
-    return dataset.assign_attrs({"Conventions": "CF-1.8", "verdict": found.verdict, **told, **attributes})
+    notes = {"notes": "\n".join(found.notes)} if found.notes else {}
+    return dataset.assign_attrs({"Conventions": "CF-1.8", "verdict": found.verdict, **notes, **attributes})
 
 
 def described(name: str, value: float) -> xr.DataArray:
@@ -131,15 +131,15 @@ def joined(found: Sequence[xr.Dataset | ExperimentError], files: Sequence[str]) 
     whole["file"] = ("file", np.array(files, dtype=object))
     for name in ("file", *_OF_FILES):
         whole[name].attrs["long_name"] = WORDS[name][1]
-    return whole.assign_attrs({key: value for key, value in good[0].attrs.items() if key not in ("verdict", "told")})
+    return whole.assign_attrs({key: value for key, value in good[0].attrs.items() if key not in ("verdict", "notes")})
 
 
 def _row(found: xr.Dataset | ExperimentError, like: xr.Dataset) -> xr.Dataset:
     """Return what is known of a file, with its words as variables; nothing, ``like`` that of another, if it failed."""
     if isinstance(found, xr.Dataset):
-        words = {name: str(found.attrs.get(name, "")) for name in ("verdict", "told")} | {"status": OK, "message": ""}
+        words = {name: str(found.attrs.get(name, "")) for name in ("verdict", "notes")} | {"status": OK, "message": ""}
     else:
-        words = {"verdict": "", "told": "", "status": FAILED, "message": str(found)}
+        words = {"verdict": "", "notes": "", "status": FAILED, "message": str(found)}
         found = like.map(lambda values: xr.full_like(values, np.nan if values.dtype.kind == "f" else 0)
                          if values.dtype.kind in "fi" else values)  # fmt: skip
     names = [f"{number}" for number in range(1, found.sizes["measurement"] + 1)]

@@ -171,7 +171,7 @@ def rank(study: Study, solve: Solve, say: Callable[[str], None] = lambda _: None
 
     Raises:
         StudyError: if its scene cannot be run, or is not one scene.
-        SurrogateError: if a planned test cannot be computed. Further ones that cannot be are left out, and told.
+        SurrogateError: if a planned test cannot be computed. Further ones that cannot be are left out, with a note.
     """
     designer = Designer(study, solve)
     planned = designer.widths(designer.planned)

@@ -100,7 +100,7 @@ def identify(measured: Sequence[Measured], unknowns: Sequence[Unknown]) -> Estim
         profiles=profiles,
         windows=() if does_fit or beyond else _windows(measured, found),
         evidence=found.misfit,
-        told=(*combinations(found, seen), *(_told(found) if does_fit else _doubtful(replace(found, x=x)))),
+        notes=(*combinations(found, seen), *(_notes(found) if does_fit else _doubtful(replace(found, x=x)))),
     )
 
 
@@ -242,7 +242,7 @@ def _misfit(least: Fit) -> str:
     )
 
 
-def _told(found: Fit) -> Iterator[str]:
+def _notes(found: Fit) -> Iterator[str]:
     """Yield what may make the bars of a law that fits too small."""
     yield from cut(found)
     yield from levels(found)

@@ -145,9 +145,9 @@ def without_odd(found: Sequence[Specimen], why: str) -> tuple[Specimen, ...]:
 def _too_deep(specimen: Specimen, number: int, why: str) -> Specimen:
     """Return a specimen whose curve of that number is too deep for its scene."""
     curve = specimen.curves[number]
-    told = f"the curve is about {engineering(depth_of(curve), 'm')} deep, for which there is no force: {why}. "
-    told += "Is a unit or a size wrong? Else give a `window` that ends earlier"
-    return Specimen(specimen.name, (), ExperimentError(curve.name, told))
+    message = f"the curve is about {engineering(depth_of(curve), 'm')} deep, for which there is no force: {why}. "
+    message += "Is a unit or a size wrong? Else give a `window` that ends earlier"
+    return Specimen(specimen.name, (), ExperimentError(curve.name, message))
 
 
 def _refusal(scene: Study, sought: Sequence[Unknown], deepest: float) -> str:

@@ -28,7 +28,7 @@ def out_of_range(found: Fit) -> str:
 
 def cut(found: Fit) -> tuple[str, ...]:
     """Return in sentences which bars end where a range ends, though it has no natural end there."""
-    space, told = found.model.space, []
+    space, notes = found.model.space, []
     for place, unknown in enumerate(space.unknowns):
         is_free = unknown.prior is None and (unknown.is_logarithmic or unknown.name.startswith("contact_point"))
         if not is_free or not (unknown.is_wanted or unknown.name.startswith("contact_point")):
@@ -38,8 +38,8 @@ def cut(found: Fit) -> tuple[str, ...]:
         if len(ends) == 1:
             where = engineering(ends[0], unknown.unit)
             text = f"The error bar of {title(unknown.name)} ends where its range does, at {where}"
-            told.append(f"{text}{'' if unknown.is_wanted else _TOO_SMALL}.")
-    return tuple(told)
+            notes.append(f"{text}{'' if unknown.is_wanted else _TOO_SMALL}.")
+    return tuple(notes)
 
 
 def at_an_end(found: Fit) -> Iterator[str]:

@@ -144,30 +144,30 @@ class Work:
         """Return what curves of a specimen say, or why they cannot be fitted.
 
         Where forces that were corrected over ``near`` are not exact enough for it, return the ranges to correct over.
-        Whatever goes wrong with one specimen is told of it, and does not end the others.
+        What goes wrong with one specimen is its message, and does not end the others.
         """
         try:
             fit = identify(scenes.measured(specimen), unknowns(self.study))
             ranges = scenes.ranges(fit)
-            return self._told(specimen, scenes, fit) if near in (None, ranges) else ranges
+            return self._with_notes(specimen, scenes, fit) if near in (None, ranges) else ranges
         except ExperimentError as error:
             return error
         except Exception as error:
             return ExperimentError(specimen.name, f"cannot be fitted: {type(error).__name__}: {error}")
 
-    def _told(self, specimen: Specimen, scenes: Scenes, found: Estimate) -> xr.Dataset:
+    def _with_notes(self, specimen: Specimen, scenes: Scenes, found: Estimate) -> xr.Dataset:
         """Return the dataset of a fit, with all that is said of it."""
         measured, sought = scenes.measured(specimen), unknowns(self.study)
-        told = [*doubts_of_scale(scenes.cases, specimen.curves), *doubts_of_force(measured, sought), *found.told]
+        notes = [*doubts_of_scale(scenes.cases, specimen.curves), *doubts_of_force(measured, sought), *found.notes]
         if found.fits:
-            told += doubts_of_depth(scenes.cases, found.curves)
-            told += doubts_of_radius(scenes.cases, found.unknowns)
-        told += advice(self.study, found) if len(self.specimens) == 1 else ()
+            notes += doubts_of_depth(scenes.cases, found.curves)
+            notes += doubts_of_radius(scenes.cases, found.unknowns)
+        notes += advice(self.study, found) if len(self.specimens) == 1 else ()
         dataset = dataset_of(found, _attributes(self.study), [curve.time for curve in specimen.curves])
-        told += doubts_of_moduli(dataset)
+        notes += doubts_of_moduli(dataset)
         if len(measured) == 1 and (young := hertz_young(scenes.cases[0], measured[0], found)) is not None:
             dataset = dataset.assign(hertz_young=described("hertz_young", young))
-        return dataset.assign_attrs({"told": "\n".join(told)} if told else {})
+        return dataset.assign_attrs({"notes": "\n".join(notes)} if notes else {})
 
 
 def _attributes(study: Study) -> dict[str, Any]:

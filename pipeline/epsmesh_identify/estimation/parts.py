@@ -161,7 +161,7 @@ class Estimate:
     ``low`` and ``high`` are right if the body is as declared, ``low_hidden`` and ``high_hidden`` also if it hides what
     it may. All are NaN if the law does not fit. ``part`` (u, len(SOURCES)) are half widths by source; the root of the
     sum of their squares is half of high - low. An unknown that is not ``seen`` is anywhere in its range.
-    ``windows`` show how the modulus changes with the depth that is fitted. ``told`` is for the user, in sentences.
+    ``windows`` show how the modulus changes with the depth that is fitted. ``notes`` are for the user, in sentences.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -180,7 +180,7 @@ class Estimate:
     evidence: float = nan
     """Logarithm of the evidence for a smooth deviation from the law, relative to that for none."""
 
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def fits(self) -> bool:

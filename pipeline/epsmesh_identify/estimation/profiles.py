@@ -18,7 +18,7 @@ _MOST, _OF_RANGE, _OF_SPREAD, _GROWTH = 24, 0.08, 0.6, 1.3
 # Gauss-Newton steps at each point, which begins where its neighbour ended; halvings of a step that is too long.
 _NEWTON, _HALVINGS = 6, 5
 # Steps that gain less, in twice the logarithm of the likelihood, are not made. A good one gains this share of what its
-# derivatives foretell.
+# derivatives predict.
 _CLOSE, _GOOD = 1e-2, 0.7
 
 
@@ -75,15 +75,15 @@ class Likelihood:
     def best(self, x: FloatArray, held: Sequence[int]) -> tuple[FloatArray, float, FloatArray]:
         """Return the best coordinates with those in ``held`` unchanged, the sum of squares, and the normal matrix.
 
-        Derivatives are computed anew only where a step gains much less than they foretell.
+        Derivatives are computed anew only where a step gains much less than they predict.
         """
         residual, jacobian = self.residual(x), self.jacobian(x)
         square, is_new = float(residual @ residual), True
         for _ in range(_NEWTON):
             matrix, slope = jacobian.T @ jacobian, jacobian.T @ residual
             step = _bounded(matrix, slope, x, held)
-            foretold = -float(step @ (2 * slope + matrix @ step))
-            if foretold < _CLOSE:
+            predicted = -float(step @ (2 * slope + matrix @ step))
+            if predicted < _CLOSE:
                 break
             for halving in range(_HALVINGS if is_new else 1):
                 trial = np.clip(x + step / 2**halving, 0.0, 1.0)
@@ -95,7 +95,7 @@ class Likelihood:
                 x, residual, square = trial, after, square - gain
             elif is_new:
                 break
-            is_new = gain < _GOOD * foretold
+            is_new = gain < _GOOD * predicted
             if is_new:
                 jacobian = self.jacobian(x)
         return x, square, jacobian.T @ jacobian

@@ -23,7 +23,7 @@ from epsmesh_identify.surrogate.cases import Solve, SurrogateError
 
 
 def identification(study: Study, output: Path, store: Path, say: Callable[[str], None]) -> xr.Dataset:
-    """Return the dataset of an identification; ``say`` is told what is found in files, and how far the work is.
+    """Return the dataset of an identification; ``say`` gets what is found in files, and how far the work is.
 
     Cases of forces are in the ``store``; results of single files are kept in the folder ``output``. Ranks share the
     files, and each returns the dataset; collective.
@@ -38,7 +38,7 @@ def identification(study: Study, output: Path, store: Path, say: Callable[[str],
     comm = workflow.world()
     with workflow.abort_on_exception(comm, ExperimentError, StoreError, StudyError, SurrogateError):
         found, cases = specimens(study), cases_of(study)
-        read = [(one.name, f"{curve.name}: {line}") for one in found for curve in one.curves for line in curve.told]
+        read = [(one.name, f"{curve.name}: {line}") for one in found for curve in one.curves for line in curve.notes]
         read += [(one.name, line) for one in found if one.curves for line in doubts_of_scale(cases, one.curves)]
         for line in once(read, len(found)):
             say(line)
@@ -58,7 +58,7 @@ def telling(solve: Solve, say: Callable[[str], None]) -> Solve:
     """Return what solves studies, and says how many cases there were every few seconds."""
     start, count, printed = time.monotonic(), 0, time.monotonic()
 
-    def told(study: Study) -> xr.Dataset:
+    def computed(study: Study) -> xr.Dataset:
         nonlocal count, printed
         dataset = solve(study)
         count += len(study)
@@ -67,4 +67,4 @@ def telling(solve: Solve, say: Callable[[str], None]) -> Solve:
             say(f"forces over the ranges of the unknowns: {counted(count, 'case')} so far, {printed - start:.0f} s")
         return dataset
 
-    return told
+    return computed

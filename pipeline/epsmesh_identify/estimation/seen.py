@@ -34,8 +34,8 @@ def combinations(found: Fit, seen: npt.NDArray[np.bool_]) -> tuple[str, ...]:
     inner = spread[np.ix_(places, places)] * np.outer(rate, rate)
     names = [space.unknowns[k].name for k in places]
     what = "This curve sees" if len(found.force) == 1 else f"These {len(found.force)} curves see"
-    told = _told(names, inner, [bool(seen[k]) for k in places])
-    return tuple(f"{what} {text}" for text in told)
+    notes = _notes(names, inner, [bool(seen[k]) for k in places])
+    return tuple(f"{what} {text}" for text in notes)
 
 
 def _has_logarithm(unknown: Unknown) -> bool:
@@ -52,7 +52,7 @@ def _rate(space: Space, place: int, x: float) -> float:
     return -2 * value / (1 - value**2) * (unknown.high - unknown.low)
 
 
-def _told(names: Sequence[str], spread: FloatArray, seen: Sequence[bool]) -> Iterator[str]:
+def _notes(names: Sequence[str], spread: FloatArray, seen: Sequence[bool]) -> Iterator[str]:
     """Yield pairs of unknowns, of logarithms with a covariance ``spread``, that are seen together only."""
     done = set[str]()
     for first, second in permutations(range(len(names)), 2):

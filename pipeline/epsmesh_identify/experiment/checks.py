@@ -1,4 +1,4 @@
-"""Checks of a recorded curve: what cannot be one is an error, what is doubtful is told."""
+"""Checks of a recorded curve: what cannot be one is an error, what is doubtful is noted."""
 
 import numpy as np
 
@@ -26,24 +26,24 @@ _LONG, _LEFT, _NONE = 3.0, 2.0, 0.1
 
 def check_size(found: Recorded) -> Recorded:
     """Tell depths and forces that hardly anyone measures: their unit may be another."""
-    told = []
+    notes = []
     depth, force = float(np.ptp(found.depth)), float(np.abs(found.force).max())
     if not _DEPTHS[0] <= depth <= _DEPTHS[1]:
-        told.append(f"the depth changes by {depth:.3g} m: is its unit right?")
+        notes.append(f"the depth changes by {depth:.3g} m: is its unit right?")
     if not _FORCES[0] <= force <= _FORCES[1]:
-        told.append(f"the force is up to {force:.3g} N: is its unit right?")
-    return found.tell(*told)
+        notes.append(f"the force is up to {force:.3g} N: is its unit right?")
+    return found.noting(*notes)
 
 
 def without_saturation(found: Recorded) -> Recorded:
-    """Return the curve without rows in which the load cell is at its end, which are told."""
+    """Return the curve without rows in which the load cell is at its end, which are noted."""
     largest = found.force.max()
     rows = np.flatnonzero(found.force == largest)
     rise = float(np.ptp(found.depth[rows]))
     if len(rows) < _PLATEAU or rise < _RISE * np.ptp(found.depth) or len(rows) <= 2 * _usual_run(found.force, largest):
         return found
     kept = found.part(found.force < largest)
-    return kept.tell(
+    return kept.noting(
         f"force stays at its largest value {largest:.4g} N in {len(rows)} rows, from line {found.lines[rows[0]]} on, "
         f"while the depth rises by {rise:.3g} m: the load cell is saturated; these rows are left out"
     )
@@ -56,13 +56,13 @@ def _usual_run(force: FloatArray, largest: float) -> int:
 
 
 def check_contact(found: Recorded, *, is_rising: bool, is_cut: bool) -> Recorded:
-    """Return an approach without air far longer than the contact; report one without contact, tell one without air.
+    """Return an approach without air far longer than the contact; report one without contact, note one without air.
 
-    ``is_rising`` tells an approach alone from one with a hold, in which the depth has no usual step. Air is left where
+    ``is_rising``: an approach alone, not one with a hold, in which the depth has no usual step. Air is left where
     the study gives the window: ``is_cut`` is false.
     """
     depth, force = found.depth, found.force
-    told = [*gaps(found, depth, "depth", "m"), *_flat_end(found)] if is_rising else []
+    notes = [*gaps(found, depth, "depth", "m"), *_flat_end(found)] if is_rising else []
     air = np.median(force[: max(3, len(force) // 20)])
     end = np.median(force[-max(3, len(force) // 20) :])
     noise = float(np.median(np.abs(np.diff(force)))) * 1.4826 / np.sqrt(2)
@@ -75,12 +75,12 @@ def check_contact(found: Recorded, *, is_rising: bool, is_cut: bool) -> Recorded
     touch = int(below[-1]) + 1 if below.size else 0
     way, contact = float(depth[min(touch, len(depth) - 1)] - depth[0]), float(depth[-1] - depth[touch - 1])
     if way < _NONE * np.ptp(depth):
-        told.append("little or no air before the contact: contact point and baseline are hardly known")
+        notes.append("little or no air before the contact: contact point and baseline are hardly known")
     elif is_cut and way > _LONG * contact > 0:
         kept = depth >= depth[touch] - _LEFT * contact
-        told.append(f"{int((~kept).sum())} rows of air, far longer than the contact, are left out")
-        return found.part(kept).tell(*told)
-    return found.tell(*told)
+        notes.append(f"{int((~kept).sum())} rows of air, far longer than the contact, are left out")
+        return found.part(kept).noting(*notes)
+    return found.noting(*notes)
 
 
 def _flat_end(found: Recorded) -> list[str]:

@@ -20,7 +20,7 @@ _KINDS = {"m": "a length", "N": "a force", "s": "a time"}
 class Recorded:
     """Depth (m), force (N) and time (s from the first row, or None) as recorded, and the lines they are from.
 
-    ``names`` has the headers of the columns, by what they are. ``told`` says what was found without being asked for.
+    ``names`` has the headers of the columns, by what they are. ``notes`` say what was found without being asked for.
     ``began`` is the time of the first row as recorded.
     """
 
@@ -30,7 +30,7 @@ class Recorded:
     time: FloatArray | None
     lines: IntArray
     names: dict[str, str]
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     deflection: FloatArray | None = None
     began: float = 0.0
 
@@ -53,9 +53,9 @@ class Recorded:
             deflection=deflection,
         )  # fmt: skip
 
-    def tell(self, *words: str) -> "Recorded":
+    def noting(self, *words: str) -> "Recorded":
         """Return it with more that was found."""
-        return replace(self, told=(*self.told, *words))
+        return replace(self, notes=(*self.notes, *words))
 
 
 def recorded(table: Table, reading: Reading) -> Recorded:
@@ -64,23 +64,23 @@ def recorded(table: Table, reading: Reading) -> Recorded:
     Raises:
         ExperimentError: if a column is missing, ambiguous, of another kind, without a unit, or has text.
     """
-    told = [*table.told, *_empty(table)]
+    notes = [*table.notes, *_empty(table)]
     has_spring = "deflection" in reading.columns
     wanted = ("piezo", "deflection") if has_spring else ("depth", "force")
     chosen: dict[str, int] = {}
     for kind in wanted:
-        chosen[kind] = _named(table, kind, reading) if kind in reading.columns else _found(table, kind, reading, told)
+        chosen[kind] = _named(table, kind, reading) if kind in reading.columns else _found(table, kind, reading, notes)
     if "time" in reading.columns:
         chosen["time"] = _named(table, "time", reading)
-    elif (time := _time(table, set(chosen.values()), reading, told)) is not None:
+    elif (time := _time(table, set(chosen.values()), reading, notes)) is not None:
         chosen["time"] = time
     _check_distinct(table, chosen)
-    values = {kind: _in_si(table, number, kind, reading, told) for kind, number in chosen.items()}
+    values = {kind: _in_si(table, number, kind, reading, notes) for kind, number in chosen.items()}
     names = {kind: table.headers[number].text or f"{number + 1}" for kind, number in chosen.items()}
     way = values["piezo" if has_spring else "depth"]
     force = values["deflection"] * (reading.spring or 1.0) if has_spring else values["force"]
     found = Recorded(
-        table.file, way, force, values.get("time"), table.lines, names, tuple(told), values.get("deflection")
+        table.file, way, force, values.get("time"), table.lines, names, tuple(notes), values.get("deflection")
     )
     return _without_missing(found)
 
@@ -147,7 +147,7 @@ def _are_equal(table: Table, numbers: list[int], *, but_for_a_constant: bool = F
     return True
 
 
-def _found(table: Table, kind: str, reading: Reading, told: list[str]) -> int:
+def _found(table: Table, kind: str, reading: Reading, notes: list[str]) -> int:
     """Return the column that is unmistakably depth or force: by its words and unit, or the only one of that unit."""
     units = [_unit(table, number, reading, kind) for number in range(len(table.headers))]
     of_kind = [n for n, unit in enumerate(units) if unit and is_unit_of(unit, UNITS[kind]) and _has_values(table, n)]
@@ -159,10 +159,10 @@ def _found(table: Table, kind: str, reading: Reading, told: list[str]) -> int:
     candidates = called or of_kind
     if len(candidates) > 1 and _are_equal(table, candidates, but_for_a_constant=kind == "force"):
         same = ", ".join(f"`{_title(table, n)}`" for n in candidates[1:])
-        told.append(f"{kind} is column `{_title(table, candidates[0])}`; {same} differs by no more than a constant")
+        notes.append(f"{kind} is column `{_title(table, candidates[0])}`; {same} differs by no more than a constant")
         return candidates[0]
     if len(candidates) == 1:
-        told.append(f"{kind} is column `{_title(table, candidates[0])}`")
+        notes.append(f"{kind} is column `{_title(table, candidates[0])}`")
         return candidates[0]
     why = f"could be {', '.join(f'`{_title(table, n)}`' for n in candidates)}" if candidates else "is not found"
     raise ExperimentError(
@@ -193,22 +193,22 @@ def _if_bent(table: Table) -> str:
     return "; if the force is the deflection of a spring, name piezo, deflection and spring" if is_bent else ""
 
 
-def _time(table: Table, taken: set[int], reading: Reading, told: list[str]) -> int | None:
+def _time(table: Table, taken: set[int], reading: Reading, notes: list[str]) -> int | None:
     """Return the only column that is called time, or has a unit of time; None if there is none, or several."""
     free = [n for n in range(len(table.headers)) if n not in taken and _has_values(table, n)]
     for number, (line, text) in table.strange.items():
         if is_called(table.headers[number].name, "time"):
-            told.append(f'column `{_title(table, number)}` has text, "{text}" in line {line}, and is not read as time')
+            notes.append(f'column `{_title(table, number)}` has text, "{text}" in line {line}, and is not read as time')
     found = [n for n in free if is_called(table.headers[n].name, "time")]
     found = found or [n for n in free if is_unit_of(table.headers[n].unit, "s")]
     for number in [n for n in found if not _unit(table, n, reading, "time")]:
-        told.append(f"column `{_title(table, number)}` has no unit, and is not read as time: give it in units")
+        notes.append(f"column `{_title(table, number)}` has no unit, and is not read as time: give it in units")
     found = [n for n in found if is_unit_of(_unit(table, n, reading, "time"), "s")]
     if len(found) > 1:
-        told.append(f"time could be {', '.join(_title(table, n) for n in found)}: not read; name it in columns")
+        notes.append(f"time could be {', '.join(_title(table, n) for n in found)}: not read; name it in columns")
     if len(found) != 1:
         return None
-    told.append(f"time is column `{_title(table, found[0])}`")
+    notes.append(f"time is column `{_title(table, found[0])}`")
     return found[0]
 
 
@@ -224,7 +224,7 @@ def _unit(table: Table, number: int, reading: Reading, kind: str) -> str:
     return header or in_name or reading.units.get(kind, "")
 
 
-def _in_si(table: Table, number: int, kind: str, reading: Reading, told: list[str]) -> FloatArray:
+def _in_si(table: Table, number: int, kind: str, reading: Reading, notes: list[str]) -> FloatArray:
     """Return a column in SI units."""
     title, si = _title(table, number), UNITS[kind]
     if number in table.strange:
@@ -254,7 +254,7 @@ def _in_si(table: Table, number: int, kind: str, reading: Reading, told: list[st
     if named and is_unit_of(named, si) and not np.isclose(factor_of(named, si), factor, rtol=1e-9):
         raise ExperimentError(table.file, f'has the unit {unit}, but columns.{kind} is "{wanted}"', column=title)
     if unit in MASSES:
-        told.append(f"{kind} is the weight of a mass: 1 {unit} is {factor:.6g} N")
+        notes.append(f"{kind} is the weight of a mass: 1 {unit} is {factor:.6g} N")
     return table.values[:, number] * factor
 
 
@@ -282,11 +282,11 @@ def _without_missing(found: Recorded) -> Recorded:
         raise ExperimentError(found.file, "has no row with depth and force")
     kept = found.part(rows)
     if kept.time is not None and np.ptp(kept.time) == 0:
-        kept = replace(kept, time=None).tell(f"time never changes (column `{kept.names['time']}`): not read")
+        kept = replace(kept, time=None).noting(f"time never changes (column `{kept.names['time']}`): not read")
     if kept.time is not None:
         kept = replace(kept, time=kept.time - kept.time[0], began=float(kept.time[0]))
     count = int(missing.sum())
     if count:
         first = int(found.lines[np.flatnonzero(missing)[0]])
-        kept = kept.tell(f"{count} rows without all values, the first in line {first}: left out")
+        kept = kept.noting(f"{count} rows without all values, the first in line {first}: left out")
     return kept

@@ -11,11 +11,11 @@ class Curve:
 
     ``depth`` (n,) is the way of the tool, or of the machine, in m: larger is deeper, and its zero is arbitrary, since
     the point of contact is not known. ``force`` (n,) is in N, positive where the tool presses. ``time`` (n,) is in s,
-    None if it was not recorded. ``told`` says what was found in the file without being asked for.
+    None if it was not recorded. ``notes`` say what was found in the file without being asked for.
     """
 
     name: str
     depth: FloatArray
     force: FloatArray
     time: FloatArray | None = None
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()

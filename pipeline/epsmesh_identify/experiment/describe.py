@@ -40,7 +40,7 @@ def describe(path: Path, reading: Reading | None = None) -> str:
         curve = read_curve(path, reading)
     except ExperimentError as error:
         return "\n".join([*lines, "", f"not read yet: {error}", "", *_to_choose(table, path.name)])
-    lines += ["", *_of_segments(signed(whole, reading)), *(f"- {told}" for told in curve.told)]
+    lines += ["", *_of_segments(signed(whole, reading)), *(f"- {note}" for note in curve.notes)]
     return "\n".join([*lines, "", *_block(whole, path.name, signs_of(whole, reading)), *_to_add(table)])
 
 

@@ -24,7 +24,7 @@ _OTHERS = ("\t", ";", ",", "  ")
 def headers_of(before: Sequence[str], layout: Layout, values: FloatArray) -> tuple[tuple[Header, ...], str]:
     """Return the headers, from the lines before the rows: names, and units there or in a row of their own.
 
-    Besides, return what is told of a line of headers that has one more or fewer than there are columns of ``values``.
+    Besides, return a note on a line of headers that has one more or fewer than there are columns of ``values``.
     """
     width = layout.width
     for count in (width, width - 1, width + 1):
@@ -69,7 +69,7 @@ def _named(fields: Sequence[str], units: Sequence[str] = ()) -> tuple[Header, ..
 
 
 def _placed(names: list[str], units: list[str], values: FloatArray) -> tuple[tuple[Header, ...], str]:
-    """Return the headers of columns whose line of headers has one more, or one fewer, and what is told of it.
+    """Return the headers of columns whose line of headers has one more, or one fewer, and a note on it.
 
     Rows may end with a separator, or begin with a name or number that has no header. Otherwise no header is sure.
     """
@@ -79,10 +79,10 @@ def _placed(names: list[str], units: list[str], values: FloatArray) -> tuple[tup
             return _named([*names, ""], [*units, ""]), ""
         first = values[:, 0]
         if np.isnan(first).all() or np.array_equal(first, np.arange(1, rows + 1)):
-            told = f"the first column has the names of rows: its header is not among the {len(names)}"
-            return _named(["", *names], ["", *units]), told
-    told = f"{width} columns have {len(names)} headers, which are not used: name columns by number, and their units"
-    return _named([""] * width), told
+            note = f"the first column has the names of rows: its header is not among the {len(names)}"
+            return _named(["", *names], ["", *units]), note
+    note = f"{width} columns have {len(names)} headers, which are not used: name columns by number, and their units"
+    return _named([""] * width), note
 
 
 def _with_unit(text: str, unit: str) -> Header:

@@ -1,4 +1,4 @@
-"""Checks of the order of rows: what is no curve over time is an error, gaps and jumps are told."""
+"""Checks of the order of rows: what is no curve over time is an error, gaps and jumps are noted."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ _EXACT, _DATE = 1e-3, 1e6
 
 
 def check_order(found: Recorded) -> Recorded:
-    """Return the curve; report rows that are in no order, and tell gaps in time."""
+    """Return the curve; report rows that are in no order, and note gaps in time."""
     if np.ptp(found.depth) == 0:
         raise ExperimentError(found.file, "the depth never changes", column=found.depth_name)
     if np.ptp(found.force) == 0:
@@ -40,7 +40,7 @@ def check_order(found: Recorded) -> Recorded:
     _check_spikes(found, found.depth, found.depth_name)
     _check_spikes(found, found.force, found.force_name)
     _check_last(found)
-    return found.tell(*_jumps(found), *(_of_time(found, found.time) if found.time is not None else ()))
+    return found.noting(*_jumps(found), *(_of_time(found, found.time) if found.time is not None else ()))
 
 
 def _check_time(found: Recorded, time: FloatArray) -> None:
@@ -78,12 +78,12 @@ def _check_last(found: Recorded) -> None:
 
 def _of_time(found: Recorded, time: FloatArray) -> list[str]:
     """Tell gaps in time, and a depth that looks like a time while the time looks like a depth."""
-    told = gaps(found, time, "time", "s")
+    notes = gaps(found, time, "time", "s")
     steps = np.abs(np.diff(found.depth))
     is_clock = found.depth[0] == 0 and np.ptp(steps) <= _EXACT * steps.max()
     if is_clock and 0 < abs(found.began) < _DATE and np.ptp(np.diff(time)) > 10 * _EXACT * np.abs(np.diff(time)).max():
-        told.append("the depth rises in even steps from 0, and the time does not: are these columns swapped?")
-    return told
+        notes.append("the depth rises in even steps from 0, and the time does not: are these columns swapped?")
+    return notes
 
 
 def _check_spikes(found: Recorded, values: FloatArray, name: str) -> None:
@@ -104,15 +104,15 @@ def _check_spikes(found: Recorded, values: FloatArray, name: str) -> None:
 
 def _jumps(found: Recorded) -> list[str]:
     """Tell times that are there twice, and a fall of the depth from one row to the next, as between blocks of rows."""
-    told = []
+    notes = []
     if found.time is not None and (same := int((np.diff(found.time) == 0).sum())):
-        told.append(f"{same} rows have the time of the row before")
+        notes.append(f"{same} rows have the time of the row before")
     steps = np.diff(found.depth)
     row = int(np.argmax(np.abs(steps)))
     if abs(steps[row]) > max(_FALL * float(np.ptp(found.depth)), _GAP * float(np.median(np.abs(steps)))):
         jump, line = abs(steps[row]), found.lines[row + 1]
-        told.append(f"the depth jumps by {jump:.3g} m before line {line}: is this one curve, in order?")
-    return told
+        notes.append(f"the depth jumps by {jump:.3g} m before line {line}: is this one curve, in order?")
+    return notes
 
 
 def gaps(found: Recorded, values: FloatArray, what: str, unit: str) -> list[str]:

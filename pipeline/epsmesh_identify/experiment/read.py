@@ -20,8 +20,8 @@ from epsmesh_identify.experiment.signs import signed
 from epsmesh_identify.experiment.table import table_of
 from epsmesh_identify.experiment.text import read_lines
 
-# Files of a folder whose errors are told; the others are counted.
-_MOST_TOLD = 5
+# Files of a folder whose errors are listed; the others are counted.
+_MOST_LISTED = 5
 # A row at the end of a window is in it.
 _ROUNDING = 1e-9
 
@@ -75,9 +75,9 @@ def some(found: Sequence[Curve | ExperimentError], pattern: str) -> tuple[Curve 
         return tuple(found)
     if len(errors) == 1:
         raise errors[0]
-    told = [str(error) for error in errors[:_MOST_TOLD]]
-    more = [f"… and {len(errors) - _MOST_TOLD} more files"] if len(errors) > _MOST_TOLD else []
-    raise ExperimentError(pattern, "\n".join([f"{len(errors)} files, and none has such a curve:", *told, *more]))
+    listed = [str(error) for error in errors[:_MOST_LISTED]]
+    more = [f"… and {len(errors) - _MOST_LISTED} more files"] if len(errors) > _MOST_LISTED else []
+    raise ExperimentError(pattern, "\n".join([f"{len(errors)} files, and none has such a curve:", *listed, *more]))
 
 
 def read_curve(path: Path, reading: Reading) -> Curve:
@@ -94,7 +94,7 @@ def read_curve(path: Path, reading: Reading) -> Curve:
     if reading.segment.startswith("approach"):
         found = check_count(without_saturation(found), reading.segment)
         found = check_contact(found, is_rising=reading.segment == "approach", is_cut=reading.window is None)
-    return Curve(path.stem, found.depth, found.force, found.time, found.told)
+    return Curve(path.stem, found.depth, found.force, found.time, found.notes)
 
 
 def whole_curve(path: Path, reading: Reading) -> Recorded:
@@ -125,7 +125,7 @@ def _segment(found: Recorded, cycles: tuple[Cycle, ...], inside: BoolArray, read
     if reading.cycle > len(cycles):
         raise ExperimentError(found.file, f"cycle = {reading.cycle}: it has {len(cycles)}")
     if len(cycles) > 1:
-        found = found.tell(f"{len(cycles)} cycles: number {reading.cycle} is read")
+        found = found.noting(f"{len(cycles)} cycles: number {reading.cycle} is read")
     rows = np.arange(len(found.depth))[cycles[reading.cycle - 1].rows(reading.segment)]
     if not rows.size:
         raise ExperimentError(found.file, _absent(cycles[reading.cycle - 1], reading.segment))

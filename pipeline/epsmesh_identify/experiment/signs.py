@@ -34,18 +34,18 @@ def signs_of(found: Recorded, reading: Reading) -> tuple[int, int]:
 def signed(found: Recorded, reading: Reading) -> Recorded:
     """Return the curve with depth and force positive where the tool presses: see :func:`signs_of`."""
     depth_sign, force_sign = signs_of(found, reading)
-    told = []
+    notes = []
     if reading.depth_sign is None and depth_sign < 0:
-        told.append(f"depth falls as the tool advances (column `{found.depth_name}`): its sign is changed")
+        notes.append(f"depth falls as the tool advances (column `{found.depth_name}`): its sign is changed")
     if reading.force_sign is None and force_sign < 0:
-        told.append(f"force is negative under pressure (column `{found.force_name}`): its sign is changed")
+        notes.append(f"force is negative under pressure (column `{found.force_name}`): its sign is changed")
     own = _deep_end(found.depth, found.force)
     if own and reading.depth_sign == -own:
-        told.append(f"sign.depth = {reading.depth_sign} makes the end with constant force the deep one: is it {own}?")
+        notes.append(f"sign.depth = {reading.depth_sign} makes the end with constant force the deep one: is it {own}?")
     depth, force = found.depth * depth_sign, found.force * force_sign
     if found.deflection is not None:  # the depth is the piezo's way less what the spring yields
         depth = depth - found.deflection * force_sign
-    return replace(found, depth=depth, force=force, deflection=None).tell(*told)
+    return replace(found, depth=depth, force=force, deflection=None).noting(*notes)
 
 
 def _deep_end(depth: FloatArray, force: FloatArray) -> int:

@@ -38,7 +38,7 @@ _UNIT = "\x1f"
 class Table:
     """Values (rows × columns; NaN where missing) and the numbers of their lines, from 1.
 
-    ``strange`` has, by column, the first line and text of a value that is no number. ``told`` says what was found.
+    ``strange`` has, by column, the first line and text of a value that is no number. ``notes`` say what was found.
     ``spring`` is the spring constant in the lines above. ``unused`` says why headers there are those of no columns.
     """
 
@@ -47,7 +47,7 @@ class Table:
     values: FloatArray
     lines: IntArray
     strange: dict[int, tuple[int, str]] = field(default_factory=dict)
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     layout: Layout = field(default_factory=lambda: Layout(",", ".", 0))
     spring: str = ""
     unused: str = ""
@@ -71,16 +71,16 @@ def table_of(lines: Sequence[str], file: str) -> Table:
     if len(wrong) > max(1, _MOST_ODD * len(kept)):
         width = len(layout.fields(lines[wrong[0]]))
         raise ExperimentError(file, f"has {width} columns, others have {layout.width}", line=wrong[0] + 1)
-    told = [f"{_of_lines(odd)} no row of {layout.width} columns: left out"] if odd else []
+    notes = [f"{_of_lines(odd)} no row of {layout.width} columns: left out"] if odd else []
     if spring := spring_of(lines[:begin]):
-        told.append(f"the header has a spring constant of {spring}: {_OF_SPRING}")
+        notes.append(f"the header has a spring constant of {spring}: {_OF_SPRING}")
     numbers = np.array(kept) + 1
     values, strange, clocks = _values([lines[n] for n in kept], layout, numbers)
     headers, of_headers = headers_of(lines[:begin], layout, values)
-    told += [of_headers] if of_headers else []
+    notes += [of_headers] if of_headers else []
     headers = tuple(replace(one, unit="s") if n in clocks else one for n, one in enumerate(headers))
     unused = "" if any(header.text for header in headers) else of_headers
-    return Table(file, headers, values, numbers, strange, tuple(told), layout, spring, unused)
+    return Table(file, headers, values, numbers, strange, tuple(notes), layout, spring, unused)
 
 
 def spring_of(before: Sequence[str]) -> str:
@@ -196,7 +196,7 @@ def _check_decimals(before: Sequence[str], layout: Layout, file: str, begin: int
         if is_header and len(fields) < layout.width <= 2 * len(fields):
             raise ExperimentError(
                 file,
-                f"has {layout.width} columns, and a header of {len(fields)}: decimal commas cannot be told from commas "
-                "between columns; save it with semicolons",
+                f"has {layout.width} columns, and a header of {len(fields)}: decimal commas are not distinguishable "
+                "from commas between columns; save it with semicolons",
                 line=begin + 1,
             )

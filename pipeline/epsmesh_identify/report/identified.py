@@ -33,7 +33,7 @@ _NAMES = {
     "drift": "drift",
 }
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-# Unknowns whose error is told as a number, not as a share of their value: it may be 0, or is a share itself.
+# Unknowns whose error is given as a number, not as a share of their value: it may be 0, or is a share itself.
 _ABSOLUTE = ("poisson", "friction", "baseline", "tilt", "drift", "contact_point", "share")
 _SHARES = "relaxation_share_"
 # Error bars whose sides differ by more than this share have no ±.
@@ -57,7 +57,7 @@ def answer(dataset: xr.Dataset) -> list[str]:
         lines = list(_without_bars(dataset))
     else:
         lines = [of_unknown(dataset, name, is_short=number > 0) for number, name in enumerate(wanted(dataset))]
-    return [*lines, *_hertz(dataset), *told(dataset)]
+    return [*lines, *_hertz(dataset), *notes(dataset)]
 
 
 def _hertz(dataset: xr.Dataset) -> Iterator[str]:
@@ -68,13 +68,13 @@ def _hertz(dataset: xr.Dataset) -> Iterator[str]:
         yield f"Hertz's formula, a paraboloid on a half-space, by least squares: {what} = {value}."
 
 
-def told(dataset: xr.Dataset) -> list[str]:
+def notes(dataset: xr.Dataset) -> list[str]:
     """Return what the fit has to say, in sentences; those of many files once."""
     if "file" in dataset.dims:
-        files, lines = dataset["file"].values.astype(str), dataset["told"].values.astype(str)
+        files, lines = dataset["file"].values.astype(str), dataset["notes"].values.astype(str)
         said = [(file, line) for file, own in zip(files, lines, strict=True) for line in own.splitlines()]
         return [_ended(line) for line in once(said, len(files))]
-    return [_ended(line) for line in str(dataset.attrs.get("told", "")).splitlines() if line]
+    return [_ended(line) for line in str(dataset.attrs.get("notes", "")).splitlines() if line]
 
 
 def _ended(sentence: str) -> str:
@@ -259,8 +259,8 @@ def _of_files(dataset: xr.Dataset) -> Iterator[str]:
         yield f"It does not fit {', '.join(names[:_MOST])}{_more(names, _MOST)}."
     if failed:
         reasons = list(failed.values())
-        told_of = f"{'; '.join(reasons[:_MOST_REASONS])}{_more(reasons, _MOST_REASONS)}"
-        yield f"{counted(len(failed), 'file')} failed: {told_of}."
+        listed = f"{'; '.join(reasons[:_MOST_REASONS])}{_more(reasons, _MOST_REASONS)}"
+        yield f"{counted(len(failed), 'file')} failed: {listed}."
     own = dataset.isel(file=np.flatnonzero(fits))
     for name in wanted(dataset) if fits.any() else ():
         one = own.sel(unknown=name)

@@ -50,11 +50,13 @@ class Columns(BaseModel):
     depth: Annotated[
         Column | None,
         Words(
-            "Column of the depth: its header, or its number from 1.", '"indentation / nm"', default="found, and told"
+            "Column of the depth: its header, or its number from 1.",
+            '"indentation / nm"',
+            default="found, and reported",
         ),
     ] = None
-    force: Annotated[Column | None, Words("Column of the force.", '"load (µN)"', default="found, and told")] = None
-    time: Annotated[Column | None, Words("Column of the time.", '"time [s]"', default="found, and told")] = None
+    force: Annotated[Column | None, Words("Column of the force.", '"load (µN)"', default="found, and reported")] = None
+    time: Annotated[Column | None, Words("Column of the time.", '"time [s]"', default="found, and reported")] = None
     piezo: Annotated[
         Column | None,
         Words(

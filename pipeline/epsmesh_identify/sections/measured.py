@@ -58,8 +58,8 @@ def _completed(raw: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Problem, .
         found["body"] = _each(raw["body"], lambda body: _with_pieces(body, values))
     if isinstance(material := raw.get("material", {}), dict) and ("material" in raw or not _has_pieces(raw)):
         found |= {"material": own} if (own := _filled(material, "", values)) else {}
-    told = {"probe": ("probe.depth", _ABSENT), "body": ("[body]", _VALUES), "material": ("[material]", _VALUES)}
-    changed = (told[section] for section in told if found.get(section) != raw.get(section))
+    remedies = {"probe": ("probe.depth", _ABSENT), "body": ("[body]", _VALUES), "material": ("[material]", _VALUES)}
+    changed = (remedies[section] for section in remedies if found.get(section) != raw.get(section))
     return found, (*lacking, *(Problem(key, None, why) for key, why in changed))
 
 

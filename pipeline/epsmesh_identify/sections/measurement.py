@@ -83,7 +83,7 @@ class Measurement(Section):
     ]
     columns: Annotated[
         Columns | None,
-        Words("Columns of the file.", '{depth = "depth (mm)", force = "force (N)"}', default="found, and told"),
+        Words("Columns of the file.", '{depth = "depth (mm)", force = "force (N)"}', default="found, and reported"),
     ] = None
     units: Annotated[
         ColumnUnits | None,
@@ -108,7 +108,7 @@ class Measurement(Section):
     ] = None
     sign: Annotated[
         Sign | None,
-        Words("Signs of depth and force, 1 or -1.", "{depth = -1, force = 1}", default="found, and told"),
+        Words("Signs of depth and force, 1 or -1.", "{depth = -1, force = 1}", default="found, and reported"),
     ] = None
     depth_is: Annotated[
         Literal["machine", "tool"],

@@ -52,8 +52,8 @@ def on_pad():
     level = [{"name": "narrow", "file": "narrow.csv", "baseline": "level"}]
     body = BALL["body"] | {"height": "10 mm"}
     identify = {"young": ["1 kPa", "100 kPa"], "poisson": [0.2, 0.5]}
-    told = []
-    return rank(study(body=body, probe=PUNCH, identify=identify, measurement=level), never, told.append), told
+    notes = []
+    return rank(study(body=body, probe=PUNCH, identify=identify, measurement=level), never, notes.append), notes
 
 
 def test_one_punch_does_not_see_poissons_ratio_and_a_wide_one_besides_does(on_pad):
@@ -71,9 +71,9 @@ def test_one_punch_does_not_see_poissons_ratio_and_a_wide_one_besides_does(on_pa
 
 def test_what_cannot_be_computed_is_left_out_and_told(on_pad):
     """Bonded contact is not that of the integral equation."""
-    design, told = on_pad
+    design, notes = on_pad
     assert not any("bonded" in one.words for one in design.ranked)
-    assert told == ["the same test, bonded: left out: not solved"]
+    assert notes == ["the same test, bonded: left out: not solved"]
 
 
 @pytest.fixture

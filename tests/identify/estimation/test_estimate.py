@@ -44,10 +44,10 @@ def test_a_baseline_tilts_where_there_is_air_and_is_level_by_assumption_elsewher
     # Little air tells little of the tilt: the bar is that of what is known beforehand.
     short = identify([measured(OfYoung(Punch()), values, error, 2e-4, 0.03, tilt=0.04)], [YOUNG])
     assert short.low[0] <= 2e4 <= short.high[0]
-    assert not any("taken for level" in sentence for sentence in short.told)
+    assert not any("taken for level" in sentence for sentence in short.notes)
     deep = identify([measured(Ball(), values, error, 2e-4, 0.0)], [YOUNG])
-    assert any("taken for level" in sentence for sentence in deep.told)
-    assert not any("taken for level" in sentence for sentence in found.told)
+    assert any("taken for level" in sentence for sentence in deep.notes)
+    assert not any("taken for level" in sentence for sentence in found.notes)
     # Nothing may be hidden: there is one bar.
     assert np.all(found.low_hidden == found.low) and np.all(found.high_hidden == found.high)
 
@@ -68,9 +68,9 @@ def test_one_punch_does_not_tell_poissons_ratio_and_two_do():
     ]
     one, two = identify(curves[:1], [YOUNG, POISSON]), identify(curves, [YOUNG, POISSON])
     assert not one.seen[1]
-    (sentence,) = one.told
+    (sentence,) = one.notes
     assert re.fullmatch(r"This curve sees E / \(1 - ν²\)\S* to ± [\d.]+ %, and not ν\.", sentence)
-    assert not two.told
+    assert not two.notes
     assert two.seen[:2].all()
     for found in (one, two):
         assert found.low[0] <= 2e4 <= found.high[0]
@@ -151,7 +151,7 @@ def test_values_of_a_law_that_does_not_fit_are_told_to_be_extrapolated():
     soft = replace(right.curve, force=right.curve.force * (1 - 0.3 * contact**2))
     found = identify([Measured(soft, Shallow())], [YOUNG])
     assert not found.fits
-    assert any("values are an extrapolation" in sentence for sentence in found.told)
+    assert any("values are an extrapolation" in sentence for sentence in found.notes)
 
 
 class Base:
@@ -184,7 +184,7 @@ def test_a_modulus_beyond_its_range_is_no_fit():
     found = identify([measured(Ball(), {"young": 5e6}, error, 2e-4)], [YOUNG])
     assert found.verdict.startswith("does not fit within the ranges")
     assert np.isnan(found.high[0])
-    assert any("E is the end of its range, 1.00 MPa" in sentence for sentence in found.told)
+    assert any("E is the end of its range, 1.00 MPa" in sentence for sentence in found.notes)
 
 
 @pytest.mark.parametrize("air", [0.0, 0.5])

@@ -1,4 +1,4 @@
-"""Ranges that do not include the truth have no bar, and those that cut a bar are told."""
+"""Ranges that do not include the truth have no bar, and those that cut a bar have a note."""
 
 from dataclasses import replace
 
@@ -57,9 +57,9 @@ def test_a_curve_that_begins_deep_in_contact_has_a_bar_that_holds(begins, is_zer
 def test_a_bar_that_its_range_cuts_is_told_of():
     found = _found(1e3, 25.05e3)
     assert found.fits
-    assert found.told == ("The error bar of E ends where its range does, at 25.1 kPa.",)
+    assert found.notes == ("The error bar of E ends where its range does, at 25.1 kPa.",)
     assert found.low[0] <= 25e3 <= found.high[0]
-    assert not _found(1e3, 1e6).told
+    assert not _found(1e3, 1e6).notes
 
 
 def test_a_truth_at_the_end_of_its_range_is_not_refused():

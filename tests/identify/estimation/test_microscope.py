@@ -93,8 +93,8 @@ def test_much_adhesion_is_no_fit_and_a_little_is_told(ball):
     assert "adhesion or a snap" in much.verdict
     assert np.isnan(much.low).all()
     little = identify([tip(curve(sneddon, 2e-3, dip=0.02), ball)], [SOFT])
-    assert not little.fits or any("adhesion" in sentence for sentence in little.told)
-    assert not any("adhesion" in sentence for sentence in identify([tip(curve(sneddon, 2e-3), ball)], [SOFT]).told)
+    assert not little.fits or any("adhesion" in sentence for sentence in little.notes)
+    assert not any("adhesion" in sentence for sentence in identify([tip(curve(sneddon, 2e-3), ball)], [SOFT]).notes)
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9, 0.99])

@@ -36,7 +36,7 @@ def punches(*names, seed=1):
 def test_one_punch_sees_a_product_and_two_see_both(name):
     """The narrow one sees the plane-strain modulus; below the wide one the layer's exponent is larger."""
     one = identify(punches(name), [YOUNG, POISSON])
-    (sentence,) = one.told
+    (sentence,) = one.notes
     found = re.fullmatch(r"This curve sees E / \(1 - ν²\)\^?(\S*) to ± ([\d.]+) %, and not ν\.", sentence)
     assert found
     assert float(found[2]) < 3
@@ -66,7 +66,7 @@ class Membrane:
 def test_skin_and_its_thickness_are_seen_together():
     error = 0.003 * noise(np.random.default_rng(2), 150, 0.6)
     curve = measured(Membrane(), {"skin_young": 1e5, "skin_thickness": 1e-3}, error, 1e-3)
-    sentence, *_ = identify([curve], [SKIN, THICKNESS]).told
+    sentence, *_ = identify([curve], [SKIN, THICKNESS]).notes
     assert sentence.startswith("This curve sees E of skin × (skin thickness)^2 to ± ")
     assert sentence.endswith(", and not skin thickness.")
 

@@ -35,7 +35,7 @@ def test_a_pasted_block_reads_what_was_found(tmp_path, segment):
     found = read_curve(path, Reading(segment=segment))
     np.testing.assert_array_equal(curve.depth, found.depth)
     np.testing.assert_array_equal(curve.force, found.force)
-    assert not any("sign is changed" in told for told in curve.told)  # it is given
+    assert not any("sign is changed" in note for note in curve.notes)  # it is given
 
 
 def test_segments_are_listed(tmp_path):

@@ -66,7 +66,7 @@ HEADERS = [
 def test_headers_with_units(tmp_path, names):
     curve = read(write(tmp_path / "a.csv", dict(zip(names, IN_MM.values(), strict=True))))
     assert is_the_approach(curve)
-    assert any(f"depth is column `{names[1]}`" in told for told in curve.told)
+    assert any(f"depth is column `{names[1]}`" in note for note in curve.notes)
 
 
 UNITS = [
@@ -87,7 +87,7 @@ def test_units_of_machines_and_scales(tmp_path, length, metres, unit, newtons):
     units = ColumnUnits.model_validate({"time": "s", "depth": length, "force": unit}).model_dump(exclude_none=True)
     curve = read(write(tmp_path / "b.csv", plain), columns=names, units=units)
     assert is_the_approach(curve)
-    assert any("1 g is 0.00980665 N" in told for told in curve.told) == (unit == "g")
+    assert any("1 g is 0.00980665 N" in note for note in curve.notes) == (unit == "g")
 
 
 def test_headers_of_rows_with_a_name_or_a_number(tmp_path):
@@ -96,7 +96,7 @@ def test_headers_of_rows_with_a_name_or_a_number(tmp_path):
         rows = lambda lines: [lines[0], *(f"{name.format(n)},{row}" for n, row in enumerate(lines[1:], 1))]  # noqa: B023, E731
         curve = read(write(tmp_path / "a.csv", IN_MM, change=rows))
         assert is_the_approach(curve)
-        assert any("the first column has the names of rows" in told for told in curve.told)
+        assert any("the first column has the names of rows" in note for note in curve.notes)
 
 
 def test_headers_that_end_with_a_separator(tmp_path):
@@ -130,7 +130,7 @@ def test_columns_by_name_without_their_unit_or_with_it(tmp_path):
 def test_signs_are_found_and_told(tmp_path):
     curve = read(write(tmp_path / "a.csv", {"time (s)": TIME, "z (mm)": -74 - 1e3 * DEPTH, "F (mN)": -1e3 * FORCE}))
     assert is_the_approach(curve)
-    assert sum("sign is changed" in told for told in curve.told) == 2
+    assert sum("sign is changed" in note for note in curve.notes) == 2
 
 
 def test_a_spring_and_its_deflection(tmp_path):
@@ -145,7 +145,7 @@ def test_two_forces_that_differ_by_a_constant_are_one(tmp_path):
     curve = read(write(tmp_path / "a.csv", IN_MM | {"less baseline (mN)": 1e3 * FORCE - 3}, change=lambda lines: [
         lines[0].replace("less baseline", "corrected force"), *lines[1:]]))  # fmt: skip
     assert is_the_approach(curve)
-    assert any("no more than a constant" in told for told in curve.told)
+    assert any("no more than a constant" in note for note in curve.notes)
 
 
 def test_segments_of_a_ramp_and_hold(tmp_path):
@@ -186,7 +186,7 @@ def test_cycles_are_apart(tmp_path):
     path = write(tmp_path / "a.csv", columns)
     curves = [read(path, cycle=number) for number in (1, 2, 3)]
     assert [round(c.force.max() / force.max(), 2) for c in curves] == [1.0, 0.9, 0.8]
-    assert any("3 cycles" in told for told in curves[0].told)
+    assert any("3 cycles" in note for note in curves[0].notes)
     with pytest.raises(ExperimentError, match="it has 3"):
         read(path, cycle=4)
 
@@ -206,7 +206,7 @@ def test_air_far_longer_than_contact_is_cut(tmp_path):
     curve = read(write(tmp_path / "a.csv", {"depth (mm)": 1e3 * depth, "force (mN)": 1e3 * force}))
     air = AIR - (curve.depth[0])
     assert DEEP < air < 3 * DEEP
-    assert any("air" in told for told in curve.told)
+    assert any("air" in note for note in curve.notes)
     whole = read(tmp_path / "a.csv", window=Window(-9e-3, 2e-3, "m"))
     assert len(whole.depth) == len(depth)  # a window is the user's
 
@@ -263,12 +263,12 @@ def test_a_file_of_a_force_microscope(tmp_path):
     change = lambda lines: [*lines[1:150], *AFTER, *lines[150:]]  # noqa: E731
     curve = read(write(tmp_path / "a.txt", columns, separator=" ", before=MICROSCOPE, change=change))
     assert is_the_approach(curve)
-    assert "depth is column `Height (measured)" in " ".join(curve.told)
+    assert "depth is column `Height (measured)" in " ".join(curve.notes)
 
 
 def test_the_mark_of_a_comment_is_no_part_of_a_header(tmp_path):
     path = write(tmp_path / "a.csv", IN_MM, before="# ")
-    assert any("column `time (s)`" in told for told in read(path).told)
+    assert any("column `time (s)`" in note for note in read(path).notes)
     assert is_the_approach(read(path, columns={"time": "# time (s)"}))
 
 
@@ -335,7 +335,7 @@ def test_files_of_labview(tmp_path, ending):
     change = lambda lines: [f"{row}{ending}" for row in lines[1:]]  # noqa: E731
     curve = read(write(tmp_path / "a.lvm", IN_MM, separator="\t", before=LABVIEW, change=change))
     assert is_the_approach(curve)
-    assert any("time is column `X_Value (s)`" in told for told in curve.told)
+    assert any("time is column `X_Value (s)`" in note for note in curve.notes)
 
 
 @pytest.mark.parametrize("machine", MACHINES)

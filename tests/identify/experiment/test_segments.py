@@ -77,4 +77,4 @@ def test_a_baseline_that_drifts_between_strokes_does_not_turn_signs(signs, air, 
         time, lines, names = np.arange(len(depth)) * 1.0, np.arange(len(depth)), {"depth": "z", "force": "F"}
         curve = Recorded("a.csv", signs[0] * depth, signs[1] * force, time, lines, names)
         assert signs_of(curve, Reading()) == signs
-        assert not any("is it" in told for told in signed(curve, Reading(depth_sign=signs[0])).told)
+        assert not any("is it" in note for note in signed(curve, Reading(depth_sign=signs[0])).notes)

@@ -1,4 +1,4 @@
-"""Slips in files of force curves, and in what a study says of them: each is an error or told, by name."""
+"""Slips in files of force curves, and in what a study says of them: each is an error or a note, by name."""
 
 import numpy as np
 import pytest
@@ -170,7 +170,7 @@ ERRORS = {
     ),
 }  # fmt: skip
 
-# What is in the file, how it is written, and what must be told of it.
+# What is in the file, how it is written, and what the note must say.
 TOLD = {
     "saturated load cell": (GOOD | {"force (mN)": saturated()}, {}, ["largest value", "saturated", "left out"]),
     "saturated load cell with noise": (
@@ -227,8 +227,8 @@ def test_a_slip_is_an_error_by_name(tmp_path, slip):
 @pytest.mark.parametrize("slip", TOLD)
 def test_a_slip_is_told(tmp_path, slip):
     columns, how, parts = TOLD[slip]
-    told = read_curve(write(tmp_path / "curve.csv", columns, **how), Reading()).told
-    assert any(all(part in line for part in parts) for line in told), told
+    notes = read_curve(write(tmp_path / "curve.csv", columns, **how), Reading()).notes
+    assert any(all(part in line for part in parts) for line in notes), notes
 
 
 NO_CURVES = {
@@ -263,7 +263,7 @@ def test_coarse_steps_of_the_depth_are_no_holds(tmp_path):
     columns = GOOD | {"depth (mm)": np.round(1e3 * DEPTH, 1)}
     curve = read_curve(write(tmp_path / "a.csv", columns), Reading())
     assert np.ptp(curve.depth) == pytest.approx(np.ptp(DEPTH))
-    assert not any("gap" in told for told in curve.told)
+    assert not any("gap" in note for note in curve.notes)
 
 
 def test_coarse_steps_of_the_force_are_not_saturation(tmp_path):

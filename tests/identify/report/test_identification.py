@@ -31,7 +31,7 @@ def test_one_bar_is_told_where_nothing_may_hide():
 
 
 def test_an_unknown_that_the_curves_do_not_tell_has_no_value():
-    lines = answer(identification(seen=np.array([True, False, True]), told=("A second punch would tell it.",)))
+    lines = answer(identification(seen=np.array([True, False, True]), notes=("A second punch would tell it.",)))
     assert lines[1] == "ν is not in this curve: all values from 0.37 to 0.43 fit."
     assert lines[2] == "A second punch would tell it."
     assert "poisson" not in material(identification(seen=np.array([True, False, True])))

@@ -1,4 +1,4 @@
-"""What surrogates will cost, told before: about what they then cost."""
+"""The cost of surrogates, estimated before: about what they then cost."""
 
 import json
 
@@ -43,8 +43,8 @@ def test_it_is_of_the_order_of_what_is_solved(bounds):
 
 def test_plan_tells_the_forces_of_a_study_with_ranges(epsmesh, tmp_path):
     found = json.loads(epsmesh("plan", "studies/sensitivity.toml", "--output", tmp_path, "--json").stdout)
-    told, export = found["forecasts"]
-    assert told["command"] == "sensitivity" and told["least"] == 3
+    planned, export = found["forecasts"]
+    assert planned["command"] == "sensitivity" and planned["least"] == 3
     assert export["command"] == "export"
     lines = epsmesh("plan", "studies/sensitivity.toml", "--output", tmp_path).stdout
     assert "sensitivity, forces of the scene: 3 solves" in lines
