@@ -44,8 +44,8 @@ _MOST_LINEAR = 60
 # Without patience: the least share of the first increment that may be taken, and the number of iterations after which
 # gaps of active nodes are at most so large, in units of the depth.
 _WHOLE, _SOON, _NEARLY_CLOSED = 0.5, 10, 1e-3
-# A set that is solved so often ends the entry of followers, and then changes of many nodes at once.
-_WITHOUT_FOLLOWERS, _ONE_BY_ONE = 2, 3
+# A set that is solved so often ends changes of many nodes at once.
+_ONE_BY_ONE = 3
 
 
 class Tissue(Protocol):
@@ -223,7 +223,7 @@ class _Loop:
         self._friction = None if friction_step is None else FrictionIteration(friction_step)
         self._is_patient, self._limit, self._scale = is_patient, limit, scale
         self._predicted, self._reactions = np.zeros(tissue.fixed.shape), np.full(len(active), np.inf)
-        self._before, self._repeats, self._seen = inf, 0, Counter[bytes]()
+        self._before, self._repeats, self._seen = inf, 0, Counter([active.tobytes()])
 
     def judge(self, iteration: int) -> ContactSolution | None:
         """Evaluate the state and take the next set; return the solution if that is one; collective.
@@ -235,7 +235,7 @@ class _Loop:
         self._place, self._there = _placed(tissue, tool)
         normal, forces = self._there.normal, tissue.forces()
         following = _next_set(tool, before, self._reactions, self._place.gap)
-        self._active = active = _with_care(tool, before, following, self._repeats)
+        self._active = active = self._with_care(before, following)
         is_same, is_rough = np.array_equal(active, before), self._limit > 0
         # A rough solution has the next set: forces of nodes that leave it are residuals.
         pressing = before & active if is_rough else before
@@ -270,6 +270,24 @@ class _Loop:
         self._reactions = np.einsum("ni,ni->n", self._predicted, normal)
         if _advance(self._tissue) < _WHOLE and iteration == 0 and not self._is_patient:
             raise LargeError("the load step turns tissue inside out")
+
+    def _with_care(self, active: BoolArray, following: BoolArray) -> BoolArray:
+        """Return the ``following`` set with single changes where sets repeat, and without followers that alternate.
+
+        A follower that enters may push its neighbours out, leave with them, and enter when they return: followers enter
+        only if the set with them was not solved before. There is an end to that. Between such entries, the sets are
+        those of a linear complementarity problem at each linearisation, in which single changes, the first one each,
+        cannot repeat (K. G. Murty, Opsearch 11, 42, 1974).
+        """
+        tool, followers = self._tool, self._tool.followers
+        if self._repeats >= _ONE_BY_ONE:
+            changes = np.flatnonzero((active != following) & ~followers)
+            following = active.copy()
+            following[changes[:1]] ^= True
+            following = tool.complete(following)
+        if following.tobytes() in self._seen:
+            following = following & (active | ~followers)
+        return following
 
     def _exerted(self, iteration: int, forces: FloatArray, before: BoolArray) -> FloatArray:
         """Return the forces (n, d) of the tool on nodes of the set ``before``; the state of friction follows."""
@@ -343,23 +361,6 @@ def _pulls(tool: PlacedTool, active: BoolArray, pressed: FloatArray) -> bool:
     """Return whether the tool pulls at an active node whose force ``pressed`` (n), N, means something."""
     forces = pressed[active & ~tool.followers]
     return bool((forces < -SLACK * np.abs(forces).mean()).any()) if len(forces) else False
-
-
-def _with_care(tool: PlacedTool, active: BoolArray, following: BoolArray, repeats: int) -> BoolArray:
-    """Return the ``following`` set with fewer changes where sets repeat, of which one was solved ``repeats`` times.
-
-    A follower that enters may push its neighbours out, and so leave again. Without their entry, the sets are those of a
-    linear complementarity problem at each linearisation, in which single changes, the first one each, cannot repeat
-    (K. G. Murty, Opsearch 11, 42, 1974). Followers then leave only, so there is an end to that, too.
-    """
-    if repeats >= _ONE_BY_ONE:
-        changes = np.flatnonzero((active != following) & ~tool.followers)
-        following = active.copy()
-        following[changes[:1]] ^= True
-        following = tool.complete(following)
-    if repeats >= _WITHOUT_FOLLOWERS:
-        following = following & (active | ~tool.followers)
-    return following
 
 
 def _advance(tissue: Tissue, most: int = _HALVINGS) -> float:
