@@ -23,7 +23,7 @@ from epsmesh.study.read import read_mapping
 from epsmesh_identify.estimation.run import identification
 from epsmesh_identify.report.identified import bar, engineering, mesh_share, written
 
-_HEADS = ("curve", "scene", "E", "as declared", "may hide", "largest parts", "share of the mesh", "authors")
+_HEADS = ("curve", "scene", "E", "as declared", "undeclared", "largest parts", "share of the mesh", "authors")
 _COLUMNS = {"depth": "Z_Position(mm)", "force": "Corrected_Force(N)", "time": "Timestamp(s)"}
 _MOST_PARTS = 2
 

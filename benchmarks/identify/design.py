@@ -156,7 +156,7 @@ def rows(planned: Planned, count: int, seed: int) -> list[dict[str, Any]]:
 
 
 def _hidden(designer: Designer, trials: Sequence[Trial], tests: Sequence[Measured], study: Study) -> list[Measured]:
-    """Return tests of a body that may hide what the study says."""
+    """Return tests of a body of which the study may leave something undeclared."""
     tips = [tip_of_probe(trial.probe, trial.depth) for trial in trials]
     poisson = designer.values.get("poisson", case_of(trials[0].scene).material.poisson)
     parts = hidden_parts(identification_of(study).may_hide, tips, [trial.depth for trial in trials], poisson)

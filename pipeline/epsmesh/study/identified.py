@@ -283,7 +283,7 @@ def _table(path: str, dataset: "xr.Dataset") -> dict[str, Any]:
 def _correlation(own: "xr.Dataset", wider: "Mapping[str, xr.DataArray]") -> FloatArray:
     """Return the correlation (u, u) of errors that are within the wider bars.
 
-    That of the dataset is of the narrower ones. What a body may hide moves each parameter on its own, as far as known.
+    That of the dataset is of the narrower ones. What may be undeclared moves each parameter on its own.
     """
     share = ((own["high"] - own["low"]) / (wider["high"] - wider["low"])).clip(0, 1).fillna(1).values
     found = own["correlation"].values * np.outer(share, share)

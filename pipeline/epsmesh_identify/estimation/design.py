@@ -34,7 +34,7 @@ POINTS = 150
 # Ranges of forces about the declared values: a factor, or a share of the range.
 _FACTOR, _SHARE = 1.1, 0.05
 _TOLERANCE = 2e-3
-# What a body may hide: stiffness ratios of a layer and its thicknesses, and the curvature of a base, by the first
+# What may be undeclared: stiffness ratios of a layer and its thicknesses, and the curvature of a base, by the first
 # test's contact radius.
 _RATIOS, _THICKNESSES, _CURVATURES = (1 / 3, 3.0), (0.2, 0.5, 1.0), (0.2, 0.6)
 _HALF_WIDTH = 1.96

@@ -8,7 +8,7 @@ import numpy as np
 from epsmesh.report.words import percent
 from epsmesh_identify.estimation.design import POINTS, USUAL, Design, Widths
 from epsmesh_identify.estimation.parts import Unknown
-from epsmesh_identify.report.identified import engineering, title, words_of_hidden
+from epsmesh_identify.report.identified import engineering, title, words_of_undeclared
 
 UNSEEN = "not seen"
 """The bar of an unknown that may be anywhere in its range."""
@@ -17,7 +17,7 @@ UNSEEN = "not seen"
 def lines(design: Design) -> Iterator[str]:
     """Yield the ranking as a table, and then what it says of unknowns that the planned tests do not see."""
     names = list(design.planned)
-    kinds = ("", " hidden") if design.may_hide else ("",)
+    kinds = ("", " undeclared") if design.may_hide else ("",)
     head = ["test", "narrower", *(f"{title(name)}{kind}" for name in names for kind in kinds)]
     rows = [("as planned", "", design.planned)]
     rows += [(one.words, f"{one.gain:.1f} times", one.widths) for one in design.ranked]
@@ -32,7 +32,7 @@ def lines(design: Design) -> Iterator[str]:
         f"{POINTS} points of a test to the next."
     )
     if design.may_hide:
-        yield f"hidden: if the body may hide {words_of_hidden(design.may_hide)}."
+        yield f"undeclared: {words_of_undeclared(design.may_hide)}."
 
 
 def _cells(design: Design, names: list[str], widths: Widths) -> list[str]:

@@ -51,7 +51,7 @@ Near = tuple[tuple[Range, ...], ...]
 
 @dataclass(frozen=True)
 class Scenes:
-    """What all specimens share: for each measurement a case and the force of its scene, and what the body may hide."""
+    """What all specimens share: for each measurement a case and the force of its scene, and what may be undeclared."""
 
     measurements: tuple[Measurement, ...]
     cases: tuple[Case, ...]

@@ -1,4 +1,4 @@
-"""What a body may hide that its study does not declare: unknowns of a fit, and factors of the force.
+"""What may be undeclared in a study: unknowns of a fit, and factors of the force.
 
 The bar of a curve that is fitted with them is right even if the body has a layer on top, a base that is nearer than
 declared, or a law that stiffens or softens. Their unknowns, shared by all curves:
@@ -54,7 +54,7 @@ class HiddenPart:
 def hidden_parts(
     kinds: Iterable[str], tips: Sequence[Callable[[FloatArray], Tip]], deepest: Sequence[float], poisson: float
 ) -> list[tuple[HiddenPart, ...]]:
-    """Return for each curve, with its tip and its largest depth (m), what the body may hide of these ``kinds``.
+    """Return for each curve, with its tip and its largest depth (m), what of these ``kinds`` may be undeclared.
 
     ``poisson`` is the ratio of the body, or about its middle if it is unknown.
     """

@@ -83,8 +83,8 @@ class Measured:
     """One curve and the scene it was measured on.
 
     ``machine_compliance`` (m/N) is what the machine yields: the tool is where the recorded depth says, less the force
-    times it; None if it is the unknown "machine_stiffness" (N/m). ``hidden`` is what this body may hide. ``may_tilt``
-    tells whether the force without contact may be linear in the depth, instead of constant.
+    times it; None if it is the unknown "machine_stiffness" (N/m). ``hidden`` is what may be undeclared of this body.
+    ``may_tilt`` says whether the force without contact may be linear in the depth, instead of constant.
     """
 
     curve: Curve

@@ -15,8 +15,8 @@ from epsmesh.states import FAILED
 from epsmesh.study.identified import FITS, is_of_test
 from epsmesh.study.text import toml_of
 
-# What a body may hide, in words.
-_HIDDEN = {"layer": "a layer", "base": "a stiff base", "strain": "stiffening with strain"}
+# What a study may leave undeclared, by the words of its key `may_hide`.
+_UNDECLARED = {"layer": "layer", "base": "base", "strain": "stiffening"}
 _SOURCES = {
     "noise": "noise",
     "contact": "contact point and baseline",
@@ -108,22 +108,23 @@ def of_unknown(dataset: xr.Dataset, name: str, *, is_short: bool = False) -> str
     value = f"{what} = {written(dataset, name, float(one['estimate']))}"
     first, second = bar(dataset, name), bar(dataset, name, hidden=True)
     first = first if first.startswith("±") else f"({first})"
-    if not second or second == first or not hidden_words(dataset):
+    if not second or second == first or not if_undeclared(dataset):
         return f"{value} {first}."
     if is_short:
-        return f"{value} {first} as declared; {second} with what it may hide."
-    return f"{value} {first} if the body is as declared; {second} if it may hide {hidden_words(dataset)}."
+        return f"{value} {first} as declared; {second} with what may be undeclared."
+    return f"{value} {first} if the body is as declared; {second} {if_undeclared(dataset)}."
 
 
-def hidden_words(dataset: xr.Dataset) -> str:
-    """Return what the second error bar includes."""
-    return words_of_hidden(str(dataset.attrs.get("may_hide", "")).split())
+def if_undeclared(dataset: xr.Dataset) -> str:
+    """Return when the second error bar holds; "" if it is the first."""
+    return words_of_undeclared(str(dataset.attrs.get("may_hide", "")).split())
 
 
-def words_of_hidden(may_hide: Sequence[str]) -> str:
-    """Return what a body may hide, by the words of the key ``may_hide``."""
-    kinds = [_HIDDEN.get(kind, kind) for kind in may_hide]
-    return " or ".join(filter(None, (", ".join(kinds[:-1]), *kinds[-1:])))
+def words_of_undeclared(may_hide: Sequence[str]) -> str:
+    """Return when the second error bar holds, by the words of the key ``may_hide``; "" if there are none."""
+    kinds = [_UNDECLARED.get(kind, kind) for kind in may_hide]
+    words = " or ".join(filter(None, (", ".join(kinds[:-1]), *kinds[-1:])))
+    return f"if an undeclared {words} cannot be excluded" if words else ""
 
 
 def bar(dataset: xr.Dataset, name: str, *, hidden: bool = False) -> str:
@@ -218,7 +219,7 @@ def material(dataset: xr.Dataset) -> str:
             terms.setdefault(key, []).append(f"{owner.removeprefix('relaxation_')} = {text}")
             continue
         second = bar(dataset, name, hidden=True)
-        comment = f"{bar(dataset, name)}{f'; {second} with what it may hide' if second else ''}"
+        comment = f"{bar(dataset, name)}{f'; {second} with what may be undeclared' if second else ''}"
         heading = f'# in the table of "{owner}":' if owner else "[material]"
         lines.setdefault(heading, []).append(f"{key} = {text}  # {comment}")
     if terms:
@@ -288,5 +289,5 @@ def _median_bars(dataset: xr.Dataset, name: str) -> str:
     else:
         words = [percent(float((half / abs(one["estimate"])).median())) for half in halves]
     first, second = (f"± {word}" if word not in ("", "nan") else "" for word in words)
-    beside = f", {second} if the body may hide {hidden_words(dataset)}" if second and second != first else ""
+    beside = f", {second} {if_undeclared(dataset)}" if second and second != first else ""
     return f". Median error bar: {first} if the body is as declared{beside}" if first else ""

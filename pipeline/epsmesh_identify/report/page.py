@@ -14,7 +14,7 @@ from epsmesh.report.page.facts import provenance, study_path
 from epsmesh.report.page.inline import PAGE_CSS, inline_svg
 from epsmesh.study.identified import FITS
 from epsmesh_identify.report.figures.identification import identification
-from epsmesh_identify.report.identified import answer, bar, hidden_words, material, parts, title, wanted, written
+from epsmesh_identify.report.identified import answer, bar, if_undeclared, material, parts, title, wanted, written
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -68,7 +68,7 @@ def _of_one(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
         unseen = "not in the curves" if name in wanted(dataset) else "as known before"
         bars = [bar(dataset, name), bar(dataset, name, hidden=True)] if seen else [unseen, ""]
         rows.append([title(name), value, *bars])
-    return ["", "value", "if the body is as declared", f"if it may hide {hidden_words(dataset) or 'nothing'}"], rows
+    return ["", "value", "if the body is as declared", if_undeclared(dataset) or "the same"], rows
 
 
 def _of_files(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
@@ -82,5 +82,5 @@ def _of_files(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
             value = written(one, name, float(one["estimate"].sel(unknown=name))) if str(one["verdict"].values) else ""
             cells += [value, bar(one, name), bar(one, name, hidden=True)] if verdict == FITS else [value, "", ""]
         rows.append([*cells, verdict])
-    heads = [head for name in names for head in (title(name), "as declared", "may hide")]
+    heads = [head for name in names for head in (title(name), "as declared", "undeclared")]
     return ["file", *heads, "law"], rows

@@ -47,7 +47,7 @@ def test_the_modulus_is_within_both_bars(folder, found):
 
 def test_the_answer_has_both_bars_and_a_material_to_paste(found):
     assert "if the body is as declared; " in found.stdout
-    assert "if it may hide a layer or a stiff base." in found.stdout
+    assert "if an undeclared layer or base cannot be excluded." in found.stdout
     assert '\n[material]\nyoung = "20' in found.stdout
 
 

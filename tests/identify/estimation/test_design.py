@@ -100,7 +100,7 @@ def test_a_small_ball_tells_most_of_a_skin_and_a_large_one_of_what_is_below():
 
 @pytest.mark.usefixtures("few")
 def test_hidden_parts_widen_the_second_bar_and_a_second_ball_narrows_it():
-    """About ± 50 % for one ball of a body that may hide something, and less with a second ball, best a smaller one."""
+    """About ± 50 % for one ball if something may be undeclared, and less with a second ball, best a smaller one."""
     design = rank(study(), never)
     declared, hidden = design.planned["young"]
     assert 5 < hidden / declared < 50
@@ -108,7 +108,7 @@ def test_hidden_parts_widen_the_second_bar_and_a_second_ball_narrows_it():
     assert small.widths["young"][1] < large.widths["young"][1] < 0.6 * hidden
     assert small.gain > large.gain
     assert as_data(design)["ranked"][0]["gain"] == max(one.gain for one in design.ranked)
-    assert next(iter(lines(design))).split() == ["test", "narrower", "E", "E", "hidden"]
+    assert next(iter(lines(design))).split() == ["test", "narrower", "E", "E", "undeclared"]
 
 
 def test_bars_are_those_that_fits_then_have():

@@ -1,4 +1,4 @@
-"""Unknowns of what a body may hide."""
+"""Unknowns of what may be undeclared."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ BLADE = probe(shape="blade", length="4 mm", width="1 mm", depth="0.5 mm")
 
 
 def parts(*probes):
-    """Return what the body may hide, for each tool."""
+    """Return what may be undeclared, for each tool."""
     return hidden_parts(KINDS, [tip_of_probe(tool, DEEPEST) for tool in probes], [DEEPEST] * len(probes), 0.45)
 
 

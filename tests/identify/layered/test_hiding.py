@@ -1,4 +1,4 @@
-"""Factors of what a body may hide: exact where they can be, 1 where nothing is hidden, smooth between."""
+"""Factors of what may be undeclared: exact where they can be, 1 where nothing is hidden, smooth between."""
 
 from math import radians
 

@@ -19,10 +19,10 @@ NONE = {name: np.full(3, np.nan) for name in ("low", "high", "low_hidden", "high
 def test_both_error_bars_are_told_each_with_what_it_supposes():
     first, second = answer(identification())
     assert first == (
-        "E = 12.0 kPa ± 5 % if the body is as declared; ± 17 % if it may hide a layer, a stiff base or stiffening with "
-        "strain."
+        "E = 12.0 kPa ± 5 % if the body is as declared; ± 17 % if an undeclared layer, base or stiffening cannot be "
+        "excluded."
     )
-    assert second == "ν = 0.4 ± 0.03 as declared; 0.3 to 0.44 with what it may hide."
+    assert second == "ν = 0.4 ± 0.03 as declared; 0.3 to 0.44 with what may be undeclared."
 
 
 def test_one_bar_is_told_where_nothing_may_hide():

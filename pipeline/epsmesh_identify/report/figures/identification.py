@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from epsmesh.files import FIGURE_FORMATS
 from epsmesh.report.figures.style import COLOURS, FAILED, LINE, QUIET, STYLE, finish, new_figure, save
 from epsmesh.study.identified import FITS
-from epsmesh_identify.report.identified import answer, bar, engineering, hidden_words, title, wanted
+from epsmesh_identify.report.identified import answer, bar, engineering, if_undeclared, title, wanted
 
 _WIDTH, _CURVES, _RESIDUALS, _PROFILES, _BESIDE = 7.6, 2.4, 1.2, 1.9, 1.4  # inches
 # Curves and unknowns that are shown; all are in the dataset.
@@ -137,7 +137,7 @@ def _bars(dataset: xr.Dataset, unknown: str) -> str:
     if not bool(dataset["seen"].sel(unknown=unknown)):
         return "not in the curves"
     first, second = bar(dataset, unknown), bar(dataset, unknown, hidden=True)
-    return f"{first}\nmay hide: {second}" if second and second != first else first
+    return f"{first}\nundeclared: {second}" if second and second != first else first
 
 
 def _caption(dataset: xr.Dataset, lines: Sequence[str], count: int, has_profiles: bool) -> str:
@@ -146,9 +146,9 @@ def _caption(dataset: xr.Dataset, lines: Sequence[str], count: int, has_profiles
     more = dataset.sizes["measurement"] - count
     parts += [f"The first {count} of {dataset.sizes['measurement']} curves are shown."] if more else []
     if has_profiles:
-        hidden = hidden_words(dataset)
+        hidden = if_undeclared(dataset)
         bars = "inner band: its 95 % error bar if the body is as declared"
-        bars += f"; outer band: if it may hide {hidden}" if hidden else ""
+        bars += f"; outer band: {hidden}" if hidden else ""
         parts.append(f"Below: how much worse the best fit is at other values of an unknown ({bars}).")
     return " ".join(parts)
 
@@ -174,9 +174,9 @@ def _of_files(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
         ax.plot(place[~good], values[~good], "x", color=FAILED)
         ax.set_ylabel(f"{title(unknown)}{f', {unit}' if unit else ''}")
     axes[-1].set_xlabel(f"files, in the order of {title(shown[0])}")
-    hidden = hidden_words(dataset)
+    hidden = if_undeclared(dataset)
     bars = "Thick lines: 95 % error bars if the body is as declared"
-    bars += f"; thin ones: if it may hide {hidden}." if hidden else "."
+    bars += f"; thin ones: {hidden}." if hidden else "."
     failed = " Crosses: the law does not fit." if not fits.all() else ""
     finish(figure, name, " ".join([*lines[:1], f"{bars}{failed}"]), legend=False)
     return figure
