@@ -21,12 +21,24 @@ COSTS = ROOT / "benchmarks" / "results" / "tests.md"
 
 # Folders, files and tests that run by night, beside those with the mark: what takes long and guards what seldom breaks.
 NIGHTLY = (
-    "tests/benchmarks",
+    *(
+        f"tests/benchmarks/test_{name}.py"
+        for name in (
+            "asked",
+            "coverage",
+            "drag",
+            "organs",
+            "plain_loop",
+            "resolution",
+            "stress",
+            "work_precision",
+        )
+    ),
     "tests/docs/test_blocks.py::test_blocks_of_a_page_run",
     "tests/report/test_notebook.py",
     "tests/cli/test_start.py",
     "tests/cli/test_loading.py",
-    "tests/run/test_cold_start.py",
+    "tests/run/test_cold_start.py::test_a_command_without_a_compiler_ends_with_a_sentence",
     "tests/test_installed.py",
     "tests/test_same.py::test_what_may_not_matter_does_not",
     "tests/fuzz/test_large.py",

@@ -18,7 +18,7 @@ def test_what_runs_by_night_is_there(place):
 
 
 def test_a_test_is_nightly_by_its_folder_its_name_or_a_browser():
-    assert suites.is_nightly("tests/benchmarks/test_peers.py::test_one[2]")
+    assert suites.is_nightly("tests/benchmarks/test_drag.py::test_one[2]")
     assert suites.is_nightly("tests/docs/test_blocks.py::test_blocks_of_a_page_run[docs/x.md]")
     assert not suites.is_nightly("tests/docs/test_blocks.py::test_blocks_of_a_page_run_well")
     assert suites.is_nightly("tests/view/test_page.py::test_one", ["tmp_path", "browser"])

@@ -401,30 +401,6 @@ def test_a_layer_is_a_load_on_the_regular_part_of_the_skin():
         assert scope.young * touch.force[2] == pytest.approx(force, rel=most)
 
 
-def test_an_inclusion_off_the_axis_of_a_cylinder_is_where_it_is():
-    inside = TUMOUR | {"at": ["5 mm", "0 mm", "-12 mm"]}
-    scope = scope_of(study(body=CYLINDER | {"inclusion": [inside]}))
-    assert scope.tool[1] == scope.case.probe.radius
-    region = Region.of(scope.body, 0.6)
-    assert (region.is_round, region.is_axial, region.even) == (True, False, (False, True))
-    mesh, law = coarse_mesh(scope.case, region), MaterialLaw.of(*scope.tissues_at(0.45))
-    held_out, room = [(4e-3, -2e-3), (-3e-3, 5e-3)], region.thickness
-    known: list[np.ndarray] = []
-
-    def found(places, poisson):
-        values = compliances(mesh, region, [*places, *held_out], poisson, law)
-        known.extend(values[len(places) :])
-        return values[: len(places)]
-
-    table, _ = tabulate(region, (0.45, 0.45), found, 1.0, (4,))
-    for (x, y), values in zip(held_out, known, strict=True):
-        place = table.at(x, y, 0.45)
-        assert place.c * room == pytest.approx(values[0] * room, abs=3e-3)
-        assert [place.regular[0, 2] * room, place.regular[1, 2] * room] == pytest.approx(values[4:6] * room, abs=3e-3)
-    # The tumour is stiff, and the face symmetric without it.
-    assert (table.at(-5e-3, 2e-3, 0.45).c - table.at(5e-3, 2e-3, 0.45).c) * room > 0.02
-
-
 def test_other_tissue_bounds_what_is_answered_for():
     layered = CYLINDER | {"layer": [SKIN | {"thickness": "6 mm"}]}
     region = Region.of(scope_of(study(body=layered)).body, 0.15)

@@ -17,7 +17,6 @@ from epsmesh_realtime.export.surface_body import surface_body
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Table
 from tests.export.test_export import BOX, CYLINDER, DISC, DOME, SKIN, Known, study
-from tests.realtime.synthetic import point_force
 
 
 def fields(body: dict, poissons: tuple[float, float], margin: float) -> FarFields:
@@ -47,23 +46,6 @@ def test_a_table_of_two_places_is_reciprocal_and_knows_each_by_itself(body, most
         for number, row in enumerate(compliances(known.body.mesh, region, places, poisson, law)):
             room = region.room(*places[number])
             assert told[number, number] * room == pytest.approx(row[0] * room, abs=2 * most)
-
-
-def test_a_force_draws_other_places_along_the_face_no_more_than_the_file_says():
-    """Of a half-space (1 - 2ν)(1 + ν)/(2π) at most; what is held adds to that far away."""
-    known = fields(CYLINDER, (0.3, 0.3 + 1e-9), 0.5)
-    told = tabulate_pairs(known).aside
-    assert 0.4 * 1.3 / (2 * np.pi) < told < 0.5
-    solved, largest = known.solved[0], 0.0
-    on = solved.nodes[:, 2] > -1e-9
-    on &= np.hypot(*solved.nodes[:, :2].T) <= known.body.region.reach[0]
-    for source, regular in zip(known.sources, solved.values, strict=True):
-        away = solved.nodes - (*source, 0.0)
-        way = np.linalg.norm(away, axis=1)
-        beside = on & (way > 2e-3)
-        moved = regular[beside, :2] + point_force(away[beside], 0.3)[:, :2]
-        largest = max(largest, float((np.linalg.norm(moved, axis=1) * way[beside]).max()))
-    assert told == pytest.approx(largest, rel=0.02)
 
 
 def test_the_bar_holds_what_a_table_of_few_places_misses(monkeypatch):

@@ -71,17 +71,14 @@ def test_regions_that_meet_are_meshed_with_their_volumes_below_a_tool_on_one_of_
 @pytest.mark.parametrize(
     "probe",
     [
-        {},
-        pytest.param(
-            {
-                "shape": "blade",
-                "length": "9 mm",
-                "width": "3 mm",
-                "direction": [0, 1, 0],
-                "at": ["19.57 mm", "3 mm", "17 mm"],
-            },
-            marks=pytest.mark.nightly,
-        ),
+        pytest.param({}, marks=pytest.mark.nightly),
+        {
+            "shape": "blade",
+            "length": "9 mm",
+            "width": "3 mm",
+            "direction": [0, 1, 0],
+            "at": ["19.57 mm", "3 mm", "17 mm"],
+        },
     ],
     ids=["disc", "along a blade's side"],
 )

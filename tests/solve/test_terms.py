@@ -77,7 +77,7 @@ def test_a_body_on_soft_springs_is_rigid(law):
 
 
 @pytest.mark.parametrize("element", ["displacement", "mixed"])
-@pytest.mark.parametrize("method", ["iterative", pytest.param("direct", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("method", [pytest.param("iterative", marks=pytest.mark.nightly), "direct"])
 @pytest.mark.parametrize("contact", [{}, BALL], ids=["bonded", "found"])
 def test_stiff_springs_are_a_support(contact, method, element):
     """The difference from a fixed face falls as their compliance; the solver needs no more iterations."""

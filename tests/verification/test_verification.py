@@ -11,7 +11,9 @@ from typer.testing import CliRunner
 from epsmesh import cli, verify
 from epsmesh.verify import Row
 from tests.verification import known, table
+from tests.verification.bodies import body_rows
 from tests.verification.boundary import rectangle_stiffness
+from tests.verification.loads import load_rows
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +32,11 @@ def test_a_force_two_bars_off_is_out(installed):
         wrong = row.reference * (1 + 2 * (row.bar + row.reference_bar))
         assert not replace(row, value=wrong).is_right
         assert not replace(row, value=float("nan")).is_right
+
+
+@pytest.mark.parametrize("rows", [load_rows, body_rows])
+def test_loads_and_bodies_have_their_closed_forms(rows):
+    assert not [row for row in rows(MPI.COMM_SELF, quick=True) if not row.is_right]
 
 
 @pytest.mark.nightly
