@@ -20,7 +20,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("solve", "mesh", "scene", "shapes", "plan", "export")
+_ROOMS = {"epsmesh": ("solve", "mesh", "scene", "shapes", "plan"), "epsmesh_realtime": ("export",)}
+ROOMS = {room: ROOT / "pipeline" / package / room for package, rooms in _ROOMS.items() for room in rooms}
 _COPIED = ("pipeline", "tests", "benchmarks", "studies", "meshes", "docs", "pyproject.toml")
 _SECONDS = 900  # a change whose tests take longer counts as hanging
 _SWAPS: dict[type, type] = {
@@ -58,8 +59,8 @@ def main(arguments: list[str]) -> int:
     options = _options(arguments)
     draw = random.Random(options.seed)
     rooms = options.room or ROOMS
-    files = [file for room in rooms for file in sorted((ROOT / "pipeline" / "epsmesh" / room).rglob("*.py"))]
-    mutants = [mutant for file in files for mutant in _mutants(file)]
+    files = [(room, file) for room in rooms for file in sorted(ROOMS[room].rglob("*.py"))]
+    mutants = [(room, mutant) for room, file in files for mutant in _mutants(file)]
     chosen = draw.sample(mutants, min(options.count, len(mutants)))
     rows = []
     with TemporaryDirectory(prefix="epsmesh-mutants-") as folder:
@@ -72,10 +73,10 @@ def main(arguments: list[str]) -> int:
             if verdict := _run(tree, room):
                 print(f"the tests of {room} fail as they are: {verdict}", file=sys.stderr)
                 return 2
-        for mutant in chosen:
+        for room, mutant in chosen:
             place = tree / mutant.file.relative_to(ROOT)
             place.write_text(mutant.text)
-            verdict = _run(tree, mutant.file.relative_to(ROOT / "pipeline" / "epsmesh").parts[0])
+            verdict = _run(tree, room)
             shutil.copy(mutant.file, place)
             rows.append((f"{mutant.file.relative_to(ROOT)}:{mutant.line}", mutant.changed, verdict or "SURVIVES"))
             print(*rows[-1], sep="  ", flush=True)
@@ -140,7 +141,8 @@ def _run(tree: Path, room: str) -> str:
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", f"tests/{room}"]
     if not (tree / "tests" / room).exists():
         command[-1] = "tests/mesh"  # tests of meshes cover scenes
-    environment = {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
+    # The copy's packages, before those that are installed.
+    environment = {**os.environ, "PYTHONPATH": f"{tree / 'pipeline'}:{tree}", "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         found = subprocess.run(
             command,
