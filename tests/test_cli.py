@@ -153,6 +153,7 @@ def test_interrupted_parallel_run_writes_what_is_done_and_two_ranks_agree_with_o
     np.testing.assert_allclose(two["force"], one["force"], rtol=1e-8)
 
 
+@pytest.mark.nightly
 def test_run_killed_at_random_moments_yields_the_same_dataset(epsmesh, small, whole, tmp_path):
     """SIGKILL, again and again, at any moment: nothing finished is lost, and in the end nothing tells it happened.
 

@@ -13,6 +13,7 @@ _EVERY = {name_of(pair): pair for pair in pairs()}
 _SLOW = {"F_exact", "surface", "image", "border", "accuracy", "relaxing regions", "relaxing round scene"}
 _QUICK = [name for name, pair in _EVERY.items() if not _SLOW & {feature.name for feature in pair}]
 _SAMPLE = random.Random(32).sample(_QUICK, 40)
+_BY_DAY = 16
 
 
 # Features that make no other case of a study, or none of one with a tool that finds its contact anyway.
@@ -66,7 +67,10 @@ def test_every_pair_is_taken_or_refused_with_the_reason_of_the_table(folder):
         assert len(_EVERY[name]) == 1 or _SAME_CASE & {*name.split(" + ")} or is_another
 
 
-@pytest.mark.parametrize("name", _SAMPLE)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if number < _BY_DAY else pytest.mark.nightly) for number, name in enumerate(_SAMPLE)],
+)
 def test_what_is_taken_runs(name, folder):
     result: Result = run(_EVERY[name], folder)
     assert result.outcome in ("taken", "refused"), result.message
