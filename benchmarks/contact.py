@@ -99,7 +99,7 @@ def sweeps(repeats: int = _REPEATS) -> dict[str, dict[str, float]]:
 
 def _sweep(without: tuple[str, ...], on_one: bool) -> tuple[float, list[float]]:
     """Return the seconds of twelve depths, and the forces (N)."""
-    probe = {"depth_range": [_DEPTHS[0], _DEPTHS[-1]]} if on_one else {}
+    probe = {"mesh_depths": [_DEPTHS[0], _DEPTHS[-1]]} if on_one else {}
     plan = make_plan(parse(_study(0.3, "0.3 mm", _DEPTHS, **probe)), without=("axisymmetric", *without))
     start = time.process_time()
     records = compute(plan, MPI.COMM_SELF)

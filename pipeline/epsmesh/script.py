@@ -50,7 +50,7 @@ _OF_STUDIES = frozenset(
         "axis",
         "contact",
         "depth",
-        "depth_range",
+        "mesh_depths",
         "force",
         "history",
         "incision",
@@ -87,7 +87,7 @@ class Result:
 
 
 class Problem:
-    """Tissue on a dolfinx ``mesh`` of tetrahedra, and a tool that presses along −z, bonded or with found contact.
+    """Tissue on a dolfinx ``mesh`` of tetrahedra, and a tool that presses along −z, bonded or with unilateral contact.
 
     ``facets`` are tags of facets, ``groups`` their values by name: "tool", "fixed", and "mirror_x", "mirror_y" on
     planes of symmetry x = 0, y = 0. All other facets are free. ``law`` has ``young`` (Pa), ``poisson``, ``law`` and its

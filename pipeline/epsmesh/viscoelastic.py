@@ -158,7 +158,7 @@ _AT_ONCE = 1e-9
 
 @dataclass(frozen=True)
 class Contact:
-    """Found contact over time (n,): the force is ``weights`` (n, k) times the elastic forces at k depths.
+    """Unilateral contact over time (n,): the force is ``weights`` (n, k) times the elastic forces at k depths.
 
     ``depth`` (n,) is the depth at which elastic contact has the same area; 0 after contact is lost. ``others`` are
     weights of other interpolations of the elastic curve: linear, and by another continuation to depth 0.

@@ -16,6 +16,7 @@ from epsmesh.launcher import is_launched
 from epsmesh.plan.cost import CostModel
 from epsmesh.plan.plan import Plan, leave_out_stored, make_plan
 from epsmesh.plan.shard import Shard
+from epsmesh.printable import counted
 from epsmesh.report.publish import Results, ResultsError, publish
 from epsmesh.run.begun import ENDING, Begun, fail_begun, store_done
 from epsmesh.run.completion import complete
@@ -352,15 +353,13 @@ def _heard_by(handler: Callable[..., None] | signal.Handlers) -> Iterator[None]:
 
 
 def _what_ended(failed: int, again: int) -> str:
-    """Say that the process of an earlier run ended with cases that have ``failed`` or are tried ``again``."""
-    told = []
+    """Say that an earlier run was killed while it solved cases that have ``failed``, or are solved ``again``."""
+    found = []
     if failed:
-        what = "the case that it was at has failed" if failed == 1 else f"the {failed} cases that it was at have failed"
-        told.append(f"{what}, and the others go on; the next run tries again")
+        found.append(f"{counted(failed, 'case')} failed, after two attempts; the next run tries again")
     if again:
-        what = "the case that it was at is" if again == 1 else f"the {again} cases that it was at are"
-        told.append(f"{what} tried again, after the others")
-    return f"the process of an earlier run ended: {'; '.join(told)}" if told else ""
+        found.append(f"{counted(again, 'case')} will be solved after the others")
+    return f"an earlier run was killed while it solved cases: {'; '.join(found)}" if found else ""
 
 
 def _known_beside(path: Path, keys: Collection[str]) -> dict[str, Record]:

@@ -201,4 +201,4 @@ def test_one_of_a_thing_is_called_so_and_letters_that_are_seen_are_written_as_th
         told = done.stdout + done.stderr
         assert done.exit_code == 0, told
         assert "µm" in told
-        assert not re.search(r"\\u00|(?<![\d.])1 (cases|solves|meshes|operators|steps|ranks|places)\b", told), told
+        assert not re.search(r"\\u00|(?<![\d.])1 (cases|solves|meshes|systems|steps|ranks|places)\b", told), told

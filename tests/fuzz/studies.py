@@ -64,7 +64,7 @@ _WORDS = (
 _KEYS = (
     "name", "shape", "size", "radius", "axes", "fixed", "young", "poisson", "density", "law", "action", "depth",
     "at", "axis", "contact", "motion", "epsilon", "fine", "coarse", "rim", "growth", "outside", "degree",
-    "element", "model", "accuracy", "depth_range", "method", "energy_tolerance", "reduced_basis_error",
+    "element", "model", "accuracy", "mesh_depths", "method", "energy_tolerance", "reduced_basis_error",
     "exact", "timing", "repeats",
     "without", "stop_near_exact", "gravity", "traction", "layer", "inclusion", "path", "file", "unit", "slice",
     "incision", "title", "measurement", "identify", "columns",

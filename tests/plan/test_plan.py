@@ -89,7 +89,7 @@ def test_one_mesh_for_many_depths_is_not_recommended_where_it_is_refused():
     mesh = {"accuracy": "5 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
     for changes, is_told in (({}, True), ({"mesh": mesh}, False)):
         plan = make_plan(study(probe=sphere, **changes))
-        assert any("depth_range" in skipped.reason for skipped in plan.skipped) == is_told
+        assert any("mesh_depths" in skipped.reason for skipped in plan.skipped) == is_told
 
 
 @pytest.mark.parametrize(

@@ -132,5 +132,5 @@ def test_every_entry_of_a_stiffness_has_its_unit(tmp_path):
     unit = {"x": "N/m", "rx": "N m"}
     for one, other in (("x", "x"), ("x", "rx"), ("rx", "x"), ("rx", "rx")):
         expected = unit[one] if one == other else "N"
-        assert str(data["stiffness"].sel(movement=one, conjugate=other)["stiffness_unit"].values) == expected
+        assert str(data["stiffness"].sel(movement=one, reaction=other)["stiffness_unit"].values) == expected
         assert data.epsmesh.to_frame().attrs["units"][f"stiffness_{one}_{other}"] == expected

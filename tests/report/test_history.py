@@ -149,7 +149,7 @@ def test_stages_of_found_contact_become_time():
     assert data["force"].dims == ("ramp", "epsilon", "time")
     assert data["contact_area"].dims == ("ramp", "epsilon", "time")
     assert data["status"].dims == data["time_total"].dims == ("ramp", "epsilon")
-    assert "stage" not in {*data.dims, *data.coords}
+    assert "step" not in {*data.dims, *data.coords}
     assert compare(data, data).agrees
     for kind in choose(data):
         figure(data, kind)

@@ -113,7 +113,7 @@ def test_what_such_a_tool_cannot_do_is_refused(tool, change, words):
         (DISC | {"edge": "2 mm"}, ["probe.edge", "leaves no flat face", "sphere"]),
         (DISC | {"edge": "9 mm", "depth": "0.5 mm"}, ["probe.edge", "leaves no flat face"]),
         (DISC | {"edge": "-1 mm"}, ["probe.edge", "at least 0"]),
-        (DISC | {"edge": "0.2 mm", "depth_range": ["0.1 mm", "0.2 mm"]}, ["probe.depth_range", "a disc has no"]),
+        (DISC | {"edge": "0.2 mm", "mesh_depths": ["0.1 mm", "0.2 mm"]}, ["probe.mesh_depths", "a disc has no"]),
         (FLAT | {"edge": "0.5 mm"}, ["probe.edge", "leaves no flat face"]),
         (FLAT | {"edge": "9 mm", "depth": "0.5 mm"}, ["probe.edge", "leaves no flat face"]),
         (FLAT | {"edge": "0.2 mm", "slice": "0.1 mm"}, ["probe.contact", "bonded to the blade"]),

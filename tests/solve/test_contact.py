@@ -70,7 +70,7 @@ def test_nothing_pulls_and_nothing_comes_through(element):
 
 def swept(mesh, depths, probe=SPHERE, body=LARGE, **changes):
     """Return the records of depths (mm) of a tool on one mesh."""
-    ends = {"depth_range": [f"{d:.6g} mm" for d in (depths[0], depths[-1])]} | probe
+    ends = {"mesh_depths": [f"{d:.6g} mm" for d in (depths[0], depths[-1])]} | probe
     ends["depth"] = [f"{d:.6g} mm" for d in depths]
     found = solve(body=body, probe=ends, mesh=COARSE | {"fine": "20 mm", "coarse": "20 mm"} | mesh, **changes)
     return list(found.values())
@@ -94,7 +94,7 @@ def test_contact_radius_grows_smoothly_with_depth():
 @pytest.mark.parametrize("degree", [2, 3])
 def test_contact_on_few_nodes_has_an_error_bar_that_tells_how_coarse_its_elements_are(degree):
     """A cone that touches four nodes: Sneddon's force, corrected for the finite body."""
-    (found,) = swept({"rim": "0.3 mm", "degree": degree}, [0.02], CONE | {"depth_range": ["0.02 mm", "0.2 mm"]})
+    (found,) = swept({"rim": "0.3 mm", "degree": degree}, [0.02], CONE | {"mesh_depths": ["0.02 mm", "0.2 mm"]})
     exact = known.half_space_cone(10e3, 0.3, radians(86), 0.02e-3)
     assert abs(found.force / exact - 1) < found.force_error < 0.15
 
@@ -102,7 +102,7 @@ def test_contact_on_few_nodes_has_an_error_bar_that_tells_how_coarse_its_element
 def test_small_depths_on_the_mesh_of_a_range_have_bars_and_areas_that_are_worth_something():
     """A ball on a column little wider than the ball, on elements as large as its contact."""
     depths = [0.05e-3, 0.1e-3, 0.2e-3, 0.4e-3]
-    ball = {"shape": "sphere", "radius": "4 mm", "depth_range": ["0.02 mm", "0.4 mm"]}
+    ball = {"shape": "sphere", "radius": "4 mm", "mesh_depths": ["0.02 mm", "0.4 mm"]}
     body = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}
     column = {"epsilon": "4.5 mm", "outside": "free", "fine": "1 mm", "coarse": "6 mm", "rim": "0.6 mm", "growth": 0.8}
     found = swept(column, [1e3 * depth for depth in depths], ball, body)

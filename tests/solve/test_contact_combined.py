@@ -78,7 +78,7 @@ def test_force_is_not_scaled_where_loads_bend_the_surface():
 
 
 DEPTHS = [f"{depth:.4g} mm" for depth in np.linspace(0.04, 0.12, 10)]
-ON_ONE_MESH = SPHERE | {"depth": DEPTHS, "depth_range": [DEPTHS[0], DEPTHS[-1]]}
+ON_ONE_MESH = SPHERE | {"depth": DEPTHS, "mesh_depths": [DEPTHS[0], DEPTHS[-1]]}
 
 
 @pytest.mark.parametrize("scene", [{"load": pulled(1.0)}, {"mesh": MESH | BALL}], ids=["loads", "half ball"])

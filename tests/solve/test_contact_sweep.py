@@ -26,7 +26,7 @@ MESH = {"fine": "2 mm", "coarse": "2 mm", "rim": "0.4 mm", "growth": 0.6}
 
 def sphere(depths, *, on_one_mesh=True):
     """Return a ball off the axis of its body, so that half of the body is solved."""
-    ends = {"depth_range": [DEPTHS[0], DEPTHS[-1]]} if on_one_mesh else {}
+    ends = {"mesh_depths": [DEPTHS[0], DEPTHS[-1]]} if on_one_mesh else {}
     return {"shape": "sphere", "radius": "6 mm", "depth": depths, "at": ["0.5 mm", "0 mm"], **ends}
 
 
@@ -102,7 +102,7 @@ def test_plan_tells_why_depths_are_solved_alone():
     plan = make_plan(study(body=SMALL, probe=sphere(DEPTHS, on_one_mesh=False), mesh=MESH))
     assert len(plan.meshes) == len(DEPTHS)
     (reason,) = (skipped.reason for skipped in plan.skipped if skipped.name == "initial-guess")
-    assert "depth_range" in reason
+    assert "mesh_depths" in reason
     together = make_plan(study(body=SMALL, probe=sphere(DEPTHS), mesh=MESH))
     assert len(together.meshes) == 1
     assert "condensed to the contact surface for 10 depths" in " ".join(story(together, (3,))["steps"])
@@ -123,8 +123,8 @@ def test_keys_of_tools_without_a_range_and_of_the_exact_force_do_not_know_of_it(
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"probe": sphere("0.2 mm")}, r"probe\.depth.*is outside depth_range, 0\.04 mm to 0\.12 mm"),
-        ({"probe": sphere("0.1 mm") | {"depth_range": ["0.2 mm", "0.1 mm"]}}, "must begin with the smaller depth"),
+        ({"probe": sphere("0.2 mm")}, r"probe\.depth.*is outside mesh_depths, 0\.04 mm to 0\.12 mm"),
+        ({"probe": sphere("0.1 mm") | {"mesh_depths": ["0.2 mm", "0.1 mm"]}}, "must begin with the smaller depth"),
         ({"mesh": {"accuracy": "1 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))},
          "needs given element sizes"),
     ],

@@ -73,7 +73,7 @@ def test_corners_that_push_their_neighbours_out_do_not_enter_again():
 
 
 def test_force_is_the_derivative_of_the_energy():
-    probe = SPHERE | {"depth_range": ["1.98 mm", "2.02 mm"]}
+    probe = SPHERE | {"mesh_depths": ["1.98 mm", "2.02 mm"]}
     deep, deeper = (touched(f"{depth} mm", base=probe)[0] for depth in (1.98, 2.02))
     mean = (deep.reaction[2] + deeper.reaction[2]) / 2
     assert (deeper.energy - deep.energy) / 0.04e-3 == pytest.approx(mean, rel=1e-3)
@@ -93,7 +93,7 @@ def test_a_depth_that_is_not_reached_is_partial_and_says_where(monkeypatch):
         return solve_contact(tissue, tool, *others, **how)
 
     monkeypatch.setattr(contact_steps, "solve_contact", fails_beyond)
-    probe = SPHERE | {"depth_range": ["1 mm", "2 mm"]}
+    probe = SPHERE | {"mesh_depths": ["1 mm", "2 mm"]}
     (record,) = solve(material=TISSUE, probe=probe | {"depth": "2 mm"}, mesh=COARSE).values()
     assert record.status == "partial"
     assert 1.4e-3 < record.depth_reached <= 1.5e-3
@@ -105,8 +105,8 @@ def test_a_depth_that_is_not_reached_is_partial_and_says_where(monkeypatch):
 
 def test_a_ball_pressed_in_to_its_equator_leaves_no_tissue_inside():
     """Newton's method from the undeformed body once ended around the ball, at a hundredth of the force."""
-    solution, found = touched("3.9 mm", base=SPHERE | {"depth_range": ["3.5 mm", "3.9 mm"]})
-    before, _ = touched("3.5 mm", base=SPHERE | {"depth_range": ["3.5 mm", "3.9 mm"]})
+    solution, found = touched("3.9 mm", base=SPHERE | {"mesh_depths": ["3.5 mm", "3.9 mm"]})
+    before, _ = touched("3.5 mm", base=SPHERE | {"mesh_depths": ["3.5 mm", "3.9 mm"]})
     assert found["gap"].min() > -0.1 * 3.9e-3
     assert 1.0 < solution.reaction[2] / before.reaction[2] < (3.9 / 3.5) ** 3
 
@@ -125,7 +125,7 @@ def test_the_bar_has_a_load_path_of_its_own_where_the_next_degree_does_not_settl
 
 def test_depths_on_a_path_have_the_forces_and_bars_of_each_alone():
     depths = [f"{depth} mm" for depth in (0.5, 1.0, 1.5)]
-    probe = SPHERE | {"depth": depths, "depth_range": ["0.5 mm", "1.5 mm"]}
+    probe = SPHERE | {"depth": depths, "mesh_depths": ["0.5 mm", "1.5 mm"]}
     together = solve(material=TISSUE, probe=probe, mesh=COARSE).values()
     for depth, one in zip(depths, together, strict=True):
         (alone,) = solve(material=TISSUE, probe=probe | {"depth": depth}, mesh=COARSE).values()

@@ -239,7 +239,7 @@ def test_friction_that_slides_is_the_law_times_the_force():
 
 def test_few_nodes_touch_and_have_friction():
     """The corner below the tip is inside the tool, which is no error at small displacements."""
-    tool = {"shape": "cone", "angle": "86 deg", "radius": "4 mm", "depth": "0.02 mm", "depth_range": ["5 um", "0.2 mm"]}
+    tool = {"shape": "cone", "angle": "86 deg", "radius": "4 mm", "depth": "0.02 mm", "mesh_depths": ["5 um", "0.2 mm"]}
     body = {"shape": "cylinder", "radius": "60 mm", "height": "60 mm"}
     mesh = {"fine": "20 mm", "coarse": "20 mm", "rim": "0.3 mm", "growth": 0.5}
     smooth, rough = (

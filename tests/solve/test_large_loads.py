@@ -204,7 +204,7 @@ def test_a_finer_mesh_of_a_ball_under_a_pull_beside_it_is_within_the_bar():
 
 @pytest.mark.nightly
 def test_force_under_loads_is_the_derivative_of_the_energy():
-    probe = BALL | {"depth_range": ["1.98 mm", "2.02 mm"]}
+    probe = BALL | {"mesh_depths": ["1.98 mm", "2.02 mm"]}
     deep, deeper = (one(load=gravity(9.81), probe=probe | {"depth": f"{d} mm"}, mesh=COARSE) for d in (1.98, 2.02))
     assert (deeper.energy - deep.energy) / 0.04e-3 == pytest.approx((deep.force + deeper.force) / 2, rel=1e-3)
 

@@ -209,7 +209,7 @@ def test_blade_that_slices_has_bars_on_each_component():
 def test_dataset_has_the_stiffness():
     found = solved_dataset(probe={"motion": ["press", "all"]}, mesh={"degree": 1})
     stiffness = found["stiffness"]
-    assert stiffness.dims == ("motion", "movement", "conjugate")
+    assert stiffness.dims == ("motion", "movement", "reaction")
     assert np.isnan(stiffness.sel(motion="press")).all()
     matrix = stiffness.sel(motion="all").values
     assert np.array_equal(matrix, matrix.T)

@@ -41,7 +41,7 @@ HAVING = {
     "accuracy": {"mesh": {"accuracy": "1 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth"))},
     "fixed column": {"mesh": {"epsilon": "12 mm", "outside": "fixed"}},
     "frictionless contact": {"probe": {"contact": "frictionless"}},
-    "range of depths": {"probe": SPHERE | {"depth_range": ["0.1 mm", "0.3 mm"]}},
+    "range of depths": {"probe": SPHERE | {"mesh_depths": ["0.1 mm", "0.3 mm"]}},
     "open slit": {"probe": BLADE | {"incision": "6 mm", "ends": "open"}},
     "oblique slit": {"probe": BLADE | {"incision": "6 mm", "direction": [1, 1, 0]}},
     "fixed sides": {"body": {"fixed": "bottom+sides"}},

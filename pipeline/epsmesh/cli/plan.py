@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from epsmesh.study.sweep import Study
 
 # What there is to do, as it is called in the summary of a plan, and one of it.
-_TO_DO = {"meshes": "mesh", "operators": "operator", "solves": "solve"}
+_TO_DO = {"meshes": "mesh", "systems": "equation system", "solves": "solve"}
 # Longer lists of steps than this are cut: the costliest are shown.
 _MOST_STEPS = 20
 

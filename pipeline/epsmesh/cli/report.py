@@ -59,7 +59,7 @@ def report(
     rest: Annotated[
         bool,
         typer.Option(
-            "--rest",
+            "--all",
             help="With --figures: also draw the scenes that figures of a large study leave out: <study>_<kind>_2.png …",
         ),
     ] = False,
@@ -79,7 +79,7 @@ def report(
     from epsmesh.report.read import other_kind
 
     if not figures and (kind or rest):
-        fail("--kind and --rest say which figures are drawn: give --figures, too")
+        fail("--kind and --all say which figures are drawn: give --figures, too")
     path, dataset = read_dataset(file, output, any_kind=True)
     if other := other_kind(dataset):
         _write_other(path, dataset, other, figures=figures)

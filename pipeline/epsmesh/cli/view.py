@@ -79,7 +79,7 @@ def view(
     Example: epsmesh view studies/figure3.toml 12 --sofa
 
     Of an insertion it writes a film of the path, <study>_<number>_path.gif, beside the dataset of a run: deformed
-    sections over depth, and F. With --export, or "stage=5 mm", one state of a blade is shown.
+    sections over depth, and F. With --export, or "step=5 mm", one state of a blade is shown.
 
     Example: epsmesh view studies/scalpel-path.toml
 
@@ -101,7 +101,7 @@ def view(
         fail(Fault(f"{option}: is for a label map; a study has it in [body]", key=option))
     (study,) = read_all([file])
     chosen = find_case(study, case or "0")
-    is_state = mesh_only or bool(export) or "stage" in case
+    is_state = mesh_only or bool(export) or "step" in case
     if is_state and study.is_insertion and study.tool(chosen).CUTS == "crack":
         why = "states of a needle that is inserted are found on the way: only the film of its path is drawn"
         fail(of_file(study.file, why, "docs/guide/insertion.md"))

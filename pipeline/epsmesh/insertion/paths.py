@@ -89,7 +89,7 @@ def _alone(study: Study, case: Case) -> Study:
     parts = {name: (getattr(case, name),) for name in ("body", "material", "probe", "mesh", "load")}
     sections = {name: found for name, found in study.sections.items() if name != "tool"} | parts
     slit = case.probe.slit
-    axis = Axis("probe", "stage", (slit.tip if slit else 0.0,), "m", piece="insertion", is_stage=True)
+    axis = Axis("probe", "step", (slit.tip if slit else 0.0,), "m", piece="insertion", is_stage=True)
     return replace(study, axes=(axis,), sections=sections)
 
 

@@ -175,8 +175,8 @@ def _memory(solve: Solve) -> float:
 def kind_of(solve: Solve) -> str:
     """Return the kind of a solve in the cost model.
 
-    It names element, degree, several movements, found contact, friction, several materials, time steps, and a curved
-    or folded body.
+    It names element, degree, several movements, unilateral contact, friction, several materials, time steps, and a
+    curved or folded body.
     """
     case, way = solve.case, solve.way
     if solve.axisymmetric:

@@ -54,7 +54,7 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
         "warnings": list(plan.study.warnings),
         "cases": len(plan.study),
         "meshes": len(steps),
-        "operators": sum(step["operators"] for step in steps),
+        "systems": sum(step["operators"] for step in steps),
         "solves": len(plan.solves),
         "exact": sum(solve.is_reference for solve in plan.solves),
         "exact_unasked": _unasked(plan),

@@ -20,7 +20,7 @@ from epsmesh.study.closure import FarRegion
 # With fewer Poisson's ratios, each is solved: a reduced basis needs about five solutions itself.
 _FEWEST_RATIOS = 12
 _LONE_DEPTHS = (
-    "No initial guess from other depths: each depth of this tool has its own mesh. With probe.depth_range all depths "
+    "No initial guess from other depths: each depth of this tool has its own mesh. With probe.mesh_depths all depths "
     "share one mesh."
 )
 

@@ -15,7 +15,7 @@ from epsmesh.study.way import Motion, Way
 _WORSE = 2.9
 # The middle of the top face.
 CENTRE = (0.0, 0.0)
-# With at least so many depths of found contact, a small body is condensed to the possible contact surface.
+# With at least so many depths of unilateral contact, a small body is condensed to the possible contact surface.
 FEWEST_DEPTHS = 10
 # Largest number of unknowns of a small body, measured: benchmarks/results/solvers.md.
 MOST_DOFS = 40_000
@@ -100,7 +100,7 @@ class OperatorStep:
 
     @property
     def is_condensed(self) -> bool:
-        """Whether found contact has enough depths for each material to condense a small body.
+        """Whether unilateral contact has enough depths for each material to condense a small body.
 
         With an accuracy it does not apply: each depth then has its own error bar.
         """

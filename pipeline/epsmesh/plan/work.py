@@ -41,7 +41,7 @@ class Plan:
         stored: the keys of stored records.
         shared: whether solves share meshes and assembly.
         reuse: whether solutions of neighbouring cases are initial guesses.
-        condensed: whether many depths of found contact on a small body use condensation.
+        condensed: whether many depths of unilateral contact on a small body use condensation.
         cost: the cost model of steps.
         part: the keys of a shard; None for a whole study.
         unasked: the solves for F_exact that are left out because `solve.exact` is off by default, with the study's

@@ -32,7 +32,7 @@ from epsmesh.study.case import Case
 from epsmesh.study.sweep import Study
 from epsmesh.study.way import Motion
 
-_SIZES = {"component": 3, "movement": 6, "conjugate": 6}
+_SIZES = {"component": 3, "movement": 6, "reaction": 6}
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ _PARTS = (
     _Part((*LARGEST, *_COUNTS)),
     _Part(("force_exact", "force_exact_error"), is_exact=True),
     _Part(("force_vector", "force_vector_error"), ("component",)),
-    _Part(("stiffness", "stiffness_error"), ("movement", "conjugate"), lambda case: case.way.motion is Motion.SIX),
+    _Part(("stiffness", "stiffness_error"), ("movement", "reaction"), lambda case: case.way.motion is Motion.SIX),
     _Part(("energy_release", "energy_release_error"), of=_has_slit),
     _Part(("energy_release_exact", "energy_release_exact_error"), of=_has_slit, is_exact=True),
     _Part(_OF_LOADS[:-1], of=lambda case: case.load.acts),
@@ -190,8 +190,8 @@ def _motions() -> dict[str, Any]:
     units = [[("N/m", "N", "N m")[one + other] for other in rotates] for one in rotates]
     return {
         "movement": ("movement", list(_MOTIONS), attributes("movement")),
-        "conjugate": ("conjugate", list(_MOTIONS), attributes("conjugate")),
-        "stiffness_unit": (("movement", "conjugate"), np.array(units, dtype=object), attributes("stiffness_unit")),
+        "reaction": ("reaction", list(_MOTIONS), attributes("reaction")),
+        "stiffness_unit": (("movement", "reaction"), np.array(units, dtype=object), attributes("stiffness_unit")),
     }
 
 

@@ -26,7 +26,7 @@ _TEXTS = ("message", "force_exact_message")
 _CONTACT = {"contact_area": 1.0, "contact_radius": 0.5}
 # Powers of the depth of forces that are no powers on a half-space.
 _OF_EDGE, _OF_TIP = 1.0, 1.5
-_STAGE, _MANY = "stage", 10_000
+_STEP, _MANY = "step", 10_000
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def over_time(dataset: xr.Dataset, study: Study, cases: Sequence[Case], records:
     times = np.unique(np.concatenate([history.times() for history in histories]))
     dims = [axis.name for axis in study.axes if not axis.is_stage]
     if not any(axis.is_stage for axis in study.axes):
-        dataset = dataset.assign({name: values.expand_dims(_STAGE) for name, values in dataset.data_vars.items()})
+        dataset = dataset.assign({name: values.expand_dims(_STEP) for name, values in dataset.data_vars.items()})
     whole = [case for _, case in study.whole_cases()]
     depths = np.array([case.probe.depth for case in cases]).reshape(study.shape)
     if len(dims) < len(study.axes):
@@ -84,7 +84,7 @@ def over_time(dataset: xr.Dataset, study: Study, cases: Sequence[Case], records:
     if "load_force" in last:
         found |= _crept(last.assign(found), dims, whole, convolutions)
     coordinate = ("time", times, attributes("time"))
-    return last.drop_vars(_STAGE, errors="ignore").assign(found).assign_coords(time=coordinate)
+    return last.drop_vars(_STEP, errors="ignore").assign(found).assign_coords(time=coordinate)
 
 
 def convolution_of(case: Case, times: FloatArray, depths: tuple[float, ...]) -> Convolution:
@@ -128,7 +128,7 @@ def _follow(
 def _transformed(dataset: xr.Dataset, name: str, dims: list[str], convolutions: Sequence[Convolution]) -> xr.DataArray:
     """Return a force or its error bar over time. The error bar includes that of the elastic curve's interpolation."""
     values = _table(dataset, name, dims)
-    more = [str(dim) for dim in dataset[name].dims if dim not in (*dims, _STAGE)]
+    more = [str(dim) for dim in dataset[name].dims if dim not in (*dims, _STEP)]
     if not name.endswith("_error"):
         found = [
             np.tensordot(convolution.weights, own, 1) for convolution, own in zip(convolutions, values, strict=True)
@@ -202,18 +202,16 @@ def _contact(
 
 def last_stage(dataset: xr.Dataset) -> xr.Dataset:
     """Return the dataset at the last stage, with what all stages cost, and the worst of their states."""
-    last = dataset.isel({_STAGE: -1}, drop=True)
-    found = {name: dataset[name].sum(_STAGE) for name in _SUMS if name in dataset}
-    found |= {name: dataset[name].max(_STAGE) for name in _LARGEST if name in dataset}
-    found |= {
-        name: xr.apply_ufunc(_first, dataset[name], input_core_dims=[[_STAGE]], vectorize=True) for name in _TEXTS
-    }
-    found["status"] = xr.apply_ufunc(_worst, dataset["status"], input_core_dims=[[_STAGE]], vectorize=True)
+    last = dataset.isel({_STEP: -1}, drop=True)
+    found = {name: dataset[name].sum(_STEP) for name in _SUMS if name in dataset}
+    found |= {name: dataset[name].max(_STEP) for name in _LARGEST if name in dataset}
+    found |= {name: xr.apply_ufunc(_first, dataset[name], input_core_dims=[[_STEP]], vectorize=True) for name in _TEXTS}
+    found["status"] = xr.apply_ufunc(_worst, dataset["status"], input_core_dims=[[_STEP]], vectorize=True)
     kept = {
         name: values.astype(dataset[name].dtype).transpose(*last[name].dims).assign_attrs(dataset[name].attrs)
         for name, values in found.items()
     }
-    counts = {name: kept[name].where((dataset[name] >= 0).all(_STAGE), -1) for name in ("iterations",) if name in kept}
+    counts = {name: kept[name].where((dataset[name] >= 0).all(_STEP), -1) for name in ("iterations",) if name in kept}
     return last.assign(kept | {name: values.astype(dataset[name].dtype) for name, values in counts.items()})
 
 
@@ -227,7 +225,7 @@ def _worst(states: np.ndarray) -> str:
 
 def _table(dataset: xr.Dataset, name: str, dims: list[str]) -> FloatArray:
     """Return the values of a variable: cases, stages, and its other dimensions."""
-    values = dataset[name].transpose(*dims, _STAGE, ...)
+    values = dataset[name].transpose(*dims, _STEP, ...)
     return np.asarray(values.values.reshape(-1, *values.shape[len(dims) :]))
 
 

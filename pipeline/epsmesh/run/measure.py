@@ -119,7 +119,7 @@ def _course(case: Case, history: History | None) -> dict[str, tuple[float, ...]]
 
 
 def _of_contact(contact: ContactResult | None) -> dict[str, Any]:
-    """Return the fields of a record for found contact, none for a prescribed footprint."""
+    """Return the fields of a record for unilateral contact, none for a prescribed footprint."""
     if contact is None:
         return {}
     found = {name: getattr(contact, name) for name in _OF_FRICTION}

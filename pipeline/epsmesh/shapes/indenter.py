@@ -67,7 +67,7 @@ class Indenter(Probe):
     # In units of a ball's, whose limit is known best (pipeline/epsmesh/solve/estimate.py).
     EXPECTED_ERROR = 1.4
     NOT_DRAWN: ClassVar[tuple[str, ...]] = ("action", "contact", "friction", "motion")
-    SWEPT = ("depth_range",)
+    SWEPT = ("mesh_depths",)
 
     depth: Annotated[
         Length,
@@ -78,7 +78,7 @@ class Indenter(Probe):
             is_used=True,
         ),
     ]
-    depth_range: Annotated[
+    mesh_depths: Annotated[
         tuple[Length, Length] | None,
         Words(
             "Range of depths that share one mesh: smallest and largest depth. Elements are small wherever the "
@@ -150,12 +150,12 @@ class Indenter(Probe):
     @property
     def not_drawn(self) -> tuple[str, ...]:
         """Keys on which the mesh does not depend; the depth is one of them if one mesh serves many depths."""
-        return (*self.NOT_DRAWN, "depth") if self.depth_range else self.NOT_DRAWN
+        return (*self.NOT_DRAWN, "depth") if self.mesh_depths else self.NOT_DRAWN
 
     @property
     def depths(self) -> tuple[float, float]:
         """The smallest and the largest depth (m) of the mesh."""
-        return self.depth_range or (self.depth, self.depth)
+        return self.mesh_depths or (self.depth, self.depth)
 
     @property
     def contact_widths(self) -> tuple[float, float]:
@@ -204,12 +204,12 @@ class Indenter(Probe):
         """Report a depth outside the range of the mesh."""
         least, largest = self.depths
         if least > largest:
-            problems.error("probe.depth_range", _texts(self.depths), "must begin with the smaller depth")
+            problems.error("probe.mesh_depths", _texts(self.depths), "must begin with the smaller depth")
         elif not (1 - _ROUNDING) * least <= self.depth <= (1 + _ROUNDING) * largest:
             problems.error(
                 "probe.depth",
                 in_mm(self.depth),
-                f"is outside depth_range, {in_mm(least)} to {in_mm(largest)}, "
+                f"is outside mesh_depths, {in_mm(least)} to {in_mm(largest)}, "
                 "for which the mesh is made: widen it, or leave it out for one mesh per depth",
             )
 

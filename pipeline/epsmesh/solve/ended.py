@@ -1,7 +1,7 @@
 """The error of a load path, or of time steps, that end before their end, with the cause in mechanics.
 
 Newton's method ends where tissue becomes unstable or an element folds, which needs a law of large displacements; where
-the states of nodes with friction do not settle; or, in found contact, where the active set does not.
+the states of nodes with friction do not settle; or, in unilateral contact, where the active set does not.
 """
 
 from epsmesh.solve.newton import LargeError

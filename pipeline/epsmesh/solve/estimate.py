@@ -93,7 +93,8 @@ _FINE = (0.31, 0.61)
 def is_graded(rim: float, growth: float, *, found: bool = False, large: bool = False, sure: bool = False) -> bool:
     """Return whether a mesh is graded to the edge; ``rim`` in units of the half width, of contact if ``found``.
 
-    ``large`` is for found contact at large displacements, ``sure`` where its limit is known on large elements, too.
+    ``large`` is for unilateral contact at large displacements, ``sure`` where its limit is known on large elements,
+    too.
     """
     of_found = _GRADED_LARGE if large else _GRADED_BALL if sure else _GRADED_FOUND
     largest, steepest = of_found if found else _GRADED

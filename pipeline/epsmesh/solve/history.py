@@ -54,7 +54,7 @@ class History:
     ``forces`` (n, 3) are those of the tissue on the probe (N), with ``bars`` (n) of the time steps, and of
     the distance of nodes at the edge of contact, along the axis (N).
     ``dissipated`` (n) is the energy (J) turned into heat since the beginning, ``imbalance`` (n) the difference (J) of
-    work and of what is stored and dissipated. ``areas`` (n, m²) are those of found contact, NaN without.
+    work and of what is stored and dissipated. ``areas`` (n, m²) are those of unilateral contact, NaN without.
     """
 
     times: FloatArray

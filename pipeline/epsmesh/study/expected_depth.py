@@ -92,7 +92,7 @@ def largest_depth(body: Body, probe: Probe) -> float:
 
 def _bounds(probe: Probe, most: float) -> tuple[float, float]:
     """Return the depths of the probe's mesh if one mesh is for many, else those up to ``most``."""
-    given = getattr(probe, "depth_range", None)
+    given = getattr(probe, "mesh_depths", None)
     return given or (_LEAST * most, most)
 
 

@@ -28,7 +28,7 @@ def with_steps(sections: Sections, axes: tuple[Axis, ...]) -> tuple[Sections, tu
     ends = interfaces(cast("tuple[Body, ...]", sections["body"]))
     depths = step_depths(tools, ends)
     staged = [stage for tool in tools for stage in tool.stages(depths, ends)]
-    axis = Axis("probe", "stage", (0.0, *depths), "m", piece="insertion", is_stage=True)
+    axis = Axis("probe", "step", (0.0, *depths), "m", piece="insertion", is_stage=True)
     solve = tuple(one.model_copy(update={"exact": False}) for one in sections["solve"])
     return sections | {"probe": tuple(staged), "tool": tools, "solve": solve}, (*axes, axis)
 

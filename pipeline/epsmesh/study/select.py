@@ -27,7 +27,7 @@ def cases_with(study: Study, wanted: Mapping[str, float | int | str]) -> list[Ca
 
 
 def the_case(study: Study, wanted: Mapping[str, float | int | str]) -> Case:
-    """Return the case of a study with these labels, at the last stage of a history.
+    """Return the case of a study with these labels, at the last step of a history.
 
     Raises:
         ValueError: if there is none, or more than one.
@@ -40,7 +40,7 @@ def the_case(study: Study, wanted: Mapping[str, float | int | str]) -> Case:
         )
         raise ValueError(f"{len(found)} cases have these labels; they differ in {left}: choose one of each")
     if not found:
-        raise ValueError("these labels are those of a stage of a history, which is part of a case")
+        raise ValueError("these labels are those of a step of a history, which is part of a case")
     return found[0]
 
 

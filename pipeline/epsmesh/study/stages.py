@@ -1,4 +1,4 @@
-"""Stages of a history: depths at which found contact is solved, since its force is not proportional to the depth."""
+"""Stages of a history: depths at which unilateral contact is solved; its force is not proportional to the depth."""
 
 from itertools import pairwise, product
 from math import cos, pi, sqrt
@@ -65,7 +65,7 @@ def with_stages(
     )
     return sections | {"probe": staged}, (
         *axes,
-        Axis("probe", "stage", tuple(range(1, _COUNT + 1)), "1", piece="history", is_stage=True),
+        Axis("probe", "step", tuple(range(1, _COUNT + 1)), "1", piece="history", is_stage=True),
     )
 
 
@@ -76,7 +76,7 @@ def _at(probe: Probe, share: float, *, is_shared: bool) -> Probe:
     changes: dict[str, Any] = {"depth": canonical(share * probe.depth)}
     if is_shared and not probe.is_flat:
         least, largest = probe.depths
-        changes["depth_range"] = (
+        changes["mesh_depths"] = (
             min(canonical(shares_of(probe, is_shared=True)[0] * probe.depth), least),
             max(probe.depth, largest),
         )
@@ -84,7 +84,7 @@ def _at(probe: Probe, share: float, *, is_shared: bool) -> Probe:
 
 
 def check_history(probe: Probe, problems: Problems) -> None:
-    """Report a history in which found contact grows again after it has shrunk, and one that pulls."""
+    """Report a history in which unilateral contact grows again after it has shrunk, and one that pulls."""
     if probe.history is None or not probe.is_unilateral:
         return
     motion = probe.history.motion(probe.depth)

@@ -206,8 +206,8 @@ FEATURES: dict[str, Feature] = {
     "no round scene": Feature("probe.at", _is_off_axis, PLACE, list),
     "six motions": Feature("probe.motion", lambda s: s.probe.motion == "all"),
     "range of depths": Feature(
-        "probe.depth_range",
-        lambda s: bool(getattr(s.probe, "depth_range", None)),
+        "probe.mesh_depths",
+        lambda s: bool(getattr(s.probe, "mesh_depths", None)),
         write=lambda depths: [in_mm(depth) for depth in depths],
     ),
     "curved or inclined surface": Feature("probe.axis", lambda s: not _is_flat(s), ("body",)),
