@@ -1,4 +1,4 @@
-"""Pages of HTML that hold all they need: what they are told stays text, and one script is all that may run."""
+"""Pages of HTML that hold all they need: their data stay text, and one script is all that may run."""
 
 import json
 import zlib
@@ -39,12 +39,12 @@ def joined(*files: Path) -> str:
     return "\n".join(path.read_text(encoding="utf-8") for path in files)
 
 
-def json_in_page(told: Mapping[str, Any]) -> Markup:
-    """Return what a script is told as JSON that can stand in any element: it has no sign that HTML knows.
+def json_in_page(data: Mapping[str, Any]) -> Markup:
+    """Return ``data`` for a script as JSON that can stand in any element: it has no sign that HTML knows.
 
     `</script>` is not all that ends a script's element, or keeps it from ending: `<!--<script>` does so, too.
     """
-    text = json.dumps(told, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     for sign in "<>&\u2028\u2029":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return Markup(text)

@@ -15,5 +15,5 @@ def forecast(study: Study, cost: CostModel, ranks: int) -> Forecast:
         refused = str(reason).removeprefix(f"{study.file}: ")
         return Forecast({"command": "export", "refused": refused}, f"  export: no real-time model: {refused}")
     warned = f"; {found.warning}" if found.warning else ""
-    line = f"  export, as a real-time model: {found.told(ranks)}{warned}"
+    line = f"  export, as a real-time model: {found.text(ranks)}{warned}"
     return Forecast({"command": "export", **vars(found)}, line)

@@ -188,10 +188,10 @@ def test_what_an_export_costs_is_told_before(body):
     assert 4 + 9 * ratios <= few.least <= few.most <= 4 + (2 * 289 + 110) * ratios
     assert (many.least, many.most) == (few.least + 20, few.most + 20)
     assert 0 < few.least_seconds <= few.most_seconds < many.most_seconds
-    assert few.told().startswith(f"about {few.least} ")
+    assert few.text().startswith(f"about {few.least} ")
     # A plan and an export go on where a typical touch has no place.
     bare = replace(scope, sections={"body": {"shape": "box", "size": ["1 mm", "1 mm", "1 mm"]}, "material": SOFT})
-    assert "not known" in Export(bare).forecast().told()
+    assert "not known" in Export(bare).forecast().text()
     if body == BOX:
         law = SOFT | {"law": "neo-hookean"}
         large = replace(scope_of(study(body=BOX, material=law, probe=BALL)), sections={"body": BOX, "material": law})

@@ -56,7 +56,7 @@ def test_the_text_of_the_study_holds_what_was_read(tmp_path):
     ("changes", "told"),
     [
         ({"verdict": "does not fit: the residuals bend"}, "the residuals bend"),
-        ({"seen": np.array([True, False, True])}, "poisson cannot be told from its curves"),
+        ({"seen": np.array([True, False, True])}, "poisson cannot be identified from its curves"),
         ({"names": ("poisson",)}, "has no `young`"),
     ],
 )

@@ -119,7 +119,7 @@ def run(
                 _announce(plan, opened, quiet=quiet or as_json, verbose=verbose)
                 if as_json and not quiet:
                     warn(study)
-            show = partial(_progress, plan, is_told=not as_json, verbose=verbose) if speaks and not quiet else None
+            show = partial(_progress, plan, is_shown=not as_json, verbose=verbose) if speaks and not quiet else None
             with workflow.abort_on_exception(comm):
                 outcome = workflow.run(plan, opened, comm, output, show)
         except (StoreError, CompilerError) as wrong:
@@ -154,9 +154,9 @@ def _check_left_out(studies: "list[Study]", output: Path) -> None:
             warning(f"{study.file}: {left_out}")
 
 
-def _progress(first: "Plan", plan: "Plan", *, is_told: bool, verbose: bool) -> "Terminal":
-    """Return the progress of a ``plan``; of one that follows the ``first``, what there is to do ``is_told``."""
-    if plan is not first and is_told:
+def _progress(first: "Plan", plan: "Plan", *, is_shown: bool, verbose: bool) -> "Terminal":
+    """Return the progress of a ``plan``; of one that follows the ``first``, what there is to do ``is_shown``."""
+    if plan is not first and is_shown:
         print(f"  to do besides: {_to_do(plan)}", flush=True)
     from epsmesh.run.progress import Terminal
     from epsmesh.run.remaining import Remaining, expectations
@@ -227,7 +227,7 @@ def _conclude(
 
 
 def _of_insertions(plan: "Plan", outcome: "Outcome") -> "Iterator[str]":
-    """Yield what is told of the paths of insertions, as the dataset has them."""
+    """Yield a line on each of the paths of insertions, as the dataset has them."""
     if plan.study.is_insertion and outcome.results.files:
         from epsmesh.report.insertion import answer
         from epsmesh.report.read import read_file

@@ -114,8 +114,8 @@ def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) ->
             f"  {counted(shards, 'shard')} in {output / 'shards'} not counted: `epsmesh run {file}` merges them"
         )
     runs = runs_of(file)
-    told = {"failures": [{"case": c, "message": m} for c, m in failed], "runs": as_data(runs)}
-    say({"file": str(file), **counts, **told}, *lines, *lines_of(runs))
+    more = {"failures": [{"case": c, "message": m} for c, m in failed], "runs": as_data(runs)}
+    say({"file": str(file), **counts, **more}, *lines, *lines_of(runs))
 
 
 def _of_store(path: Path, runs: "list[Run]", prune: bool, days: float | None, *, failed: bool, yes: bool) -> None:

@@ -77,7 +77,7 @@ def _chosen(found: "LabelMap", segments: "list[Segment]", label: str) -> "Segmen
 
 
 def _data(one: "Segment") -> dict[str, Any]:
-    """Return what a script is told of a label, in SI units."""
+    """Return what a script gets of a label, in SI units."""
     return {
         "label": one.label,
         "name": one.name,

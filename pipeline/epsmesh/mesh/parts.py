@@ -183,8 +183,8 @@ def renumbered(part: Part, comm: MPI.Comm) -> tuple[Part, BoolArray]:
     count = int(np.count_nonzero(own))
     counts = comm.allgather(count)
     numbers[own] = sum(counts[: comm.rank]) + np.arange(count)
-    told = np.concatenate(exchanged(numbers[which]))
-    numbers[which] = answered(told[first][inverse.reshape(-1)])
+    numbered = np.concatenate(exchanged(numbers[which]))
+    numbers[which] = answered(numbered[first][inverse.reshape(-1)])
     return Part(part.mesh, numbers, sum(counts), part.beyond), own
 
 

@@ -11,7 +11,7 @@ def reason(error: Exception) -> str:
     Raises:
         MemoryError: if memory has run out, which no other mesh helps; gmsh then gives that reason or none.
     """
-    told = str(error) or gmsh.logger.getLastError()
-    if isinstance(error, MemoryError) or not told or _OF_MEMORY in told:
-        raise MemoryError(f"gmsh: {told or 'gives no reason: memory may have run out'}") from error
-    return told
+    reason = str(error) or gmsh.logger.getLastError()
+    if isinstance(error, MemoryError) or not reason or _OF_MEMORY in reason:
+        raise MemoryError(f"gmsh: {reason or 'gives no reason: memory may have run out'}") from error
+    return reason

@@ -76,7 +76,7 @@ def refuse_thin(solves: Iterable[Solve], file: str) -> None:
         thin = thinnest(case)
         if thin is not None and share * thin.tetrahedra > MOST:
             limit, way_out = f"a mesh may have at most {MOST:,.0f} of them", thin.way_out(share).capitalize()
-            problems.append(Problem(thin.key, thin.value, f"{_told(thin, share)}; {limit}. {way_out}"))
+            problems.append(Problem(thin.key, thin.value, f"{_words(thin, share)}; {limit}. {way_out}"))
     if problems:
         raise StudyError(file, problems)
 
@@ -87,9 +87,9 @@ def cause(case: Case) -> str:
     if thin is None or thin.tetrahedra < max(_MANY, _SHARE * estimate.cells(case)):
         return ""
     value = "" if thin.value is None else f" = {thin.value}"
-    return f"{thin.key}{value}: {_told(thin)}: {thin.way_out()}"
+    return f"{thin.key}{value}: {_words(thin)}: {thin.way_out()}"
 
 
-def _told(thin: Thin, share: float = 1.0) -> str:
+def _words(thin: Thin, share: float = 1.0) -> str:
     count = float(f"{share * thin.tetrahedra:.2g}")
     return f"{thin.name} is {in_mm(thin.thickness)} thick, for which about {count:,.0f} tetrahedra are needed"

@@ -251,7 +251,7 @@ def _pairs(case: str, a: xr.Dataset, i: tuple[int, ...], b: xr.Dataset, j: tuple
 
 
 def _judge(one: float, other: float, bar_a: float, bar_b: float, states: list[str]) -> tuple[str, str]:
-    """Return whether two values agree, and why that cannot be told."""
+    """Return whether two values agree, and why that is not known."""
     if states != ["ok", "ok"]:
         return "differ", f"{states[0]} in A, {states[1]} in B"
     if not (isfinite(one) and isfinite(other)):

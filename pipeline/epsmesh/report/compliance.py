@@ -61,7 +61,7 @@ def compliance(dataset: xr.Dataset, against: Against = "exact") -> xr.Dataset:
 def tool_dimension(dataset: xr.Dataset) -> str:
     """Return the dimension along which most tools differ; "" if fewer than two of them do, or compliances do not add.
 
-    Radii before names: they can be told apart on an axis.
+    Radii before names: they are distinguished on an axis.
     """
     study = study_of(dataset)
     names = [axis.name for axis in (study.axes if study else ()) if axis.section == "probe"]

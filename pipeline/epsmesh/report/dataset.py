@@ -221,7 +221,7 @@ def _depths(plan: Plan, cases: Sequence[Case], flat: Sequence[Record | None]) ->
 def _texts(
     plan: Plan, cases: Sequence[Case], flat: Sequence[Record | None], exact: Sequence[Record | None]
 ) -> dict[str, Any]:
-    """Return what is told in words of each case."""
+    """Return what each case has in words."""
     notices = ["; ".join(case.body.notices) for case in cases]
     texts = {
         "status": [r.status if r else PENDING for r in flat],

@@ -13,7 +13,7 @@ from epsmesh.study.swept import unit_of
 # Values by key, as mesh.fine or body.layer[1].young. A key that a shape does not have is not there.
 Parameters = dict[str, Any]
 
-# Digits of a number that are told apart: "3 mm" and "0.3 cm" are one length.
+# Digits of a number that are distinguished: "3 mm" and "0.3 cm" are one length.
 _DIGITS = 9
 # Where a file lies is not what is in it: bodies of files are compared by their heights, volume and extent.
 _FILE = "body.file"

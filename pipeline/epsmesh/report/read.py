@@ -35,7 +35,7 @@ _NEEDED = (
     "reductions",
     "study",
 )
-# By these it is told from other kinds.
+# These distinguish it from other kinds.
 _OF_CASES = ("force", "force_ratio", "force_exact")
 # Twice what the most cases that a study may have take.
 _LARGEST = 1_000_000_000  # bytes

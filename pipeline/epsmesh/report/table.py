@@ -216,12 +216,12 @@ def _reference(dataset: xr.Dataset) -> str:
 def _reasons(status: np.ndarray, message: np.ndarray, bar: np.ndarray, exact: np.ndarray, reference: str) -> np.ndarray:
     """Return, cell by cell, why a case cannot be judged; "" if it can."""
     why = np.full(status.shape, "", dtype=object)
-    told = np.where(message == "", "", ": " + message.astype(object))
+    reason = np.where(message == "", "", ": " + message.astype(object))
     why[~np.isfinite(exact)] = f"{reference} is not known"
-    why[~(bar >= 0)] = ("no error bar" + told)[~(bar >= 0)]
+    why[~(bar >= 0)] = ("no error bar" + reason)[~(bar >= 0)]
     for state in (one for one in STATES if one != OK):
         text = "not yet run" if state == PENDING else state
-        why[status == state] = (text + told)[status == state]
+        why[status == state] = (text + reason)[status == state]
     return why
 
 

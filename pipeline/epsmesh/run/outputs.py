@@ -38,7 +38,7 @@ _HIGHEST = 2
 def outputs_of(
     solve: Solve, problem: QuasiStaticProblem, spaces: Spaces, record: Record, *, has_bar: bool
 ) -> tuple[dict[str, float], str]:
-    """Return outputs of the last solution of a ``problem``, with their bars, by name, and what is told; collective."""
+    """Return outputs of the last solution of a ``problem``, with their bars, by name, and notes; collective."""
     case, meshed, body = solve.case, solve.meshed_case, spaces.body
     state = problem.state()
     finer, why = (problem.finer_state, "") if has_bar else (None, "not requested")
@@ -48,7 +48,7 @@ def outputs_of(
     compile_law(body.comm, state)
     clear = clear_cells(body, conditions_of(case).front, wholly=True)
     found: dict[str, float] = {}
-    told = [f"no error bars on outputs: {why}"] if why else []
+    notes = [f"no error bars on outputs: {why}"] if why else []
     undo = put_back(case, meshed, body, [each for each in (state, finer) if each is not None])
     try:
         states = [each and replace(each, law=law) for each in (state, finer)]
@@ -60,10 +60,10 @@ def outputs_of(
             bar = nan if isinstance(number, str) else _bar(output, number)
             value = nan if isinstance(number, str) else number.value
             found |= {output.name: value, f"{output.name}_error": bar}
-            told += _told(output, number)
+            notes += _notes(output, number)
     finally:
         undo()
-    return found, "; ".join(told)
+    return found, "; ".join(notes)
 
 
 def _of_fields(output: Output, case: Case, state: State | None, finer: State | None, clear: BoolArray) -> Number:
@@ -154,7 +154,7 @@ def _bar(output: Output, number: Number) -> float:
     return CHANGES * max(number.change, POINTWISE[str(kind)] * number.pointwise)
 
 
-def _told(output: Output, number: Number | str) -> list[str]:
+def _notes(output: Output, number: Number | str) -> list[str]:
     if isinstance(number, str):
         return [f"{output.name}: {number}"]
     if number.is_outside:

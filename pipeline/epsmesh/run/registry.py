@@ -157,9 +157,9 @@ def runs() -> list[Run]:
             run = _read(path)
             found.append((run, is_held(path, run.machine, run.pid)))
     known = _running_jobs() if any(_is_elsewhere(run) and run.job_id for run, _ in found) else None
-    told = [_judged(run, is_locked, known) for run, is_locked in found if Path(run.store).exists()]
+    judged = [_judged(run, is_locked, known) for run, is_locked in found if Path(run.store).exists()]
     return sorted(
-        told, key=lambda run: (run.study, Path(run.store).parent, [int(n) for n in run.shard.split("/") if n])
+        judged, key=lambda run: (run.study, Path(run.store).parent, [int(n) for n in run.shard.split("/") if n])
     )
 
 
@@ -180,7 +180,7 @@ def _is_elsewhere(run: Run) -> bool:
 def _running_jobs() -> frozenset[str] | None:
     """Return the numbers of the user's running Slurm jobs, None if Slurm does not answer."""
     try:
-        told = subprocess.run(
+        done = subprocess.run(
             ["squeue", "--me", "-h", "-r", "-t", "running,completing", "-o", "%A"],
             capture_output=True,
             text=True,
@@ -189,7 +189,7 @@ def _running_jobs() -> frozenset[str] | None:
         )
     except (OSError, subprocess.SubprocessError):
         return None
-    return frozenset(told.stdout.split())
+    return frozenset(done.stdout.split())
 
 
 def _read(path: Path) -> Run:

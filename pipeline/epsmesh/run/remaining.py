@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _TRUST = 0.005
 # Neighbouring solves are similar: each new one reduces the weight of earlier ones by this factor.
 _MEMORY = 0.95
-# The time left is told once so many solves, and this share of the estimated time, have been measured: the first solve
+# The time left is shown once so many solves, and this share of the estimated time, have been measured: the first solve
 # also compiles.
 _ENOUGH, _KNOWN = 3, 0.03
 # An overdue solve still has this share of its expected time left.

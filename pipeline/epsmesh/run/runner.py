@@ -219,9 +219,9 @@ class StepRunner:
         solution = solve_problem(solve.case, problem, estimate=has_bar, meshed=solve.meshed_case)
         record = record_of(solve, solution, meshed.times.mesh)
         if solve.case.outputs:
-            found, told = outputs_of(solve, problem, meshed.spaces, record, has_bar=has_bar)
+            found, notes = outputs_of(solve, problem, meshed.spaces, record, has_bar=has_bar)
             record = replace(record, largest=record.largest | found)
-            missing = "; ".join(filter(None, (missing, told)))
+            missing = "; ".join(filter(None, (missing, notes)))
         stamped = self._stamp(record, meshed.memory)
         return replace(stamped, message=missing, surface_deviation=meshed.spaces.body.deviation)
 

@@ -259,7 +259,7 @@ def _table(path: str, dataset: "xr.Dataset") -> dict[str, Any]:
     # What was known beforehand and only widens the bars of others need not be in the curves.
     sought = own["seen"].where(own["wanted"] == 1, 1) if "wanted" in own else own["seen"]
     if unseen := [name for name in tissue if not bool(sought.sel(unknown=name))]:
-        what = f"{', '.join(unseen)} cannot be told from its curves: "
+        what = f"{', '.join(unseen)} cannot be identified from its curves: "
         raise _UnusableError(f"{what}give a value in the study of the identification, or add a curve that tells it")
     ends = {end: own.get(f"{end}_hidden", own[end]) for end in ("low", "high")}
     ends = {end: values.where(values.notnull(), own[end]) for end, values in ends.items()}

@@ -46,13 +46,13 @@ def check_tools(placed: Sequence[tuple[Body, Probe]], problems: Problems) -> Non
 
 def _check_tool(extent: float, probe: Probe, size: float, problems: Problems) -> None:
     if probe.depth < _SHALLOW < _TIP < size and probe.depth != _NOTHING:
-        told = f"is less than a thousandth of a millimetre, with a tool of {in_mm(size)}"
+        doubt = f"is less than a thousandth of a millimetre, with a tool of {in_mm(size)}"
         deeper = in_mm(1e3 * probe.depth)
-        problems.warn("probe.depth", f"{probe.depth * 1e6:.4g} µm", f"{told}. Is {deeper} meant?")
+        problems.warn("probe.depth", f"{probe.depth * 1e6:.4g} µm", f"{doubt}. Is {deeper} meant?")
     if getattr(probe, "insertion", None) and probe.revolved and size > _NEEDLE:
-        told = f"is inserted; needles and trocars have radii up to {in_mm(_NEEDLE)}"
+        doubt = f"is inserted; needles and trocars have radii up to {in_mm(_NEEDLE)}"
         key = "probe.shaft" if hasattr(probe, "shaft") else "probe.radius"
-        problems.warn(key, in_mm(size), f"{told}. Is {in_mm(size / 10)} meant, or is it the diameter?")
+        problems.warn(key, in_mm(size), f"{doubt}. Is {in_mm(size / 10)} meant, or is it the diameter?")
     elif 2 * size > extent:
         problems.warn("probe", None, f"is {in_mm(2 * size)} wide, and the body {in_mm(extent)}: is a unit wrong?")
 

@@ -114,7 +114,7 @@ class Problems:
         """Add a warning."""
         self._add(self.warnings, self._problem(key, found, allowed))
 
-    def told_once(self) -> Iterator[str]:
+    def warnings_once(self) -> Iterator[str]:
         """Yield the warnings. Those of a sweep, which differ in numbers only, are one."""
         groups: dict[tuple[str, str, tuple[tuple[str, str], ...]], list[Problem]] = {}
         for problem in self.named(self.warnings):
@@ -176,10 +176,10 @@ class Problems:
             what = f"must be an array of tables: write [[{where}.{key}]]" if inner else "must be a table"
             self.error(f"{where}.{key}".rstrip("."), found, what)
         else:
-            told = other_name(where, key) if item["type"] == "extra_forbidden" else ""
-            told = told or allowed({**item, "loc": place}, model)
+            meant = other_name(where, key) if item["type"] == "extra_forbidden" else ""
+            meant = meant or allowed({**item, "loc": place}, model)
             hint = OTHER_VALUES.get(key, {}).get(found.casefold(), "") if isinstance(found, str) else ""
-            self.error(f"{where}.{key}".rstrip("."), found, told + hint)
+            self.error(f"{where}.{key}".rstrip("."), found, meant + hint)
 
     def _add(self, problems: list[Problem], problem: Problem) -> None:
         """Add a problem. If it is known for other tables, these are added to it."""

@@ -106,7 +106,7 @@ def parse(raw: Mapping[str, Any], *, file: str = "study", text: str = "", filled
     check_steps(sections, every_axis, problems)
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))
-    warnings = tuple(f"{file}: {warning}" for warning in problems.told_once())
+    warnings = tuple(f"{file}: {warning}" for warning in problems.warnings_once())
     title = str(whole.get("title", Path(file).stem))
     return Study(
         file, Path(file).stem, title, text, every_axis, sections, warnings, given, extra, identified, outputs(),
@@ -119,8 +119,8 @@ def _check_one_force(
 ) -> None:
     """Report insertions and given forces beside what is of one force of a case, at a depth: ``others``, in words."""
     if has_insertion(sections["probe"]) and others:
-        told = f"has no place in {others}, which are of one force: omit it, or them"
-        problems.error("probe.insertion", None, told)
+        reason = f"has no place in {others}, which are of one force: omit it, or them"
+        problems.error("probe.insertion", None, reason)
     if any(getattr(probe, "force", None) for probe in sections["probe"]) and (others or is_identified):
         within = f"in {others}, nor " if others else ""
         problems.error("probe.force", None, f"has no place {within}with what was identified: give a depth")

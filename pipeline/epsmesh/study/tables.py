@@ -237,8 +237,8 @@ def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "
 def _lacking(name: str, model: type[Section], shape: str, key: str) -> str:
     """Return the message about an unknown key: shapes that have it, or a similar key."""
     models = SECTIONS[name]
-    if told := other_name(name, key):
-        return told
+    if meant := other_name(name, key):
+        return meant
     if not isinstance(models, Mapping):
         return f"unknown key; {nearest(key, model.model_fields)}"
     article = "an" if shape[0] in "aeiou" else "a"
@@ -279,8 +279,8 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
             f"{where}.shape", shape, f"must be one shape: for a sweep over shapes, write one [[{name}]] for each"
         )
     else:
-        told = OTHER_SHAPES.get(name, {}).get(str(shape).casefold()) or nearest(str(shape), model)
-        problems.error(f"{where}.shape", shape, f"unknown shape; {told}")
+        meant = OTHER_SHAPES.get(name, {}).get(str(shape).casefold()) or nearest(str(shape), model)
+        problems.error(f"{where}.shape", shape, f"unknown shape; {meant}")
     known = dict.fromkeys(key for kind in model.values() for key in kind.model_fields)
     unknown = [key for key in raw if key not in known]
     for key in unknown[:MOST_ERRORS]:

@@ -104,7 +104,7 @@ def export(
     """
     planned = Export(scope, accuracy, checks, margin, largest, ranks.kept)
     solver = planned.solver
-    ranks.note(f"the export needs {planned.forecast().told(ranks.comm.size)}, less what is kept")
+    ranks.note(f"the export needs {planned.forecast().text(ranks.comm.size)}, less what is kept")
     make = _flat if scope.is_flat else curved_model
     of_table = planned.solver_of_table
     bare, error, places = make(scope, of_table, accuracy, largest, (*_BARS, solver.accuracy), margin, ranks)
@@ -150,8 +150,8 @@ def _flat(
     region = Region.of(scope.body, margin)
     if min(region.reach) <= 0:
         raise ExportError("the body leaves no region: make it wider")
-    if told := too_large(scope, largest * region.room(0.0, 0.0)):
-        ranks.note(f"warning: {told}")
+    if doubt := too_large(scope, largest * region.room(0.0, 0.0)):
+        ranks.note(f"warning: {doubt}")
     ranks.note("meshing the body")
     mesh = coarse_mesh(scope.case, region, ranks=ranks)
     solved: list[tuple[float, float]] = []

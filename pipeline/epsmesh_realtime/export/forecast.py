@@ -63,7 +63,7 @@ class Forecast:
             most_seconds=self.most_seconds + most_seconds,
         )
 
-    def told(self, ranks: int = 1) -> str:
+    def text(self, ranks: int = 1) -> str:
         """Write it in words, with times on several ranks."""
         if not self.most:
             return "solves whose number is not known before"

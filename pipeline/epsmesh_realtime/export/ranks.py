@@ -57,17 +57,17 @@ class Ranks:
         known = {n: array for n, item in enumerate(items) if (array := self.kept.get((what, given, item))) is not None}
         # All ranks must agree on what is left: some may not see the files of others.
         known = self.comm.bcast(known)
-        told = start = time.monotonic()
+        noted = start = time.monotonic()
         left = [item for n, item in enumerate(items) if n not in known]
         if len(left) < len(items):
             self.note(f"{what}: {len(items) - len(left)} of {len(items)} were solved by an earlier export")
 
         def kept(some: Sequence[Item]) -> Iterator[FloatArray]:
-            nonlocal told
+            nonlocal noted
             for number, (item, array) in enumerate(zip(some, work(some), strict=True), start=1):
                 self.kept.put((what, given, item), array)
-                if number in (1, len(some)) or time.monotonic() - told > _SILENCE:
-                    told = time.monotonic()
+                if number in (1, len(some)) or time.monotonic() - noted > _SILENCE:
+                    noted = time.monotonic()
                     self._tell(what, number * self.comm.size, len(left), start)
                 yield array
 

@@ -15,7 +15,7 @@ from epsmesh.report.words import choice, is_numeric, number, symbol
 
 Selection = dict[str, Any]
 
-# More than these cannot be told apart, or do not fit a page.
+# More than these cannot be distinguished, or do not fit a page.
 MOST = (7, 3, 3)
 # Quantities that differ by less than this along a dimension do not depend on it: E scales F and leaves F/F_max.
 _IDLE = 1e-7

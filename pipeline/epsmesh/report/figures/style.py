@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocato
 from epsmesh.files import atomic
 
 WIDTH, LEGEND = 7.1, 1.9  # inches: the width of a page's text, and of the legend beside the panels
-# From dark to light, told apart by the colour-blind and in grey; markers tell them apart as well.
+# From dark to light, distinguishable for the colour-blind and in grey; markers differ as well.
 COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#b87d00", "#b0413e", "#9030f0", "#480000")
 MARKERS = "osD^vPX"
 CLAIM, FAILED, QUIET, LINE, GRID, PAPER = "#d81b60", "#c62828", "#555555", "#000000", "#dddddd", "#ffffff"

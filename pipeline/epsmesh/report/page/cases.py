@@ -145,10 +145,10 @@ def case_table(dataset: xr.Dataset) -> Table:
     )
     message = _texts("message", by_case(dataset, "message").values.ravel(), "why there is no force")
     known = [column for column in quantities if any(value is not None for value in column.values)]
-    told = [column for column in (origin, message) if any(column.words or ())]
+    words = [column for column in (origin, message) if any(column.words or ())]
     rank = {state: position for position, state in enumerate(WORST_FIRST)}
     order = sorted(range(size), key=lambda row: rank.get(states[row], 0))
-    return Table([numbers, status, *axes, *known, *told], order)
+    return Table([numbers, status, *axes, *known, *words], order)
 
 
 def _axis(dataset: xr.Dataset, dim: str, position: int, dims: list[str]) -> Column:
@@ -191,7 +191,7 @@ def _quantity(array: xr.DataArray, name: str) -> Column:
 def _rounded(value: float, name: str, factor: float) -> float | int:
     if name in ("dofs", "cells", "iterations"):
         return int(value)
-    # Ratios near 1 are told apart by what they differ from it.
+    # Ratios near 1 are distinguished by what they differ from it.
     return float(f"{value * factor:.{_DIGITS + 2 if name in ('force_ratio', 'force_exact_ratio') else _DIGITS}g}")
 
 

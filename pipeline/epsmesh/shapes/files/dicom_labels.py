@@ -101,8 +101,8 @@ def _of_segments(data: Any) -> LabelMap:
         groups = _group(data, k, "SegmentIdentificationSequence")
         index = (slice(None), slice(None), int(grid.places[k]))
         pieces.setdefault(int(groups.ReferencedSegmentNumber), []).append((index, frame.T, 1))
-    values, told = painted(grid.shape, pieces, names)
-    return _with_room(LabelMap(values, grid.affine, notices + told, names))
+    values, overlaps = painted(grid.shape, pieces, names)
+    return _with_room(LabelMap(values, grid.affine, notices + overlaps, names))
 
 
 def _with_room(found: LabelMap) -> LabelMap:
@@ -112,9 +112,9 @@ def _with_room(found: LabelMap) -> LabelMap:
         return found
     affine = found.affine.copy()
     affine[:, 3] -= affine[:, 0] + affine[:, 1]
-    told = "its slices are as large as its segments: it is not known whether the image ends at them"
+    notice = "its slices are as large as its segments: it is not known whether the image ends at them"
     padded = np.pad(values, ((1, 1), (1, 1), (0, 0)))
-    return LabelMap(padded, affine, (*found.notices, told), found.names)
+    return LabelMap(padded, affine, (*found.notices, notice), found.names)
 
 
 def _source_slices(data: Any) -> float:

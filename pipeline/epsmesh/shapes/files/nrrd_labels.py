@@ -63,8 +63,8 @@ def read_nrrd(path: Path, unit: float | None) -> LabelMap:
         raise SurfaceError(f"its segments name more layers than the {sizes[0]} that it has: export it again")
     names = {number: name for number, (_, _, name) in enumerate(segments, start=1)}
     pieces = {n: [(..., values[layer], label)] for n, (layer, label, _) in enumerate(segments, start=1)}
-    one, told = painted(shape, pieces, names)
-    return LabelMap(one, affine, (*notices, *told), names)
+    one, overlaps = painted(shape, pieces, names)
+    return LabelMap(one, affine, (*notices, *overlaps), names)
 
 
 def _affine(header: Any, unit: float | None) -> tuple[FloatArray, tuple[str, ...]]:

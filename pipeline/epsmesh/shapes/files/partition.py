@@ -87,8 +87,8 @@ def partition_of(found: LabelMap, labels: Sequence[tuple[int | str, float | None
         length, made = narrower
         if thin.number == 0 or labels[thin.number][1] is not None:
             raise SurfaceError(f'{thin}: give it `smooth = "{in_mm(length)}"`, which suffices') from None
-        told = f"label {labels[thin.number][0]} is thin: its filter is {in_mm(length)} wide"
-        return replace(made, notices=(*made.notices, told))
+        notice = f"label {labels[thin.number][0]} is thin: its filter is {in_mm(length)} wide"
+        return replace(made, notices=(*made.notices, notice))
 
 
 def _narrower(

@@ -98,8 +98,8 @@ def _parsed(data: bytes, ending: str) -> Raw:
     raw = _by_ending(data, ending)
     if _space(data, ending) != "LPS":
         return raw
-    told = "its header says SPACE=LPS: x and y are negated, into the frame of images (RAS: right, front, head)"
-    return Raw(raw.points * (-1.0, -1.0, 1.0), raw.facets, (*raw.notices, told))
+    notice = "its header says SPACE=LPS: x and y are negated, into the frame of images (RAS: right, front, head)"
+    return Raw(raw.points * (-1.0, -1.0, 1.0), raw.facets, (*raw.notices, notice))
 
 
 def _by_ending(data: bytes, ending: str) -> Raw:
