@@ -17,14 +17,12 @@ _RECTANGLE = "boundary elements (A. E. H. Love 1929)"
 _ELLIPSES = (1.5, 3, 8)  # first semi-axis over second
 # Not along the axes, so that the scene has no symmetry.
 _OBLIQUE = [2.0, 1.0, 0.0]
-# Above this ν the two paths are compared with each other: _incompressible.
-_MOST_COMPRESSIBLE = 0.49
 _NEAR_HALF = (0.49, 0.499, 0.4999, 0.5)
 
 
 def scene_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows of all scenes; ``quick`` yields a few of each kind; collective."""
-    for compare in (_half_space, _rectangles, _ellipses, _cylinders, _incompressible):
+    for compare in (_half_space, _rectangles, _ellipses, _incompressible):
         yield from compare(comm, quick)
 
 
@@ -65,16 +63,6 @@ def _ellipses(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
                 (force, source, 1e-4),
                 _scene(cylinder(FAR, FAR), 0.3, probe),
             )
-
-
-def _cylinders(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    for (contact, nu), value in known.CYLINDER.items():
-        if nu > _MOST_COMPRESSIBLE:
-            continue
-        truth = value * 10e3 * 1e-5 * 1e-3, known.CYLINDER_SOURCE, known.CYLINDER_ERROR
-        scene = _scene(known.CYLINDER_BODY, nu, disc(3, contact=contact))
-        for path in ("2D",) if quick else ("2D", "3D"):
-            yield against(comm, f"cylinder R = H = 50 mm, a = 3 mm, {contact}, ν = {nu:g}", path, truth, scene)
 
 
 def _incompressible(comm: MPI.Comm, quick: bool) -> Iterator[Row]:

@@ -58,7 +58,6 @@ DIMITRIADIS = "E. K. Dimitriadis et al., Biophys. J. 82, 2798 (2002)"
 CIAVARELLA = "M. Ciavarella, Int. J. Solids Struct. 36, 4149 (1999)"
 BILODEAU = "G. G. Bilodeau, J. Appl. Mech. 59, 519 (1992)"
 SNEDDON = "I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965)"
-STICKING = "F. M. Borodich, L. M. Keer, Int. J. Solids Struct. 41, 2479 (2004)"
 SPENCE = "D. A. Spence, Proc. R. Soc. A 305, 55 (1968)"
 GALIN = "L. A. Galin, Contact Problems (1961)"
 # Quadrature of tissue that sticks: points, and the end of the integral, whose integrand falls like exp(-2 x).

@@ -1,6 +1,6 @@
 """Laws of large displacements: uniform stretch and shear of a cube, against closed forms of the stress."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,6 @@ from epsmesh.shapes.tissue import MOST_TERMS
 from epsmesh.solve.compiled import vector_space
 from epsmesh.solve.forms import ElasticForms, HyperelasticForms
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.verify import Row
 
 # Parameters besides Young's modulus and Poisson's ratio with which each law is verified.
 FURTHER: dict[str, dict[str, Any]] = {
@@ -28,8 +27,6 @@ FURTHER: dict[str, dict[str, Any]] = {
     "veronda-westmann": {"alpha": 1.5},
 }
 YOUNG, POISSON = 10e3, 0.4
-_STRETCHES, _SHEAR = (0.7, 1.4), 0.5
-_ROUNDING, _OF_ROOTS = 1e-9, 1e-7  # the second is that of principal stretches
 # Tolerance of coordinates on the unit cube.
 _ON_FACE = 1e-9
 
@@ -143,20 +140,3 @@ class Cube:
 
     def _deform(self, deformation: FloatArray) -> None:
         self._elastic.displacement.interpolate(lambda x: (deformation - np.eye(3)) @ x)
-
-
-def law_rows() -> Iterator[Row]:
-    """Yield the rows of uniaxial stretch, and simple shear, of every law; on one rank."""
-    for law in FURTHER:
-        cube, stress = Cube(law), Stress.of_law(law)
-        for stretch in _STRETCHES:
-            lateral, nominal = stress.uniaxial(stretch)
-            force, _ = cube.forces(np.diag([lateral, lateral, stretch]))
-            yield _row(law, f"stretch {stretch:g}", nominal, force[2])
-        force, _ = cube.forces(np.eye(3) + _SHEAR * np.outer([1, 0, 0], [0, 0, 1]))
-        yield _row(law, f"shear {_SHEAR:g}", stress.shear(_SHEAR), force[0])
-
-
-def _row(law: str, deformation: str, reference: float, value: float) -> Row:
-    bar = _OF_ROOTS if law == "ogden" else _ROUNDING
-    return Row(f"cube, {law}, {deformation}", "uniform", reference, "closed form of the stress", value, bar)
