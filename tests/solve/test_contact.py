@@ -56,8 +56,8 @@ def test_nothing_pulls_and_nothing_comes_through(element):
     with pressed(material={"poisson": 0.45}, mesh=COARSE | {"element": element}) as (problem, law, movement):
         solution = problem.solve(law, movement)
     state, active, obstacle = (
-        problem.constraint.contact.found.state,
-        problem.constraint.contact.found.active,
+        problem.constraint.contact.smooth.state,
+        problem.constraint.contact.smooth.active,
         problem.constraint.contact.obstacle,
     )
     apart = obstacle.bounds - state.moved
@@ -121,7 +121,7 @@ def test_face_that_is_inclined_lifts_off_on_one_side():
     inclined = Tool(lambda points: 0.15 * points[:, 0], lambda points: np.ones(len(points), dtype=bool))
     with pressed(inclined, probe=DISC) as (problem, law, movement):
         force = problem.solve(law, movement).reaction[2]
-    touching = problem.constraint.contact.obstacle.candidates.points[problem.constraint.contact.found.active, 0]
+    touching = problem.constraint.contact.obstacle.candidates.points[problem.constraint.contact.smooth.active, 0]
     assert touching.min() < -0.95e-3
     assert 0.0 < touching.max() < 0.9e-3
     assert force > record(probe=DISC).force

@@ -112,7 +112,7 @@ def test_tractions_obey_coulomb():
         problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.way.element, tool=tool_of(case))
         solution = problem.solve(law_of(case), movement_of(case))
         contact = problem.constraint.contact
-    step, corner = contact.pressed, contact.obstacle.candidates.is_corner
+    step, corner = contact.rubbed.fine, contact.obstacle.candidates.is_corner
     normal, tangential = -step.forces[:, 2], np.linalg.norm(step.forces[:, :2], axis=1)
     touching, sliding = step.active & ~corner, step.slide.sliding & ~corner
     assert solution.balance < 1e-6
@@ -120,7 +120,7 @@ def test_tractions_obey_coulomb():
     assert (tangential[touching] <= 0.2 * normal[touching] + 1e-6 * normal.max()).all()
     assert tangential[sliding] == pytest.approx(0.2 * normal[sliding], abs=1e-6 * normal.max())
     assert np.abs(step.forces[~step.active]).max() == 0.0
-    through = contact.moved[:, 2] - contact.obstacle.bounds
+    through = contact.rubbed.moved[:, 2] - contact.obstacle.bounds
     assert np.abs(through[step.active]).max() < 1e-9 * 0.1e-3
     assert through[~corner].max() < 1e-5 * 0.1e-3
     assert through.max() < 0.02 * 0.1e-3  # corners beside the edge have no part of a pressure

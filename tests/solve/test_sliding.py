@@ -10,9 +10,8 @@ from mpi4py import MPI
 from epsmesh.run.meshing import mesh_case
 from epsmesh.run.problem import law_of, tool_of
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, press, press_with_friction
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, Friction, press, press_with_friction
 from epsmesh.solve.contact.large import placed_tool
-from epsmesh.solve.contact.large_friction import friction_of
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.quasi_static import QuasiStaticProblem
@@ -33,7 +32,7 @@ def test_drag_at_constant_depth_is_the_law_times_the_force():
         problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.way.element, tool=tool_of(case))
         body = DeformedBody(problem.elements, Surface(spaces), law_of(case), "direct", stack)
         tool, path = tool_of(case), ContactPath(ContactPathPoint(0.0, np.zeros_like(body.state)))
-        friction = friction_of(body, FRICTION, DEPTH)
+        friction = Friction.on(body.candidates, body.law, FRICTION, DEPTH)
         press_with_friction(body, lambda depth: placed_tool(body, tool, depth), path, DEPTH, friction, 4)
 
         def beside(travel):

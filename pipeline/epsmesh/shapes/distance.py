@@ -36,10 +36,14 @@ class Distance:
     curvature: FloatArray
 
     @staticmethod
-    def along_axis(gap: FloatArray, dim: int) -> "Distance":
-        """Return the distance of linear elasticity in ``dim`` dimensions: ``gap`` is that along the last axis."""
-        down, count = -np.eye(dim)[-1], len(gap)
-        return Distance(gap, np.broadcast_to(down, (count, dim)), np.broadcast_to(0.0, (count, dim, dim)))
+    def along_axis(heights: FloatArray, moved: FloatArray) -> "Distance":
+        """Return the distance of linear elasticity: that along the last axis, above the places of points at rest.
+
+        ``heights`` (n) are those of the tool there, ``moved`` (n, d) the displacements.
+        """
+        dim = moved.shape[1]
+        normal, curvature = np.broadcast_to(-np.eye(dim)[-1], moved.shape), np.broadcast_to(0.0, (*moved.shape, dim))
+        return Distance(heights - moved[:, -1], normal, curvature)
 
     def turned(self, axes: FloatArray) -> "Distance":
         """Return it from coordinates with the unit vectors ``axes``, in rows (3, 3), in those of these vectors."""

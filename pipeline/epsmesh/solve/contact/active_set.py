@@ -14,7 +14,7 @@ import numpy as np
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
-from epsmesh.solve.contact.deformed import PlacedTool, solve_contact
+from epsmesh.solve.contact.deformed import ContactSolution, NoTouchError, PlacedTool, solve_contact
 from epsmesh.solve.contact.elements import ContactElements, SurfaceState
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.newton import LargeError
@@ -27,11 +27,15 @@ class ContactError(SolveError):
 
 @dataclass(frozen=True, eq=False)
 class SettledContact:
-    """A converged active set and its solution; ``sets`` is the number of sets that were solved."""
+    """A converged active set and its solution: what ``touched``, and the state of all candidates."""
 
-    active: BoolArray
+    touched: ContactSolution
     state: SurfaceState
-    sets: int
+
+    @property
+    def active(self) -> BoolArray:
+        """The active set (n)."""
+        return self.touched.active
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +53,7 @@ class Obstacle:
         """Return the tool above nodes that move along the axis only; the support holds those that are ``fixed`` (n)."""
 
         def distance(points: FloatArray) -> Distance:
-            return Distance.along_axis(self.bounds - points[:, -1], 1)
+            return Distance.along_axis(self.bounds, points)
 
         def complete(active: BoolArray) -> BoolArray:
             return neighbours.complete(active) & can_touch
@@ -82,8 +86,12 @@ def find_set(
     first = tool.complete(active)  # guessed from larger elements, it may reach beside the tool
     try:
         touched = solve_contact(tissue, tool, first)
+    except NoTouchError as error:
+        raise ContactError(str(error)) from error
     except LargeError as error:
         if not roughly:
             raise ContactError(f"the contact area does not settle: {error}") from error
-        return SettledContact(tissue.forces()[:, 0] != 0.0, elements.state(), 0)
-    return SettledContact(touched.active, elements.state(), touched.iterations)
+        forces = tissue.forces()
+        gap = tool.distance(tissue.positions()).gap
+        touched = ContactSolution(forces[:, 0] != 0.0, forces, gap, 0, -forces[:, 0])
+    return SettledContact(touched, elements.state())

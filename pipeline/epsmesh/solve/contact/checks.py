@@ -4,10 +4,12 @@ from typing import Protocol
 
 import numpy as np
 
-from epsmesh.arrays import FloatArray
+from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve.balance import check_work
 from epsmesh.solve.contact.active_set import ContactError
 from epsmesh.solve.contact.deformed import ContactSolution, SteppedTissue, Tissue
+from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.newton import LargeError
 
 
@@ -23,6 +25,19 @@ class StoringTissue(SteppedTissue, Protocol):
 def force_of(touched: ContactSolution) -> float:
     """Return the force on the tool along its axis, from the modelled part."""
     return -float(touched.forces[:, -1].sum())
+
+
+def check_edge(tool: Tool, candidates: Candidates, active: BoolArray) -> None:
+    """Check that the contact of ``active`` nodes (n) ends within the candidates, or where the tool does.
+
+    Raises:
+        ContactError: if it reaches their edge elsewhere.
+    """
+    if not np.all(tool.ends_at(candidates.points[active & candidates.is_edge])):
+        raise ContactError(
+            "the contact reaches the edge of the surface region that is searched for contact: "
+            "use a smaller depth, or align the probe's axis with the surface normal"
+        )
 
 
 def check_support(tissue: Tissue, touched: ContactSolution) -> None:

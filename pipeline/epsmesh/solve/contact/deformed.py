@@ -120,6 +120,10 @@ class ContactSolution:
         return np.asarray(np.sign(self.pressed) * np.sqrt(np.maximum(squares, 0.0)))
 
 
+class NoTouchError(LargeError):
+    """The tool touches no node."""
+
+
 class Residual(NamedTuple):
     """Norms (N) of the residual inside the body, and at the nodes that the tool may touch."""
 
@@ -156,7 +160,7 @@ def solve_contact(
     forces is known, to which the residual is then compared.
 
     Raises:
-        LargeError: if the loop does not converge.
+        LargeError: if the loop does not converge; a NoTouchError, if the tool touches no node.
         SolveError: if a linear solver fails.
     """
     loop = _Loop(tissue, tool, active, friction_step, is_patient=is_patient, limit=limit, scale=scale)
@@ -242,7 +246,7 @@ class _Loop:
         self._pressed = np.where(pressing, np.einsum("ni,ni->n", forces, normal), 0.0)
         exerted = self._exerted(iteration, forces, before)
         if is_same and self._scale is None and not active.any():
-            raise LargeError("the probe does not touch a single node: use smaller elements below it")
+            raise NoTouchError("the probe does not touch a single node: use smaller elements below it")
         residual = Residual(tissue.unbalanced(), float(np.linalg.norm(forces - exerted)))
         enough = max(self._limit, _ROUNDING) if residual.size > self._before / 2 else self._limit
         self._before = residual.size

@@ -1,4 +1,4 @@
-"""Unilateral contact with friction in a linear elastic body: response, slip, and error bar.
+"""Unilateral contact with friction in a linear elastic body.
 
 Contact without friction is found first. The surface near it is then condensed, all three components of its nodes, and
 the load path of the tool is followed there, in steps whose depths go with the square of their numbers: the contact of a
@@ -19,23 +19,17 @@ from epsmesh.arrays import BoolArray, FloatArray, IntArray
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.active_set import ContactError
-from epsmesh.solve.contact.checks import force_of
 from epsmesh.solve.contact.condensed import CondensedTissue
 from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, Friction, press_with_friction
-from epsmesh.solve.contact.coulomb import Slide, rubbing_of
+from epsmesh.solve.contact.coulomb import Slide
 from epsmesh.solve.contact.deformed import SLACK, ContactSolution, PlacedTool
-from epsmesh.solve.contact.elements import SurfaceState, Unknowns
-from epsmesh.solve.contact.estimators import half_the_steps
-from epsmesh.solve.contact.found import FoundContact
+from epsmesh.solve.contact.elements import Unknowns
+from epsmesh.solve.contact.found import LinearContact, Rubbed
 from epsmesh.solve.contact.surface import Candidates, Neighbours
-from epsmesh.solve.contact.tool import Tool
-from epsmesh.solve.contact_result import ContactResult
-from epsmesh.solve.elements.base import Elements, HierarchicalEstimate, Solver
+from epsmesh.solve.elements.base import Elements, Solver
 from epsmesh.solve.elements.fields import Column
-from epsmesh.solve.movement import Movement
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.solve.response import Response, reaction
 from epsmesh.stages import stage
 
 # Steps of a load path.
@@ -118,95 +112,32 @@ class SurfaceBody:
         return np.asarray(global_sum(self._space.comm, found))
 
 
-@dataclass(frozen=True, eq=False)
-class FrictionalContact(FoundContact):
-    """Contact with the friction of a ``tool``, beside the frictionless one that was ``found``.
-
-    ``pressed`` is its equilibrium, nodes in the order of the candidates, which ``moved`` (n, 3), m, and ``coarse`` that
-    from half as many load steps. ``smooth`` and ``frictional`` are the unknowns without and with friction.
-    """
-
-    tool: Tool
-    pressed: ContactSolution
-    coarse: ContactSolution
-    moved: FloatArray
-    smooth: Unknowns
-    frictional: Unknowns
-
-    @property
-    def stored(self) -> float:
-        """The energy (J) of the modelled part: less than half the work of the force, since friction dissipates."""
-        return float((self.moved * self.pressed.forces).sum()) / 2
-
-    @property
-    def force(self) -> float:
-        """The force (N) on the modelled part of the tool."""
-        return force_of(self.pressed)
-
-    def summary(self, sag: float) -> ContactResult:
-        """Return the area of the whole contact, and the part of it that slides."""
-        candidates, pressed = self.obstacle.candidates, self.pressed
-        torque = self.tool.torque(candidates.points, pressed.forces)
-        rubbing = rubbing_of(candidates, self.tool.friction, pressed, self.coarse)
-        return super().summary(sag).with_friction(rubbing, torque, self._plug.body.mirrored)
-
-    def response(self, column: Column, movement: Movement) -> Response:
-        """Return the force at this depth as a stiffness, F/d, with its components across the axis."""
-        space, (depth,) = self._plug.displacements, movement.amounts
-        products = self._plug.products(self.sweep.law, [column])
-        (moved,), (residual,) = products.moved, products.residuals
-        local = np.array([residual.reshape(-1, 3)[space.fixed_owned, 2].sum(), moved @ residual])
-        support, energy = global_sum(space.comm, depth * local * (1.0, depth))
-        balance = max(abs(support / self.force - 1), abs(2 * self.stored / energy - 1))
-        across = self.pressed.forces[:, :2].sum(axis=0)
-        on_probe = np.array([[*across, -self.force]]) / depth
-        return reaction(movement, np.array([[self.force / depth]]), on_probe, self._plug.body.mirrored, balance)
-
-    def hierarchical_estimate(
-        self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
-    ) -> HierarchicalEstimate:
-        """Return the change of the force in one degree more, and its error bar."""
-        (depth,) = movement.amounts
-        self._plug.put(columns[0], self.smooth, depth)
-        found = super().hierarchical_estimate(columns, movement, stack, keep=keep)
-        self._plug.put(columns[0], self.frictional, depth)
-        return half_the_steps(found, self.pressed, self.coarse, super().force)
-
-    def _touching(self) -> tuple[BoolArray, SurfaceState]:
-        return self.pressed.active, SurfaceState(self.moved[:, 2], self.pressed.forces[:, 2], 2 * self.stored)
-
-
-def add_friction(contact: FoundContact, tool: Tool, smooth: Unknowns, stack: ExitStack) -> FrictionalContact:
-    """Return the contact with the friction of a ``tool``, from the one without, whose unknowns are ``smooth``.
-
-    Collective.
+def rub(contact: LinearContact, stack: ExitStack) -> LinearContact:
+    """Return a ``contact`` without friction with the friction of its tool; collective.
 
     Raises:
         SolveError: if the factorisation fails.
         ContactError: if a load step does not settle.
     """
-    sweep, obstacle = contact.sweep, contact.obstacle
-    elements, candidates = sweep.elements.plug, obstacle.candidates
-    body = SurfaceBody(elements, sweep.law, sweep.elements.numbering.local, stack)
-    is_free, reachable = body.is_free(), np.isfinite(obstacle.bounds)
-    reachable &= is_free[:, 2]
-    touched = contact.found.active
+    sweep, obstacle, friction = contact.sweep, contact.obstacle, contact.tool.friction
+    candidates, depth = obstacle.candidates, obstacle.depth
+    body = SurfaceBody(sweep.elements.plug, sweep.law, sweep.elements.numbering.local, stack)
+    is_free, neighbours = body.is_free(), candidates.neighbours
+    reachable = np.isfinite(obstacle.bounds) & is_free[:, 2]
+    touched = contact.smooth.active
     while True:
-        nodes = np.flatnonzero(_around(candidates, touched) & reachable)
+        near = neighbours.complete(_around(candidates, touched) & reachable) & reachable
+        nodes = np.flatnonzero(near)
         tissue = CondensedTissue(body.compliance(nodes, is_free), candidates.points[nodes], ~is_free[nodes])
-        surface = CondensedSurface(tissue, obstacle.bounds[nodes] + obstacle.depth, candidates.neighbours.of(nodes))
-        both = [press_condensed(surface, obstacle.depth, tool.friction, count) for count in (STEPS, STEPS // 2)]
-        pressed, coarse = (_of_all(candidates, nodes, one) for one in both)
-        moved, frictional = body.moved(pressed.forces)
-        through = (moved[:, 2] - obstacle.bounds > SLACK * obstacle.depth) & ~pressed.active & reachable
-        through[nodes] = False
+        surface = CondensedSurface(tissue, obstacle.bounds[nodes] + depth, neighbours.of(nodes))
+        both = [press_condensed(surface, depth, friction, count) for count in (STEPS, STEPS // 2)]
+        fine, coarse = (_of_all(candidates, nodes, one) for one in both)
+        moved, unknowns = body.moved(fine.forces)
+        gap = obstacle.bounds - moved[:, 2]
+        through = (gap < -SLACK * depth) & reachable & ~near & ~neighbours.followers
         if not through.any():
-            break
+            return replace(contact, rubbed=Rubbed(replace(fine, gap=gap), coarse, moved, unknowns))
         touched = touched | through
-    known = {name: getattr(contact, name) for name in ("sweep", "obstacle", "found", "loaded", "obstacle_above")}
-    return FrictionalContact(
-        **known, tool=tool, pressed=pressed, coarse=coarse, moved=moved, smooth=smooth, frictional=frictional
-    )
 
 
 def _around(candidates: Candidates, active: BoolArray) -> BoolArray:
@@ -227,10 +158,9 @@ class CondensedSurface:
 
     def tool_at(self, depth: float) -> PlacedTool:
         """Return the tool at a ``depth`` (m), with the gaps along its axis."""
-        places, dim = self.tissue.places, self.tissue.places.shape[1]
 
         def distance(points: FloatArray) -> Distance:
-            return Distance.along_axis(self.heights - depth - (points - places)[:, -1], dim)
+            return Distance.along_axis(self.heights - depth, points - self.tissue.places)
 
         return PlacedTool(distance, self.neighbours.complete, self.neighbours.followers, depth)
 

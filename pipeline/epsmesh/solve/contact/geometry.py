@@ -13,9 +13,9 @@ from functools import cache
 
 import numpy as np
 
-from epsmesh.arrays import BoolArray, FloatArray
-from epsmesh.solve.contact.active_set import Obstacle
-from epsmesh.solve.contact.elements import FreeResponse, SurfaceState
+from epsmesh.arrays import FloatArray
+from epsmesh.solve.contact.deformed import ContactSolution
+from epsmesh.solve.contact.elements import FreeResponse
 from epsmesh.solve.contact.surface import FACET_CORNERS, Candidates
 
 # Search for the first touch: sampling points along an edge of each facet, rounds of refinement, the factor by which a
@@ -109,21 +109,21 @@ class Area:
 
 
 def contact_area(
-    obstacle: Obstacle, active: BoolArray, state: SurfaceState, modulus: FloatArray, mirrored: tuple[int, ...] = ()
+    candidates: Candidates, touched: ContactSolution, modulus: FloatArray, mirrored: tuple[int, ...] = ()
 ) -> Area:
     """Return the contact area of the modelled part, bounded by planes of symmetry normal to the axes ``mirrored``.
 
     ``modulus`` (n) is E / (1 - ν²) of the tissue at each candidate (Pa).
     """
-    candidates, weights = obstacle.candidates, obstacle.candidates.weights
+    active, weights, reactions = touched.active, candidates.weights, touched.forces[:, -1]
     sure, near = float(weights[active].sum()), candidates.bordering(active) & (weights > 0)
     if not near.any():
         return Area(sure, 0.0)
     within = active[near]
-    pressure = np.maximum(-state.reactions[near], 0.0) / weights[near] * within
-    gap = np.maximum(obstacle.bounds[near] - state.moved[near], 0.0) * ~within
-    force, width = -float(state.reactions[active].sum()), _WIDTH * candidates.widths[near]
-    semi_axis = _semi_axis(candidates.points[:, :2], -np.where(active, state.reactions, 0.0), mirrored)
+    pressure = np.maximum(-reactions[near], 0.0) / weights[near] * within
+    gap = np.maximum(touched.gap[near], 0.0) * ~within
+    force, width = -float(reactions[active].sum()), _WIDTH * candidates.widths[near]
+    semi_axis = _semi_axis(candidates.points[:, :2], -np.where(active, reactions, 0.0), mirrored)
     inner = sure - float(weights[near][within].sum())
     area = sure or float(weights[near].sum())
     for _ in range(_MOST_ROUNDS):

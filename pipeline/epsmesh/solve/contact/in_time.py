@@ -14,10 +14,10 @@ from petsc4py import PETSc
 
 from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
-from epsmesh.solve.contact.active_set import ContactError
+from epsmesh.solve.contact.checks import check_edge
 from epsmesh.solve.contact.contact_steps import check_outside
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, SteppedTissue, first_set, solve_contact
-from epsmesh.solve.contact.large import placed_tool, touched_area
+from epsmesh.solve.contact.large import on_surface, placed_tool
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
@@ -121,14 +121,11 @@ class ToolIndentation(ContactIndentation):
 
     def _measure(self, touched: ContactSolution, share: float) -> None:
         tissue = self._tissue
-        at_edge = tissue.candidates.points[touched.active & tissue.candidates.is_edge]
-        if not np.all(self._tool.ends_at(at_edge)):
-            raise ContactError("the contact reaches the edge of the region that is searched: use a smaller depth")
+        check_edge(self._tool, tissue.candidates, touched.active)
         self.force = touched.forces.sum(axis=0)
         self.rate = -float(self.force[2]) * self._depth
         self.area = 0.0
         if touched.active.any():
             # Pressures beside the edge tell its place with the modulus of the law: those without relaxation.
             elastic = replace(touched, forces=tissue.elastic_forces() * touched.active[:, None])
-            area = touched_area(tissue, elastic, share * self._depth).value
-            self.area = 2.0 ** len(tissue.elements.body.mirrored) * area
+            self.area = on_surface(tissue, self._tool, elastic).whole_area

@@ -13,6 +13,7 @@ steps, and again in half as many: the change of the force is the bar of the step
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import nan
 from typing import ClassVar
 
@@ -22,18 +23,21 @@ from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.compiled import global_sum
-from epsmesh.solve.contact.active_set import ContactError, Obstacle
-from epsmesh.solve.contact.checks import check_energy, check_support, force_of
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, check_outside, press, press_with_friction
+from epsmesh.solve.contact.checks import check_edge, check_energy, check_support, force_of
+from epsmesh.solve.contact.contact_steps import (
+    ContactPath,
+    ContactPathPoint,
+    Friction,
+    check_outside,
+    press,
+    press_with_friction,
+)
 from epsmesh.solve.contact.corrections import Corrections
-from epsmesh.solve.contact.coulomb import rubbing_of
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
-from epsmesh.solve.contact.elements import SurfaceState
-from epsmesh.solve.contact.estimators import half_the_steps
-from epsmesh.solve.contact.geometry import Area, contact_area
-from epsmesh.solve.contact.large_friction import friction_of
+from epsmesh.solve.contact.estimators import estimate_of, half_the_steps
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
+from epsmesh.solve.contact.surface_contact import SurfaceContact
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact_result import ContactResult
@@ -115,7 +119,8 @@ class LargeContact:
     def _with_friction(self, smooth: "LargeContactSolution") -> "tuple[LargeContactSolution, int]":
         """Return contact with friction, beside that without, ``smooth``, and Newton's iterations; see :meth:`solve`."""
         body, depth, state, tool = smooth.body, smooth.depth, smooth.body.state, smooth.placed
-        friction, found, iterations = friction_of(body, self._tool.friction, depth), list[ContactSolution](), 0
+        friction = Friction.on(body.candidates, body.law, self._tool.friction, depth)
+        found, iterations = list[ContactSolution](), 0
         for steps in (self.STEPS // 2, self.STEPS):
             path = ContactPath(ContactPathPoint(0.0, smooth.sagged.state))
             try:
@@ -184,20 +189,15 @@ class LargeContactSolution:
         """The energy (J) of the modelled part that is due to the depth."""
         return self.body.energy - self.sagged.energy
 
+    @cached_property
+    def surface_contact(self) -> SurfaceContact:
+        """The contact as the tool has it."""
+        return on_surface(self.body, self.tool, self.touched, None if self.beside is None else self.beside.coarse)
+
     @property
     def force(self) -> float:
         """The force (N) on the modelled part of the tool, along its axis."""
-        return force_of(self.touched)
-
-    @property
-    def is_ended(self) -> bool:
-        """Whether the contact reaches the edge of the candidates, where the tool itself ends."""
-        return bool((self.touched.active & self.body.candidates.is_edge).any())
-
-    @property
-    def whole_area(self) -> float:
-        """The contact area (m²) of the whole body, normal to the axis."""
-        return float(2.0 ** len(self.body.elements.body.mirrored) * self._area().value)
+        return self.surface_contact.force
 
     def equilibrium(self, movement: Movement, iterations: int, stack: ExitStack) -> Equilibrium:
         """Return the checked equilibrium of a ``movement``; the ``stack`` frees its columns."""
@@ -209,14 +209,9 @@ class LargeContactSolution:
         return Equilibrium(self, columns, movement, iterations, self.response(movement), contact=self.summary())
 
     def summary(self) -> ContactResult:
-        """Return the area of the whole contact, the part that slides, the friction, and the effects of loads."""
-        mirrored, touched, tool = self.body.elements.body.mirrored, self.touched, self.tool
-        loaded = 2.0 ** len(mirrored) * self.sagged.stored
-        found = ContactResult(self.whole_area, sag=self.sagged.sag, load_energy=loaded, is_ended=self.is_ended)
-        if self.beside is None:
-            return found
-        rubbing = rubbing_of(self.body.candidates, tool.friction, touched, self.beside.coarse)
-        return found.with_friction(rubbing, tool.torque(self.body.positions(), touched.forces), mirrored)
+        """Return the whole contact, with the effects of loads."""
+        stored = 2.0 ** len(self.body.elements.body.mirrored) * self.sagged.stored
+        return self.surface_contact.result(self.sagged.sag, stored)
 
     def check(self) -> None:
         """Check the work, and that contact ends within the candidates.
@@ -225,12 +220,8 @@ class LargeContactSolution:
             LargeError: if the work of the reactions is not the change of the energy.
             ContactError: if contact reaches the support or the edge of the candidates.
         """
-        candidates = self.body.candidates
         check_support(self.body, self.touched)
-        if not np.all(self.tool.ends_at(candidates.points[self.touched.active & candidates.is_edge])):
-            raise ContactError(
-                "the contact reaches the edge of the surface region that is searched for contact: use a smaller depth"
-            )
+        check_edge(self.tool, self.body.candidates, self.touched.active)
         check_energy(self.body, self.touched, _SMALL)
 
     def response(self, movement: Movement) -> Response:
@@ -259,22 +250,15 @@ class LargeContactSolution:
             self.body.state = self.beside.state
             found = smooth.hierarchical_estimate(columns, movement, stack, keep=keep)
             self.body.state = state
-            return half_the_steps(found, self.touched, self.beside.coarse, smooth.force)
-        finer = self._found_again(movement.loads, stack)
-        share, at_edge = 1 - finer.force / self.force, self._area().bar
+            return half_the_steps(found, self.surface_contact, smooth.force)
+        finer, here = self._found_again(movement.loads, stack), self.surface_contact
+        share, at_edge = 1 - finer.force / self.force, here.area.bar
         least = AT_EDGE_LARGE[self.body.elements.degree]
         taken, bar = found_again_bar(share, at_edge, least, at_end=self._at_sharp_end())
         # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue
         # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
-        of_area = nan if self.is_ended else at_edge + bar + abs(finer.whole_area / self.whole_area - 1)
-        return HierarchicalEstimate(
-            finer.body.elements,
-            [],
-            decrements=np.array([[taken * self.force / self.depth]]),
-            relative=np.array([bar]),
-            area_bar=of_area,
-            at_edge=at_edge,
-        )
+        of_area = nan if here.is_ended else bar + abs(finer.surface_contact.whole_area / here.whole_area - 1)
+        return estimate_of(finer.body.elements, here, self.depth, (taken, bar), of_area)
 
     @stage("contact sets")
     def _found_again(self, loads: Loads | None, stack: ExitStack) -> "LargeContactSolution":
@@ -336,16 +320,13 @@ class LargeContactSolution:
         areas = candidates.areas * touching
         return float(areas[at_end[candidates.facets].any(axis=1)].sum() / areas.sum())
 
-    def _area(self) -> Area:
-        return touched_area(self.body, self.touched, self.depth)
 
-
-def touched_area(body: DeformedBody, touched: ContactSolution, depth: float) -> Area:
-    """Return the contact area of the modelled part, where its candidates are, normal to the axis."""
+def on_surface(
+    body: DeformedBody, tool: Tool, touched: ContactSolution, coarse: ContactSolution | None = None
+) -> SurfaceContact:
+    """Return contact with a body, where its candidates are; ``coarse`` is that from half as many load steps."""
     candidates = body.candidates
     if not body.law.is_linear:
         candidates = replace(candidates, points=body.positions())
     modulus = candidates.from_regions(body.law.plane_moduli)
-    state = SurfaceState(np.zeros(len(candidates)), touched.forces[:, 2], nan)
-    obstacle = Obstacle(candidates, touched.gap, depth)
-    return contact_area(obstacle, touched.active, state, modulus, body.elements.body.mirrored)
+    return SurfaceContact(candidates, touched, tool, modulus, body.elements.body.mirrored, coarse)

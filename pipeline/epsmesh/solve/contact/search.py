@@ -9,19 +9,18 @@ along the axis.
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from math import nan
 
 import numpy as np
 
-from epsmesh.arrays import BoolArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.contact.active_set import ContactError, Obstacle, SettledContact, find_set
+from epsmesh.solve.contact.checks import check_edge
 from epsmesh.solve.contact.condensed import CondensedElements, suits
 from epsmesh.solve.contact.elements import ContactElements, FarShare, FreeResponse
-from epsmesh.solve.contact.found import FoundContact
-from epsmesh.solve.contact.frictional import add_friction
+from epsmesh.solve.contact.found import LinearContact
+from epsmesh.solve.contact.frictional import rub
 from epsmesh.solve.contact.geometry import Touch
 from epsmesh.solve.contact.in_time import ToolIndentation
 from epsmesh.solve.contact.large import LargeContact
@@ -57,7 +56,7 @@ class ContactSearch:
         self._elements, self._tool = elements, tool
         self._surface, self._touch = Surface(spaces, elements.displacements.conditions), Touch(tool.height, tool.first)
         self.candidates: Candidates = self._surface.of(elements.degree)
-        self.contact: FoundContact | None = None
+        self.contact: LinearContact | None = None
         self._reuse, self._condense = reuse or condense, condense
         self._sweep: Sweep | None = None  # kept from depth to depth of one material
         self._large: LargeContact | None = None
@@ -90,28 +89,32 @@ class ContactSearch:
         if np.any(obstacle.bounds[elements.is_fixed] < 0):
             raise ContactError("the probe reaches the fixed part of the body: no displacement satisfies both")
         first, found = self._find(sweep, obstacle, (_LOOSE, strict), loaded)
-        self._check_edge(found.active)
+        check_edge(self._tool, self.candidates, found.active)
         unknowns = elements.unknowns()
         self._elements.put(columns[0], unknowns, depth)
         if elements.far is not None:
             movement = close_far(columns, movement, elements.far.share / depth)
-        self.contact = contact = FoundContact(
+        iterations = first + found.touched.iterations
+        contact = LinearContact(
             sweep=sweep,
+            tool=self._tool,
             obstacle=obstacle,
-            found=found,
+            smooth=found,
+            unknowns=unknowns,
             loaded=loaded,
             obstacle_above=lambda: self._obstacle(self._surface.of(self._elements.degree + 1), depth, loaded),
         )
         if self._tool.friction:
-            self.contact = contact = add_friction(contact, self._tool, unknowns, stack)
-            self._elements.put(columns[0], contact.frictional, depth)
-            found = replace(found, sets=found.sets + contact.pressed.iterations)
+            contact = rub(contact, stack)
+            assert contact.rubbed is not None
+            self._elements.put(columns[0], contact.rubbed.unknowns, depth)
+            iterations += contact.rubbed.fine.iterations
+        self.contact = contact
         response = contact.response(columns[0], movement)
         check_balance(response.balance)
         if self._reuse:
             sweep.keep(depth, found, unknowns)
         sag = nan if loaded is None else self._touch.sag(self.candidates, loaded)
-        iterations = first + found.sets
         return Equilibrium(contact, columns, movement, iterations, response, contact=contact.summary(sag))
 
     def _solve_large(self, asked: Request, stack: ExitStack) -> Equilibrium:
@@ -187,7 +190,7 @@ class ContactSearch:
             energy = None if found is None else found.state.energy
             found = find_set(lower, obstacle, active, (_LOOSE,), energy, roughly=True)
             lower.show()
-            elements, sets = lower, sets + found.sets
+            elements, sets = lower, sets + found.touched.iterations
         assert elements is not None
         assert found is not None
         return sets, elements, found
@@ -212,11 +215,3 @@ class ContactSearch:
         else:
             stack.callback(sweep.close)
         return sweep
-
-    def _check_edge(self, active: BoolArray) -> None:
-        points = self.candidates.points[active & self.candidates.is_edge]
-        if not np.all(self._tool.ends_at(points)):
-            raise ContactError(
-                "the contact reaches the edge of the surface region that is searched for contact: "
-                "use a smaller depth, or align the probe's axis with the surface normal"
-            )

@@ -39,7 +39,7 @@ class Tool:
         heights = self.height(places) - self.first
 
         def distance(points: FloatArray, depth: float) -> Distance:
-            return Distance.along_axis(heights - depth - (points - places)[:, 2], 3)
+            return Distance.along_axis(heights - depth, points - places)
 
         return replace(self, distance=distance)
 

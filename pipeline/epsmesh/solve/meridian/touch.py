@@ -156,8 +156,7 @@ class MeridianTouch:
         return Distance(found.gap / self.unit, found.normal[:, [0, 2]], curvature)
 
     def _along_axis(self, points: FloatArray, depth: float) -> Distance:
-        moved = points[:, 1] - self.tissue.places[:, 1]
-        return Distance.along_axis(self._heights - depth - moved, 2)
+        return Distance.along_axis(self._heights - depth, points - self.tissue.places)
 
     @cached_property
     def _heights(self) -> FloatArray:
