@@ -65,11 +65,7 @@ def check_contact(found: Recorded, *, is_rising: bool, is_cut: bool) -> Recorded
     notes = [*gaps(found, depth, "depth", "m"), *_flat_end(found)] if is_rising else []
     air = np.median(force[: max(3, len(force) // 20)])
     end = np.median(force[-max(3, len(force) // 20) :])
-    noise = float(np.median(np.abs(np.diff(force)))) * 1.4826 / np.sqrt(2)
-    if end - air <= _NOISE * noise:
-        why = f"the force never rises: from {air:.3g} N to {end:.3g} N at a noise of {noise:.2g} N, so there is no "
-        why += "contact in this part; check the signs and the columns"
-        raise ExperimentError(found.file, why, column=found.force_name)
+    check_rise(found, air, end)
     begun = air + _BEGUN * (end - air)
     below = np.flatnonzero(force < begun)
     touch = int(below[-1]) + 1 if below.size else 0
@@ -81,6 +77,15 @@ def check_contact(found: Recorded, *, is_rising: bool, is_cut: bool) -> Recorded
         notes.append(f"{int((~kept).sum())} rows of air, far longer than the contact, are left out")
         return found.part(kept).noting(*notes)
     return found.noting(*notes)
+
+
+def check_rise(found: Recorded, air: float, end: float) -> None:
+    """Report a force that is no larger at the ``end`` than in the ``air`` (N)."""
+    noise = float(np.median(np.abs(np.diff(found.force)))) * 1.4826 / np.sqrt(2)
+    if end - air <= _NOISE * noise:
+        why = f"the force never rises: from {air:.3g} N to {end:.3g} N at a noise of {noise:.2g} N, so there is no "
+        why += "contact in this part; check the signs and the columns"
+        raise ExperimentError(found.file, why, column=found.force_name)
 
 
 def _flat_end(found: Recorded) -> list[str]:

@@ -46,12 +46,8 @@ class Recorded:
 
     def part(self, rows: IntArray | slice | FloatArray) -> "Recorded":
         """Return some of the rows."""
-        time = None if self.time is None else self.time[rows]
-        deflection = None if self.deflection is None else self.deflection[rows]
-        return replace(
-            self, depth=self.depth[rows], force=self.force[rows], time=time, lines=self.lines[rows],
-            deflection=deflection,
-        )  # fmt: skip
+        columns = {name: getattr(self, name) for name in ("depth", "force", "time", "lines", "deflection")}
+        return replace(self, **{name: values[rows] for name, values in columns.items() if values is not None})
 
     def noting(self, *words: str) -> "Recorded":
         """Return it with more that was found."""
@@ -147,43 +143,46 @@ def _are_equal(table: Table, numbers: list[int], *, but_for_a_constant: bool = F
     return True
 
 
-def _found(table: Table, kind: str, reading: Reading, notes: list[str]) -> int:
-    """Return the column that is unmistakably depth or force: by its words and unit, or the only one of that unit."""
+def candidates(table: Table, kind: str, reading: Reading) -> list[int]:
+    """Return the columns that can be depth, force or time: those that are called so, else those of such a unit."""
     units = [_unit(table, number, reading, kind) for number in range(len(table.headers))]
-    of_kind = [n for n, unit in enumerate(units) if unit and is_unit_of(unit, UNITS[kind]) and _has_values(table, n)]
-    without = [n for n, unit in enumerate(units) if not unit and _has_values(table, n)]
-    if kind == "depth":
-        of_kind = [n for n in of_kind if not is_called(table.headers[n].name, "deflection")]
-    of_kind = [n for n in of_kind if units[n] not in MASSES or is_called(table.headers[n].name, kind)]
-    called = [n for n in (*of_kind, *without) if is_called(table.headers[n].name, kind)]
-    candidates = called or of_kind
-    if len(candidates) > 1 and _are_equal(table, candidates, but_for_a_constant=kind == "force"):
-        same = ", ".join(f"`{_title(table, n)}`" for n in candidates[1:])
-        notes.append(f"{kind} is column `{_title(table, candidates[0])}`; {same} differs by no more than a constant")
-        return candidates[0]
-    if len(candidates) == 1:
-        notes.append(f"{kind} is column `{_title(table, candidates[0])}`")
-        return candidates[0]
-    why = f"could be {', '.join(f'`{_title(table, n)}`' for n in candidates)}" if candidates else "is not found"
+    names = [header.name for header in table.headers]
+    full = [n for n in range(len(names)) if _has_values(table, n)]
+    of_kind = [n for n in full if is_unit_of(units[n], UNITS[kind])]
+    of_kind = [n for n in of_kind if units[n] not in MASSES or is_called(names[n], kind)]
+    of_kind = [n for n in of_kind if kind != "depth" or not is_called(names[n], "deflection")]
+    called = [n for n in full if (n in of_kind or not units[n]) and is_called(names[n], kind)]
+    return sorted(called, key=lambda n: n not in of_kind) or of_kind
+
+
+def _found(table: Table, kind: str, reading: Reading, notes: list[str]) -> int:
+    """Return the column that is unmistakably depth or force."""
+    found = candidates(table, kind, reading)
+    titles = [f"`{_title(table, number)}`" for number in found]
+    if found and _are_equal(table, found, but_for_a_constant=kind == "force"):
+        same = f"; {', '.join(titles[1:])} differs by no more than a constant" if titles[1:] else ""
+        notes.append(f"{kind} is column {titles[0]}{same}")
+        return found[0]
+    what = f"could be {', '.join(titles)}" if found else "is not found"
     raise ExperimentError(
         table.file,
-        f"{kind} {why} among {_listed(table)}: name it by header or number in columns of {_SECTION}, and its unit in "
-        f"units if the header has none{_if_bent(table)}{_why_not(table, kind, units)}{_unused(table)}",
+        f"{kind} {what} among {_listed(table)}: name it by header or number in columns of {_SECTION}, and its unit in "
+        f"units if the header has none{_if_bent(table)}{_why_not(table, kind, reading)}{_unused(table)}",
     )
 
 
-def _why_not(table: Table, kind: str, units: list[str]) -> str:
+def _why_not(table: Table, kind: str, reading: Reading) -> str:
     """Return why columns that are called so are none: they have text or nothing, or a unit of another kind."""
     reasons = []
     for number, header in enumerate(table.headers):
-        title = _title(table, number)
+        title, unit = _title(table, number), _unit(table, number, reading, kind)
         if number in table.strange:
             line, text = table.strange[number]
             reasons.append(f'`{title}` has text, "{text}" in line {line}')
         elif is_called(header.name, kind) and not _has_values(table, number):
             reasons.append(f"`{title}` has no values")
-        elif is_called(header.name, kind) and units[number] and not is_unit_of(units[number], UNITS[kind]):
-            reasons.append(f"`{title}` has the unit {units[number]}, no unit of {_KINDS[UNITS[kind]]}")
+        elif is_called(header.name, kind) and unit and not is_unit_of(unit, UNITS[kind]):
+            reasons.append(f"`{title}` has the unit {unit}, no unit of {_KINDS[UNITS[kind]]}")
     return "".join(f"; {reason}" for reason in reasons)
 
 
@@ -195,15 +194,13 @@ def _if_bent(table: Table) -> str:
 
 def _time(table: Table, taken: set[int], reading: Reading, notes: list[str]) -> int | None:
     """Return the only column that is called time, or has a unit of time; None if there is none, or several."""
-    free = [n for n in range(len(table.headers)) if n not in taken and _has_values(table, n)]
     for number, (line, text) in table.strange.items():
         if is_called(table.headers[number].name, "time"):
             notes.append(f'column `{_title(table, number)}` has text, "{text}" in line {line}, and is not read as time')
-    found = [n for n in free if is_called(table.headers[n].name, "time")]
-    found = found or [n for n in free if is_unit_of(table.headers[n].unit, "s")]
-    for number in [n for n in found if not _unit(table, n, reading, "time")]:
-        notes.append(f"column `{_title(table, number)}` has no unit, and is not read as time: give it in units")
-    found = [n for n in found if is_unit_of(_unit(table, n, reading, "time"), "s")]
+    found = [n for n in candidates(table, "time", reading) if n not in taken]
+    without = [n for n in found if not _unit(table, n, reading, "time")]
+    notes += [f"column `{_title(table, n)}` has no unit, and is not read as time: give it in units" for n in without]
+    found = [n for n in found if n not in without]
     if len(found) > 1:
         notes.append(f"time could be {', '.join(_title(table, n) for n in found)}: not read; name it in columns")
     if len(found) != 1:

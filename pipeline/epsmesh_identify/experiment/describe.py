@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from epsmesh_identify.experiment.columns import Recorded
+from epsmesh_identify.experiment.columns import Recorded, candidates
 from epsmesh_identify.experiment.header import is_unit_of
 from epsmesh_identify.experiment.read import read_curve, whole_curve
-from epsmesh_identify.experiment.reading import UNITS, ExperimentError, Reading
+from epsmesh_identify.experiment.reading import ExperimentError, Reading
 from epsmesh_identify.experiment.segments import cycles_of
 from epsmesh_identify.experiment.signs import signed, signs_of
 from epsmesh_identify.experiment.table import Table, table_of
 from epsmesh_identify.experiment.text import read_lines
-from epsmesh_identify.experiment.words import is_called, is_other
+from epsmesh_identify.experiment.words import is_called
 
 _SEPARATORS = {" ": "spaces", "\t": "tabs", ",": "commas", ";": "semicolons", "|": "bars"}
 # Units that people read, from the largest on: the first of which there is one at least.
@@ -22,6 +22,9 @@ _READ = {
     "force": ((1.0, "N"), (1e-3, "mN"), (1e-6, "µN"), (1e-9, "nN")),
     "time": ((1.0, "s"), (1e-3, "ms")),
 }
+
+# Of columns without a unit, as an example.
+_UNITS = {"depth": "mm", "force": "N", "time": "s"}
 
 
 def describe(path: Path, reading: Reading | None = None) -> str:
@@ -35,13 +38,22 @@ def describe(path: Path, reading: Reading | None = None) -> str:
     reading = reading or Reading()
     table = table_of(read_lines(path), str(path))
     lines = [_of_table(table, path.name), *_of_columns(table)]
+    head = [
+        "[[measurement]]",
+        f"name = {_text(path.stem)}",
+        f"file = {_text(path.as_posix())} # from the study's folder",
+    ]
+    whole = None
     try:
         whole = whole_curve(path, reading)
-        curve = read_curve(path, reading)
+        curve, signs = read_curve(path, reading), signs_of(whole, reading)
     except ExperimentError as error:
-        return "\n".join([*lines, "", f"not read yet: {error}", "", *_to_choose(table, path.name)])
-    lines += ["", *_of_segments(signed(whole, reading)), *(f"- {note}" for note in curve.notes)]
-    return "\n".join([*lines, "", *_block(whole, path.name, signs_of(whole, reading)), *_to_add(table)])
+        lines += ["", f"not read yet: {error}"]
+        block = _block(whole, None) if whole else _to_choose(table)
+    else:
+        lines += ["", *_of_segments(signed(whole, reading)), *(f"- {note}" for note in curve.notes)]
+        block = _block(whole, signs)
+    return "\n".join([*lines, "", *head, *block, *_to_add(table)])
 
 
 def _of_table(table: Table, name: str) -> str:
@@ -91,53 +103,36 @@ def _of_part(found: Recorded) -> str:
     return f"of {len(found.depth)} rows over {', '.join(extents)}"
 
 
-def _block(found: Recorded, name: str, signs: tuple[int, int]) -> list[str]:
-    """Return the table of a study that reads the file so."""
+def _block(found: Recorded, signs: tuple[int, int] | None) -> list[str]:
+    """Return the keys of a study that reads the file so; without ``signs``, these are to be chosen."""
     columns = ", ".join(
         f"{kind} = {header if header.isdecimal() else _text(header)}" for kind, header in found.names.items()
     )
-    return [
-        *_heading(name),
-        f"columns = {{{columns}}}",
-        *([f"sign = {{depth = {signs[0]}, force = {signs[1]}}}"] if min(signs) < 0 else []),
-    ]
+    depth, force = signs or (1, 1)
+    sign = f"sign = {{depth = {depth}, force = {force}}}{'' if signs else ' # check'}"
+    return [f"columns = {{{columns}}}", *([sign] if signs is None or min(signs) < 0 else [])]
 
 
-def _to_choose(table: Table, name: str) -> list[str]:
-    """Return the table of a study in which columns are to be chosen: the likely ones are written."""
+def _to_choose(table: Table) -> list[str]:
+    """Return the keys of a study in which columns are to be chosen: the likely ones are written."""
     if spring := _of_spring(table):
-        return [*_heading(name), f"columns = {{{', '.join(spring)}}} # check"]
+        return [f"columns = {{{', '.join(spring)}}} # check"]
     chosen: dict[str, int] = {}
-    for kind in ("depth", "force", "time"):
-        if (number := _likely(table, kind, set(chosen.values()))) is not None:
-            chosen[kind] = number
-    columns = [f"{kind} = {_of_column(table, number)}" for kind, number in chosen.items()]
-    lacking = [f"{kind} = …" for kind in ("depth", "force") if kind not in chosen]
-    units = [
-        f'{kind} = "{ {"m": "mm", "N": "N", "s": "s"}[UNITS[kind]] }"'
-        for kind, number in chosen.items()
-        if not table.headers[number].unit
-    ]
-    hint = f"; no column has the name and unit of {' and '.join(one.split()[0] for one in lacking)}" if lacking else ""
+    for place, kind in enumerate(("time", "depth", "force")):
+        free = [n for n in candidates(table, kind, Reading()) if n not in {*chosen.values(), *table.strange}]
+        if not free and kind != "time" and place < len(table.headers) and not table.headers[place].text:
+            free = [place]
+        chosen |= {kind: free[0]} if free else {}
+    columns = ", ".join(f"{kind} = {_of_column(table, number)}" for kind, number in chosen.items())
+    units = [f'{kind} = "{_UNITS[kind]}"' for kind, number in chosen.items() if not table.headers[number].unit]
+    lacking = [kind for kind in ("depth", "force") if kind not in chosen]
+    hint = f"; no column has the name and unit of {' and '.join(lacking)}" if lacking else ""
     return [
-        *_heading(name),
-        *([f"columns = {{{', '.join(columns)}}} # check: header or number of each column{hint}"] if columns else []),
-        *([f"# columns = {{{', '.join(lacking)}}}{hint}"] if not columns else []),
+        f"columns = {{{columns}}} # check: header or number of each column{hint}"
+        if chosen
+        else f"# columns = {{depth = …, force = …}}{hint}",
         *([f"units = {{{', '.join(units)}}} # check"] if units else []),
-        *_to_add(table),
     ]
-
-
-def _likely(table: Table, kind: str, taken: set[int]) -> int | None:
-    """Return the column that is likely a depth, force or time: by name, unit or place; None if none can be."""
-    free = [n for n in range(len(table.headers)) if n not in taken and not np.isnan(table.values[:, n]).all()]
-    free = [n for n in free if n not in table.strange]
-    of_kind = [n for n in free if is_unit_of(table.headers[n].unit, UNITS[kind])]
-    without = [n for n in free if not table.headers[n].unit and not is_other(table.headers[n].name)]
-    called = [n for n in (*of_kind, *without) if is_called(table.headers[n].name, kind)]
-    place = ("time", "depth", "force").index(kind)
-    unnamed = [n for n in without if n == place and not table.headers[n].text and kind != "time"]
-    return next(iter((*called, *of_kind, *unnamed)), None)
 
 
 def _of_spring(table: Table) -> list[str]:
@@ -164,14 +159,6 @@ def _to_add(table: Table) -> list[str]:
     if table.spring:
         return [f"machine_stiffness = {_text(table.spring)} # of the spring, if the depth is the way of the piezo"]
     return ['# machine_stiffness = "60 N/mm" # of machine and load cell; or a range, or "unknown"; rigid without it']
-
-
-def _heading(name: str) -> list[str]:
-    return [
-        "[[measurement]]",
-        f"name = {_text(Path(name).stem)}",
-        f"file = {_text(name)} # path from the study's folder",
-    ]
 
 
 def _text(text: str) -> str:

@@ -1,13 +1,14 @@
-"""Signs of depth and force: deeper and pressed are positive."""
+"""Signs of depth and force with which both are positive where the tool presses: found where all evidence agrees."""
 
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from epsmesh.arrays import FloatArray
+from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh_identify.experiment.checks import check_rise
 from epsmesh_identify.experiment.columns import Recorded
-from epsmesh_identify.experiment.reading import Reading
+from epsmesh_identify.experiment.reading import ExperimentError, Reading
 from epsmesh_identify.experiment.segments import turning_points
 
 # Shares of the depth at both ends of a curve that are compared, and by how much the contact's end must vary more, or
@@ -21,14 +22,23 @@ _TURN, _SHORT, _PLACES = 0.1, 0.1, 80
 def signs_of(found: Recorded, reading: Reading) -> tuple[int, int]:
     """Return the signs of depth and force with which both are positive where the tool presses.
 
-    Force varies where there is contact, and not in air: this end of the depths is the deep one, and the force there
-    is pressure. A curve that begins and ends at the same depth is deep where it turns. Where neither is clear, the end
-    with the larger force is the deep one; where these are alike, too, the tool is taken to advance from the first row
-    on.
+    Where no end is the deep one, as of a straight line without air, the tool advances from the first row on.
+
+    Raises:
+        ExperimentError: if the study gives no sign of the depth, and a curve is deep at one end by its turn, and at the
+            other by its force.
     """
-    depth = reading.depth_sign or _deep_end(found.depth, found.force) or _by_time(found.depth, found.force)
+    ends = {reading.depth_sign} if reading.depth_sign else _deep_ends(found.depth, found.force)
+    if len(ends) > 1:
+        low, high = sorted(float(np.median(found.force[_last(found.depth, end)])) for end in (-1, 1))
+        check_rise(found, low, high)
+        why = "it is not clear at which end of the depths the tool presses: write sign = {depth = 1, force = 1} in "
+        why += "[[measurement]] if both are largest there, else -1 for what is smallest"
+        raise ExperimentError(found.file, why, column=found.depth_name)
+    depth = next(iter(ends), 0) or _by_time(found.depth, found.force)
     way, force = _mean_stroke(found.depth * depth, found.force)
-    return depth, reading.force_sign or _force_sign(way, force)
+    deep, shallow = (np.median(force[end]) for end in (way >= way.max() - 0.05 * np.ptp(way), _last(way, -1)))
+    return depth, reading.force_sign or (-1 if deep < shallow else 1)
 
 
 def signed(found: Recorded, reading: Reading) -> Recorded:
@@ -39,27 +49,34 @@ def signed(found: Recorded, reading: Reading) -> Recorded:
         notes.append(f"depth falls as the tool advances (column `{found.depth_name}`): its sign is changed")
     if reading.force_sign is None and force_sign < 0:
         notes.append(f"force is negative under pressure (column `{found.force_name}`): its sign is changed")
-    own = _deep_end(found.depth, found.force)
-    if own and reading.depth_sign == -own:
-        notes.append(f"sign.depth = {reading.depth_sign} makes the end with constant force the deep one: is it {own}?")
+    own = _deep_ends(found.depth, found.force)
+    if reading.depth_sign and own == {-reading.depth_sign}:
+        notes.append(f"sign.depth = {depth_sign} makes the end with constant force the deep one: is it {-depth_sign}?")
+    if not (reading.depth_sign or own):
+        notes.append("no end is clearly the deep one: the tool advances from the first row on, or give sign")
     depth, force = found.depth * depth_sign, found.force * force_sign
     if found.deflection is not None:  # the depth is the piezo's way less what the spring yields
         depth = depth - found.deflection * force_sign
     return replace(found, depth=depth, force=force, deflection=None).noting(*notes)
 
 
-def _deep_end(depth: FloatArray, force: FloatArray) -> int:
-    """Return 1 if contact is at the largest depths, -1 if at the smallest; 0 if that is not clear."""
+def _deep_ends(depth: FloatArray, force: FloatArray) -> set[int]:
+    """Return the ends of the depths, 1 for the largest, at which the tool presses by all evidence; {} for none.
+
+    A curve that begins and ends at the same depth is deep where it turns; the force varies in contact, not in air.
+    Where neither says anything, as without air, the end with a much larger force is the deep one.
+    """
     rows = _moving(depth)
     depth, force = depth[rows], force[rows]
     way, mean = _mean_stroke(depth, force)
-    spreads, sizes = ((measure(way, mean, -1), measure(way, mean, 1)) for measure in (_spread, _size))
-    return (
-        _clear_end(*spreads, _CLEAR_SIZE)
-        or _turned_to(depth)
-        or _clear_end(*spreads, _CLEAR)
-        or _clear_end(*sizes, _CLEAR_SIZE)
-    )
+    varies = _clear_end(_spread(way, mean, -1), _spread(way, mean, 1), _CLEAR)
+    is_large = _clear_end(_size(way, mean, -1), _size(way, mean, 1), _CLEAR_SIZE)
+    return {_turned_to(depth), varies} - {0} or {is_large} - {0}
+
+
+def _by_time(depth: FloatArray, force: FloatArray) -> int:
+    """Return the sign with which the depth rises from the first row to the one of the largest change of force."""
+    return -1 if depth[int(np.argmax(np.abs(force - force[0])))] < depth[0] else 1
 
 
 def _clear_end(low: float, high: float, clear: float) -> int:
@@ -107,31 +124,22 @@ def _moving(depth: FloatArray) -> list[int]:
     return rows
 
 
+def _last(along: FloatArray, end: int) -> BoolArray:
+    """Return which depths are in the last quarter towards an ``end``."""
+    return end * along >= (end * along).max() - _END * np.ptp(along)
+
+
 def _spread(depth: FloatArray, force: FloatArray, end: int) -> float:
     """Return by how much the force varies in the last quarter of the depths towards an ``end``: by slope or range."""
-    along = end * depth
-    near = along >= along.max() - _END * np.ptp(along)
-    if near.sum() < _FEWEST or np.ptp(along[near]) == 0:
+    near = _last(depth, end)
+    if near.sum() < _FEWEST or np.ptp(depth[near]) == 0:
         return 0.0
-    slope = np.polyfit(along[near] - along[near].mean(), force[near], 1)[0]
+    slope = np.polyfit(depth[near] - depth[near].mean(), force[near], 1)[0]
     between = np.ptp(np.quantile(force[near], _BETWEEN))
-    return float(max(abs(slope) * np.ptp(along[near]), between))
+    return float(max(abs(slope) * np.ptp(depth[near]), between))
 
 
 def _size(depth: FloatArray, force: FloatArray, end: int) -> float:
     """Return the size of the force at the last depths towards an ``end``: without air, it is small at first touch."""
     along = end * depth
     return float(abs(np.median(force[along >= along.max() - 0.05 * np.ptp(along)])))
-
-
-def _by_time(depth: FloatArray, force: FloatArray) -> int:
-    """Return the sign with which the depth rises from the first row to the one of the largest change of force."""
-    turn = int(np.argmax(np.abs(force - force[0])))
-    return -1 if depth[turn] < depth[0] else 1
-
-
-def _force_sign(depth: FloatArray, force: FloatArray) -> int:
-    """Return the sign with which the force at the deep end is pressure."""
-    span = np.ptp(depth)
-    deep, shallow = depth >= depth.max() - 0.05 * span, depth <= depth.min() + _END * span
-    return -1 if np.median(force[deep]) < np.median(force[shallow]) else 1

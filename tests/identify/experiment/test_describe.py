@@ -1,6 +1,7 @@
 """What is said of a file is what a study needs to read it."""
 
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -95,3 +96,11 @@ def test_a_deflection_is_no_depth_but_that_of_a_spring(tmp_path):
     (curve,) = curves_of(study, measurements_of(study)[0])
     assert np.ptp(curve.depth) == pytest.approx(np.ptp(DEPTH), rel=1e-3)
     assert np.ptp(curve.force) == pytest.approx(np.ptp(FORCE[: FORCE.argmax() + 1]), rel=1e-3)
+
+
+def test_a_pasted_block_names_the_file_from_where_the_user_is(tmp_path, monkeypatch):
+    (tmp_path / "curves").mkdir()
+    write(tmp_path / "curves" / "a.csv", COLUMNS)
+    monkeypatch.chdir(tmp_path)
+    (table,) = block(describe(Path("curves") / "a.csv"))["measurement"]
+    assert (table["name"], table["file"]) == ("a", "curves/a.csv")

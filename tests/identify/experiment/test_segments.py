@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from epsmesh.arrays import FloatArray
 from epsmesh_identify.experiment.columns import Recorded
-from epsmesh_identify.experiment.reading import Reading
+from epsmesh_identify.experiment.reading import ExperimentError, Reading
 from epsmesh_identify.experiment.segments import cycles_of
 from epsmesh_identify.experiment.signs import signed, signs_of
 
@@ -50,11 +50,17 @@ def noise(rng: np.random.Generator, rows: int) -> FloatArray:
     return correlated
 
 
+# Straight lines without air, with an offset of the force.
+UNCLEAR = (3, 11, 36)
+
+
 @pytest.mark.parametrize("seed", range(60))
 def test_signs_and_segments(seed):
+    """Of a straight line without air, and with an offset of the force, no end is clearly the deep one."""
     one = made(seed)
     assert signs_of(one.curve, Reading()) == one.signs
     curve = signed(one.curve, Reading())
+    assert any("no end is clearly" in note for note in curve.notes) == (seed in UNCLEAR)
     (cycle,) = cycles_of(curve.depth, curve.time)
     tolerance = max(4, 0.05 * one.ramp)
     assert cycle.start == 0
@@ -78,3 +84,13 @@ def test_a_baseline_that_drifts_between_strokes_does_not_turn_signs(signs, air, 
         curve = Recorded("a.csv", signs[0] * depth, signs[1] * force, time, lines, names)
         assert signs_of(curve, Reading()) == signs
         assert not any("is it" in note for note in signed(curve, Reading(depth_sign=signs[0])).notes)
+
+
+def test_signs_that_contradict_each_other_are_asked_for():
+    """A curve that begins and ends pressed is deep at one end by its turn, and at the other by its force."""
+    depth = np.concatenate([np.linspace(1, 0, 300), np.linspace(0, 1, 300)])
+    force, time, lines = np.maximum(depth - 0.5, 0) ** 1.5, np.arange(600.0), np.arange(600)
+    curve = Recorded("a.csv", depth, force, time, lines, {"depth": "z", "force": "F"})
+    with pytest.raises(ExperimentError, match=r"`z`: it is not clear .* write sign = \{depth = 1, force = 1\} in"):
+        signs_of(curve, Reading())
+    assert signs_of(curve, Reading(depth_sign=1)) == (1, 1)
