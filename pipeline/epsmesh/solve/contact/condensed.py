@@ -7,26 +7,25 @@ in a direct solve. The result does not depend on the initial guess.
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.solve import SolveError
-from epsmesh.solve.compiled import vector
 from epsmesh.solve.contact.constraint import Constraint, Sliding
 from epsmesh.solve.contact.elements import ContactElements, FarShare, SurfaceState, Unknowns
 from epsmesh.solve.contact.levels import Hierarchy, Surface
 from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.surface_body import SurfaceBody
 from epsmesh.solve.elements.base import Elements
-from epsmesh.solve.linear_solver import Level, LinearSolver
+from epsmesh.solve.linear_solver import Level
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.stages import stage
 
 # Most candidates for which condensation pays within ten depths, measured: benchmarks/results/solvers.md.
 _MOST_CANDIDATES = 1_500
-# Right-hand sides solved together.
-_TOGETHER = 64
 
 
 class CondensedTissue:
@@ -136,30 +135,21 @@ class CondensedElements(ContactElements):
             SolveError: if the factorisation fails.
         """
         super().__init__(elements, surface, law, method, stack)
-        self._stack = stack
         self._multigrid: Hierarchy | None = None
-        self._free = self._factor()
-        stack.callback(self._free.close)
+        free = self.without_tool.is_free() & [False, False, True]
         with stage("set-up"):
-            self._near = self._condense()
+            self._near = np.zeros((len(free), len(free)))
+            self._near[np.ix_(free[:, 2], free[:, 2])] = self.without_tool.compliance(np.argwhere(free))
         self.couple(None)
 
-    def _factor(self) -> LinearSolver:
-        space = self.space
-        level = Level(space.space, self.hierarchy.finest, space.prescribed)
-        return LinearSolver([level], direct=True)
-
-    @stage("condensation")
-    def _condense(self) -> FloatArray:
-        """Return the compliance C (n, n), in m/N, symmetric."""
-        dofs, size = 3 * self.numbering.local + 2, self.space.owned
-        compliance = np.empty((len(dofs), len(dofs)))
-        for first in range(0, len(dofs), _TOGETHER):
-            here = dofs[first : first + _TOGETHER]
-            loads = np.zeros((size, len(here)), order="F")
-            loads[here, np.arange(len(here))] = 1.0
-            compliance[:, first : first + len(here)] = self._free.solve_many(loads)[dofs]
-        return (compliance + compliance.T) / 2
+    @cached_property
+    def without_tool(self) -> SurfaceBody:
+        """The body without a tool, with the operator of all sets."""
+        level = Level(self.space.space, self.hierarchy.finest, self.space.prescribed)
+        nothing = np.empty(0, dtype=np.int32)
+        solver = self.plug.solver_on([level], self.law, nothing, direct=True, earlier=None)
+        self._stack.callback(solver.close)
+        return SurfaceBody(self.plug, self.law, self.numbering.local, solver)
 
     def tissue(self, tolerances: Sequence[float], energy: float | None) -> CondensedTissue:
         """Return the condensed tissue in its current state; it is exact, whatever the tolerances."""
@@ -187,20 +177,12 @@ class CondensedElements(ContactElements):
 
     def unknowns(self) -> Unknowns:
         """Return the displacement (m) of the whole body, owned dofs, under the current reactions."""
-        with vector(self.space.space) as loads:
-            reactions = self._tissue.forces()[:, 0]
-            self.numbering.put(loads.array, reactions, reactions != 0.0)
-            self._free.solve(loads, self.fields[0])
-        return super().unknowns()
+        reactions = self._tissue.forces()
+        return self.without_tool.moved(np.pad(reactions, ((0, 0), (2, 0))))[1]
 
     def relax(self, tolerance: float, load: Unknowns) -> Unknowns:
         """Return the solution for a ``load`` on the body without a probe."""
-        space = self.space
-        with vector(space.space) as rhs, vector(space.space) as found:
-            (rhs.array[:],) = load
-            rhs.array[space.prescribed_owned] = 0.0
-            self._free.solve(rhs, found)
-            return (np.array(found.array),)
+        return self.without_tool.solved([load])[0]
 
     def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
         """Return multigrid levels with the local ``facets`` fixed; they are kept for the next depth."""

@@ -22,6 +22,7 @@ from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.deformed import Tissue
 from epsmesh.solve.contact.levels import Hierarchy, Numbering, Surface, normal_dofs
 from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.surface_body import SurfaceBody
 from epsmesh.solve.elements.base import Elements, Solver
 from epsmesh.solve.elements.fields import Column, Fields
 from epsmesh.solve.linear_solver import Level
@@ -114,6 +115,7 @@ class ContactElements:
         self._active: BoolArray = np.zeros(len(self.candidates), dtype=bool)
         self._held: Int32Array = np.empty(0, dtype=np.int32)
         self.solver: Solver | None = None
+        self._stack = stack
         stack.callback(self.close)
 
     @cached_property
@@ -122,6 +124,12 @@ class ContactElements:
         is_held = np.zeros(self.space.owned)
         is_held[3 * self.space.fixed_owned + 2] = 1.0
         return np.asarray(self.numbering.gather(is_held) > 0)
+
+    @cached_property
+    def without_tool(self) -> SurfaceBody:
+        """The body without a tool, factorised once."""
+        solver = self.plug.set_up(self.law, self._stack, direct=True, keep=False)
+        return SurfaceBody(self.plug, self.law, self.numbering.local, solver)
 
     def tissue(self, tolerances: Sequence[float], energy: float | None) -> Tissue:
         """Return the body as the loop sees it; see :class:`LinearTissue`."""

@@ -105,7 +105,7 @@ class ContactSearch:
             obstacle_above=lambda: self._obstacle(self._surface.of(self._elements.degree + 1), depth, loaded),
         )
         if self._tool.friction:
-            contact = rub(contact, stack)
+            contact = rub(contact)
             assert contact.rubbed is not None
             self._elements.put(columns[0], contact.rubbed.unknowns, depth)
             iterations += contact.rubbed.fine.iterations
