@@ -1,54 +1,55 @@
-"""What tests cost: from pytest's own list to the tables of ``benchmarks/results/tests.md``.
+"""What tests cost, in seconds of the processor, those of their processes too: so other work beside them counts little.
 
-    make test PYTEST_ARGS=--durations=0 | tee log
-    python -m tests.costs log
+    make test PYTEST_ARGS="-p tests.costs"
+    python -m tests.costs
 
-prints the tables. Their first one by file is the order in which ``make test`` runs files (:mod:`tests.suites`).
+records it in ``results/tests.jsonl`` and prints the tables of ``benchmarks/results/tests.md``. The table of files gives
+the order in which ``make test`` runs them (:mod:`tests.suites`).
 """
 
-import re
-import sys
+import json
+import os
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-_LINE = re.compile(r"^\s*([\d.]+)s (?:call|setup|teardown) +(tests/\S+?\.py)::(.+)$", re.MULTILINE)
-# The shortest files and tests (s) of the tables.
+import pytest
+
+RECORD = Path(__file__).parents[1] / "results" / "tests.jsonl"
+# The cheapest file (s) and the number of tests of the tables.
 _FILE, _TESTS = 2.0, 25
 
 
-def durations(log: str) -> tuple[Counter[str], Counter[str]]:
-    """Return the seconds of every file and of every test in a log of ``--durations=0``."""
-    files, tests = Counter[str](), Counter[str]()
-    for seconds, file, name in _LINE.findall(log):
-        files[file] += float(seconds)
-        tests[f"{file}::{name}"] += float(seconds)
-    return files, tests
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Record what a test costs, with the fixtures that it is the first to ask for."""
+    before = _processor()
+    yield
+    with RECORD.open("a", encoding="utf-8") as file:
+        file.write(json.dumps([item.nodeid, round(_processor() - before, 3)]) + "\n")
+
+
+def _processor() -> float:
+    """Return the seconds that this process and those that it has waited for have used."""
+    return sum(os.times()[:4])
 
 
 def table(title: str, rows: Iterable[tuple[str, float]]) -> str:
     """Return a table of seconds."""
-    return "\n".join(
-        [f"| {title} | seconds |", "|---|---|", *(f"| `{name}` | {seconds:.0f} |" for name, seconds in rows)]
-    )
+    return "\n".join([f"| {title} | seconds |", "|---|---|", *(f"| `{name}` | {time:.0f} |" for name, time in rows)])
 
 
-def folders(files: Mapping[str, float]) -> Counter[str]:
-    """Return the seconds of every folder of tests."""
-    found = Counter[str]()
-    for file, seconds in files.items():
-        found["/".join(file.split("/")[:2]) if file.count("/") > 1 else "tests"] += seconds
-    return found
-
-
-def main(log: Path) -> None:
-    """Print the tables of a log."""
-    files, tests = durations(log.read_text(encoding="utf-8"))
-    print(f"{sum(files.values()):.0f} s of set-up and call, of all workers together.\n")
-    print(table("folder", folders(files).most_common()), end="\n\n")
-    print(table("file", ((name, seconds) for name, seconds in files.most_common() if seconds >= _FILE)), end="\n\n")
-    print(table("test", tests.most_common(_TESTS)))
+def tables(seconds: Counter[str]) -> str:
+    """Return the tables of all tests, by folder, by file and by test."""
+    files, folders = Counter[str](), Counter[str]()
+    for name, time in seconds.items():
+        file = Path(name.partition("::")[0])
+        files[str(file)] += time
+        folders["/".join(file.parent.parts[:2])] += time
+    slow = [(name, time) for name, time in files.most_common() if time >= _FILE]
+    parts = table("folder", folders.most_common()), table("file", slow), table("test", seconds.most_common(_TESTS))
+    return "\n\n".join([f"{sum(seconds.values()):.0f} s in {len(seconds)} tests.", *parts])
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    print(tables(Counter(dict(map(json.loads, RECORD.read_text(encoding="utf-8").splitlines())))))

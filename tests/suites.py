@@ -14,6 +14,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -93,7 +94,8 @@ def imported(file: Path) -> Iterator[Path]:
                     yield from (found for found in (path.with_suffix(".py"), path / "__init__.py") if found.is_file())
 
 
-def concerns(places: Iterable[str]) -> set[str]:
+@cache
+def concerns(places: tuple[str, ...]) -> set[str]:
     """Return the files of this checkout that the Python files in ``places`` import."""
     given = [ROOT / place for place in places]
     files = [file for place in given for file in ([place] if place.is_file() else place.rglob("*.py"))]
