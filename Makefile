@@ -40,7 +40,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's mpirun: another one on PATH does not match Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release wheel-road slurm-test verify benchmark peers plain-loop realtime wasm vendored resolution stress coverage pairs same fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release wheel-road slurm-test verify benchmark peers plain-loop realtime wasm vendored stress coverage pairs same fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -104,7 +104,6 @@ benchmark: setup ## make the tables of docs/why/performance.md in results/ (on a
 	@scripts/peers.sh
 	$(PYTHON) -m benchmarks.start_up
 	$(PYTHON) -m benchmarks.ranks
-	$(PYTHON) -m benchmarks.communication
 	$(PYTHON) -m benchmarks.peers
 	$(PYTHON) -m benchmarks.asked
 	$(PYTHON) -m benchmarks.plain_loop --sample 24
@@ -116,7 +115,6 @@ benchmark: setup ## make the tables of docs/why/performance.md in results/ (on a
 	$(PYTHON) -m benchmarks.paths
 	$(PYTHON) -m benchmarks.huge
 	$(PYTHON) -m benchmarks.work_precision
-	$(PYTHON) -m benchmarks.many_machines
 	$(PYTHON) -m benchmarks.drag --minutes 5
 	$(EPSMESH) run studies/speedup.toml --fresh
 
@@ -138,9 +136,6 @@ wasm: ## build the evaluator for the page of `epsmesh touch`, after a change of 
 
 vendored: setup ## fetch the JavaScript of others again, with npm, as scripts/vendored.toml records it
 	$(PYTHON) scripts/vendored.py
-
-resolution: setup ## the effect of a file's resolution, noise and voxels on F (a quarter of an hour): results/resolution.png
-	$(MPI_ENV) $(PYTHON) -m benchmarks.resolution
 
 stress: setup ## extreme values of every input (10 minutes; STRESS_ARGS="poisson layer" selects rows)
 	$(PYTHON) -m benchmarks.stress $(STRESS_ARGS)

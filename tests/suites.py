@@ -30,7 +30,6 @@ NIGHTLY = (
             "drag",
             "organs",
             "plain_loop",
-            "resolution",
             "stress",
             "work_precision",
         )

@@ -1,11 +1,10 @@
 """Every benchmark runs: its smallest sample, and what its row says of the scene."""
 
 import json
-import sys
 
 import pytest
 
-from benchmarks import communication, contact, one_run, organs, solvers
+from benchmarks import contact, one_run, organs, solvers
 from benchmarks.processor import by_turns
 from benchmarks.scenes import BOX, DISC, graded, study
 
@@ -41,17 +40,6 @@ def test_a_place_of_an_organ_has_a_mesh_and_parts(tmp_path, monkeypatch):
     assert row["meshes"] >= 1
     assert min(row[part] for part in organs.PARTS) > 0
     assert row["rest"] < 0.3 * row["seconds"]
-
-
-@pytest.mark.nightly
-def test_what_ranks_send_is_counted(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        sys, "argv", ["communication", "--ranks", "1", "2", "--fine", "6 mm", "--output", str(tmp_path)]
-    )
-    communication.main()
-    one, two = json.loads((tmp_path / "communication.json").read_text())["runs"]
-    assert one["most"]["messages"] == 0 < two["most"]["messages"]
-    assert 0 < two["most"]["iterating"] <= two["most"]["solve"]
 
 
 def test_ways_take_turns():

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from benchmarks.two_discs import forces, meshed
 from epsmesh.run.case_solution import CaseSolution
 from epsmesh.run.solved import solve_alone, solve_fields
 from epsmesh_realtime.export import far, tabulate
@@ -17,6 +16,7 @@ from epsmesh_realtime.export.surface_body import surface_body
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Table
 from tests.export.test_export import BOX, CYLINDER, DISC, DOME, SKIN, Known, study
+from tests.export.two_discs import forces, meshed
 
 
 def fields(body: dict, poissons: tuple[float, float], margin: float) -> FarFields:

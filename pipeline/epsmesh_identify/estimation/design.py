@@ -38,7 +38,7 @@ _TOLERANCE = 2e-3
 # test's contact radius.
 _RATIOS, _THICKNESSES, _CURVATURES = (1 / 3, 3.0), (0.2, 0.5, 1.0), (0.2, 0.6)
 _HALF_WIDTH = 1.96
-# Bars of fits are so much wider: these do not know the noise (benchmarks/identify/design.py).
+# Bars of fits are so much wider: these do not know the noise (benchmarks/results/identify.md).
 _OF_UNKNOWN_NOISE = 1.2
 # An unknown is not seen if its bar covers this share of its range.
 _BLIND = 0.75
