@@ -33,6 +33,7 @@ _POISSON = (0.0, 0.2, 0.3, 0.4, 0.45, 0.48, 0.495, 0.5)
 _TO_THE_LIMIT = (0.0, 0.2, 0.3, 0.4, 0.45, 0.47, 0.49, 0.495, 0.499, 0.4999, 0.5)
 _OF_TOOLS = (0.0, 0.2, 0.3, 0.4, 0.45, 0.47, 0.49, 0.495, 0.499, 0.5)
 _OF_ORGANS = (0.2, 0.3, 0.4, 0.45, 0.47, 0.49, 0.499)
+_FRICTIONS: tuple[float | str, ...] = (0.05, 0.1, 0.2, 0.4, 0.8, "stick")
 # Kinds of scenes, with their shares of the cases.
 _DESIGNS = {"cylinder": 0.32, "layer": 0.15, "box": 0.18, "off centre": 0.12, "blade": 0.23}
 _CONTACTS = {"curved": 0.3, "layered": 0.35, "off axis": 0.2, "off the pole": 0.15}
@@ -354,6 +355,16 @@ def contact(dice: Dice) -> Thrown:
     return scene, _drawn_sizes(dice, _GRADED_TOOLS, _NAIVE_TOOLS, _FAR)
 
 
+def friction(dice: Dice) -> Thrown:
+    """Balls and cones with friction, on the axis of cylinders; the truth is axisymmetric."""
+    body = _cylinder(dice.log(6.0, 30.0), dice.log(3.0, 20.0))
+    material = _tissue(dice.between(0.0, 0.44, 3))
+    probe = _ball(dice, 20.0) if dice.chance(0.7) else _cone(dice)
+    probe |= {"contact": "unilateral", "friction": _FRICTIONS[dice.one_of(range(len(_FRICTIONS)))]}
+    scene = {"body": body, "material": material, "probe": probe}
+    return scene, _drawn_sizes(dice, _GRADED_TOOLS, _GRADED_TOOLS, 0.25 * 6.0)
+
+
 def wedges(dice: Dice) -> Thrown:
     """Wedges, sharp and rounded, on boxes and cylinders, at the depth of a half contact width of 1 mm."""
     length, height = dice.log(3.0, 16.0), dice.log(1.5, 12.0)
@@ -429,6 +440,7 @@ FAMILIES: dict[str, Family] = {
     "tumours": Family(tumours, "0.2 %"),
     "tools": Family(tools, "0.01 %", 3.0),
     "contact": Family(contact, "0.4 %", 3.0),
+    "friction": Family(friction, "0.3 %", 3.0),
     "wedges": Family(wedges, "0.3 %", 3.0),
     # Both converged forces are extrapolated, far within their bars; a tighter accuracy would take minutes.
     "slits": Family(slits, "2 %", 3.0),
