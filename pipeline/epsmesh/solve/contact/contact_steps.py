@@ -173,12 +173,12 @@ def press_with_friction(
     """Continue a new load ``path`` to a ``depth`` (m) with friction; return Newton's iterations; collective.
 
     There are at least so many ``steps``, whose depths go with the square of their numbers. At the first ones, the tool
-    may touch no node, or too few for the contact to settle.
+    may touch no node, or too few for the contact to settle: the next one then continues from the last equilibrium.
 
     Raises:
-        LargeError: if a step becomes too small; the path keeps the steps that converged.
+        LargeError: if a step in the second half becomes too small; the path keeps the steps that converged.
     """
-    iterations, start, farthest = 0, path.last, path.last
+    iterations = 0
     for number in range(1, steps + 1):
         there = depth * (number / steps) ** 2
         if path.last.touched is None:
@@ -190,12 +190,9 @@ def press_with_friction(
         path.step = inf
         try:
             iterations += press(tissue, tool_at, path, there, friction)
-        except LargeError:  # few nodes touch, whose state does not settle: contact begins with the next step
-            farthest = max(farthest, path.last, key=lambda point: point.amount if point.touched else 0.0)
+        except LargeError:
             if number > steps // 2:
-                path.return_to(farthest)
                 raise
-            path.return_to(start)
     return iterations
 
 
