@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from epsmesh_identify.estimation.dataset import dataset_of
-from epsmesh_identify.estimation.parts import CurveFit, Estimate, NoiseFound, Profile, Unknown, Window
+from epsmesh_identify.estimation.parts import CurveFit, Estimate, NoiseEstimate, Profile, Unknown, Window
 
 STUDY = '[material]\nyoung = "1 kPa"\nlaw = "linear"\n'
 UNKNOWNS = (
@@ -37,7 +37,7 @@ def estimate(names=("young", "poisson", "contact_point"), correlation=-0.5, seed
     depth = np.linspace(-2e-4, 1e-3, 300)
     fit = 2e3 * np.clip(depth, 0, None) ** 1.5
     noise = np.convolve(np.random.default_rng(seed).normal(size=320), np.full(21, 1 / 21), "valid") * 2e-3
-    curve = CurveFit("punch", depth, fit + noise, fit, 0.02 * fit + 1e-4, NoiseFound(0.9, 0.1, 0.0, 5e-4))
+    curve = CurveFit("punch", depth, fit + noise, fit, 0.02 * fit + 1e-4, NoiseEstimate(0.9, 0.1, 0.0, 5e-4))
     half = (ends["high"] - ends["low"]) / 2
     part = half[:, None] * np.sqrt([0.6, 0.2, 0.1, 0.05, 0.03, 0.02])
     profiles = {}

@@ -368,7 +368,7 @@ def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> 
     for key in (*plan.keys, *plan.reference_keys):
         if key and not records[key].is_ok:
             return done("failed", records[key].message, seconds=seconds)
-    if unreached := [found.message for found in plan.found_depths.values() if found.message]:
+    if unreached := [found.message for found in plan.depths_at_force.values() if found.message]:
         return done("failed", unreached[0], seconds=seconds)
     first = records[plan.keys[0]]
     outcome = "taken" if math.isfinite(first.force) and math.isfinite(first.force_error) else "failed"

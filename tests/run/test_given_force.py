@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from epsmesh.api import RunnableStudy
-from epsmesh.plan.given_force import FoundDepth, Trial, next_depth
+from epsmesh.plan.given_force import DepthAtForce, Trial, next_depth
 from epsmesh.plan.plan import make_plan
 from epsmesh.report.compare import compare
 from epsmesh.report.dataset import build
@@ -188,7 +188,7 @@ def test_search_finds_powers_of_the_depth_despite_jumps_from_mesh_to_mesh(expone
         return depth**exponent * (1 + 2e-4 * np.sin(1e7 * depth))
 
     wanted, depth, trials = 1e-3**exponent, start, []
-    while not isinstance(depth, FoundDepth):
+    while not isinstance(depth, DepthAtForce):
         trials.append(Trial(depth, force(depth), 2e-3))
         depth = next_depth(wanted, trials, 1e-2, None)
     assert not depth.message
@@ -199,13 +199,13 @@ def test_search_finds_powers_of_the_depth_despite_jumps_from_mesh_to_mesh(expone
 
 def test_search_goes_round_depths_that_fail():
     depth, trials = 5e-3, []
-    while not isinstance(depth, FoundDepth):
+    while not isinstance(depth, DepthAtForce):
         fails = depth > 2e-3
         trials.append(Trial(depth, message="it fails") if fails else Trial(depth, depth**1.5, 1e-3))
         depth = next_depth(1e-3**1.5, trials, 1e-2, None)
     assert depth.depth == pytest.approx(1e-3, rel=1e-3)
     trials, depth = [], 1e-3
-    while not isinstance(depth, FoundDepth):
+    while not isinstance(depth, DepthAtForce):
         trials.append(Trial(depth, message="it fails") if depth > 2e-3 else Trial(depth, depth**1.5, 1e-3))
         depth = next_depth(3e-3**1.5, trials, 1e-2, None)
     assert "it fails" in depth.message
@@ -248,7 +248,7 @@ def test_forces_that_do_not_rise_between_near_depths_ask_for_one_that_is_farther
 def test_a_force_between_depths_that_are_as_near_as_trials_may_be_is_reached():
     """The bar of a meridian is smaller than what F does between two such depths."""
     trials, depth, force = [], 1e-3, (1e-3 * (1 + 0.9e-6)) ** 1.5
-    while not isinstance(depth, FoundDepth):
+    while not isinstance(depth, DepthAtForce):
         trials.append(Trial(depth, depth**1.5, 1e-7))
         depth = next_depth(force, trials, 1e-2, 1.5)
     assert not depth.message

@@ -46,7 +46,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class FoundDepth:
+class DepthAtForce:
     """The depth (m) at a given ``force`` (N), its error bar (m), and the trial depth whose solution is the case's.
 
     With a ``message`` the force is not reached: ``depth`` and ``reached`` are then the largest depth and force (N).
@@ -63,7 +63,7 @@ class FoundDepth:
     reached: float = nan
 
 
-def next_depth(force: float, trials: Sequence[Trial], most: float, exponent: float | None) -> float | FoundDepth:
+def next_depth(force: float, trials: Sequence[Trial], most: float, exponent: float | None) -> float | DepthAtForce:
     """Return the next depth (m) to try for a ``force`` (N), or what was found; ``most`` is the largest depth.
 
     ``exponent`` is that of the depth in F, if it is known exactly.
@@ -92,7 +92,7 @@ def next_depth(force: float, trials: Sequence[Trial], most: float, exponent: flo
         if is_near and not _is_tried(beside, trials) and len(trials) < _MOST_TRIALS:
             return beside
         reason = f"the depth was not found in {len(trials)} trials"
-        return FoundDepth(force, best.depth, solved=best.depth, message=reason, reached=best.force)
+        return DepthAtForce(force, best.depth, solved=best.depth, message=reason, reached=best.force)
     return depth
 
 
@@ -100,10 +100,10 @@ def _is_tried(depth: float, trials: Sequence[Trial]) -> bool:
     return any(abs(log(depth / trial.depth)) < _LEAST for trial in trials)
 
 
-def _begin(force: float, trials: Sequence[Trial]) -> float | FoundDepth:
+def _begin(force: float, trials: Sequence[Trial]) -> float | DepthAtForce:
     last = min(trials, key=lambda trial: trial.depth)
     if len(trials) >= _FAILURES:
-        return FoundDepth(force, solved=last.depth, message=last.message)
+        return DepthAtForce(force, solved=last.depth, message=last.message)
     return canonical(last.depth / 2)
 
 
@@ -142,14 +142,14 @@ def _within(depth: float, below: Trial | None, above: Trial | None, most: float)
     return canonical(min(depth, most))
 
 
-def _found(force: float, best: Trial, slope: float, further: float = 0.0) -> FoundDepth:
+def _found(force: float, best: Trial, slope: float, further: float = 0.0) -> DepthAtForce:
     """Return the depth a last step along the secant away from the ``best``; the bar has a part of that step."""
     step = log(force / best.force)
     depth = best.depth * exp(step / slope)
     error = depth * (best.bar + _SHARE_OF_BAR * abs(step) + further) / slope
-    return FoundDepth(force, depth, error, best.depth, slope, force / best.force)
+    return DepthAtForce(force, depth, error, best.depth, slope, force / best.force)
 
 
-def _unreached(force: float, below: Trial, reason: str) -> FoundDepth:
+def _unreached(force: float, below: Trial, reason: str) -> DepthAtForce:
     text = f"the force is not reached: at {1e3 * below.depth:.4g} mm it is {1e3 * below.force:.4g} mN"
-    return FoundDepth(force, below.depth, solved=below.depth, message=f"{text}, and {reason}", reached=below.force)
+    return DepthAtForce(force, below.depth, solved=below.depth, message=f"{text}, and {reason}", reached=below.force)

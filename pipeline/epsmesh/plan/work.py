@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from epsmesh.plan.cost import CostModel
 from epsmesh.plan.equivalent_places import EquivalentPlace
-from epsmesh.plan.given_force import FoundDepth
+from epsmesh.plan.given_force import DepthAtForce
 from epsmesh.plan.place_path import PlacePath
 from epsmesh.plan.proportional_depths import ProportionalDepth
 from epsmesh.plan.steps import MeshStep, Solve, Solves, mesh_steps
@@ -48,7 +48,7 @@ class Plan:
             scenes: see :func:`epsmesh.plan.plan.of_unit_scene`.
         equivalent: by index of a case, the equivalent place that is solved instead.
         proportional: by index of a case, the proportional depth that is solved instead.
-        found_depths: by index of a case with a given force, its depth, once it is found.
+        depths_at_force: by index of a case with a given force, its depth, once it is found.
         place_paths: paths of which some places are solved, and F at the others is interpolated.
         ends: the plans of the study at the ends of the bars of its material and image; their solves are among these.
     """
@@ -68,7 +68,7 @@ class Plan:
     unasked: tuple[Solve, ...] = ()
     equivalent: Mapping[tuple[int, ...], EquivalentPlace] = field(default_factory=dict)
     proportional: Mapping[tuple[int, ...], ProportionalDepth] = field(default_factory=dict)
-    found_depths: Mapping[tuple[int, ...], FoundDepth] = field(default_factory=dict)
+    depths_at_force: Mapping[tuple[int, ...], DepthAtForce] = field(default_factory=dict)
     place_paths: tuple[PlacePath, ...] = ()
     ends: tuple["EndPlans", ...] = ()
 

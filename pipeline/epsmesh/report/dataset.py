@@ -13,7 +13,7 @@ import xarray as xr
 from epsmesh import __version__
 from epsmesh.netcdf import write_netcdf
 from epsmesh.plan.equivalent_places import EquivalentPlace
-from epsmesh.plan.given_force import FoundDepth
+from epsmesh.plan.given_force import DepthAtForce
 from epsmesh.plan.key import digest
 from epsmesh.plan.plan import Plan
 from epsmesh.quantities import LARGEST, MESH_DIMENSIONS, RUN, attributes, quantity_of
@@ -209,7 +209,7 @@ def _of_places(study: Study, cases: Sequence[Case]) -> dict[str, Any]:
 def _depths(plan: Plan, cases: Sequence[Case], flat: Sequence[Record | None]) -> dict[str, Any]:
     """Return the depths at given forces, with their error bars; not a number where the force is not reached."""
     found = [
-        depth if record and record.is_ok and (depth := plan.found_depths.get(case.index)) else FoundDepth(nan)
+        depth if record and record.is_ok and (depth := plan.depths_at_force.get(case.index)) else DepthAtForce(nan)
         for case, record in zip(cases, flat, strict=True)
     ]
     return {
@@ -278,7 +278,7 @@ def _by_depth(dataset: xr.Dataset, plan: Plan) -> xr.DataArray:
 
     At one force the depths of meshes differ; F_max is the force at the same depth.
     """
-    powers = [found.exponent if (found := plan.found_depths.get(i)) else nan for i in plan.study.indices()]
+    powers = [found.exponent if (found := plan.depths_at_force.get(i)) else nan for i in plan.study.indices()]
     power = dataset["depth"].copy(data=np.array(powers).reshape(dataset["depth"].shape))
     return (dataset["depth"] / _of_full_order(dataset, "depth")) ** power
 

@@ -17,6 +17,6 @@ def at_its_depth(study: Study, case: Case, comm: MPI.Comm) -> tuple[Study, Case,
         return study, case, ""
     sections = {name: (getattr(case, name),) for name in ("body", "material", "probe", "mesh", "load")}
     plan = make_plan(replace(study, axes=(), sections=dict(study.sections) | sections))
-    found = with_depths(plan, compute(plan, comm)).found_depths[()]
+    found = with_depths(plan, compute(plan, comm)).depths_at_force[()]
     deeper = replace(study, depths={case.index: found.solved if found.message else found.depth}, seeks=False)
     return deeper, deeper.case(case.index), found.message

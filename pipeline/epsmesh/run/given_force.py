@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from math import isfinite, nan
 from typing import Any
 
-from epsmesh.plan.given_force import FoundDepth, Trial, next_depth
+from epsmesh.plan.given_force import DepthAtForce, Trial, next_depth
 from epsmesh.plan.plan import Plan, first_attempts, make_plan
 from epsmesh.plan.proportional_depths import depth_key
 from epsmesh.plan.reductions import REDUCTIONS
@@ -37,7 +37,7 @@ def with_depths(plan: Plan, records: Mapping[str, Record]) -> Plan:
     study = plan.study
     if not study.seeks_depths:
         return plan
-    found: dict[tuple[int, ...], FoundDepth] = {}
+    found: dict[tuple[int, ...], DepthAtForce] = {}
     trials: dict[tuple[int, ...], list[Trial]] = {}
     current = _Round({}, plan)
     cases = [case for case in study.cases() if not case.no_contact]
@@ -54,7 +54,7 @@ def with_depths(plan: Plan, records: Mapping[str, Record]) -> Plan:
             assert case.probe.force is not None
             most = largest_depth(case.body, case.probe)
             following = next_depth(case.probe.force, tried, most, 1.0 if _is_proportional(case) else None)
-            if isinstance(following, FoundDepth):
+            if isinstance(following, DepthAtForce):
                 found[index], depths[index] = following, following.solved
             else:
                 depths[index] = following
@@ -62,8 +62,8 @@ def with_depths(plan: Plan, records: Mapping[str, Record]) -> Plan:
             break
         current = _made(plan, depths)
     if len(found) < len(cases):
-        return replace(current.plan, found_depths=found)
-    return replace(_made(plan, depths, is_last=True).plan, found_depths=found)
+        return replace(current.plan, depths_at_force=found)
+    return replace(_made(plan, depths, is_last=True).plan, depths_at_force=found)
 
 
 def lacking(plan: Plan, records: Mapping[str, Record]) -> Plan | None:
@@ -73,13 +73,13 @@ def lacking(plan: Plan, records: Mapping[str, Record]) -> Plan | None:
     keys = tuple(solve.key for solve in solves)
     if not solves:
         return None
-    bare = replace(current, solves=solves, keys=keys, reference_keys=(), unasked=(), found_depths={})
+    bare = replace(current, solves=solves, keys=keys, reference_keys=(), unasked=(), depths_at_force={})
     return first_attempts(bare)
 
 
 def at_force(plan: Plan, case: Case, record: Record | None, *, is_exact: bool = False) -> Record | None:
     """Return the record of a case, or of its F_exact, at the depth of its given force; one of any other as it is."""
-    found = plan.found_depths.get(case.index)
+    found = plan.depths_at_force.get(case.index)
     if found is None:
         return record
     if found.message and is_exact:

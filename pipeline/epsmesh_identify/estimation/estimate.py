@@ -21,7 +21,7 @@ from epsmesh_identify.estimation.parts import (
     CurveFit,
     Estimate,
     Measured,
-    NoiseFound,
+    NoiseEstimate,
     Profile,
     Unknown,
     Window,
@@ -193,7 +193,7 @@ def _curve(found: Fit, number: int) -> CurveFit:
         force=model.measured[number].curve.force,
         fit=force,
         band=1.96 * np.sqrt(np.maximum(variance, 0.0)),
-        noise=NoiseFound(noise.correlation ** (1 / block), noise.white, noise.growth, scale),
+        noise=NoiseEstimate(noise.correlation ** (1 / block), noise.white, noise.growth, scale),
     )
 
 

@@ -33,7 +33,7 @@ from epsmesh_identify.surrogate.cases import SurrogateError
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-Found: TypeAlias = xr.Dataset | ExperimentError
+Outcome: TypeAlias = xr.Dataset | ExperimentError
 """What is known of a specimen, or why nothing is."""
 
 # Seconds between two lines of progress.
@@ -58,7 +58,7 @@ class Work:
     specimens: tuple[Specimen, ...]
     scenes: Callable[[tuple[Specimen, ...], float], Scenes]
 
-    def done(self, comm: "MPI.Comm", kept: Kept, say: Callable[[str], None]) -> list[Found]:
+    def done(self, comm: "MPI.Comm", kept: Kept, say: Callable[[str], None]) -> list[Outcome]:
         """Return what is found of each specimen, on every rank; collective.
 
         Raises:
@@ -67,7 +67,7 @@ class Work:
         """
         count, printed = len(self.specimens), time.monotonic()
         mine = {n: one for n, one in enumerate(self.specimens) if n % comm.size == comm.rank}
-        found: dict[int, Found] = {n: one.error for n, one in mine.items() if one.error}
+        found: dict[int, Outcome] = {n: one.error for n, one in mine.items() if one.error}
         known = {n: kept.read(one) for n, one in mine.items() if n not in found} if count > 1 else {}
         found |= {n: dataset for n, dataset in known.items() if dataset is not None}
         for number, outcome in self._fitted({n: one for n, one in mine.items() if n not in found}, comm):
@@ -80,7 +80,7 @@ class Work:
         every = {number: one for part in comm.allgather(found) for number, one in part.items()}
         return [every[number] for number in range(count)]
 
-    def _fitted(self, mine: Mapping[int, Specimen], comm: "MPI.Comm") -> Iterator[tuple[int, Found]]:
+    def _fitted(self, mine: Mapping[int, Specimen], comm: "MPI.Comm") -> Iterator[tuple[int, Outcome]]:
         """Yield what is found of specimens of this rank by number, in any order; all ranks go through it."""
         left, some = dict.fromkeys(mine, ""), self.specimens
         for times in _DEEPER:
@@ -122,7 +122,9 @@ class Work:
                 raise
             return self._scenes(fewer)
 
-    def _repeated(self, some: Mapping[int, Specimen], scenes: Scenes, comm: "MPI.Comm") -> Iterator[tuple[int, Found]]:
+    def _repeated(
+        self, some: Mapping[int, Specimen], scenes: Scenes, comm: "MPI.Comm"
+    ) -> Iterator[tuple[int, Outcome]]:
         """Yield what is found of specimens by number: fits, repeated with forces that are corrected about them.
 
         All ranks go through it, as they solve the cases of corrections together.
@@ -140,7 +142,7 @@ class Work:
                 scenes.near(own)
             about = wanted
 
-    def _tried(self, specimen: Specimen, scenes: Scenes, near: Near | None) -> Found | Near:
+    def _tried(self, specimen: Specimen, scenes: Scenes, near: Near | None) -> Outcome | Near:
         """Return what curves of a specimen say, or why they cannot be fitted.
 
         Where forces that were corrected over ``near`` are not exact enough for it, return the ranges to correct over.

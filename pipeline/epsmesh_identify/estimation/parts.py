@@ -101,7 +101,7 @@ SOURCES = ("noise", "contact", "machine", "thickness", "law", "mesh")
 
 
 @dataclass(frozen=True)
-class NoiseFound:
+class NoiseEstimate:
     """The most probable noise of a curve.
 
     A share ``white`` of its variance is white, the rest an autoregressive process with ``correlation`` from one point
@@ -127,7 +127,7 @@ class CurveFit:
     force: FloatArray
     fit: FloatArray
     band: FloatArray
-    noise: NoiseFound
+    noise: NoiseEstimate
 
     @property
     def residual(self) -> FloatArray:

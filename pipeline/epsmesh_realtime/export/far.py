@@ -35,7 +35,7 @@ Place = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Image:
+class Symmetry:
     """A symmetry (3, 3) of the body, with the interpolation from its nodes to the moved nodes."""
 
     motion: FloatArray
@@ -190,9 +190,9 @@ def _held_out(region: Region) -> list[Place]:
     return [(float(x), float(y)) for x, y in shares * region.reach]
 
 
-def image_of(boundary: OnBoundary, motion: FloatArray) -> Image:
+def symmetry_of(boundary: OnBoundary, motion: FloatArray) -> Symmetry:
     """Return a symmetry with the point of the boundary that it maps to each node."""
-    return Image(motion, *located(boundary, boundary.nodes @ motion))
+    return Symmetry(motion, *located(boundary, boundary.nodes @ motion))
 
 
 def located(boundary: OnBoundary, points: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -15,7 +15,7 @@ from epsmesh_realtime.export.kept import NONE, Kept
 # Seconds between two lines of progress of quick work.
 _SILENCE = 5.0
 Item = TypeVar("Item")
-Found = TypeVar("Found")
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
@@ -29,17 +29,17 @@ class Ranks:
     note: Callable[[str], None] = lambda text: None  # prints progress, on the first rank
     kept: Kept = NONE
 
-    def on_first(self, make: Callable[[], Found]) -> Found:
+    def on_first(self, make: Callable[[], Answer]) -> Answer:
         """Return on every rank the result of ``make`` on the first one."""
         return self.together([None], lambda _: [make()])[0]
 
-    def together(self, items: Sequence[Item], work: Callable[[Sequence[Item]], Iterable[Found]]) -> list[Found]:
+    def together(self, items: Sequence[Item], work: Callable[[Sequence[Item]], Iterable[Answer]]) -> list[Answer]:
         """Return the results of ``work`` for all ``items``. Each rank calls it once, with every n-th item.
 
         Use it for work with a set-up that costs the same for any number of items.
         """
         own = range(self.comm.rank, len(items), self.comm.size)
-        found: dict[int, Found] = {}
+        found: dict[int, Answer] = {}
         wrong = None
         try:
             found.update(zip(own, work([items[n] for n in own]) if own else (), strict=True))
@@ -74,9 +74,9 @@ class Ranks:
         found = iter(self.together(left, kept))
         return [known[n] if n in known else next(found) for n in range(len(items))]
 
-    def in_turn(self, items: Sequence[Item], work: Callable[[Item], Found], what: str) -> list[Found]:
+    def in_turn(self, items: Sequence[Item], work: Callable[[Item], Answer], what: str) -> list[Answer]:
         """Return the result of ``work`` for each of ``items``: a free rank does the next one. ``what`` names them."""
-        found: dict[int, Found] = {}
+        found: dict[int, Answer] = {}
         wrong, start = None, time.monotonic()
         with Counter(self.comm, self.comm.rank, self.comm.size) as counter:
             while wrong is None and (number := counter.next()) < len(items):
@@ -95,7 +95,7 @@ class Ranks:
             f"{what}: {min(done, count)} of {count}" + (f", about {format_seconds(left)} left" if left > 0 else "")
         )
 
-    def _gathered(self, count: int, found: Mapping[int, Found], wrong: Exception | None) -> list[Found]:
+    def _gathered(self, count: int, found: Mapping[int, Answer], wrong: Exception | None) -> list[Answer]:
         # Some exceptions cannot be pickled, so only their text is sent.
         every: list[Any] = self.comm.allgather((count, found, None if wrong is None else str(wrong)))
         if wrong is not None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from epsmesh.arrays import FloatArray
-from epsmesh_realtime.export.far import FarFields, image_of, least_rank
+from epsmesh_realtime.export.far import FarFields, least_rank, symmetry_of
 from epsmesh_realtime.surface import SurfaceTable
 
 # Error of the truncation, in R × room, as a share of its largest value.
@@ -21,7 +21,7 @@ _QUARTERS = ((0, 5, 4), (5, 1, 3), (4, 3, 2), (3, 4, 5))
 def tabulate_surface(far: FarFields, origin: FloatArray) -> SurfaceTable:
     """Return the modes of the whole boundary, with their error at held-out places."""
     boundary, sources = far.solved[0], len(far.sources)
-    images = [image_of(boundary, motion) for motion in far.motions]
+    images = [symmetry_of(boundary, motion) for motion in far.motions]
     fields = np.array(
         [[image.of(values).ravel() for values in found.values[:sources] for image in images] for found in far.solved]
     )
