@@ -45,7 +45,7 @@ MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-setup: ## install everything (root or sudo for Debian's packages); EXTRAS=view adds PNG pictures of cases
+setup: ## install everything (root or sudo for Debian's packages)
 	@scripts/setup.sh
 
 # Without the packages for tests and documentation, which take as long to install as all others.

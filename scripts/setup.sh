@@ -13,14 +13,11 @@ packages=(
 )
 python=/usr/bin/python3
 venv=.venv
-# EXTRAS=run installs what studies need, without tests and documentation: half of the Python packages. EXTRAS=view adds
-# PyVista, for pictures of a case. A venv keeps what it has.
+# EXTRAS=run installs what studies need, without tests and documentation: half of the Python packages. A venv keeps what
+# it has.
 extras=dev,docs,images,repair,fmi
 if [[ ${EXTRAS:-} == run ]] && ! compgen -G "$venv/lib/python*/site-packages/pytest" >/dev/null; then
     extras=images,repair
-elif [[ ${EXTRAS:-} == view ]] || compgen -G "$venv/lib/python*/site-packages/pyvista" >/dev/null; then
-    extras=dev,docs,images,repair,fmi,view
-    packages+=(libegl1)
 fi
 [[ $extras == images,repair ]] || packages+=(libudunits2-0) # of cfchecker, in tests
 stamp=$venv/.epsmesh-setup

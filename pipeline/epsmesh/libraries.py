@@ -12,9 +12,7 @@ from pathlib import Path
 # What meshes and solves: Debian's packages, conda-forge's, or the wheels of the extra `solver`.
 SOLVER = ("dolfinx", "dolfinx_solver", "ufl", "basix", "ffcx", "petsc4py", "mpi4py", "gmsh")
 _ORGANS = ("igl", "nibabel", "nrrd", "pydicom", "mmgpy")
-_EXTRAS = (
-    dict.fromkeys(SOLVER, "solver") | dict.fromkeys(_ORGANS, "organs") | {"pyvista": "view", "pymeshfix": "repair"}
-)
+_EXTRAS = dict.fromkeys(SOLVER, "solver") | dict.fromkeys(_ORGANS, "organs") | {"pymeshfix": "repair"}
 # What the wheels were built for.
 _PYTHON, _GLIBC, _MACHINE = (3, 12), (2, 34), "x86_64"
 _BITS = 2**32

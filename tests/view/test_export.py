@@ -1,7 +1,5 @@
 """Files for ParaView hold the fields, in VTK's order of nodes."""
 
-from xml.etree import ElementTree as Xml
-
 import meshio
 import numpy as np
 import pytest
@@ -57,22 +55,6 @@ def test_mid_nodes_lie_between_their_corners(curved, tmp_path):
         assert (offset < 0.3 * np.linalg.norm(edge, axis=1)).all()
 
 
-def test_xdmf_holds_the_same_numbers(curved, tmp_path):
-    vtu = meshio.read(write_fields(curved, tmp_path / "case.vtu"))
-    grid = Xml.parse(write_fields(curved, tmp_path / "case.xdmf")).getroot().find("Domain/Grid")
-    numbers = {
-        part.get("Name", part.tag): np.fromstring(item.text, sep=" ").reshape(
-            tuple(map(int, item.get("Dimensions").split()))
-        )
-        for part in grid
-        if (item := part.find("DataItem")) is not None
-    }
-    np.testing.assert_array_equal(numbers["Topology"], vtu.cells_dict["tetra10"])
-    np.testing.assert_allclose(numbers["Geometry"], vtu.points, rtol=1e-14)
-    for name, values in {**vtu.point_data, **{k: v[0] for k, v in vtu.cell_data.items()}}.items():
-        np.testing.assert_allclose(numbers[name], values, rtol=1e-14, err_msg=name)
-
-
 def test_mesh_alone_and_straight_elements(tmp_path):
     found = fields(mesh_only=True, degree=1, rim="0.5 mm")
     read = meshio.read(write_fields(found, tmp_path / "case.vtu"))
@@ -112,22 +94,3 @@ def test_cells_have_the_degree_of_the_displacement_and_the_values_of_the_solutio
     assert straight.mean() > (0.99 if degree == 1 else 0.3)
     skin = read.cell_data["region"][0] == 1
     np.testing.assert_array_equal(skin, centre[:, 2] > -4e-3)
-
-
-@pytest.mark.parametrize("degree", [2, 3])
-def test_pyvista_reads_the_displacement_of_the_solution(degree, tmp_path):
-    pyvista, _vtk = pytest.importorskip("pyvista"), pytest.importorskip("vtkmodules.vtkCommonCore")
-    made = study(mesh={"degree": degree, "rim": "2 mm"})
-    (case,) = made.cases()
-    solved = solve_fields(solve_alone(made, case), MPI.COMM_SELF, bar=False)
-    grid = pyvista.read(write_fields(fields_of(solved, stress=True), tmp_path / "case.vtu"))
-    points = np.random.default_rng(1).uniform([-8e-3, -8e-3, -15e-3], [8e-3, 8e-3, -4e-3], (60, 3))
-    sampled = []
-    for point in points:  # VTK's own functions of the cell
-        cell = grid.get_cell(grid.find_containing_cell(point))
-        weights = [0.0] * cell.n_points
-        place = [0.0] * 3, _vtk.reference(0), [0.0] * 3, _vtk.reference(0.0)
-        cell.EvaluatePosition(point, *place, weights)
-        sampled.append(np.array(weights) @ grid["displacement"][cell.point_ids])
-    np.testing.assert_allclose(sampled, solved.state.at(points).displacement, atol=1e-8)
-    assert {"stress", "von_mises", "region"} <= {*grid.array_names}

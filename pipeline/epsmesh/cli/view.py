@@ -1,4 +1,4 @@
-"""The command that shows one case: pictures of mesh and deformation, and files for ParaView; or a label map."""
+"""The command that shows one case: a page, or files for other programs; the film of a path; or a label map."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -51,8 +51,8 @@ def view(
     output: Output = DEFAULT_OUTPUT,
     mesh_only: Annotated[bool, typer.Option("--mesh-only", help="Mesh, but do not solve.")] = False,
     export: Annotated[
-        Literal["html", "vtu", "xdmf", "sofa"] | None,
-        typer.Option(help="Write the page, a file for ParaView and PyVista, or a scene of SOFA, without pictures."),
+        Literal["html", "vtu", "sofa"] | None,
+        typer.Option(help="Write the page (default), a file for ParaView and PyVista, or a scene of SOFA."),
     ] = None,
     vtk: Annotated[bool, typer.Option("--vtk", help="Short for --export vtu.")] = False,
     sofa: Annotated[bool, typer.Option("--sofa", help="Short for --export sofa.")] = False,
@@ -63,16 +63,13 @@ def view(
     ] = "",
     as_json: Json = False,
 ) -> None:
-    """Draw the mesh of one case, cut open, and the deformed body.
-
-    With PyVista it writes the pictures <study>_<number>_mesh.png and <study>_<number>_deformed.png. Without, it writes
-    the page <study>_<number>.html, on which the body can be turned and cut. --export chooses what is written.
+    """Write the page of one case, <study>_<number>.html, on which the body can be turned, cut and deformed.
 
     Example: epsmesh view studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=coarse"
 
     Example: epsmesh view studies/figure3.toml 12 --mesh-only
 
-    Example: epsmesh view studies/figure3.toml 12 --export html
+    Example: epsmesh view studies/figure3.toml 12 --export vtu
 
     For SOFA it writes the scene <study>_<number>.py, its mesh .msh and its arrays .npz.
 
@@ -116,21 +113,17 @@ def view(
         _check_sofa(study, chosen, mesh_only)
     number = next(n for n, other in enumerate(study.cases()) if other.index == chosen.index)
     stem = output / f"{study.name}_{number}"
-    missing = "" if export else _missing()
-    endings = (
-        _ENDINGS.get(export or "", [f".{export or 'html'}"]) if export or missing else ["_mesh.png", "_deformed.png"]
-    )
-    check_output(*(stem.with_name(f"{stem.name}{ending}") for ending in endings))
+    export = export or "html"
+    check_output(*(stem.with_name(f"{stem.name}{ending}") for ending in _ENDINGS.get(export, [f".{export}"])))
     check_machine()
     from epsmesh.workflow import abort_on_exception, ended_soon, load_solvers, world
 
     comm = world()
-    export = "html" if missing else export
     load_solvers()
     with abort_on_exception(comm, typer.Exit), ended_soon():
         fields = fields_of(study, chosen, comm, mesh_only, export, meshes)
         if fields is not None:
-            _write(study, fields, stem, export, missing)
+            _write(study, fields, stem, export)
 
 
 def _check_sofa(study: "Study", case: "Case", mesh_only: bool) -> None:
@@ -169,7 +162,7 @@ def fields_of(
         if unreached:
             raise CaseFailure(unreached)
         solve = solve_alone(study, case)
-        wanted = {"bar": export in ("html", "sofa"), "stress": export in ("vtu", "xdmf")}
+        wanted = {"bar": export in ("html", "sofa"), "stress": export == "vtu"}
         return compute_fields(solve, comm, mesh_only=mesh_only, cache=MeshCache(meshes), note=note, **wanted)
     except (CaseFailure, MeshError, SolveError) as failure:
         why = f"failed: {failure}"
@@ -180,21 +173,19 @@ def fields_of(
     fail(Fault(why, file=study.file, key="CASE", value=str(case)), status=SOME_FAILED, on_all_ranks=True)
 
 
-def _write(study: "Study", fields: "Fields", stem: Path, export: str | None, missing: str) -> None:
-    """Write what was asked for, and say what is in it, and what pictures would need."""
+def _write(study: "Study", fields: "Fields", stem: Path, export: str) -> None:
+    """Write what was asked for, and say what is in it."""
     written = _written(study, fields, stem, export)
     unknowns = f", {fields.dofs:,} unknowns" if fields.dofs else ""
     say(
         {"cells": len(fields.cells), "dofs": fields.dofs, "files": [str(path) for path in written]},
         f"{len(fields.cells):,} elements{unknowns}",
         *(f"wrote {path}{remark}" for path, remark in written.items()),
-        *([f"Optional: with {missing}, this command draws PNG pictures."] if missing else []),
     )
 
 
-def _written(study: "Study", fields: "Fields", stem: Path, export: str | None) -> dict[Path, str]:
+def _written(study: "Study", fields: "Fields", stem: Path, export: str) -> dict[Path, str]:
     """Write what was asked for; return the files, with what is to be said of each."""
-    title = str(fields.case) if study.axes else study.title
     if export == "html":
         from epsmesh.view.page import write_page
 
@@ -204,32 +195,8 @@ def _written(study: "Study", fields: "Fields", stem: Path, export: str | None) -
         from epsmesh import __version__
         from epsmesh.view.sofa import write_sofa
 
+        title = str(fields.case) if study.axes else study.title
         return dict.fromkeys(write_sofa(fields, stem, title, __version__), "")
-    if export:
-        from epsmesh.view.export import write_fields
+    from epsmesh.view.export import write_fields
 
-        return {write_fields(fields, stem.with_name(f"{stem.name}.{export}")): ""}
-    from epsmesh.view.picture import draw_deformed, draw_mesh
-
-    files = {draw_mesh(fields, stem.with_name(f"{stem.name}_mesh.png"), title): ""}
-    if fields.displacement is not None:
-        path, factor = draw_deformed(fields, stem.with_name(f"{stem.name}_deformed.png"), title)
-        files[path] = f" (displacement {factor:,.0f} × as large)"
-    return files
-
-
-def _missing() -> str:
-    """Return what pictures need and this machine lacks, and how to install it, or nothing."""
-    import ctypes
-    import os
-    from importlib.util import find_spec
-
-    if find_spec("pyvista") is None:
-        return "PyVista installed (`make setup EXTRAS=view`, or `pip install '.[view]'` in the project's folder)"
-    if not os.environ.get("DISPLAY"):
-        # VTK ends the process, without a word, where it finds nothing to draw with.
-        try:
-            ctypes.CDLL("libEGL.so.1")
-        except OSError:
-            return "libEGL installed (`make setup EXTRAS=view`, or `apt-get install libegl1`)"
-    return ""
+    return {write_fields(fields, stem.with_name(f"{stem.name}.vtu")): ""}

@@ -1,8 +1,6 @@
-"""Fields as files that ParaView reads: VTU, or XDMF that holds its own numbers."""
+"""Fields as a file that ParaView reads."""
 
-import io
 from pathlib import Path
-from xml.etree import ElementTree as Xml
 
 import meshio
 import numpy as np
@@ -20,19 +18,16 @@ _ZERO = 1e-9
 
 
 def write_fields(fields: Fields, path: Path) -> Path:
-    """Write ``fields`` to ``path``, ``….vtu`` or ``….xdmf``, in place of an earlier file only once it is whole.
+    """Write ``fields`` to ``path``, ``….vtu``, in place of an earlier file only once it is whole.
 
     At points: ``displacement`` (m), ``on_probe`` and ``on_support`` (1 or 0). In cells: ``element_size`` (m),
     ``max_strain`` (largest principal strain by magnitude), ``within_epsilon`` (1 or 0) and ``region``; ``stress``
-    (Pa, nine components, at the cell's centre) and ``von_mises``. A VTU file has cells of the displacement's degree.
+    (Pa, nine components, at the cell's centre) and ``von_mises``. The cells have the displacement's degree.
     """
     points, cells, displacement = fields.points, fields.cells, fields.displacement
+    if (nodes := fields.nodes) is not None:
+        points, cells, displacement = nodes.points, nodes.cells, nodes.displacement
     with atomic(path) as temporary:
-        if path.suffix == ".xdmf":
-            _xdmf(_mesh(fields, points, cells, displacement)).write(temporary)
-            return path
-        if (nodes := fields.nodes) is not None:
-            points, cells, displacement = nodes.points, nodes.cells, nodes.displacement
         meshio.vtu.write(temporary, _mesh(fields, points, cells, displacement))
     return path
 
@@ -58,39 +53,6 @@ def _mesh(fields: Fields, points: np.ndarray, cells: np.ndarray, displacement: n
     of_vtk = cells[:, compat.vtk_order(cells.shape[1])]
     blocks = {name: [values] for name, values in in_cells.items()}
     return meshio.Mesh(points, [(_KINDS[cells.shape[1]], of_vtk)], point_data=at_points, cell_data=blocks)
-
-
-def _xdmf(mesh: meshio.Mesh) -> Xml.ElementTree:
-    """Return an XDMF document with its numbers as text: meshio's own writer needs h5py, and a second file."""
-    (block,) = mesh.cells
-    root = Xml.Element("Xdmf", Version="3.0")
-    grid = Xml.SubElement(Xml.SubElement(root, "Domain"), "Grid", Name="Grid", GridType="Uniform")
-    Xml.SubElement(grid, "Time", Value="0")  # some readers ask for it
-    kind = {"tetra": "Tetrahedron", "tetra10": "Tetrahedron_10"}[block.type]
-    topology = Xml.SubElement(grid, "Topology", TopologyType=kind, NumberOfElements=str(len(block.data)))
-    _add_numbers(topology, block.data)
-    _add_numbers(Xml.SubElement(grid, "Geometry", GeometryType="XYZ"), mesh.points)
-    in_cells = {name: values for name, (values,) in mesh.cell_data.items()}
-    for centre, data in (("Node", mesh.point_data), ("Cell", in_cells)):
-        for name, values in data.items():
-            shape = {1: "Scalar", 3: "Vector", 9: "Tensor"}[1 if values.ndim == 1 else values.shape[1]]
-            _add_numbers(Xml.SubElement(grid, "Attribute", Name=name, AttributeType=shape, Center=centre), values)
-    return Xml.ElementTree(root)
-
-
-def _add_numbers(parent: Xml.Element, values: np.ndarray) -> None:
-    whole = np.issubdtype(values.dtype, np.integer)
-    item = Xml.SubElement(
-        parent,
-        "DataItem",
-        Dimensions=" ".join(map(str, values.shape)),
-        Format="XML",
-        NumberType="Int" if whole else "Float",
-        Precision=str(values.dtype.itemsize),
-    )
-    text = io.StringIO()
-    np.savetxt(text, values, fmt="%d" if whole else "%.16g")
-    item.text = text.getvalue()
 
 
 def _marked(fields: Fields, group: str, count: int, cells: np.ndarray) -> np.ndarray:
