@@ -16,8 +16,8 @@ from epsmesh.insertion.paths import followed, paths, possible
 from epsmesh.insertion.steps import CUTTING, INDENTATION, WITHDRAWAL
 from epsmesh.plan.plan import make_plan
 from epsmesh.report.dataset import build
+from epsmesh.report.headline import headline
 from epsmesh.report.insertion import answer
-from epsmesh.report.page.facts import of_paths
 from epsmesh.run.record import Record
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.physics import MaterialLaw
@@ -97,7 +97,7 @@ def test_tissue_is_pierced_where_the_intact_body_has_the_energy_of_the_cut_one(p
     assert path.punctures[0].depth == pytest.approx(depth, rel=1e-4)
     plan, records = solved(scene())
     assert all(skipped.name != "duplicates" for skipped in plan.skipped)  # its stages are one state
-    told = of_paths(build(plan, records))
+    told = " ".join(headline(build(plan, records)))
     assert (
         told.startswith(f"Puncture at {1e3 * path.punctures[0].depth:.4g}")
         and f"{1e3 * path.steps[-1].force:.4g} mN, at 6 mm" in told

@@ -33,11 +33,12 @@ class Guide(Guideline):
 
 
 def guide_if_any(dataset: xr.Dataset) -> Guide | None:
-    """Return the guide for a usual accuracy, or None if nothing can be judged."""
+    """Return the guide for a usual accuracy, or None if the study compares no meshes, or nothing can be judged."""
     try:
-        return guide(dataset, USUAL_ACCURACY)
+        found = guide(dataset, USUAL_ACCURACY)
     except DatasetError:
         return None
+    return found if len(found.verdicts) > 1 else None
 
 
 def guide(dataset: xr.Dataset, accuracy: str | float | None = None, budget: str | float | None = None) -> Guide:

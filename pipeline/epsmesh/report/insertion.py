@@ -31,10 +31,11 @@ def _lines(dataset: xr.Dataset) -> Iterator[str]:
     pierced = punctures(dataset)
     for number in pierced["puncture"].values:
         one = pierced.sel(puncture=number)
-        depth, bar = (write("depth", round(float(one[f"puncture_depth{end}"]), 8)) for end in ("", "_error"))
-        force, of_force = (1e3 * float(one[f"puncture_force{end}"]) for end in ("", "_error"))
+        depth, bar, force, of_force = (
+            1e3 * float(one[f"puncture_{name}{end}"]) for name in ("depth", "force") for end in ("", "_error")
+        )
         where = f" of layer {number}" if number > 1 else ""
-        yield f"puncture{where} at {depth} ± {bar}, F = {force:.4g} ± {of_force:.2g} mN"
+        yield f"puncture{where} at {depth:.4g} ± {bar:.2g} mm, F = {force:.4g} ± {of_force:.2g} mN"
     if not pierced.sizes["puncture"]:
         yield f"the tissue stays whole down to {write('depth', float(last['depth']))}: F is {_last(last)}"
     elif PHASES[int(last["phase"])] == INDENTATION:

@@ -9,9 +9,9 @@ import xarray as xr
 
 from epsmesh.files import write_whole
 from epsmesh.pages import joined, render_page
-from epsmesh.report.figures.style import STYLE, stack
+from epsmesh.report.figures.style import STYLE
 from epsmesh.report.page.facts import provenance, study_path
-from epsmesh.report.page.inline import PAGE_CSS, inline_svg
+from epsmesh.report.page.inline import PAGE_CSS, in_page
 from epsmesh.study.identified import FITS
 from epsmesh_identify.report.figures.identification import identification
 from epsmesh_identify.report.identified import answer, bar, if_undeclared, material, parts, title, wanted, written
@@ -49,13 +49,8 @@ def render(dataset: xr.Dataset, name: str) -> str:
 
 
 def _figure(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return the figure as SVG, for a wide page and for a phone."""
     with mpl.rc_context(STYLE):
-        drawn = identification(dataset, "", answered=False)
-        caption = drawn.get_label()
-        svg, width = inline_svg(drawn, "identification")
-        phone, _ = inline_svg(stack(drawn), "identification-phone")
-    return {"kind": "identification", "caption": caption, "svg": svg, "width": width, "phone": phone}
+        return in_page(identification(dataset, "", answered=False), "identification")
 
 
 def _of_one(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:

@@ -104,7 +104,7 @@ def test_figure_and_page_are_written_whole(tmp_path):
     files = draw(dataset, tmp_path / "one")
     assert [file.name for file in files] == ["one.png", "one.svg"]
     page = render(dataset, "one")
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 1
     assert 'from = "results/one.nc"' in page
 
 

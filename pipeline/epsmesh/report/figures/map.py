@@ -5,27 +5,33 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import AutoLocator, FixedLocator, Locator
+from scipy.spatial import ConvexHull
 
+from epsmesh.arrays import FloatArray
 from epsmesh.report.figures.facets import arrange
 from epsmesh.report.figures.style import CLAIM, FAILED, LINE, finish, look, new_figure
+from epsmesh.report.table import study_of
 from epsmesh.report.words import choices, heading, scale
+from epsmesh.shapes.facetted import Facetted
+from epsmesh.shapes.triangles import closed_edges, doubled_normals
 from epsmesh.states import FAILURES, NO_CONTACT, OK, PENDING, SKIPPED
 
 PLACES = ("x", "y")
 _MOST_PANELS = 3
 _COLOURS = "cividis"
 _PANEL = 3.0  # inches: the width of a panel
-# Letters of labels that have room below a panel.
-_LETTERS = 30
+# Beside the outline, as a share of the map.
+_ROOM = 0.03
 
 
 def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """The force (mN) seen from above, and its error bar (mN); a column for each value of one other quantity.
 
-    Places without contact have a ring, those without a force a cross.
+    Places without contact have a ring, those without a force a cross; the line is the outline of the body.
     """
+    outline = _outline(dataset)
     facets = arrange(dataset, ("force",), None, flat=PLACES, most=(_MOST_PANELS, 1, 1))
     parts = [dataset.sel(facets.at | curve).transpose("y", "x", ...) for curve in facets.curves]
     titles = [choices(dataset, curve) for curve in facets.curves]
@@ -40,6 +46,7 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         limits = {"vmin": known.min(), "vmax": known.max()} if known.size else {}
         for column, (ax, values) in enumerate(zip(axes[row], maps, strict=True)):
             drawn = draw_map(ax, parts[column], values, **limits)
+            _draw_outline(ax, outline)
             ax.set_title(titles[column] if row == 0 else "")
             ax.set_xlabel(heading(dataset["x"]) if row == 1 else "")
             ax.set_ylabel(heading(dataset["y"]) if column == 0 else "")
@@ -63,10 +70,35 @@ def draw_map(ax: Axes, part: xr.Dataset, values: np.ndarray, **look: Any) -> Any
         if rows.size:
             style = {"marker": marker, "color": colour, "linestyle": "none", "fillstyle": "none", "markersize": 4}
             ax.plot(x[columns], y[rows], label=label, **style)
-    ax.xaxis.set_major_locator(_labels_of(x))
-    ax.yaxis.set_major_locator(_labels_of(y))
     ax.set_aspect("equal")
     return drawn
+
+
+def _outline(dataset: xr.Dataset) -> FloatArray:
+    """Return the outline of the body seen from above: lines (n, 2, 2), in mm; none where the study cannot be read."""
+    study = study_of(dataset)
+    body = next(iter(study.cases())).body if study else None
+    if body is None:
+        return np.empty((0, 2, 2))
+    if isinstance(body, Facetted):
+        points, facets = body.triangles.points, body.triangles.facets
+        edges, owners = closed_edges(facets)
+        is_above = doubled_normals(points, facets)[:, 2] > 0
+        return 1e3 * points[edges[np.diff(is_above[owners])[:, 0]], :2]
+    places = np.vstack(body.outline())[:, :2]
+    return 1e3 * places[ConvexHull(places).simplices]
+
+
+def _draw_outline(ax: Axes, outline: FloatArray) -> None:
+    """Draw lines beside a map, as far away as the map is large."""
+    if not len(outline):
+        return
+    ax.add_collection(LineCollection(list(outline), colors=LINE, linewidths=0.8), autolim=False)
+    for which, places in (("x", outline[..., 0]), ("y", outline[..., 1])):
+        low, high = getattr(ax, f"get_{which}lim")()
+        room = _ROOM * (high - low)
+        least, most = places.min() - room, places.max() + room
+        getattr(ax, f"set_{which}lim")(max(least, low - (high - low)), min(most, high + (high - low)))
 
 
 def draw_excess(ax: Axes, excess: xr.DataArray, bar: xr.DataArray, point: tuple[float, float, float]) -> Any:
@@ -92,9 +124,3 @@ def draw_excess(ax: Axes, excess: xr.DataArray, bar: xr.DataArray, point: tuple[
     ax.set_xlabel("position x, mm")
     ax.set_ylabel("position y, mm")
     return drawn
-
-
-def _labels_of(values: np.ndarray) -> Locator:
-    """Return where an axis is labelled: at the values if these have room below a panel, otherwise at round numbers."""
-    letters = len(values) * max(len(f"{value:.4g}") for value in values)
-    return FixedLocator(values) if letters <= _LETTERS else AutoLocator()

@@ -18,8 +18,6 @@ COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#b87d00", "#b0413e", "#9030f0", "#4
 MARKERS = "osD^vPX"
 CLAIM, FAILED, QUIET, LINE, GRID, PAPER = "#d81b60", "#c62828", "#555555", "#000000", "#dddddd", "#ffffff"
 SIZE = 9.0  # points
-# Inches: the width of a phone, the height of a panel there and of a line of its legend; letters of a line.
-_PHONE, _PHONE_PANEL, _PHONE_LINE, _PHONE_LETTERS = 3.4, 2.2, 0.19, 38
 # Letters of SIZE in an inch of a line, and in a line of the legend.
 _LETTERS, _LEGEND_LETTERS = 13, 24
 _DECADES = {"x": 1.4, "y": 2.2}  # from here on a logarithmic axis writes powers of ten alone
@@ -85,8 +83,8 @@ def add_note(figure: Figure, note: str, warning: str = "") -> None:
     figure.supxlabel(words, x=0.01, ha="left", fontsize=SIZE, color=FAILED if warning else QUIET)
 
 
-def write_legend(figure: Figure, above: Axes | None = None) -> None:
-    """Name the curves of all panels, to the right of the upper right one, or in the empty axes ``above`` them."""
+def write_legend(figure: Figure) -> None:
+    """Name the curves of all panels, to the right of the upper right one."""
     known = [ax.get_legend_handles_labels() for ax in figure.axes]
     entries = {
         label: handle for handles, labels in reversed(known) for handle, label in zip(handles, labels, strict=True)
@@ -97,11 +95,11 @@ def write_legend(figure: Figure, above: Axes | None = None) -> None:
     first = figure.axes[0].get_subplotspec()
     last = first.get_gridspec().ncols - 1 if first else 0
     beside = next(ax for ax in figure.axes if not first or ax.get_subplotspec().colspan.start == last)
-    (above or beside).legend(
+    beside.legend(
         [entries[name] for name in names],
-        [textwrap.fill(name, _LEGEND_LETTERS if above is None else _PHONE_LETTERS) for name in names],
+        [textwrap.fill(name, _LEGEND_LETTERS) for name in names],
         loc="upper left",
-        bbox_to_anchor=(1.02, 1.0) if above is None else (0.0, 1.0),
+        bbox_to_anchor=(1.02, 1.0),
         borderaxespad=0.0,
         frameon=False,
     )
@@ -121,65 +119,6 @@ def write_above(ax: Axes, title: str, letters: int, columns: int) -> None:
         ncol=columns,
         frameon=False,
     )
-
-
-def stack(figure: Figure) -> Figure:
-    """Put the panels of a figure below one another, each with its own title, ticks and axis titles: for a phone."""
-    # A bar of colours is no panel: it follows those that it belongs to.
-    specs = {ax: ax.get_subplotspec() for ax in figure.axes if hasattr(ax, "get_subplotspec")}
-    # By where they are, since grids may be within one another.
-    at = {ax: _corner(ax) for ax, spec in specs.items() if spec is not None}
-    panels = sorted(at, key=at.__getitem__)
-    words = {}
-    for ax in panels:
-        row, column = ([p for p in panels if at[p][i] == at[ax][i]] for i in (0, 1))
-        words[ax] = (
-            next(filter(None, (p.get_title() for p in (ax, *column, *row))), ""),
-            next(filter(None, (p.get_xlabel() for p in (*column[column.index(ax) :], *reversed(column)))), ""),
-            next(filter(None, (p.get_ylabel() for p in (ax, *row))), ""),
-        )
-    legends = [legend for ax in panels if (legend := ax.get_legend()) is not None]
-    is_beside = len(legends) == 1 and legends[0].get_bbox_to_anchor().x0 > legends[0].axes.bbox.x1
-    lines = sum(text.get_text().count("\n") + 1 for text in legends[0].get_texts()) if is_beside else 0
-    heights = [_PHONE_LINE * lines + 0.01, *([_PHONE_PANEL] * len(panels))]
-    turned = [label for ax in panels for label in ax.get_xticklabels() if label.get_rotation()]
-    figure.set_size_inches(_PHONE, sum(heights) + (1.3 if turned else 0.4) * len(panels))
-    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-    for number, ax in enumerate(panels, start=1):
-        ax.set_subplotspec(grid[number, 0])
-        ax.tick_params(labelbottom=True, labelleft=True)
-        title, x, y = (" ".join(text.split()) for text in words[ax])
-        ax.set_title(textwrap.fill(title, _PHONE_LETTERS))
-        ax.set_xlabel(textwrap.fill(x, _PHONE_LETTERS))
-        ax.set_ylabel(textwrap.fill(y, 26))
-        if own := None if is_beside else ax.get_legend():
-            write_above(ax, own.get_title().get_text(), _PHONE_LETTERS - 12, 1)
-            _lift_title(ax)
-        for label in ax.get_xticklabels() if turned else ():
-            if label.get_rotation():
-                label.set(rotation=90, ha="center", rotation_mode="default")
-    if is_beside:
-        legends[0].remove()
-        above = figure.add_subplot(grid[0, 0])
-        above.axis("off")
-        write_legend(figure, above)
-    return figure
-
-
-def _corner(ax: Axes) -> tuple[float, float]:
-    """Return where the upper left corner of a panel is: from the top, and from the left."""
-    box = ax.get_position()
-    return round(-box.y1, 3), round(box.x0, 3)
-
-
-def _lift_title(ax: Axes) -> None:
-    """Put the title of a panel above the legend that is above the panel."""
-    legend = ax.get_legend()
-    if legend is None or not ax.get_title():
-        return
-    texts = [text for text in (legend.get_title(), *legend.get_texts()) if text.get_text()]
-    lines = sum(text.get_text().count("\n") + 1 for text in texts)
-    ax.set_title(ax.get_title(), pad=6 + 1.5 * lines * texts[-1].get_fontsize())
 
 
 def log_scale(ax: Axes, which: str = "y") -> None:

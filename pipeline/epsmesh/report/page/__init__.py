@@ -6,37 +6,32 @@ from shlex import quote as shell
 from typing import Any
 from urllib.parse import quote
 
-import matplotlib as mpl
 import xarray as xr
 
 from epsmesh.files import write_whole
-from epsmesh.pages import hash_of, joined, render_page
+from epsmesh.pages import joined, render_page
 from epsmesh.printable import counted
 from epsmesh.report.figures import choose, figure
-from epsmesh.report.figures.style import STYLE, stack
 from epsmesh.report.guide import guide_if_any
+from epsmesh.report.headline import headline
 from epsmesh.report.page.cases import FIRST_ROWS, case_table
 from epsmesh.report.page.facts import (
     by_status,
     facts,
-    of_paths,
     origins,
     provenance,
     reductions,
     reproduce,
-    summary,
     without_exact,
 )
-from epsmesh.report.page.inline import inline_svg
+from epsmesh.report.page.inline import in_page
 from epsmesh.report.table import warnings_of
 from epsmesh.report.uncertainty import unknowns
-from epsmesh.report.values import answer_of, at_peak, has_path
+from epsmesh.report.values import at_peak
 from epsmesh.states import FAILURES, SKIPPED
 
 # What the answer says of times, and the headlines need not say again.
 _TOLD = "speed-ups"
-# What the curves show first.
-_MAIN = ("force_ratio", "force_exact_ratio", "force")
 _TEMPLATES, _VENDOR = Path(__file__).parent / "templates", Path(__file__).parent / "vendor"
 # jQuery, which DataTables needs, comes before it.
 _SCRIPTS = (_VENDOR / "jquery.slim.min.js", _VENDOR / "dataTables.min.js", _TEMPLATES / "page.js")
@@ -60,13 +55,9 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
     study = str(dataset.attrs.get("study", ""))
     guide = guide_if_any(over_time)
     table = case_table(dataset)
-    varying = {column.name for column in table.columns if column.varies}
-    plotly = joined(_VENDOR / "plotly-basic.min.js")
     return render_page(
         _TEMPLATES / "page.html.j2",
         joined(*_SCRIPTS),
-        plotly=plotly,
-        plotly_hash=hash_of(plotly),
         title=dataset.attrs.get("title", name),
         name=name,
         style=joined(_VENDOR / "dataTables.min.css", _TEMPLATES / "page.css"),
@@ -78,11 +69,10 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         warnings=warnings_of(dataset),
         figures=_figures(over_time),
         guide=guide,
-        answer=guide.sentence if guide else of_paths(over_time) if has_path(over_time) else summary(dataset),
+        answer=[guide.sentence] if guide else headline(over_time),
         tissue=unknowns(dataset),
         table=table,
         many_cases=counted(len(table.order), "case"),
-        main=next((name for name in _MAIN if name in varying), answer_of(dataset)),
         first_rows=FIRST_ROWS,
         reductions=reductions(dataset),
         origins=origins(dataset),
@@ -96,13 +86,5 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
 
 
 def _figures(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the figures that suit the study as SVG, for a wide page and for a phone, with what to see."""
-    found: list[dict[str, Any]] = []
-    for kind in choose(dataset):
-        if kind != "nothing":
-            drawn = figure(dataset, kind, titled=False)
-            svg, width = inline_svg(drawn, kind)
-            with mpl.rc_context(STYLE):
-                phone, _ = inline_svg(stack(drawn), f"{kind}-phone")
-            found.append({"kind": kind, "caption": drawn.get_label(), "svg": svg, "width": width, "phone": phone})
-    return found
+    """Return the figures that suit the study as SVG, with what to see."""
+    return [in_page(figure(dataset, kind, titled=False), kind) for kind in choose(dataset) if kind != "nothing"]

@@ -12,7 +12,6 @@ from epsmesh.pages import json_in_page
 from epsmesh.quantities import LARGEST, QUANTITIES
 from epsmesh.report.table import study_of
 from epsmesh.report.values import by_case, relative
-from epsmesh.report.words import heading as title_of_axis
 from epsmesh.report.words import is_numeric, lengths, number, scale, symbol
 from epsmesh.states import WORST_FIRST
 
@@ -66,7 +65,7 @@ class Column:
     """A column: ``values`` are numbers (None: none) or, where there are ``words``, the index of a word.
 
     ``keys`` sort the words of a swept number; ``hint`` is the long name, ``axis`` the title of an axis; ``is_first``
-    columns are shown at first, an ``is_axis`` column is swept.
+    columns are shown at first.
     """
 
     name: str
@@ -77,13 +76,6 @@ class Column:
     keys: list[float] | None = None
     is_filter: bool = False
     is_first: bool = True
-    is_axis: bool = False
-    axis: str = ""
-
-    @property
-    def varies(self) -> bool:
-        """Whether its numbers differ."""
-        return len({value for value in self.values if value is not None}) > 1
 
     def text(self, row: int) -> str:
         """Return what stands in a row."""
@@ -105,12 +97,6 @@ class Table:
         """The table as JSON that can stand in a ``<script>`` element."""
         columns = [vars(column) for column in self.columns]
         return json_in_page({"columns": columns, "order": self.order, "rows": FIRST_ROWS})
-
-    @property
-    def across(self) -> str:
-        """What curves are drawn against at first: ε, else the first numbers, else the first axis, or ""."""
-        swept = [column for column in self.columns if column.is_axis and len(column.words or ()) > 1]
-        return min(swept, key=lambda c: (c.name != "epsilon", c.keys is None)).name if swept else ""
 
     @property
     def filters(self) -> list[Column]:
@@ -158,17 +144,7 @@ def _axis(dataset: xr.Dataset, dim: str, position: int, dims: list[str]) -> Colu
     keys = [min(float(value), 1e300) for value in values] if is_numeric(coordinate) else None
     hint = str(coordinate.attrs.get("long_name", dim))
     words = [lengths(coordinate, number(coordinate, value)) for value in values]
-    return Column(
-        dim,
-        symbol(coordinate),
-        codes.tolist(),
-        hint,
-        words,
-        keys,
-        is_filter=True,
-        is_axis=True,
-        axis=title_of_axis(coordinate),
-    )
+    return Column(dim, symbol(coordinate), codes.tolist(), hint, words, keys, is_filter=True)
 
 
 def _quantity(array: xr.DataArray, name: str) -> Column:
@@ -183,9 +159,7 @@ def _quantity(array: xr.DataArray, name: str) -> Column:
         flat = array.values.ravel()
         values = [_rounded(value, name, factor) if np.isfinite(value) else None for value in flat]
     title = f"{heading} ({unit})" if unit else heading
-    return Column(
-        name, title, values, hint, is_first=name in _SHOWN, axis=title if name == _SHARE else title_of_axis(array)
-    )
+    return Column(name, title, values, hint, is_first=name in _SHOWN)
 
 
 def _rounded(value: float, name: str, factor: float) -> float | int:

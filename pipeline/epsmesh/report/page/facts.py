@@ -3,7 +3,6 @@
 import json
 import re
 from collections import defaultdict
-from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from shlex import quote
@@ -13,9 +12,8 @@ import numpy as np
 import xarray as xr
 
 from epsmesh.quantities import write
-from epsmesh.report.insertion import answer
 from epsmesh.report.times import doubts
-from epsmesh.report.values import at_peak, by_case, relative
+from epsmesh.report.values import by_case, relative
 from epsmesh.report.words import choices
 from epsmesh.states import FAILED, NO_CONTACT, OK, PARTIAL, PENDING, SKIPPED
 
@@ -68,56 +66,6 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
     if taken := _taken(dataset):
         found.append(("run", taken))
     return found
-
-
-def summary(dataset: xr.Dataset) -> str:
-    """Return what came out, in a sentence, where a study has no F_exact to measure errors against."""
-    force, size = dataset["force"].values, dataset["force"].size
-    known = int(np.isfinite(force).sum())
-    if not known:
-        return "No case has a force."
-    if "depth_error" in dataset and known:
-        least, most = (write("depth", float(f"{f(dataset['depth']):.4g}")) for f in (np.nanmin, np.nanmax))
-        share = 100 * float(relative(dataset, "depth_error").max())
-        bars = f", with error bars up to {share:.2g} %" if np.isfinite(share) else ""
-        return f"The depth at the given force is {least if least == most else f'{least} to {most}'}{bars}."
-    if size == 1:
-        bar = float(relative(dataset, "force_error").squeeze())
-        return (
-            f"F = {write('force', float(f'{force.item():.4g}'))}{f' ± {100 * bar:.2g} %' if np.isfinite(bar) else ''}."
-        )
-    lowest, highest = (write("force", float(f"{value:.4g}")) for value in (np.nanmin(force), np.nanmax(force)))
-    if known == 1:
-        return f"One of {size} cases has a force, {lowest}."
-    bars = 100 * relative(dataset, "force_error").values
-    worst = f", with error bars up to {np.nanmax(bars):.2g} %" if np.isfinite(bars).any() else ""
-    return f"{known} of {size} cases have a force, from {lowest} to {highest}{worst}.{_at_largest(dataset)}"
-
-
-def _at_largest(dataset: xr.Dataset) -> str:
-    """Say where on the body F is largest, if the study has several places."""
-    if "at_x" not in dataset.coords:
-        return ""
-    force = dataset["force"]
-    there = force.isel(force.fillna(-np.inf).argmax([*force.dims]))
-    x, y, z = (f"{1e3 * float(there[name]):.4g}" for name in ("at_x", "at_y", "at_z"))
-    return f" The force is largest at ({x}, {y}, {z}) mm."
-
-
-def of_paths(dataset: xr.Dataset) -> str:
-    """Return what came out of insertions: punctures, forces and their depths, the largest force; of one, or of all."""
-    if dataset["status"].size == 1:
-        return ". ".join(f"{line[0].upper()}{line[1:]}" for line in [*answer(dataset), *_largest(dataset)]) + "."
-    pierced = int(np.isfinite(dataset["puncture_depth"].values).reshape(dataset["status"].size, -1).any(axis=1).sum())
-    return f"{pierced} of {dataset['status'].size} tools pierce the tissue. {summary(at_peak(dataset))}"
-
-
-def _largest(dataset: xr.Dataset) -> Iterator[str]:
-    """Yield the largest force of one path, and its depth."""
-    peak = at_peak(dataset)
-    if np.isfinite(force := peak["force"].item()):
-        depth = write("depth", round(peak["depth"].item(), 8))
-        yield f"at the depths of the path, F is at most {1e3 * force:.4g} mN, at {depth}"
 
 
 def by_status(dataset: xr.Dataset, status: str) -> list[dict[str, Any]]:

@@ -3,6 +3,7 @@
 import re
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 from markupsafe import Markup
@@ -21,16 +22,20 @@ _THEME = {colour: f"var(--curve-{i})" for i, colour in enumerate(COLOURS, start=
     LINE: "currentColor",
     PAPER: "var(--paper)",
 }
+# Inches: narrower figures are drawn so wide that they fill the page beside what is said of them.
+_LEAST = 8.0
 _COLOUR = re.compile("|".join(_THEME))
 
 
-def inline_svg(figure: Figure, name: str) -> tuple[Markup, int]:
-    """Return ``figure`` as an ``<svg>`` element, and its width (CSS pixels); ``name`` goes before every name in it.
+def in_page(figure: Figure, name: str) -> dict[str, Any]:
+    """Return ``figure`` for a page: an ``<svg>`` element, its width (CSS pixels) and caption; ``name`` is its kind.
 
-    Its caption is left to the page. It is never shown smaller than it is drawn: letters would be.
+    It is never shown smaller than it is drawn: letters would be. ``name`` goes before every name in it.
     """
+    caption = figure.get_label()
     figure.supxlabel("")
     with mpl.rc_context(STYLE):
+        figure.set_figwidth(max(figure.get_figwidth(), _LEAST))
         buffer = StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = buffer.getvalue()
@@ -38,8 +43,7 @@ def inline_svg(figure: Figure, name: str) -> tuple[Markup, int]:
     text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
     text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{name}-", text)
     head, rest = text.split(">", 1)
-    points = float(re.findall(r'width="([\d.]+)pt"', head)[0])
-    width = round(points * 4 / 3)
+    width = round(float(re.findall(r'width="([\d.]+)pt"', head)[0]) * 4 / 3)
     head = re.sub(r' (width|height)="[^"]*"', "", head)
-    head = f'{head} style="max-width: {1.3 * width:.0f}px; min-width: {width:.0f}px" aria-hidden="true"'
-    return Markup(f"{head}>{_COLOUR.sub(lambda found: _THEME[found[0]], rest)}".strip()), width
+    svg = f'{head} style="min-width: {width}px" aria-hidden="true">{_COLOUR.sub(lambda found: _THEME[found[0]], rest)}'
+    return {"kind": name, "caption": caption, "svg": Markup(svg.strip()), "width": width}
