@@ -2,12 +2,14 @@
 
 from typing import Any
 
+import pytest
 from mpi4py import MPI
 
 from epsmesh.plan.plan import make_plan
 from epsmesh.run.execute import compute
 from epsmesh.run.record import Record
 from epsmesh.shapes.probe import Probe
+from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
 from epsmesh.study.sweep import Study
 from tests.studies import changed
@@ -32,6 +34,13 @@ def raw(**changes: Any) -> dict[str, Any]:
 def study(**changes: Any) -> Study:
     """Return the base study with changes, parsed."""
     return parse(raw(**changes))
+
+
+def refusal(content: dict[str, Any]) -> str:
+    """Return what is said of a study that is refused."""
+    with pytest.raises(StudyError) as caught:
+        parse(content)
+    return str(caught.value)
 
 
 def probe(**keys: Any) -> Probe:

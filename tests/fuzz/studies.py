@@ -20,41 +20,11 @@ GOOD = [
 # Measurements name files that are read by `epsmesh identify` only.
 GOOD.append(tomllib.loads(Path("studies/identify-two-punches.toml").read_text(encoding="utf-8")))
 _UNITS = (
-    "mm",
-    "m",
-    "cm",
-    "µm",
-    "kPa",
-    "Pa",
-    "MPa",
-    "%",
-    "deg",
-    "s",
-    "kg/m^3",
-    "m/s^2",
-    "kpa",
-    "mmHg",
-    "N/mm",
-    "mN",
-    "",
-)
+    "mm", "m", "cm", "µm", "kPa", "Pa", "MPa", "%", "deg", "s", "kg/m^3", "m/s^2", "kpa", "mmHg", "N/mm", "mN", "",
+)  # fmt: skip
 _NUMBERS = (
-    "0",
-    "-1",
-    "1",
-    "10",
-    "0.5",
-    "1e308",
-    "-1e308",
-    "1e-308",
-    "5e-324",
-    "1e999",
-    "nan",
-    "inf",
-    "10,5",
-    "−3",
-    "٣",
-)
+    "0", "-1", "1", "10", "0.5", "1e308", "-1e308", "1e-308", "5e-324", "1e999", "nan", "inf", "10,5", "−3", "٣",
+)  # fmt: skip
 _WORDS = (
     "full", "coarse", "free", "fixed", "halfspace", "green", "bonded", "frictionless", "unilateral", "pierce",
     "cut", "box", "cylinder", "ellipsoid", "disc", "blade", "sphere", "cone", "wedge", "cad", "surface",
@@ -179,13 +149,13 @@ def texts(draw: st.DrawFn) -> bytes:
 
 def toml(raw: dict[str, Any]) -> str:
     """Write a study as TOML, one line a key of a section."""
-    return "".join(f"{_key(key)} = {inline(value)}\n" for key, value in raw.items())
+    return "".join(f"{_text(key)} = {inline(value)}\n" for key, value in raw.items())
 
 
 def inline(value: Any) -> str:
     """Write a value as TOML, on one line."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_key(k)} = {inline(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{_text(k)} = {inline(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(map(inline, value)) + "]"
     if isinstance(value, str):
@@ -195,10 +165,6 @@ def inline(value: Any) -> str:
     if isinstance(value, float):
         return "nan" if isnan(value) else ("-inf" if value < 0 else "inf") if isinf(value) else repr(value)
     return value.isoformat() if isinstance(value, datetime.date | datetime.time) else str(value)
-
-
-def _key(key: str) -> str:
-    return _text(key)
 
 
 def _text(text: str) -> str:

@@ -106,8 +106,7 @@ def test_mistakes_are_named(mistake):
     with pytest.raises(StudyError) as caught:
         parse(raw(**changes))
     assert len(caught.value.problems) == 1
-    for part in parts:
-        assert part in str(caught.value)
+    assert all(part in str(caught.value) for part in parts), caught.value
 
 
 def test_laws_and_their_parameters_are_dimensions():

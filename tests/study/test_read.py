@@ -10,7 +10,7 @@ from epsmesh.study.read import parse, read_study, read_text
 from epsmesh.study.toml import to_toml
 from epsmesh_identify.sections.kept import measurements_of, spread_of
 from tests import organs
-from tests.cases import BLADE, raw, study
+from tests.cases import BLADE, raw, refusal, study
 
 STUDIES = sorted(Path("studies").glob("*.toml"))
 
@@ -290,8 +290,7 @@ def test_each_mistake_gets_its_message(name):
         parse(content, file="my.toml")
     message = str(caught.value)
     assert all(line.startswith("my.toml: ") for line in message.splitlines())
-    for word in words:
-        assert word in message
+    assert all(word in message for word in words), message
 
 
 def test_all_mistakes_at_once():
@@ -328,8 +327,7 @@ def test_an_error_of_syntax_has_its_line_and_what_was_meant(tmp_path, lines):
     file.write_text(f"[body]\n{lines}\n")
     with pytest.raises(StudyError, match=r"bad.toml: TOML syntax: ") as caught:
         read_study(file)
-    for part in SYNTAX[lines]:
-        assert part in str(caught.value)
+    assert all(part in str(caught.value) for part in SYNTAX[lines]), caught.value
 
 
 WORDS = {
@@ -356,10 +354,8 @@ WORDS = {
 @pytest.mark.parametrize("word", WORDS)
 def test_a_word_of_other_programs_has_a_sentence_that_says_what_to_write(word):
     changes, parts = WORDS[word]
-    with pytest.raises(StudyError) as caught:
-        study(**changes)
-    for part in parts:
-        assert part in str(caught.value)
+    said = refusal(raw(**changes))
+    assert all(part in said for part in parts), said
 
 
 def test_missing_file():
