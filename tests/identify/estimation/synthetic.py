@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from epsmesh.arrays import FloatArray
+from epsmesh_identify.estimation.noise import Noise
 from epsmesh_identify.estimation.parts import Measured, Unknown, Values
 from epsmesh_identify.experiment.curve import Curve
 
@@ -30,14 +31,17 @@ class Ball:
 
 @dataclass(frozen=True)
 class Punch:
-    """Force of a flat punch of a ``radius`` on a layer: the dependence on Poisson's ratio is that of its thickness."""
+    """Force of a flat punch of a ``radius`` on a layer: the dependence on Poisson's ratio is that of its thickness.
+
+    Incompressible if Poisson's ratio is none of the unknowns.
+    """
 
     radius: float = 1e-3
     layer: float = 0.0
     names: tuple[str, ...] = ("young", "poisson")
 
     def force(self, depth: FloatArray, values: Values) -> FloatArray:
-        poisson = values["poisson"]
+        poisson = values.get("poisson", 0.5)
         stiffer = 1 + self.layer * (1 + 4 * (poisson / 0.5) ** 4)
         return np.asarray(2 * values["young"] / (1 - poisson**2) * self.radius * stiffer * np.maximum(depth, 0.0))
 
@@ -53,6 +57,14 @@ def noise(rng: np.random.Generator, count: int, correlation: float, white: float
     for k in range(1, count):
         slow[k] = correlation * slow[k - 1] + steps[k]
     return np.asarray(np.sqrt(1 - white) * slow + np.sqrt(white) * rng.normal(size=count))
+
+
+def covariance(one: Noise, share: FloatArray) -> FloatArray:
+    """Return the covariance (n, n) of noise of unit variance, at shares (n,) of the largest force."""
+    lags = np.abs(np.subtract.outer(np.arange(len(share)), np.arange(len(share))))
+    scale = 1 + one.growth * share
+    found = (1 - one.white) * one.correlation**lags + one.white * np.eye(len(share))
+    return np.asarray(scale[:, None] * found * scale)
 
 
 def measured(

@@ -43,4 +43,6 @@ def test_a_wide_punch_is_proposed_where_a_narrow_one_does_not_see_poissons_ratio
 def test_there_is_no_advice_where_all_is_seen_nothing_fits_or_the_scene_needs_solves(one):
     assert advice(study(contact="bonded"), one) == ()
     assert advice(study(), replace(one, verdict="does not fit")) == ()
-    assert advice(study(), identify(punches("narrow", "wide"), [YOUNG, POISSON])) == ()
+    both = identify(punches("narrow", "wide"), [YOUNG, POISSON])  # a/h = 0.1 and 1
+    assert both.seen[:2].all() and both.low[1] <= 0.45 <= both.high[1] < both.low[1] + 0.1
+    assert advice(study(), both) == ()

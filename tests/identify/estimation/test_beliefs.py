@@ -7,8 +7,8 @@ import pytest
 
 from epsmesh_identify.estimation.beliefs import LOG_NOISE, LOG_SIZE, beliefs
 from epsmesh_identify.estimation.mixture import mixture_of
-from epsmesh_identify.estimation.noise import DEVIATIONS, GRID, TERMS, Noise, grams
-from tests.identify.estimation.synthetic import noise
+from epsmesh_identify.estimation.noise import DEVIATIONS, GRID, TERMS, grams
+from tests.identify.estimation.synthetic import covariance, noise
 
 COUNT = 200
 PRECISION, MEAN = np.array([[12.0, 3.0], [3.0, 40.0]]), np.array([0.01, -0.02])
@@ -22,12 +22,6 @@ def columns(seed, correlation=0.9):
     return np.column_stack([share**1.5, np.ones(COUNT), bent, residual]), share
 
 
-def dense(one: Noise, share):
-    lags = np.abs(np.subtract.outer(np.arange(COUNT), np.arange(COUNT)))
-    scale = 1 + one.growth * share
-    return scale[:, None] * ((1 - one.white) * one.correlation**lags + one.white * np.eye(COUNT)) * scale
-
-
 def density(residual, covariance):
     """Return the logarithm of a normal density but for its constant."""
     return -0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * residual @ np.linalg.solve(covariance, residual)
@@ -39,7 +33,7 @@ def test_evidence_is_that_of_the_dense_covariance(size, place):
     made, share = columns(1)
     found, hypothesis = beliefs(grams(made, share), PRECISION, MEAN, 0.0), size * len(GRID) + place
     slopes, bent, residual = made[:, :2], made[:, 2 : 2 + TERMS], made[:, -1]
-    of_noise = found.scale[hypothesis] ** 2 * dense(GRID[place], share) + DEVIATIONS[size] ** 2 * bent @ bent.T
+    of_noise = found.scale[hypothesis] ** 2 * covariance(GRID[place], share) + DEVIATIONS[size] ** 2 * bent @ bent.T
     whole = of_noise + slopes @ np.linalg.solve(PRECISION, slopes.T)
     assert found.evidence[hypothesis] == pytest.approx(density(residual - slopes @ MEAN, whole), abs=1e-3)
     for step in (np.zeros(2), np.array([0.03, -0.01])):

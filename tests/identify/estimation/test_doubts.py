@@ -1,7 +1,5 @@
 """A wrong unit shows as a depth that no tool goes to, or as a modulus that no tissue has."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -12,6 +10,7 @@ from epsmesh_identify.estimation.experiment import cases_of
 from epsmesh_identify.estimation.parts import Measured, Unknown
 from epsmesh_identify.experiment.curve import Curve
 from tests.cases import raw
+from tests.identify.estimation.synthetic import YOUNG, Ball
 
 
 @pytest.mark.parametrize(
@@ -37,20 +36,7 @@ def test_moduli(values):
     assert all("young" in line and "unit" in line for line in said)
 
 
-@dataclass(frozen=True)
-class Ball:
-    """A ball on tissue: F = E d^1.5 in SI units."""
-
-    names = ("young",)
-
-    def force(self, depth, values):
-        return values["young"] * np.maximum(depth, 0) ** 1.5
-
-    def error(self, depth, values):
-        return 0 * depth
-
-
-RANGE = Unknown("young", 1e3, 1e6, "Pa", is_logarithmic=True)
+BALL = Ball(radius=0.75**4)  # F = E d^1.5 in SI units
 MACHINE = Unknown("machine_stiffness", 3.0, 100.0, "N/m", is_logarithmic=True)
 
 
@@ -59,19 +45,19 @@ MACHINE = Unknown("machine_stiffness", 3.0, 100.0, "N/m", is_logarithmic=True)
 )
 def test_forces_that_no_modulus_of_the_range_gives(factor, part):
     depth = np.linspace(0, 2e-3, 200)
-    curve = Curve("punch", depth + 0.03, factor * Ball().force(depth - 1e-3, {"young": 20e3}))
-    said = doubts_of_force([Measured(curve, Ball())], [RANGE])
+    curve = Curve("punch", depth + 0.03, factor * BALL.force(depth - 1e-3, {"young": 20e3}))
+    said = doubts_of_force([Measured(curve, BALL)], [YOUNG])
     assert len(said) == bool(part) and part in "".join(said)
 
 
 def test_a_soft_machine_is_no_doubt():
     """The machine has most of the way: on a rigid one the modulus would be far below its range."""
     depth = np.linspace(0, 1e-3, 200)
-    force = Ball().force(depth, {"young": 2e3})
+    force = BALL.force(depth, {"young": 2e3})
     curve = Curve("punch", depth + 0.2 * force, force)
-    assert "is below" in doubts_of_force([Measured(curve, Ball())], [RANGE])[0]
-    assert not doubts_of_force([Measured(curve, Ball(), machine_compliance=0.2)], [RANGE])
-    assert not doubts_of_force([Measured(curve, Ball(), machine_compliance=None)], [RANGE, MACHINE])
+    assert "is below" in doubts_of_force([Measured(curve, BALL)], [YOUNG])[0]
+    assert not doubts_of_force([Measured(curve, BALL, machine_compliance=0.2)], [YOUNG])
+    assert not doubts_of_force([Measured(curve, BALL, machine_compliance=None)], [YOUNG, MACHINE])
 
 
 @pytest.mark.parametrize(
@@ -87,7 +73,7 @@ def test_what_an_error_of_the_radius_does(probe, radius, less):
     contact = "unilateral" if probe["shape"] in ("sphere", "paraboloid") else "frictionless"
     unset = {"radius": None} if "radius" not in probe else {}
     case = next(parse(raw(probe={**unset, **probe, "contact": contact})).cases())
-    said = list(doubts_of_radius([case], [RANGE]))
+    said = list(doubts_of_radius([case], [YOUNG]))
     assert len(said) == bool(radius)
     assert not radius or (f"radius of {radius}" in said[0] and f"E is about {less} % less" in said[0])
-    assert not list(doubts_of_radius([case], [RANGE, Unknown("radius of a", 1e-3, 4e-3, "m")]))
+    assert not list(doubts_of_radius([case], [YOUNG, Unknown("radius of a", 1e-3, 4e-3, "m")]))

@@ -42,7 +42,7 @@ def test_a_baseline_tilts_where_there_is_air_and_is_level_by_assumption_elsewher
     assert "tilt" not in [unknown.name for unknown in level.unknowns]
     assert not level.fits or level.high[0] < 2e4 or level.low[0] > 2e4
     # Little air tells little of the tilt: the bar is that of what is known beforehand.
-    short = identify([measured(OfYoung(Punch()), values, error, 2e-4, 0.03, tilt=0.04)], [YOUNG])
+    short = identify([measured(Punch(names=("young",)), values, error, 2e-4, 0.03, tilt=0.04)], [YOUNG])
     assert short.low[0] <= 2e4 <= short.high[0]
     assert not any("taken for level" in sentence for sentence in short.notes)
     deep = identify([measured(Ball(), values, error, 2e-4, 0.0)], [YOUNG])
@@ -183,7 +183,6 @@ def test_a_modulus_beyond_its_range_is_no_fit():
     error = 0.003 * noise(np.random.default_rng(6), 200, 0.3)
     found = identify([measured(Ball(), {"young": 5e6}, error, 2e-4)], [YOUNG])
     assert found.verdict.startswith("does not fit within the ranges")
-    assert np.isnan(found.high[0])
     assert any("E is the end of its range, 1.00 MPa" in sentence for sentence in found.notes)
 
 
@@ -192,8 +191,7 @@ def test_a_modulus_beyond_its_range_is_no_fit():
 def test_curves_of_simulations_fit_with_small_bars(law, air):
     """Without noise: exact, of another shape by 0.3 % of the force or 0.02 %, and rounded."""
     depth = np.linspace(-air * 2e-4, 2e-4, 60)
-    share, force = np.clip(depth / 2e-4, 0.0, 1.0), law.force(depth, {"young": 2e4, "poisson": 0.5})
-    law = OfYoung(law)
+    share, force = np.clip(depth / 2e-4, 0.0, 1.0), law.force(depth, {"young": 2e4})
     for other in (
         force,
         force * (1 + 3e-3 * share),
@@ -204,21 +202,6 @@ def test_curves_of_simulations_fit_with_small_bars(law, air):
         assert found.fits
         assert found.low[0] <= 2e4 <= found.high[0]
         assert found.high[0] - found.low[0] < 0.01 * 2e4
-
-
-class OfYoung:
-    """A law with Poisson's ratio known."""
-
-    names = ("young",)
-
-    def __init__(self, law):
-        self.law = law
-
-    def force(self, depth, values):
-        return self.law.force(depth, {**values, "poisson": 0.5})
-
-    def error(self, depth, values):
-        return self.law.error(depth, values)
 
 
 def test_noise_without_contact_tells_nothing():

@@ -10,7 +10,7 @@ from epsmesh_identify.estimation.noise import Noise, deviation, whiten
 from epsmesh_identify.estimation.parts import Measured
 from epsmesh_identify.estimation.relaxing import relaxed
 from epsmesh_identify.experiment.curve import Curve
-from tests.identify.estimation.synthetic import DRIFT, YOUNG, Ball, measured, noise
+from tests.identify.estimation.synthetic import DRIFT, YOUNG, Ball, covariance, measured, noise
 
 
 @pytest.mark.parametrize(
@@ -18,13 +18,10 @@ from tests.identify.estimation.synthetic import DRIFT, YOUNG, Ball, measured, no
 )
 def test_whitening_inverts_the_dense_covariance(one):
     rng, share = np.random.default_rng(0), np.linspace(0, 1, 200)
-    lags = np.abs(np.subtract.outer(np.arange(200), np.arange(200)))
-    scale = 1 + one.growth * share
-    covariance = scale[:, None] * ((1 - one.white) * one.correlation**lags + one.white * np.eye(200)) * scale
-    columns = rng.normal(size=(200, 3))
+    columns, dense = rng.normal(size=(200, 3)), covariance(one, share)
     white, half = whiten(columns, share, one)
-    assert white.T @ white == pytest.approx(columns.T @ np.linalg.solve(covariance, columns), rel=1e-9)
-    assert half == pytest.approx(np.linalg.slogdet(covariance)[1] / 2, rel=1e-9)
+    assert white.T @ white == pytest.approx(columns.T @ np.linalg.solve(dense, columns), rel=1e-9)
+    assert half == pytest.approx(np.linalg.slogdet(dense)[1] / 2, rel=1e-9)
 
 
 def test_deviations_vanish_faster_than_the_force():

@@ -9,6 +9,7 @@ from epsmesh_identify.experiment.curve import Curve
 from epsmesh_identify.experiment.read import read_curve
 from epsmesh_identify.experiment.reading import ExperimentError, Reading
 from tests.identify.estimation.synthetic import YOUNG, Ball, Punch, measured, noise
+from tests.identify.experiment.curves import write
 
 FLAT = Punch(names=("young",))
 # A law, its noise and correlation, the tilt of the baseline.
@@ -20,32 +21,17 @@ CURVES = {
 }
 
 
-class Incompressible:
-    """A law whose Poisson's ratio is known."""
-
-    names = ("young",)
-
-    def __init__(self, law):
-        self.law = law
-
-    def force(self, depth, values):
-        return self.law.force(depth, {**values, "poisson": 0.5})
-
-    def error(self, depth, values):
-        return self.law.error(depth, values)
-
-
 def curve_of(name):
     law, level, correlation, tilt = CURVES[name]
     error = level * noise(np.random.default_rng(3), 240, correlation)
-    return measured(Incompressible(law), {"young": 2e4}, error, 2e-4, 0.7, tilt=tilt)
+    return measured(law, {"young": 2e4}, error, 2e-4, 0.7, tilt=tilt)
 
 
-def write(path, curve, length, force, rows=slice(None)):
+def written(path, curve, length, force, rows=slice(None)):
     """Write a curve in units of a ``length`` and a ``force``, by name and size."""
-    columns = np.column_stack([curve.time, curve.depth / length[1], curve.force / force[1]])[rows]
-    np.savetxt(path, columns, delimiter=",", header=f"time (s),depth ({length[0]}),force ({force[0]})", comments="")
-    return path
+    columns = {"time (s)": curve.time, f"depth ({length[0]})": curve.depth / length[1]}
+    columns |= {f"force ({force[0]})": curve.force / force[1]}
+    return write(path, {name: column[rows] for name, column in columns.items()})
 
 
 @pytest.mark.parametrize("name", CURVES)
@@ -58,8 +44,8 @@ def test_units_and_zeros_change_nothing_and_fewer_rows_little(tmp_path, name):
         assert fit.fits
         return fit.estimate[0], fit.low[0], fit.high[0]
 
-    si = read_curve(write(tmp_path / "si.csv", one.curve, ("m", 1.0), ("N", 1.0)), Reading())
-    small = read_curve(write(tmp_path / "small.csv", one.curve, ("µm", 1e-6), ("nN", 1e-9)), Reading())
+    si = read_curve(written(tmp_path / "si.csv", one.curve, ("m", 1.0), ("N", 1.0)), Reading())
+    small = read_curve(written(tmp_path / "small.csv", one.curve, ("µm", 1e-6), ("nN", 1e-9)), Reading())
     moved = Curve("moved", si.depth + 0.02, si.force - 0.3 * np.ptp(si.force), si.time + 50.0)
     whole = found(si)
     width = whole[2] - whole[1]
@@ -73,6 +59,6 @@ def test_units_and_zeros_change_nothing_and_fewer_rows_little(tmp_path, name):
 
 def test_rows_in_no_order_are_no_curve(tmp_path):
     order = np.random.default_rng(1).permutation(240)
-    path = write(tmp_path / "shuffled.csv", curve_of("ball").curve, ("mm", 1e-3), ("mN", 1e-3), order)
+    path = written(tmp_path / "shuffled.csv", curve_of("ball").curve, ("mm", 1e-3), ("mN", 1e-3), order)
     with pytest.raises(ExperimentError, match="in no order"):
         read_curve(path, Reading())

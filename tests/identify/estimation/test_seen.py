@@ -33,7 +33,7 @@ def punches(*names, seed=1):
 
 
 @pytest.mark.parametrize("name", WIDTH)
-def test_one_punch_sees_a_product_and_two_see_both(name):
+def test_one_punch_sees_a_product(name):
     """The narrow one sees the plane-strain modulus; below the wide one the layer's exponent is larger."""
     one = identify(punches(name), [YOUNG, POISSON])
     (sentence,) = one.notes
@@ -41,14 +41,6 @@ def test_one_punch_sees_a_product_and_two_see_both(name):
     assert found
     assert float(found[2]) < 3
     assert (float(found[1] or 1) < 1.25) == (name == "narrow")
-
-
-def test_two_punches_see_poissons_ratio():
-    """a/h = 0.1 and 1: each modulus has a bar of its own, and nothing is left to say."""
-    both = identify(punches(*WIDTH), [YOUNG, POISSON])
-    assert both.seen[:2].all()
-    assert both.high[1] - both.low[1] < 0.1
-    assert both.low[1] <= 0.45 <= both.high[1]
 
 
 class Membrane:

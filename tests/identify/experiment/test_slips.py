@@ -82,6 +82,10 @@ ERRORS = {
     "a word among numbers": (
         GOOD, {"change": cell(149, 2, "OVERLOAD")}, {}, ["line 150", "`force (mN)`", '"OVERLOAD"'],
     ),
+    "a word among numbers, and no depth": (
+        {"time (s)": TIME, "spare": DEPTH, "force (mN)": FORCE}, {"change": cell(149, 2, "OVERLOAD")}, {},
+        ["depth is not found", '`force (mN)` has text, "OVERLOAD" in line 150'],
+    ),
     "empty column": (
         GOOD | {"force (mN)": np.nan * TIME}, {}, {"columns": {"force": 3}}, ["`force (mN)`", "no values"],
     ),
@@ -181,6 +185,10 @@ TOLD = {
         {"depth (mm)": np.arange(200) / 10, "time (s)": 12 + 1e3 * DEPTH + 3e-3 * np.cos(np.arange(200)),
          "force (mN)": 1e3 * FORCE}, {}, ["even steps from 0", "swapped"],
     ),
+    "words for times": (
+        GOOD, {"change": lambda x: [x[0], *(f"at {row}" for row in x[1:])]},
+        ['`time (s)` has text, "at 0" in line 2', "not read as time"],
+    ),
     "gap in time": (GOOD | {"time (s)": TIME + 30 * (TIME > 10)}, {}, ["gap of 30", "time", "line 102"]),
     "gap in depth": (
         GOOD, {"change": lambda lines: lines[:140] + lines[165:]}, ["gap of 0.00026", "depth", "line 141"],
@@ -220,8 +228,7 @@ def test_a_slip_is_an_error_by_name(tmp_path, slip):
     path = write(tmp_path / "curve.csv", columns, **how)
     with pytest.raises(ExperimentError) as caught:
         read_curve(path, Reading(**given))
-    for part in (str(path), *parts):
-        assert part in str(caught.value)
+    assert all(part in str(caught.value) for part in (str(path), *parts)), caught.value
 
 
 @pytest.mark.parametrize("slip", TOLD)
@@ -231,26 +238,31 @@ def test_a_slip_is_told(tmp_path, slip):
     assert any(all(part in line for part in parts) for line in notes), notes
 
 
+BINARY = b"\x01\x00\x02\x00" * 99
+# By name of the file: what is in it, and words of the message.
 NO_CURVES = {
-    "missing": (None, "No such file"),
-    "empty": (b"", "is empty"),
-    "blank": (b" \n\n", "is empty"),
-    "a spreadsheet": (b"PK\x03\x04 rest", "spreadsheet"),
-    "HDF5": (b"\x89HDF\r\n", "HDF5"),
-    "binary": (b"\x01\x00\x02\x00" * 99, "binary"),
-    "a letter": (b"Dear all,\nplease find the curves\nin the other folder.\n", "no table of numbers"),
-    "one column": (b"1.0\n2.0\n3.0\n", "no table of numbers"),
+    "empty.csv": (b"", "is empty"),
+    "blank.csv": (b" \n\n", "is empty"),
+    "spreadsheet.csv": (b"PK\x03\x04 rest", "spreadsheet"),
+    "HDF5.csv": (b"\x89HDF\r\n", "HDF5"),
+    "binary.csv": (BINARY, "binary"),
+    "binary.other": (BINARY, "binary"),
+    "binary.xlsx": (BINARY, "spreadsheet"),
+    "binary.ibw": (BINARY, "Igor"),
+    "binary.jpk-force": (BINARY, "JPK"),
+    "letter.csv": (b"Dear all,\nplease find the curves\nin the other folder.\n", "no table of numbers"),
+    "one-column.csv": (b"1.0\n2.0\n3.0\n", "no table of numbers"),
 }
 
 
-@pytest.mark.parametrize("kind", NO_CURVES)
-def test_what_is_no_table_is_told(tmp_path, kind):
-    data, part = NO_CURVES[kind]
-    path = tmp_path / "curve.csv"
-    if data is not None:
-        path.write_bytes(data)
+@pytest.mark.parametrize("name", NO_CURVES)
+def test_what_is_no_table_is_told(tmp_path, name):
+    data, part = NO_CURVES[name]
+    with pytest.raises(ExperimentError, match="No such file"):
+        read_curve(tmp_path / name, Reading())
+    (tmp_path / name).write_bytes(data)
     with pytest.raises(ExperimentError, match=part):
-        read_curve(path, Reading())
+        read_curve(tmp_path / name, Reading())
 
 
 def test_a_saturated_part_is_not_used(tmp_path):

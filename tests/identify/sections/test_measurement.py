@@ -11,7 +11,7 @@ from epsmesh.study.toml import to_toml
 from epsmesh_identify.estimation.unknowns import unknowns
 from epsmesh_identify.sections.kept import identification_of, measurements_of
 from epsmesh_identify.sections.scenes import scene_of
-from tests.cases import raw
+from tests.cases import raw, refusal
 
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.48}
 CURVE = {"name": "punch", "file": "curve.csv"}
@@ -103,10 +103,8 @@ MISTAKES = {
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_mistakes_are_named(mistake):
     measurements, identify, parts = MISTAKES[mistake]
-    with pytest.raises(StudyError) as caught:
-        parse(layered(*measurements, **identify))
-    for part in parts:
-        assert part in str(caught.value)
+    said = refusal(layered(*measurements, **identify))
+    assert all(part in said for part in parts), said
 
 
 def test_a_single_table_is_no_array():

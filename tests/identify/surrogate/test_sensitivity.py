@@ -8,6 +8,7 @@ import xarray as xr
 
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import read_mapping
+from epsmesh.study.toml import to_toml
 from epsmesh_identify.report.sensitivity import answer
 from epsmesh_identify.surrogate.cases import SurrogateError
 from epsmesh_identify.surrogate.sensitivity import dataset_of, explain
@@ -207,28 +208,10 @@ def test_a_case_without_an_error_bar_is_told():
 
 
 def test_the_command_writes_a_dataset_and_a_figure_and_tells_what_matters_most(epsmesh, tmp_path):
-    text = """
-        [body]
-        shape = "cylinder"
-        radius = "60 mm"
-        height = "60 mm"
-        fixed = "bottom"
-        [material]
-        young = "10 kPa"
-        poisson = 0.45
-        [probe]
-        shape = "disc"
-        radius = "2 mm"
-        depth = "0.1 mm"
-        contact = "frictionless"
-        [mesh]
-        accuracy = "1 %"
-        [sensitivity]
-        young = ["5 kPa", "20 kPa"]
-        poisson = [0.2, 0.5]
-        """
+    body = PUNCH["body"] | {"radius": "60 mm", "height": "60 mm"}
+    varied = {"young": ["5 kPa", "20 kPa"], "poisson": [0.2, 0.5]}
     study = tmp_path / "punch.toml"
-    study.write_text(text, encoding="utf-8")
+    study.write_text(to_toml(PUNCH | {"body": body, "mesh": {"accuracy": "1 %"}, "sensitivity": varied}, "punch"))
     ran = epsmesh("sensitivity", study, "--output", tmp_path, "--json")
     found = json.loads(ran.stdout)["outputs"]["force"]["parameters"]
     assert found["young"]["total"] > 0.9
