@@ -52,13 +52,23 @@ def write_stl(path: Path, points: np.ndarray, facets: np.ndarray) -> Path:
     return path
 
 
+def write_nifti(path: Path, values: np.ndarray, affine: np.ndarray, unit: str = "mm", extension: str = "") -> Path:
+    """Write an image whose ``affine`` (4, 4) is in the ``unit``, with an extension of its header."""
+    import nibabel
+
+    image = nibabel.Nifti1Image(values, affine)
+    image.header.set_xyzt_units(unit)
+    if extension:
+        image.header.extensions.append(nibabel.nifti1.Nifti1Extension(0, extension.encode()))
+    nibabel.save(image, path)
+    return path
+
+
 def write_labels(path: Path, voxel: float, ellipsoids: list[tuple[np.ndarray, np.ndarray]]) -> Path:
     """Write a label map (NIfTI) of cubic voxels (m): of ellipsoids, each with its centre and semi-axes (m).
 
     They have the labels 1, 2, …; where they overlap, the last one counts.
     """
-    import nibabel
-
     (centre, axes), *_ = ellipsoids
     count = np.ceil(axes / voxel).astype(int) + 3
     grid = np.stack(np.meshgrid(*[np.arange(-n, n + 1) for n in count], indexing="ij"), axis=-1)
@@ -68,7 +78,4 @@ def write_labels(path: Path, voxel: float, ellipsoids: list[tuple[np.ndarray, np
         labels[(((points - middle) / semi_axes) ** 2).sum(axis=-1) < 1] = number
     affine = np.diag([1e3 * voxel] * 3 + [1.0])
     affine[:3, 3] = 1e3 * (centre + (shift - count) * voxel)
-    image = nibabel.Nifti1Image(labels, affine)
-    image.header.set_xyzt_units("mm")
-    nibabel.save(image, path)
-    return path
+    return write_nifti(path, labels, affine)

@@ -3,7 +3,6 @@
 import struct
 
 import meshio
-import nibabel
 import nrrd
 import numpy as np
 import pytest
@@ -26,7 +25,7 @@ from epsmesh_realtime.export.file import open_model
 from tests.cases import study
 from tests.fuzz.profile import thrown
 from tests.identify.experiment.curves import cycle, write
-from tests.organs import box, write_stl
+from tests.organs import box, write_nifti, write_stl
 from tests.realtime.synthetic import write_random
 from tests.shapes.files import dicoms
 
@@ -67,9 +66,7 @@ def good(tmp_path_factory):
     places = np.stack(np.meshgrid(*3 * [np.arange(12)], indexing="ij"), -1)
     ball = (((places - 5.5) ** 2).sum(-1) < 16).astype(np.uint8)
     for ending in ("nii", "nii.gz"):
-        image = nibabel.Nifti1Image(ball, np.diag([2.0, 2.0, 2.0, 1.0]))
-        image.header.set_xyzt_units("mm")
-        nibabel.save(image, folder / f"ball.{ending}")
+        write_nifti(folder / f"ball.{ending}", ball, np.diag([2.0, 2.0, 2.0, 1.0]))
     nrrd.write(str(folder / "ball.nrrd"), ball, {"space directions": 2 * np.eye(3), "space origin": np.zeros(3),
                "space": "right-anterior-superior", "space units": ["mm"] * 3})  # fmt: skip
     dicoms.segmentation(folder / "ball.dcm", dicoms.frames(dicoms.values()))

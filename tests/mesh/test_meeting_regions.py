@@ -12,8 +12,9 @@ from epsmesh.study.problems import StudyError
 from epsmesh_realtime.export.scope import ExportError, scope_of
 from tests.cases import solve, study
 from tests.complexes import scene
+from tests.organs import write_nifti
 
-nibabel = pytest.importorskip("nibabel")
+pytest.importorskip("nibabel")
 
 PROBE = {"shape": "disc", "radius": "4 mm", "depth": "0.1 mm", "at": ["-4 mm", "4 mm", "20 mm"]}
 MESH = {"epsilon": "full", "fine": "12 mm", "coarse": "12 mm", "rim": "1.5 mm", "growth": 1.0}
@@ -24,10 +25,7 @@ TUMOUR = {"name": "tumour", "label": 7} | TISSUE
 
 
 def write(path, labels: LabelMap):
-    image = nibabel.Nifti1Image(labels.values.astype(np.uint8), np.vstack([1e3 * labels.affine, [0, 0, 0, 1]]))
-    image.header.set_xyzt_units("mm")
-    nibabel.save(image, path)
-    return path
+    return write_nifti(path, labels.values.astype(np.uint8), np.vstack([1e3 * labels.affine, [0, 0, 0, 1]]))
 
 
 @pytest.fixture(scope="module")

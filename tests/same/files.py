@@ -7,13 +7,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import nibabel
 import nrrd
 import numpy as np
 
 from tests import organs
 from tests.pairs import BASE, FEATURES, Study
-from tests.same.pair import LAW_KEYS, TISSUE_KEYS, Pair, change, copied, has, is_large, without
+from tests.same.pair import TISSUE_KEYS, Pair, change, copied, has, lump_in, without
 from tests.same.quantities import number_of
 from tests.same.scenes import write_files as write_common
 
@@ -86,9 +85,8 @@ def _write_images(folder: Path) -> None:
     write("renumbered.nrrd", np.array([0, 7, 3], dtype=np.uint8)[label], axes, origin)
     affine = np.eye(4)
     affine[:3, :3], affine[:3, 3] = axes.T, origin
-    image = nibabel.Nifti1Image(label, np.diag([-1.0, -1.0, 1.0, 1.0]) @ affine)  # to the right and to the front
-    image.header.set_xyzt_units("mm")
-    nibabel.save(image, folder / "lump.nii.gz")
+    # To the right and to the front.
+    organs.write_nifti(folder / "lump.nii.gz", label, np.diag([-1.0, -1.0, 1.0, 1.0]) @ affine)
 
 
 def _in_file(study: Study, kind: str) -> Study | None:
@@ -99,14 +97,8 @@ def _in_file(study: Study, kind: str) -> Study | None:
     other = copy.deepcopy(study)
     next(feature for feature in FEATURES if feature.name == kind).change(other)
     if kind == "image":
-        other["body"].update(file="lump.nrrd", label=1, region=[_lump(study) | {"label": 2}])
+        other["body"].update(file="lump.nrrd", label=1, region=[lump_in(study) | {"label": 2}])
     return other
-
-
-def _lump(study: Study) -> dict[str, Any]:
-    lump = {"name": "lump", "young": "60 kPa", "poisson": 0.3, "density": "1000 kg/m^3"}
-    laws = LAW_KEYS if is_large(study) else ()
-    return lump | {key: copy.deepcopy(study["material"][key]) for key in laws if key in study["material"]}
 
 
 @change("a file in another format, unit, order or frame")

@@ -8,10 +8,13 @@ from dataclasses import replace
 from itertools import pairwise, product
 from math import cos, inf, pi, sin
 
+import gmsh
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from epsmesh.compat import gmsh_session
+from epsmesh.mesh.curve import EDGES, curve
 from epsmesh.mesh.generate import generate
 from epsmesh.mesh.size import Sizes
 from epsmesh.plan.key import case_key, normalised, reference_key
@@ -21,6 +24,7 @@ from epsmesh.shapes.frame import Frame
 from epsmesh.shapes.probe import PLANES, Probe
 from epsmesh.shapes.registry import BODIES, PROBES, specialised
 from epsmesh.shapes.section import words_of
+from epsmesh.study.problems import StudyError
 from tests.cases import study
 
 # A body that is not drawn has a file: see tests/shapes/test_scanned.py.
@@ -249,11 +253,11 @@ def distance_to_outline(probe, points):
     return np.linalg.norm(offset - share[..., None] * side, axis=2).min(axis=1)
 
 
-def edge_distance(probe, points):
-    """Return the distance of points (n, 3), in own coordinates, to the edge by the probe's own text."""
+def said_distance(text, points):
+    """Return the distance that a probe's ``text`` of x, y and z in mm has at points (n, 3), in own coordinates."""
     names = {"Sqrt": np.sqrt, "Max": np.maximum, "Min": np.minimum, "Fabs": np.abs}
-    x, y, z = 1e3 * points.T
-    return 1e-3 * eval(probe.edge_distance("x", "y", "z", 1e3).replace("^", "**"), names, {"x": x, "y": y, "z": z})
+    places = dict(zip("xyz", 1e3 * points.T, strict=True))
+    return 1e-3 * eval(text("x", "y", "z", 1e3).replace("^", "**"), names, places)
 
 
 def flat(points):
@@ -263,17 +267,13 @@ def flat(points):
 def test_edge_distance_is_nought_at_the_edge_and_near_the_truth_elsewhere(a_probe):
     points = np.random.default_rng(3).uniform(-3, 3, (60, 3)) * a_probe.circumradius
     true = np.hypot(distance_to_outline(a_probe, points[:, :2]), points[:, 2])
-    said = edge_distance(a_probe, points)
+    said = said_distance(a_probe.edge_distance, points)
     assert np.all((0.6 * true < said) & (said < 2 * true))
-    assert edge_distance(a_probe, flat(a_probe.outline())).max() < 1e-9
+    assert said_distance(a_probe.edge_distance, flat(a_probe.outline())).max() < 1e-9
 
 
 def drawn_edge(probe, body):
     """Return points of every curve of the drawn footprint, in its own coordinates, and the curves' types."""
-    import gmsh
-
-    from epsmesh.compat import gmsh_session
-
     frame, curves, kinds = probe.frame_on(body), [], set()
     with gmsh_session():
         gmsh.option.setNumber("General.Terminal", 0)
@@ -291,7 +291,7 @@ def test_the_drawn_edge_is_that_of_edge_distance(a_probe, a_body):
     """For every curve; if one of them is not straight, elements are curved."""
     points, kinds = drawn_edge(a_probe, a_body)
     assert np.abs(points[:, 2]).max() < 1e-12
-    assert edge_distance(a_probe, points).max() < 1e-9 * a_probe.circumradius
+    assert said_distance(a_probe.edge_distance, points).max() < 1e-9 * a_probe.circumradius
     assert a_probe.is_curved == (kinds != {"Line"})
 
 
@@ -304,7 +304,7 @@ def test_to_edge_returns_the_nearest_points_of_a_curved_edge(a_probe):
     if not a_probe.is_curved:
         assert np.array_equal(nearest, points)
         return
-    assert edge_distance(a_probe, flat(nearest)).max() < 1e-9 * a_probe.circumradius
+    assert said_distance(a_probe.edge_distance, flat(nearest)).max() < 1e-9 * a_probe.circumradius
     least = distance_to_outline(a_probe, points)
     np.testing.assert_allclose(np.linalg.norm(nearest - points, axis=1), least, atol=1e-3 * a_probe.half_width)
 
@@ -329,15 +329,12 @@ def test_what_is_drawn_lies_within_the_outline_and_has_its_area(meshed):
 
 
 def test_curved_edges_lie_on_the_outline(meshed):
-    from epsmesh.mesh.curve import curve
-
     scene, _ = meshed
     scene = Scene(scene.body, scene.probe, rim_segments=SIZES.rim_segments(scene.probe))
     mesh = curve(generate(scene, SIZES), scene)
     patch = np.isin(mesh.cells[:, :4], mesh.rim)
     assert patch.sum(axis=1).max() >= 2
-    pairs = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
-    ends, middle = mesh.cells[:, :4][:, pairs], mesh.cells[:, 4:]
+    ends, middle = mesh.cells[:, :4][:, EDGES], mesh.cells[:, 4:]
     along = np.isin(ends, mesh.rim).all(axis=2)
     if scene.is_flat:
         along &= np.abs(mesh.points[middle][..., 2]) < 1e-12
@@ -367,11 +364,9 @@ def test_edge_distance_of_a_slender_ellipse_is_never_too_large(slender):
     """Elements grow with that distance: if it were too large, the footprint would have few of them."""
     for axes in ((f"{slender} mm", "1 mm"), ("1 mm", f"{slender} mm")):
         ellipse = probe("ellipse", axes=axes)
-        names = {"Sqrt": np.sqrt, "Max": np.maximum}
-        code = ellipse.edge_distance("x", "y", "0", 1e3).replace("^", "**")
-        x, y = np.random.default_rng(5).uniform(-1.5, 1.5, (2, 2000)) * np.array(ellipse.axes)[:, None]
-        true = np.linalg.norm(ellipse.outline()[None] - np.stack([x, y], axis=1)[:, None], axis=2).min(axis=1)
-        said = 1e-3 * eval(code, names, {"x": 1e3 * x, "y": 1e3 * y})
+        points = np.random.default_rng(5).uniform(-1.5, 1.5, (2000, 2)) * ellipse.axes
+        true = np.linalg.norm(ellipse.outline()[None] - points[:, None], axis=2).min(axis=1)
+        said = said_distance(ellipse.edge_distance, flat(points))
         apart = true > 0.02e-3  # the outline is a polygon
         assert np.all(said[apart] < 1.02 * true[apart])
         assert np.all(said[apart] > 0.58 * true[apart])
@@ -480,10 +475,7 @@ def test_the_section_of_a_round_tool_has_its_profile_as_integral(a_probe):
 
 def test_elements_are_small_where_contact_is_expected_to_end(a_probe):
     """Within the footprint, at its edge if that is singular; over a band if the edge of contact is not known."""
-    names = {"Sqrt": np.sqrt, "Max": np.maximum, "Min": np.minimum, "Fabs": np.abs}
-    points = 1e3 * inside(a_probe, 20_000)
-    code = a_probe.rim_distance("x", "y", "z", 1e3).replace("^", "**")
-    distance = 1e-3 * eval(code, names, {"x": points[:, 0], "y": points[:, 1], "z": np.zeros(len(points))})
+    distance = said_distance(a_probe.rim_distance, flat(inside(a_probe, 20_000)))
     length, area = a_probe.rim_size
     assert length > 0
     assert np.all(distance <= a_probe.circumradius)
@@ -509,10 +501,6 @@ def test_a_frame_turns_forth_and_back():
 
 def test_a_frame_places_what_is_drawn_and_writes_its_coordinates():
     """A rectangle drawn upright is rotated into the frame's plane, along its direction."""
-    import gmsh
-
-    from epsmesh.compat import gmsh_session
-
     for axis in ((0.6, 0.0, -0.8), (0.0, 0.6, 0.8), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)):
         frame = Frame((1e-3, 2e-3, 3e-3), axis=axis).turned((1.0, 2.0, 0.5))
         blade = probe("blade")
@@ -544,8 +532,6 @@ def test_a_shape_that_leaves_something_out_cannot_be_made(model, base):
 
 
 def test_what_is_not_in_the_registry_is_refused():
-    from epsmesh.study.problems import StudyError
-
     for section, shape in (("body", "torus"), ("probe", "star")):
         with pytest.raises(StudyError, match="unknown shape"):
             study(**{section: {"shape": shape}})

@@ -160,14 +160,8 @@ TUMOUR = {"name": "tumour", "at": ["0 mm"] * 3, "radius": "3 mm", "young": "1 kP
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused(folder, changes, words):
-    body = {
-        "shape": "surface",
-        "file": str(folder / "ellipsoid.stl"),
-        "unit": "mm",
-        "fixed": {"below": "-10 mm"},
-    } | changes
     with pytest.raises(StudyError, match=words):
-        study(body={key: value for key, value in body.items() if value is not None})
+        case(folder / "ellipsoid.stl", **changes)
 
 
 TEXT = (

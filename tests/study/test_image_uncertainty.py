@@ -18,7 +18,7 @@ from epsmesh.study.read import read_mapping
 from epsmesh_identify.estimation.dataset import write
 from tests.cases import raw, study
 from tests.identifications import identification
-from tests.organs import box, write_stl
+from tests.organs import box, write_nifti, write_stl
 
 RADIUS, VOXEL = 14.0, (1.5, 1.5, 2.0)  # mm
 CUBE_ROOT = np.prod(VOXEL) ** (1 / 3)
@@ -32,11 +32,8 @@ def image(tmp_path_factory) -> Path:
     affine[:3, 3] = [-0.5 * v * (n - 1) + 0.1 for v, n in zip(VOXEL, shape, strict=True)]
     places = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1) * VOXEL + affine[:3, 3]
     r = np.linalg.norm(places, axis=-1)
-    found = nibabel.Nifti1Image(((r < RADIUS) * 1 + (r < 6)).astype(np.uint8), affine)
-    found.header.set_xyzt_units("mm")
-    path = tmp_path_factory.mktemp("image") / "ball.nii"
-    nibabel.save(found, path)
-    return path
+    values = ((r < RADIUS) * 1 + (r < 6)).astype(np.uint8)
+    return write_nifti(tmp_path_factory.mktemp("image") / "ball.nii", values, affine)
 
 
 def body(image, **keys):

@@ -73,6 +73,7 @@ def taplo():
     return str(found) if found.exists() else shutil.which("taplo") or pytest.skip("taplo is not installed")
 
 
+@pytest.mark.nightly
 def test_taplo_takes_every_study_and_finds_a_broken_one(taplo, tmp_path, monkeypatch):
     """By the file that `epsmesh new` writes beside a study, and by the settings of the project."""
     for path in (Path(".taplo.toml"), *STUDIES):

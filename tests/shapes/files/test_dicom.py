@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import nibabel
 import numpy as np
 import pydicom
 import pytest
@@ -12,14 +11,12 @@ from pydicom.uid import DeflatedExplicitVRLittleEndian
 from epsmesh.shapes.files.image import read_image
 from epsmesh.shapes.files.labels import read_labels
 from epsmesh.shapes.triangles import SurfaceError
+from tests.organs import write_nifti
 from tests.shapes.files import dicoms
 
 
 def _nifti(path: Path) -> Path:
-    image = nibabel.Nifti1Image(dicoms.values(), dicoms.affine())
-    image.header.set_xyzt_units("mm")
-    nibabel.save(image, path)
-    return path
+    return write_nifti(path, dicoms.values(), dicoms.affine())
 
 
 def _same(path: Path, nifti: Path) -> None:

@@ -14,6 +14,7 @@ from epsmesh.shapes.files.crossings import crossings
 from epsmesh.shapes.files.image import read_image
 from epsmesh.shapes.files.label_surface import default_smooth, filtered
 from epsmesh.shapes.triangles import SurfaceError, Triangles, doubled_normals
+from tests.organs import write_nifti
 
 AXES = np.array([40.0, 30.0, 20.0])  # mm
 CENTRE = np.array([10.31, -20.17, 55.43])  # mm: right, front, head; on no voxel
@@ -32,13 +33,6 @@ def _ellipsoid(affine: FloatArray, shape: tuple[int, ...], label: int = 2) -> np
     return (((((places - CENTRE) / AXES) ** 2).sum(-1) < 1) * label).astype(np.uint8)
 
 
-def _nifti(path: Path, values: np.ndarray, affine: FloatArray, unit: str = "mm") -> Path:
-    image = nibabel.Nifti1Image(values, affine)
-    image.header.set_xyzt_units(unit)
-    nibabel.save(image, path)
-    return path
-
-
 def _distances(triangles: Triangles) -> FloatArray:
     """Return distances (m) of its points from the ellipsoid, to first order."""
     place, axes = triangles.points - CENTRE / 1e3, AXES / 1e3
@@ -49,13 +43,13 @@ def _distances(triangles: Triangles) -> FloatArray:
 @pytest.fixture
 def scan(tmp_path: Path) -> Path:
     affine = _affine(2.0)
-    return _nifti(tmp_path / "scan.nii.gz", _ellipsoid(affine, (51, 51, 51)), affine)
+    return write_nifti(tmp_path / "scan.nii.gz", _ellipsoid(affine, (51, 51, 51)), affine)
 
 
 @pytest.mark.parametrize("size", [1.0, 2.0])
 def test_the_surface_is_within_a_tenth_of_a_voxel_and_keeps_the_volume(size: float, tmp_path: Path):
     affine = _affine(size)
-    path = _nifti(tmp_path / "scan.nii", _ellipsoid(affine, (int(100 / size) + 1,) * 3), affine)
+    path = write_nifti(tmp_path / "scan.nii", _ellipsoid(affine, (int(100 / size) + 1,) * 3), affine)
     triangles = read_image(path, 2).triangles
     assert np.sqrt((_distances(triangles) ** 2).mean()) < 0.1e-3 * size
     assert triangles.volume == pytest.approx(VOLUME, rel=0.005)
@@ -85,7 +79,7 @@ def test_the_filter_is_narrowed_for_a_label_that_is_thin_everywhere(thickness: i
 
 def test_thick_slices_are_smoothed_over_their_distance(tmp_path: Path):
     affine = _affine((1.0, 1.0, 5.0))
-    triangles = read_image(_nifti(tmp_path / "scan.nii", _ellipsoid(affine, (101, 101, 21)), affine), 2).triangles
+    triangles = read_image(write_nifti(tmp_path / "scan.nii", _ellipsoid(affine, (101, 101, 21)), affine), 2).triangles
     assert default_smooth(np.array([1e-3, 1e-3, 5e-3])) == pytest.approx(5e-3)
     assert np.sqrt((_distances(triangles) ** 2).mean()) < 0.12 * 5e-3
     assert triangles.volume == pytest.approx(VOLUME, rel=0.01)
@@ -95,7 +89,7 @@ def test_voxels_may_be_turned_and_mirrored(tmp_path: Path):
     turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0] @ np.diag([2.0, 2.0, -2.0])
     affine = np.eye(4)
     affine[:3, :3], affine[:3, 3] = turn, CENTRE - turn @ (40, 40, 40)
-    triangles = read_image(_nifti(tmp_path / "scan.nii", _ellipsoid(affine, (81, 81, 81)), affine), 2).triangles
+    triangles = read_image(write_nifti(tmp_path / "scan.nii", _ellipsoid(affine, (81, 81, 81)), affine), 2).triangles
     assert triangles.volume == pytest.approx(VOLUME, rel=0.005)
     assert abs(_distances(triangles)).max() < 1.2e-3
 
@@ -119,7 +113,7 @@ def test_no_facets_cross_however_ragged_the_label_is(smooth: float | None, tmp_p
     random = np.random.Generator(np.random.PCG64(4)).random(values.shape)
     values[random < 0.03] = 0
     values[(np.roll(values, 1, axis=0) > 0) & (random > 0.5)] = 2
-    triangles = read_image(_nifti(tmp_path / "ragged.nii", values, affine), 2, smooth=smooth).triangles
+    triangles = read_image(write_nifti(tmp_path / "ragged.nii", values, affine), 2, smooth=smooth).triangles
     assert not len(crossings(triangles.points, triangles.facets))
 
 
@@ -127,17 +121,17 @@ def test_units_of_the_header(tmp_path: Path):
     affine = _affine(2.0)
     values = _ellipsoid(affine, (51, 51, 51))
     metres = affine * np.array([[1e-3]] * 3 + [[1.0]])
-    assert read_image(_nifti(tmp_path / "m.nii", values, metres, "meter"), 2).triangles.volume == pytest.approx(
+    assert read_image(write_nifti(tmp_path / "m.nii", values, metres, "meter"), 2).triangles.volume == pytest.approx(
         VOLUME, rel=0.01
     )
-    unknown = _nifti(tmp_path / "unknown.nii", values, affine, "unknown")
+    unknown = write_nifti(tmp_path / "unknown.nii", values, affine, "unknown")
     with pytest.raises(SurfaceError, match="names no unit"):
         read_image(unknown, 2)
     assert read_image(unknown, 2, unit=1e-3).triangles.volume == pytest.approx(VOLUME, rel=0.01)
     with pytest.raises(SurfaceError, match="another unit"):
-        read_image(_nifti(tmp_path / "mm.nii", values, affine), 2, unit=1e-2)
+        read_image(write_nifti(tmp_path / "mm.nii", values, affine), 2, unit=1e-2)
     with pytest.raises(SurfaceError, match=r"2 mm allowed|across, allowed"):
-        read_image(_nifti(tmp_path / "um.nii", values, affine, "micron"), 2)
+        read_image(write_nifti(tmp_path / "um.nii", values, affine, "micron"), 2)
 
 
 def test_crumbs_hollows_and_the_image_s_end_are_told(tmp_path: Path):
@@ -145,11 +139,11 @@ def test_crumbs_hollows_and_the_image_s_end_are_told(tmp_path: Path):
     values = _ellipsoid(affine, (51, 51, 51))
     values[0:2, 0:2, 0:2] = 2
     values[25, 25, 25] = 7
-    loaded = read_image(_nifti(tmp_path / "scan.nii", values, affine), 2)
+    loaded = read_image(write_nifti(tmp_path / "scan.nii", values, affine), 2)
     assert any("1 pieces besides" in notice for notice in loaded.notices)
     assert any("1 voxels that it encloses" in notice for notice in loaded.notices)
     assert loaded.triangles.volume == pytest.approx(VOLUME, rel=0.01)
-    half = read_image(_nifti(tmp_path / "half.nii", values[25:], _affine(2.0, (10, -70, 5))), 2)
+    half = read_image(write_nifti(tmp_path / "half.nii", values[25:], _affine(2.0, (10, -70, 5))), 2)
     assert any("cut off flat at the image's end: left (x = 9 mm)." in notice for notice in half.notices)
     more = np.pi * AXES[1] * AXES[2] * (CENTRE[0] - 9.0) * 1e-9  # the outermost voxels reach to x = 9 mm
     assert half.triangles.volume == pytest.approx(VOLUME / 2 + more, rel=0.01)
@@ -159,7 +153,7 @@ def test_the_sides_that_are_cut_off_are_the_patient_s(tmp_path: Path):
     affine = np.array([[0, -2.0, 0, 20], [0, 0, -2.0, 30], [2.0, 0, 0, -7], [0, 0, 0, 1]])
     values = np.zeros((20, 21, 22), np.uint8)
     values[3:, :15, 4:22] = 1
-    (notice,) = read_image(_nifti(tmp_path / "cut.nii", values, affine), 1).notices
+    (notice,) = read_image(write_nifti(tmp_path / "cut.nii", values, affine), 1).notices
     # The first axis runs to the head, the second one to the left, the third one to the back.
     assert "head (z = 32 mm), right (x = 21 mm), back (y = -13 mm)." in notice
 
@@ -192,7 +186,7 @@ def test_what_is_no_label_map_is_refused(scan: Path, tmp_path: Path):
         if isinstance(content, bytes):
             path.write_bytes(content)
         else:
-            _nifti(path, content, affine)
+            write_nifti(path, content, affine)
         with pytest.raises(SurfaceError, match=words):
             read_image(path, label)
     nrrd.write(str(tmp_path / "nowhere.nrrd"), values, {})
@@ -208,7 +202,7 @@ def test_several_labels_are_one_body_and_no_label_is_meant_twice(tmp_path: Path)
     parts = whole.copy()
     parts[25:][parts[25:] == 2] = 9
     parts[20:30, 24:28, 22:28][parts[20:30, 24:28, 22:28] > 0] = 4
-    one, path = (_nifti(tmp_path / f"{n}.nii", values, affine) for n, values in enumerate((whole, parts)))
+    one, path = (write_nifti(tmp_path / f"{n}.nii", values, affine) for n, values in enumerate((whole, parts)))
     names = tmp_path / "names.txt"
     names.write_text("2 liver 1 1 1 255\n4 tumour 1 1 1 255\n9 lobe 1 1 1 255\n")
     united = read_image(path, (2, "lobe", 4), names=str(names)).triangles
@@ -242,12 +236,12 @@ def test_background_that_is_not_a_number_is_background(scan: Path, tmp_path: Pat
     affine = _affine(2.0)
     values = _ellipsoid(affine, (51, 51, 51)).astype(np.float32)
     values[values == 0] = np.nan
-    found = read_image(_nifti(tmp_path / "nan.nii", values, affine), 2)
+    found = read_image(write_nifti(tmp_path / "nan.nii", values, affine), 2)
     np.testing.assert_array_equal(found.triangles.points, read_image(scan, 2).triangles.points)
     for wrong in (-1.0, np.inf):
         values[0, 0, 0] = wrong
         with pytest.raises(SurfaceError, match="contains values from"):
-            read_image(_nifti(tmp_path / f"{wrong}.nii", values, affine), 2)
+            read_image(write_nifti(tmp_path / f"{wrong}.nii", values, affine), 2)
 
 
 def test_other_formats_of_nibabel_are_at_the_same_place_and_analyze_is_refused(scan: Path, tmp_path: Path):

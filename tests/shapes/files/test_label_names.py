@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import nibabel
 import nrrd
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from epsmesh.shapes.files.labels import of_label, read_labels
 from epsmesh.shapes.triangles import SurfaceError
 from epsmesh.study.problems import StudyError
 from tests.cases import study
+from tests.organs import write_nifti
 
 AFFINE = np.diag([2.0, 2.0, 2.0, 1.0])
 NAMES = {1: "liver", 3: "kidney left"}
@@ -31,12 +31,7 @@ def of(body):
 
 
 def _nifti(path: Path, extension: str = "", values: np.ndarray | None = None) -> Path:
-    image = nibabel.Nifti1Image(_balls() if values is None else values, AFFINE)
-    image.header.set_xyzt_units("mm")
-    if extension:
-        image.header.extensions.append(nibabel.nifti1.Nifti1Extension(0, extension.encode()))
-    nibabel.save(image, path)
-    return path
+    return write_nifti(path, _balls() if values is None else values, AFFINE, extension=extension)
 
 
 def _xml(names: dict[int, str]) -> str:

@@ -1,4 +1,4 @@
-"""Effects of `repair = true` and `smooth`, and their notices."""
+"""Broken surfaces are refused with what was found; effects of `repair = true` and `smooth`, and their notices."""
 
 import sys
 from pathlib import Path
@@ -11,25 +11,29 @@ from epsmesh.shapes.triangles import SurfaceError
 from tests.shapes.files.broken import Broken, corpus
 from tests.shapes.files.solids import ball, stl
 
-FILES = corpus()
 VOLUME = 4 / 3 * np.pi * 40 * 30 * 20 * 1e-9
 
 
-@pytest.mark.parametrize("broken", [b for b in FILES if b.repairs], ids=lambda broken: broken.name)
-def test_what_can_be_mended_is_and_is_told(broken: Broken, tmp_path: Path):
+@pytest.mark.parametrize("broken", corpus(), ids=lambda broken: broken.name)
+def test_a_broken_file_is_refused_with_what_was_found_and_is_repaired_if_it_can_be(broken: Broken, tmp_path: Path):
     path = tmp_path / broken.name
     path.write_bytes(broken.data)
-    loaded = read_surface(path, broken.unit, repair=True)
-    assert loaded.triangles.volume == pytest.approx(VOLUME, rel=0.02)
-    assert any(notice.startswith("repaired") for notice in loaded.notices)
+    for repair in (False,) if broken.repairs else (False, True):
+        with pytest.raises(SurfaceError) as refused:
+            read_surface(path, broken.unit, repair=repair)
+        assert repair or all(word in str(refused.value) for word in broken.words), refused.value
+    if broken.repairs:
+        loaded = read_surface(path, broken.unit, repair=True)
+        assert loaded.triangles.volume == pytest.approx(VOLUME, rel=0.02)
+        assert any(notice.startswith("repaired") for notice in loaded.notices)
 
 
-@pytest.mark.parametrize("broken", [b for b in FILES if not b.repairs], ids=lambda broken: broken.name)
-def test_what_cannot_is_refused_all_the_same(broken: Broken, tmp_path: Path):
-    path = tmp_path / broken.name
-    path.write_bytes(broken.data)
-    with pytest.raises(SurfaceError):
-        read_surface(path, broken.unit, repair=True)
+def test_a_file_that_is_not_there_and_a_folder_are_refused(tmp_path: Path):
+    with pytest.raises(SurfaceError, match="No such file"):
+        read_surface(tmp_path / "liver.stl", 1e-3)
+    (tmp_path / "folder.stl").mkdir()
+    with pytest.raises(SurfaceError, match="directory"):
+        read_surface(tmp_path / "folder.stl", 1e-3)
 
 
 def test_a_good_file_is_left_as_it_is(tmp_path: Path):
