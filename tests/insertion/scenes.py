@@ -25,6 +25,12 @@ SCENE = {
     "probe": BLADE,
     "mesh": {"accuracy": "10 %"},
 }
+# Of a round needle; the tool is the test's.
+SHAFT = {
+    "body": {"shape": "cylinder", "radius": "30 mm", "height": "40 mm"},
+    "material": {"young": "30 kPa", "poisson": 0.49, "law": "neo-hookean"},
+    "mesh": {"accuracy": "2 %"},
+}
 FIELD = NearTip(strength(YOUNG, POISSON, WIDTH / 2), 700.0)
 
 

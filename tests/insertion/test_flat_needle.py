@@ -12,7 +12,7 @@ from epsmesh.run.record import Record
 from epsmesh.states import FAILED, OK, PARTIAL
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
-from tests.insertion.scenes import answered
+from tests.insertion.scenes import SHAFT, answered
 
 RADIUS, STIFFNESS = 0.5e-3, 2e4  # m, N/m²
 # Depth of a ring crack over that of the punch.
@@ -28,16 +28,10 @@ DISC = {
     "toughness": "5 J/m^2",
     "insertion": {"to": "6 mm", "steps": 24},
 }
-SCENE = {
-    "body": {"shape": "cylinder", "radius": "30 mm", "height": "40 mm"},
-    "material": {"young": "30 kPa", "poisson": 0.49, "law": "neo-hookean"},
-    "probe": DISC,
-    "mesh": {"accuracy": "2 %"},
-}
 
 
 def scene(**probe):
-    return parse(SCENE | {"probe": DISC | probe})
+    return parse(SHAFT | {"probe": DISC | probe})
 
 
 def record(solve, cuts):
@@ -129,9 +123,9 @@ def test_the_path_ends_where_the_column_ahead_is_near_the_bottom():
 def test_what_is_not_computed_is_refused_by_name(keys, told):
     own = {key: value for key, value in (DISC | keys).items() if value is not None}
     skin = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.49, "law": "neo-hookean"}
-    body = SCENE["body"] | ({"layer": [skin]} if own.pop("layers", False) else {})
+    body = SHAFT["body"] | ({"layer": [skin]} if own.pop("layers", False) else {})
     with pytest.raises(StudyError, match=told):
-        parse(SCENE | {"probe": own, "body": body})
+        parse(SHAFT | {"probe": own, "body": body})
 
 
 def test_a_disc_in_a_plane_crack_is_withdrawn():

@@ -27,7 +27,7 @@ from epsmesh.solve.solution import Request
 from epsmesh.states import OK, PARTIAL
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
-from tests.insertion.scenes import answered
+from tests.insertion.scenes import SHAFT, answered
 
 RADIUS, FRICTION, STORED, TORN, SQUEEZE, STIFFNESS = 0.5e-3, 0.25, 6e-3, 3e-3, 30.0, 2e4  # m, 1, N, N, N/m, N/m²
 POWER = SQUEEZE * RADIUS / (STORED + TORN)
@@ -40,12 +40,7 @@ NEEDLE = {
     "toughness": "5 J/m^2",
     "insertion": {"to": "6 mm", "steps": 24, "withdraw": True},
 }
-SCENE = {
-    "body": {"shape": "cylinder", "radius": "30 mm", "height": "40 mm"},
-    "material": {"young": "30 kPa", "poisson": 0.49, "law": "neo-hookean"},
-    "probe": NEEDLE,
-    "mesh": {"accuracy": "2 %"},
-}
+SCENE = SHAFT | {"probe": NEEDLE}
 
 
 def scene(**probe):

@@ -37,7 +37,6 @@ _PER_SCENE = 8
 _LONG = {
     "two ranks": 6,
     "two shards": 12,
-    "two stores merged": 12,
     "killed and resumed": 8,
     "run by the command line": 12,
     "run by Python": 12,

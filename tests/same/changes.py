@@ -7,6 +7,7 @@ import copy
 import random
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from tests.same.pair import (
     copied,
     has,
     is_large,
+    lump_in,
     times_of,
     with_values,
     without,
@@ -169,9 +171,7 @@ def _label_as_inclusion(study: Study, dice: random.Random) -> Pair | None:
     if study["body"] != BASE["body"] or "insertion" in study["probe"] or "incision" in study["probe"]:
         return None
     held = {"below": "-16 mm"}
-    lump = {"name": "lump", "young": "60 kPa", "poisson": 0.3, "density": "1000 kg/m^3"}
-    if is_large(study):
-        lump |= {key: copy.deepcopy(study["material"][key]) for key in LAW_KEYS if key in study["material"]}
+    lump = lump_in(study)
     image = {"shape": "image", "file": "lump.nrrd", "fixed": held}
     first, second = copy.deepcopy(study), copy.deepcopy(study)
     first["body"] = image | {"label": 1, "region": [lump | {"label": 2}]}
@@ -497,31 +497,23 @@ def _given_force(study: Study, dice: random.Random) -> Pair | None:
     return Pair(study, at_force, one_mesh=False, related=as_force, common=True)
 
 
-@change("two ranks")
-def _ranks(study: Study, dice: random.Random) -> Pair:
-    return Pair(study, study, way="two ranks", one_mesh=True)
+def _by_way(way: str, study: Study, dice: random.Random) -> Pair:
+    return Pair(study, study, way=way)
 
 
-@change("two shards")
-def _shards(study: Study, dice: random.Random) -> Pair | None:
+def _sweep_by_way(way: str, study: Study, dice: random.Random) -> Pair | None:
     found = _swept(study)
-    return found and Pair(found[0], found[0], at=found[1], at_first=found[1], way="two shards")
+    return found and Pair(found[0], found[0], at=found[1], at_first=found[1], way=way)
 
 
-@change("killed and resumed")
-def _killed(study: Study, dice: random.Random) -> Pair | None:
-    found = _swept(study)
-    return found and Pair(found[0], found[0], at=found[1], at_first=found[1], way="killed")
-
-
-@change("run by the command line")
-def _by_command(study: Study, dice: random.Random) -> Pair:
-    return Pair(study, study, way="command")
-
-
-@change("run by Python")
-def _by_python(study: Study, dice: random.Random) -> Pair:
-    return Pair(study, study, way="python")
+for _name, _made, _way in (
+    ("two ranks", _by_way, "two ranks"),
+    ("two shards", _sweep_by_way, "two shards"),
+    ("killed and resumed", _sweep_by_way, "killed"),
+    ("run by the command line", _by_way, "command"),
+    ("run by Python", _by_way, "python"),
+):
+    change(_name)(partial(_made, _way))
 
 
 # ---- outputs ------------------------------------------------------------------------------------------------

@@ -69,6 +69,13 @@ def is_large(study: Study) -> bool:
     return study["material"].get("law", "linear") != "linear"
 
 
+def lump_in(study: Study) -> dict[str, Any]:
+    """Return a stiff piece of tissue of the law of the study's material."""
+    lump = {"name": "lump", "young": "60 kPa", "poisson": 0.3, "density": "1000 kg/m^3"}
+    laws = LAW_KEYS if is_large(study) else ()
+    return lump | {key: copy.deepcopy(study["material"][key]) for key in laws if key in study["material"]}
+
+
 def with_values(outcome: Outcome, change: Callable[[str, Value], Value | None]) -> Outcome:
     """Return an outcome with other values; those that become None are left out."""
     values = {name: change(name, value) for name, value in outcome.values.items()}

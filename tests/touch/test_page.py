@@ -4,7 +4,6 @@ import json
 import os
 import threading
 from dataclasses import replace
-from http.client import HTTPConnection
 
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ from epsmesh_realtime.page.server import HOST, PageServer
 from epsmesh_realtime.query import Query
 from tests.realtime.synthetic import random_surface, write_random, write_surface
 from tests.report.browser import CHROMIUM, Browser
+from tests.touch.test_server import answer
 
 in_browser = pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="chromium is not installed")
 KINDS = (
@@ -288,17 +288,6 @@ def test_fits_a_phone_and_the_dark(browser, tmp_path):
     browser.look_like(1000, 700)
 
 
-def answer(server, path, host):
-    connection = HTTPConnection(HOST, server.server_port, timeout=10)
-    connection.putrequest("GET", path, skip_host=True)
-    connection.putheader("Host", host)
-    connection.endheaders()
-    response = connection.getresponse()
-    found = response.status, response.read().decode()
-    connection.close()
-    return found
-
-
 def test_the_command_writes_a_file_and_says_what_is_no_model(epsmesh, tmp_path):
     write_surface(tmp_path / "model.epsm")
     done = epsmesh("touch", tmp_path / "model.epsm", "-o", tmp_path / "page.html")
@@ -314,15 +303,11 @@ def test_the_command_writes_a_file_and_says_what_is_no_model(epsmesh, tmp_path):
 
 def test_the_command_opens_the_page_until_it_is_interrupted(epsmesh, tmp_path, monkeypatch):
     def interrupted(server):
-        assert answer_of(server) == 404
-        raise KeyboardInterrupt
-
-    def answer_of(server):
         thread = threading.Thread(target=server.handle_request)
         thread.start()
-        status, _ = answer(server, "/", f"{HOST}:{server.server_port}")
+        assert " 404 " in answer(server, f"GET / HTTP/1.1\nHost: {HOST}:{server.server_port}").splitlines()[0]
         thread.join()
-        return status
+        raise KeyboardInterrupt
 
     seen = []
     monkeypatch.setattr("webbrowser.open", seen.append)
