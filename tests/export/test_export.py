@@ -10,8 +10,10 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
+from epsmesh.shapes.rounded import Rounded
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.study.read import parse
+from epsmesh_realtime import Patch, Tip
 from epsmesh_realtime.export.checks import check_touches, margin, narrowest, random_touches, with_bar, with_full
 from epsmesh_realtime.export.compliance import coarse_mesh, compliances
 from epsmesh_realtime.export.curved import curved_model, upright
@@ -277,6 +279,17 @@ def test_forces_are_those_of_full_solves(middle, probe, asked, most):
     assert touch.force[2] == pytest.approx(force, rel=most + bar)
 
 
+def test_a_rounded_cone_by_a_patch_is_that_of_a_full_solve(middle):
+    probe = BALL | {"shape": "cone", "angle": "60 deg", "tip": "1.5 mm", "radius": "5 mm", "depth": "1 mm"}
+    force, bar, message = solve(MPI.COMM_SELF, "2D", {"body": CYLINDER, "material": SOFT, "probe": probe})
+    assert not message
+    section = Rounded(pi / 3, 1.5e-3)
+    tip = Tip(lambda x, y: section.height(np.hypot(x, y)), 5e-3)
+    touch = Patch(middle, tip).query(at=(0.0, 0.0, 0.0), depth=1e-3)
+    assert touch.status == "ok"
+    assert touch.force[2] == pytest.approx(force, rel=6e-3 + bar)
+
+
 @dataclass(frozen=True)
 class Known:
     """Full solves of discs on a dome whose c, h and R are known."""
@@ -302,10 +315,12 @@ class Known:
     def seconds(self, *_: object) -> float:
         return 0.0
 
-    def normal(self, x: float, y: float) -> np.ndarray:
+    def height(self, x: float, y: float) -> float:
         a, b, c = self.axes
-        z = c * np.sqrt(1 - (x / a) ** 2 - (y / b) ** 2)
-        steepest = np.array([x / a**2, y / b**2, z / c**2])
+        return c * (1 - (x / a) ** 2 - (y / b) ** 2) ** 0.5
+
+    def normal(self, x: float, y: float) -> np.ndarray:
+        steepest = np.array([x, y, self.height(x, y)]) / np.square(self.axes)
         return steepest / np.linalg.norm(steepest)
 
     def tensor(self, x: float, y: float) -> np.ndarray:
@@ -333,10 +348,8 @@ def test_a_curved_body_is_what_three_discs_tell(axes):
         own = solver.tensor(x, y)
         own[2, 2] = found.c
         assert found.regular == pytest.approx(own, abs=0.15)
-        z = c * np.sqrt(1 - (x / a) ** 2 - (y / b) ** 2)
-        steepest = np.array([x / a**2, y / b**2, z / c**2])
-        assert spot.height == pytest.approx(z, abs=1e-6 * c)
-        assert spot.normal == pytest.approx(steepest / np.linalg.norm(steepest), abs=1e-5)
+        assert spot.height == pytest.approx(solver.height(x, y), abs=1e-6 * c)
+        assert spot.normal == pytest.approx(solver.normal(x, y), abs=1e-5)
     top = model.spot(0.0, 0.0)
     assert top.bend == pytest.approx((c / a**2 + c / b**2) / 2, rel=1e-3)
     at, depth = (0.0, 0.0, c), 2e-5

@@ -1,14 +1,13 @@
-"""Tips by a patch: held against formulas of balls and cones, H. Hertz's ellipses, a loop's work and a full solve."""
+"""Tips by a patch: held against formulas of balls and cones, H. Hertz's ellipses and a loop's work."""
 
 from dataclasses import replace
 from math import pi, tan
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from scipy.special import ellipe, ellipkm1
 
-from epsmesh_realtime import Model, ModelError, Patch, Tip
+from epsmesh_realtime import ModelError, Patch, Tip
 from epsmesh_realtime.table import Table
 from tests.realtime.synthetic import random_model
 
@@ -85,41 +84,6 @@ def test_where_it_begins_tells_nothing_of_where_it_ends():
         assert touch.force == pytest.approx(cold.force, rel=1e-9)
     other = warm.query(at=AT, depth=2e-4, turn=0.3 + pi, young=2 * model.young)
     assert other.force[2] == pytest.approx(2 * touch.force[2], rel=5e-3)
-
-
-def test_a_rounded_cone_is_that_of_a_full_solve(rounded):
-    model, force, bar = rounded
-    slope, r = 1 / tan(pi / 3), 1.5e-3
-    edge = r * slope / np.hypot(1, slope)  # where the ball of the tip meets the flank
-    foot = r - np.sqrt(r**2 - edge**2)
-
-    def height(x, y):
-        rho = np.hypot(x, y)
-        return np.where(rho < edge, r - np.sqrt(np.maximum(r**2 - rho**2, 0)), foot + (rho - edge) * slope)
-
-    touch = Patch(model, Tip(height, 5e-3)).query(at=(0.0, 0.0, 0.0), depth=1e-3)
-    assert touch.status == "ok"
-    assert touch.force[2] == pytest.approx(force, rel=6e-3 + bar)
-
-
-@pytest.fixture(scope="module")
-def rounded():
-    """The middle of a cylinder as a model, and F of a full solve with its bar."""
-    from epsmesh_realtime.export.compliance import Region, coarse_mesh, compliances
-    from epsmesh_realtime.export.scope import scope_of
-    from tests.export.test_export import BALL as UNILATERAL
-    from tests.export.test_export import CYLINDER, SOFT, study
-    from tests.verification.compare import solve
-
-    probe = UNILATERAL | {"shape": "cone", "angle": "60 deg", "tip": "1.5 mm", "radius": "5 mm", "depth": "1 mm"}
-    force, bar, message = solve(MPI.COMM_SELF, "2D", {"body": CYLINDER, "material": SOFT, "probe": probe})
-    assert not message
-    scope = scope_of(study())
-    region = Region.of(scope.body, 0.5)
-    ((c, h), *_) = np.asarray(compliances(coarse_mesh(scope.case, region), region, [(0.0, 0.0)], 0.45))[:, :2]
-    t = 1 / (c + 100)
-    table = Table(np.full((1, 1, 1), t), np.full((1, 1, 1), h * t**3), 100.0, region.reach, True, (0.45, 0.45))
-    return Model(table, np.zeros(3), np.eye(3), region.sides, 0.02, 10e3, 0.45, 0.5, (0.0,) * 4, off=1e-9), force, bar
 
 
 @pytest.mark.parametrize(
