@@ -117,8 +117,7 @@ def test_the_footprint_is_what_projects_into_the_disc(meshed):
     local = a_scene.frame.local(curved.points)
     rim = np.hypot(*local[mesh.rim, :2].T)
     np.testing.assert_allclose(rim, 4e-3, rtol=1e-12)
-    edges = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
-    ends, middle = curved.cells[:, :4][:, edges].reshape(-1, 2), curved.cells[:, 4:].ravel()
+    ends, middle = curved.cells[:, :4][:, EDGES].reshape(-1, 2), curved.cells[:, 4:].ravel()
     along = middle[np.isin(ends, mesh.rim).all(axis=1)]
     on_edge = np.abs(np.hypot(*local[along, :2].T) - 4e-3) < 1e-12
     assert len(np.unique(along[on_edge])) == len(mesh.rim)
