@@ -91,9 +91,9 @@ def test_the_weak_form_is_stationary_at_the_solution():
     mesh, tags = box()
     problem = epsmesh.Problem(mesh, tags, GROUPS, LAW)
     found = problem.solve(0.2e-3, estimate=False)
-    u = next(f for f in problem.energy.coefficients() if f.ufl_shape == (3,))
+    u = next(f for f in problem.form.coefficients() if f.ufl_shape == (3,))
     u.x.array[:] = found.displacement.x.array
-    residual = dolfinx.fem.form(ufl.derivative(problem.energy, u))
+    residual = dolfinx.fem.form(ufl.derivative(problem.form, u))
     forces = dolfinx.fem.assemble_vector(residual).array.reshape(-1, 3)
     footprint = dolfinx.fem.locate_dofs_topological(u.function_space, 2, tags.find(1))
     assert -forces[footprint, 2].sum() == pytest.approx(found.force, rel=1e-9)
@@ -125,6 +125,8 @@ def test_ranks_agree(contact):
         ({"tool": BALL, "at": (0.0, 0.0, -2e-3)}, "inside the body"),
         ({"tool": BALL, "at": (0.0, 0.0, 1e-3)}, "0.001 m above its facets"),
         ({"tool": BALL | {"motion": "all"}}, "motion is a key of studies"),
+        ({"tool": BALL | {"radius": 5}}, "tool.radius = 5: must be a number with a unit as text"),
+        ({"tool": BALL | {"radus": "5 mm"}}, "tool.radus"),
         ({"tool": {"shape": "disc", "radius": "6 mm"}}, "mark those below it"),
         ({"tool": {"shape": "disc", "radius": "20 mm"}}, "mark those below it"),
         ({"groups": GROUPS | {"mirror_x": 3}}, "must lie in the plane x = 0"),
@@ -137,11 +139,32 @@ def test_what_cannot_work_is_refused(changes, message):
         epsmesh.Problem(mesh, tags, given.pop("groups"), given.pop("law"), **given)
 
 
-def test_millimetres_are_refused():
+@pytest.mark.parametrize("size", [1e3, 1e2])
+def test_millimetres_are_refused(size):
+    """Also of a body of a few millimetres."""
     mesh, tags = box()
-    mesh.geometry.x[:] *= 1e3
+    mesh.geometry.x[:] *= size
     with pytest.raises(ValueError, match="coordinates are metres"):
         epsmesh.Problem(mesh, tags, GROUPS, LAW)
+
+
+def test_a_bonded_tool_that_reaches_the_support_is_refused():
+    mesh, _ = box()
+    top, side = (
+        dolfinx.mesh.locate_entities_boundary(mesh, 2, where)
+        for where in (lambda x: x[2] > -1e-9, lambda x: x[0] > 20e-3 - 1e-9)
+    )
+    with pytest.raises(ValueError, match=r"both have the node at .0\.02"):
+        epsmesh.Problem(mesh, tags_of(mesh, {1: top, 2: side}), GROUPS, LAW)
+
+
+@pytest.mark.parametrize("tool", [None, BLUNT])
+def test_terms_that_do_not_hold_the_body_are_refused(tool):
+    mesh, tags = box()
+    below = ufl.Measure("ds", domain=mesh, subdomain_data=tags)(2)
+    for energy in (lambda u: 1e3 * u[0] * below, lambda u: 1e6 * u[2] ** 2 * below):
+        with pytest.raises(ValueError, match="against all rigid motions"):
+            epsmesh.Problem(mesh, tags, {"tool": 1}, LAW, tool=tool, terms=[energy])
 
 
 def test_tags_of_another_dimension_are_refused():

@@ -16,7 +16,7 @@ _SOFTEST, _STIFFEST, _BONE = 100.0, 1e6, 30e9
 # A depth (m) that is seldom meant but for the tips of force microscopes, which are smaller than this (m).
 _SHALLOW, _TIP = 1e-6, 50e-6
 # Radius (m) of the thickest trocars. Largest extent (m) of a body.
-_NEEDLE, _LARGEST = 7.5e-3, 1.0
+_NEEDLE, LARGEST = 7.5e-3, 1.0
 # The depth that stands for one which a study need not have: of it nobody is warned.
 UNSAID = "1 nm"
 _NOTHING = parse_quantity(UNSAID, "m")
@@ -59,7 +59,7 @@ def _check_tool(extent: float, probe: Probe, size: float, problems: Problems) ->
 
 def check_extent(body: Body, problems: Problems) -> None:
     """Warn of a body larger than any patient's."""
-    if body.extent > _LARGEST:
+    if body.extent > LARGEST:
         problems.warn("body", None, f"is {body.extent:.4g} m large. Are its lengths in mm?")
 
 

@@ -8,7 +8,7 @@ The error bar is that of frictionless contact on the same mesh, plus the change 
 steps, plus a share of what friction adds.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from epsmesh.solve.contact.surface import Candidates, Neighbours
 from epsmesh.solve.newton import LargeError
 
 # Steps of a load path.
-STEPS = 16
+_STEPS = 16
 # Facets round the frictionless contact whose nodes are condensed, too.
 _RINGS = 2
 _ADVANCE = np.array([0.0, 0.0, -1.0])
@@ -52,8 +52,8 @@ def rub(contact: LinearContact) -> LinearContact:
         free = np.flatnonzero(is_free[nodes])
         compliance[np.ix_(free, free)] = body.compliance(components)
         tissue = CondensedTissue(compliance, candidates.points[nodes], ~is_free[nodes])
-        surface = CondensedSurface(tissue, obstacle.bounds[nodes] + depth, neighbours.of(nodes))
-        both = [press_condensed(surface, depth, friction, count) for count in (STEPS, STEPS // 2)]
+        heights, own = obstacle.bounds[nodes] + depth, neighbours.of(nodes)
+        both = [_press(tissue, heights, own, depth, friction, steps) for steps in (_STEPS, _STEPS // 2)]
         fine, coarse = (_of_all(candidates, nodes, one) for one in both)
         moved, unknowns = body.moved(fine.forces)
         gap = obstacle.bounds - moved[:, 2]
@@ -71,35 +71,28 @@ def _around(candidates: Candidates, active: BoolArray) -> BoolArray:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class CondensedSurface:
-    """Condensed ``tissue`` below a tool, whose ``heights`` (n) above the nodes, m, are those at first touch."""
-
-    tissue: CondensedTissue
-    heights: FloatArray
-    neighbours: Neighbours
-
-    def tool_at(self, depth: float) -> PlacedTool:
-        """Return the tool at a ``depth`` (m), with the gaps along its axis."""
-
-        def distance(points: FloatArray) -> Distance:
-            return Distance.along_axis(self.heights - depth, points - self.tissue.places)
-
-        return PlacedTool(distance, self.neighbours.complete, self.neighbours.followers, depth)
-
-
-def press_condensed(surface: CondensedSurface, depth: float, friction: float, steps: int = STEPS) -> ContactSolution:
+def _press(
+    tissue: CondensedTissue, heights: FloatArray, neighbours: Neighbours, depth: float, friction: float, steps: int
+) -> ContactSolution:
     """Return the equilibrium at a ``depth`` (m), reached in ``steps``; infinite ``friction`` sticks.
+
+    ``heights`` (n) of the tool above the nodes, m, are those at first touch.
 
     Raises:
         ContactError: if no node touches, or a step does not settle however small it is.
     """
-    tissue, dim = surface.tissue, surface.tissue.places.shape[1]
+
+    def tool_at(there: float) -> PlacedTool:
+        def distance(points: FloatArray) -> Distance:
+            return Distance.along_axis(heights - there, points - tissue.places)
+
+        return PlacedTool(distance, neighbours.complete, neighbours.followers, there)
+
     tissue.state = np.zeros_like(tissue.state)
     path = ContactPath(ContactPathPoint(0.0, tissue.state))
-    of = Friction(friction, _ADVANCE[-dim:], tissue.penalty, surface.neighbours, depth, is_linear=True)
+    of = Friction(friction, _ADVANCE, tissue.penalty, neighbours, depth, is_linear=True)
     try:
-        iterations = press_with_friction(tissue, surface.tool_at, path, depth, of, steps)
+        iterations = press_with_friction(tissue, tool_at, path, depth, of, steps)
     except LargeError as error:
         raise ContactError(
             f"contact with friction does not settle ({error}): use smaller elements below the probe, or less friction"
