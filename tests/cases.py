@@ -23,6 +23,8 @@ BASE: dict[str, Any] = {
     "plan": {"without": ["axisymmetric"]},
 }
 
+# In a mesh of an accuracy, no sizes are given.
+NO_SIZES = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
 BLADE: dict[str, Any] = {"shape": "blade", "length": "10 mm", "width": "3 mm", "depth": "0.1 mm"}
 
 

@@ -41,6 +41,8 @@ SKIN = {"name": "skin", "young": "40 kPa", "poisson": 0.45}
 BLADE = {"shape": "blade", "length": "6 mm", "width": "1 mm", "depth": "0.1 mm", "contact": "bonded"}
 SOFT = {"young": "10 kPa", "poisson": 0.45}
 TERM = {"share": 0.4, "time": "2 s"}
+# Of models of curved bodies: accuracy, largest share of the size, parts of the bar, and a margin, which they have not.
+AS_USUAL = 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0
 RELAXING, RAMP = SOFT | {"relaxation": [TERM]}, DISC | {"history": {"ramp": "1 s", "hold": "2 s"}}
 
 
@@ -238,7 +240,7 @@ def test_a_study_of_several_ratios_makes_a_model_of_their_range():
         assert lames[1][0] == pytest.approx(9 * stiff)
     scope, solver = scope_of(study(body=DOME, **ratios)), Known(10e3)
     assert scope.poissons == (0.3, 0.45)
-    model, *_ = curved_model(scope, solver, 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
+    model, *_ = curved_model(scope, solver, *AS_USUAL)
     for ratio in (0.3, 0.33, 0.42, 0.45):
         found = model.table.at(2e-3, 1e-3, ratio)
         assert (found.c, found.h) == pytest.approx(solver.regular(2e-3, 1e-3, ratio), rel=1e-3)
@@ -339,7 +341,7 @@ def test_a_curved_body_is_what_three_discs_tell(axes):
     a, b, c = (1e-3 * axis for axis in axes)
     solver = Known(10e3, axes=(a, b, c))
     scope = scope_of(study(body=DOME | {"axes": [f"{axis} mm" for axis in axes]}))
-    model, missed, places = curved_model(scope, solver, 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
+    model, missed, places = curved_model(scope, solver, *AS_USUAL)
     assert missed < 5e-3
     assert places == (5 if axes[0] == axes[1] else 13)
     for x, y in np.random.default_rng(5).uniform(-0.25, 0.25, (20, 2)) * (a, b):
@@ -376,9 +378,7 @@ def test_a_curved_body_is_what_three_discs_tell(axes):
 @pytest.mark.parametrize(("x", "half"), [(12, 9e-3), (22, 6.75e-3), (25, 4.5e-3)])
 def test_a_region_near_the_end_of_a_face_is_the_largest_that_fits(x, half):
     disc = DISC | {"radius": "3 mm", "at": [f"{x} mm", "0 mm"]}
-    model, *_ = curved_model(
-        scope_of(study(body=DOME, probe=disc)), Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0
-    )
+    model, *_ = curved_model(scope_of(study(body=DOME, probe=disc)), Known(10e3), *AS_USUAL)
     assert model.table.reach == pytest.approx((half, half))
     z = 15e-3 * np.sqrt(1 - (x / 30) ** 2)
     assert model.query("disc", radius=2e-3, at=(1e-3 * x, 0.0, z), depth=2e-5).status == "ok"
@@ -395,7 +395,7 @@ def test_a_region_near_the_end_of_a_face_is_the_largest_that_fits(x, half):
 def test_a_face_that_ends_beside_the_tool_has_no_region():
     disc = DISC | {"radius": "3 mm", "at": ["28 mm", "0 mm"]}
     with pytest.raises(ExportError, match="to each side of it, does not fit on the face"):
-        curved_model(scope_of(study(body=DOME, probe=disc)), Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
+        curved_model(scope_of(study(body=DOME, probe=disc)), Known(10e3), *AS_USUAL)
 
 
 def test_a_layer_is_a_load_on_the_regular_part_of_the_skin():

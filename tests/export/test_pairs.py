@@ -15,7 +15,7 @@ from epsmesh_realtime.export.scope import scope_of
 from epsmesh_realtime.export.surface_body import surface_body
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.table import Table
-from tests.export.test_export import BOX, CYLINDER, DISC, DOME, SKIN, Known, study
+from tests.export.test_export import AS_USUAL, BOX, CYLINDER, DISC, DOME, SKIN, Known, study
 from tests.export.two_discs import forces, meshed
 
 
@@ -64,7 +64,7 @@ def test_a_disc_on_a_dome_sinks_the_face_beside_it_as_a_full_solve_does():
     """Along the normals of the places, by the force and the second moment of the disc."""
     disc = DISC | {"radius": "1.5 mm", "depth": "0.03 mm", "at": ["5 mm", "-4 mm"]}
     scope = scope_of(study(body=DOME, probe=DISC | {"radius": "3 mm"}))
-    model, *_ = curved_model(scope, Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
+    model, *_ = curved_model(scope, Known(10e3), *AS_USUAL)
     pairs = tabulate_pairs(far_fields(surface_body(scope, model, 0.0), scope.poissons))
     assert pairs.links == pytest.approx(pairs.links.transpose(0, 2, 1), rel=1e-12)
     assert 0.003 < pairs.error < 0.006

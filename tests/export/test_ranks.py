@@ -13,7 +13,7 @@ from epsmesh_realtime.export.export import export
 from epsmesh_realtime.export.kept import Kept
 from epsmesh_realtime.export.ranks import ALONE, Ranks
 from epsmesh_realtime.export.scope import scope_of
-from tests.export.test_export import CYLINDER, DOME, SOFT, Known, study
+from tests.export.test_export import AS_USUAL, CYLINDER, DOME, SOFT, Known, study
 
 pytestmark = pytest.mark.mpi
 WORLD = Ranks(MPI.COMM_WORLD)
@@ -140,9 +140,7 @@ def test_ranks_make_the_model_that_one_makes(monkeypatch):
 @several
 def test_discs_on_a_curved_body_are_shared_out():
     scope = scope_of(study(body=DOME))
-    (found, *counts), (alone, *known) = (
-        curved_model(scope, Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0, ranks) for ranks in (WORLD, ALONE)
-    )
+    (found, *counts), (alone, *known) = (curved_model(scope, Known(10e3), *AS_USUAL, ranks) for ranks in (WORLD, ALONE))
     assert counts == known
     assert np.array_equal(found.table.reciprocal, alone.table.reciprocal)
     assert np.array_equal(found.table.curvature, alone.table.curvature)

@@ -16,7 +16,7 @@ from epsmesh_realtime.export.scope import scope_of
 from epsmesh_realtime.export.surface import tabulate_surface
 from epsmesh_realtime.export.surface_body import surface_body
 from epsmesh_realtime.surface import SurfaceTable
-from tests.export.test_export import CYLINDER, DISC, DOME, SKIN, Known, study
+from tests.export.test_export import AS_USUAL, CYLINDER, DISC, DOME, SKIN, Known, study
 from tests.realtime.synthetic import point_force
 
 POISSON = 0.4
@@ -77,7 +77,7 @@ def test_a_skin_has_a_far_field_of_its_own(monkeypatch):
 def test_what_a_force_on_a_dome_does_elsewhere_a_force_there_does_here():
     """E. Betti, 1872: of the field next to a force, and of what the body's own shape and support add to it."""
     scope = scope_of(study(body=DOME, probe=DISC | {"radius": "5 mm"}))
-    model, *_ = curved_model(scope, Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
+    model, *_ = curved_model(scope, Known(10e3), *AS_USUAL)
     pressed = surface_body(scope, model, 0.0)
     table = tabulate_surface(far_fields(pressed, scope.poissons), model.origin)
     a, c, below = 30e-3, 15e-3, -5e-3

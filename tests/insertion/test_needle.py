@@ -28,6 +28,7 @@ from epsmesh.states import OK, PARTIAL
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
 from tests.insertion.scenes import SHAFT, answered
+from tests.studies import changed
 
 RADIUS, FRICTION, STORED, TORN, SQUEEZE, STIFFNESS = 0.5e-3, 0.25, 6e-3, 3e-3, 30.0, 2e4  # m, 1, N, N, N/m, N/m²
 POWER = SQUEEZE * RADIUS / (STORED + TORN)
@@ -342,9 +343,5 @@ def test_a_path_may_end_as_near_to_the_bottom_as_is_allowed():
     ],
 )
 def test_what_is_not_computed_is_refused_by_name(section, keys, told):
-    own = SCENE.get(section, {}) | keys
-    if "size" in own:
-        own = keys
-    own = {key: value for key, value in own.items() if value is not None}
     with pytest.raises(StudyError, match=told):
-        parse(SCENE | {section: own})
+        parse(changed(SCENE, **{section: keys}))

@@ -21,6 +21,7 @@ from epsmesh.run.stop import reason_to_skip, waves
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import read_mapping
 from tests.insertion.scenes import BLADE, FIELD, LENGTH, SCENE, STIFFNESS, elastic, solved, stored
+from tests.studies import changed
 
 # The blade on a half-space (N/m), by the rectangle's formula: what tissue above adds at most.
 ABOVE = 20e3 / (1 - 0.3**2) * 4e-3 * (0.73 + 1.54 * 0.05**0.75)
@@ -206,9 +207,8 @@ def test_a_state_that_fails_ends_the_path_there_and_earlier_ones_are_kept():
     ],
 )
 def test_what_cannot_be_inserted_is_refused(probe, key, allowed):
-    own = {name: value for name, value in (BLADE | probe).items() if value is not None}
     with pytest.raises(StudyError) as wrong:
-        read_mapping(SCENE | {"probe": own}, "blade")
+        read_mapping(changed(SCENE, probe=probe), "blade")
     assert any(problem.key == key and allowed in str(problem) for problem in wrong.value.problems), wrong.value
 
 

@@ -21,8 +21,8 @@ SCENES = {
     "tilted": {"probe": {"axis": AXIS}},
     "on a curved body": {"body": EGG},
     "beside its top": {"body": EGG, "probe": {"at": ["6 mm", "4 mm"]}},
-    "found": {"body": EGG, "probe": {"shape": "sphere", "radius": "6 mm", "depth": "0.3 mm", "contact": "unilateral"}},
     "slides": {"probe": {"shape": "blade", "length": "8 mm", "width": "2 mm", "depth": "0.2 mm", "axis": AXIS}},
+    "found": {"body": EGG, "probe": {"shape": "sphere", "radius": "6 mm", "depth": "0.3 mm", "contact": "unilateral"}},
 }
 RADIUS = 9e-3
 # A box with a hollow from side to side, between two plates.

@@ -18,7 +18,7 @@ from epsmesh.plan.symmetry import mirror_planes
 from epsmesh.run.meshing import mesh_case
 from epsmesh.run.problem import CaseFailure
 from epsmesh.study.case import Case
-from tests.cases import BLADE, solve, study
+from tests.cases import BLADE, NO_SIZES, solve, study
 from tests.mesh.test_mesh import area
 
 WORLD = MPI.COMM_WORLD
@@ -170,8 +170,7 @@ def test_the_force_agrees_with_that_of_an_unrefined_mesh(times):
 @pytest.mark.usefixtures("refine_all")
 def test_bars_on_refined_meshes_cover_errors_away_from_the_edge():
     body = {"shape": "cylinder", "radius": "25 mm", "height": "20 mm", "fixed": "bottom"}
-    keys = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
-    mesh = {**keys, "accuracy": "0.3 %", "model": "3d"}
+    mesh = NO_SIZES | {"accuracy": "0.3 %", "model": "3d"}
     found = solve(body=body, probe={"radius": "6 mm"}, mesh=mesh)[()]
     mesh |= {"accuracy": "0.1 %", "model": "auto"}
     true = solve(body=body, probe={"radius": "6 mm"}, mesh=mesh, plan={"without": None})[()]

@@ -17,6 +17,7 @@ from epsmesh.states import FAILED, OK
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse, read_study
 from epsmesh.study.toml import to_toml
+from tests.cases import study
 
 LINE = {"line": {"from": ["-11 mm", "2 mm"], "to": ["9 mm", "3 mm"], "steps": 41}}
 TUMOUR = {"name": "tumour", "at": ["1 mm", "2 mm", "-7 mm"], "radius": "4 mm", "young": "80 kPa", "poisson": 0.3}
@@ -149,15 +150,7 @@ def test_results_that_need_each_solution_have_it_with_the_reason(changes, reason
 
 def test_the_error_is_for_a_path():
     with pytest.raises(StudyError, match=r"plan.path_error.*\[probe.path\]"):
-        parse(
-            {
-                "body": {"shape": "box", "size": ["50 mm", "40 mm", "20 mm"]},
-                "plan": {"path_error": "1 %"},
-                "material": {"young": "10 kPa", "poisson": 0.3},
-                "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.1 mm"},
-                "mesh": {"accuracy": "1 %"},
-            }
-        )
+        study(plan={"path_error": "1 %"})
 
 
 @pytest.mark.nightly

@@ -5,8 +5,9 @@ import pytest
 from epsmesh.plan.describe import summary
 from epsmesh.plan.plan import declare, make_plan
 from epsmesh.study.read import parse
-from tests.cases import BLADE, raw, study
+from tests.cases import BLADE, NO_SIZES, raw, study
 
+ACCURATE = NO_SIZES | {"accuracy": "5 %"}
 SWEEP = {"material": {"poisson": [0.3, 0.4]}, "mesh": {"epsilon": ["5 mm", "full"], "outside": ["coarse", "free"]}}
 
 
@@ -63,17 +64,14 @@ def test_what_a_blade_is_said_to_do_changes_no_force(probe):
 
 
 def test_a_radius_that_an_accuracy_makes_meaningless_is_solved_once():
-    sizes = dict.fromkeys(("fine", "coarse", "rim", "growth", "degree"))
-    mesh = {"accuracy": "5 %", "epsilon": ["8 mm", "10 mm"], "outside": ["coarse", "free"]} | sizes
-    plan = make_plan(study(mesh=mesh))
+    plan = make_plan(study(mesh=ACCURATE | {"epsilon": ["8 mm", "10 mm"], "outside": ["coarse", "free"]}))
     assert len(plan.keys) == 4
     assert len(plan.solves) == 3
 
 
 def test_f_exact_beside_an_accuracy_is_computed_only_where_it_is_asked_for():
     """Its error bars tell enough; the plan says what F_exact would add."""
-    mesh = {"accuracy": "5 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
-    left_out, asked = (raw(mesh=mesh, solve=solve) for solve in ({"exact": None}, {"exact": True}))
+    left_out, asked = (raw(mesh=ACCURATE, solve=solve) for solve in ({"exact": None}, {"exact": True}))
     plan = make_plan(parse(left_out))
     assert not any(solve.is_reference for solve in plan.solves)
     unasked = summary(plan)["exact_unasked"]
@@ -86,8 +84,7 @@ def test_f_exact_beside_an_accuracy_is_computed_only_where_it_is_asked_for():
 
 def test_one_mesh_for_many_depths_is_not_recommended_where_it_is_refused():
     sphere = {"shape": "sphere", "radius": "6 mm", "contact": "unilateral", "depth": ["0.2 mm", "0.3 mm"]}
-    mesh = {"accuracy": "5 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
-    for changes, is_told in (({}, True), ({"mesh": mesh}, False)):
+    for changes, is_told in (({}, True), ({"mesh": ACCURATE}, False)):
         plan = make_plan(study(probe=sphere, **changes))
         assert any("mesh_depths" in skipped.reason for skipped in plan.skipped) == is_told
 

@@ -6,22 +6,17 @@ import pytest
 
 from epsmesh.mesh.of_case import meridian_of
 from epsmesh.plan.symmetry import is_round
-from epsmesh.study.read import parse
-from tests.cases import raw
+from tests.cases import study
 
-CYLINDER = {"shape": "cylinder", "radius": "20 mm", "height": "10 mm", "fixed": "bottom", "size": None}
+CYLINDER = {"shape": "cylinder", "radius": "20 mm", "height": "10 mm", "fixed": "bottom"}
 SKIN: dict[str, Any] = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.48}
 FAT: dict[str, Any] = {"name": "fat", "young": "2 kPa", "poisson": 0.45}
 BALL = {"name": "tumour", "at": ["0 mm", "0 mm", "-6 mm"], "radius": "2 mm", "young": "50 kPa", "poisson": 0.45}
 
 
-def case(**changes: Any):
+def case(body: Any = None, **changes: Any):
     """Return the case of a study with a cylinder, with changes."""
-    content = raw()
-    content["body"] = {key: value for key, value in (CYLINDER | changes.pop("body", {})).items() if value is not None}
-    for section, values in changes.items():
-        content[section] |= values
-    return parse(content).case(())
+    return study(body=CYLINDER | (body or {}), **changes).case(())
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from epsmesh.study.capabilities.obstacles import OBSTACLES, obstacle
 from epsmesh.study.capabilities.refusals import REFUSALS
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
-from tests.cases import BLADE, raw, study
+from tests.cases import BLADE, NO_SIZES, raw, study
 from tests.studies import changed
 
 SPHERE = {"shape": "sphere", "radius": "6 mm", "depth": "0.2 mm", "contact": "unilateral"}
@@ -38,7 +38,7 @@ HAVING = {
     "curved or inclined surface": {"probe": {"axis": [0.1, 0, -1]}},
     "degree 1": {"mesh": {"degree": 1}},
     "mixed elements": {"mesh": {"element": "mixed"}},
-    "accuracy": {"mesh": {"accuracy": "1 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth"))},
+    "accuracy": {"mesh": NO_SIZES | {"accuracy": "1 %"}},
     "fixed column": {"mesh": {"epsilon": "12 mm", "outside": "fixed"}},
     "frictionless contact": {"probe": {"contact": "frictionless"}},
     "range of depths": {"probe": SPHERE | {"mesh_depths": ["0.1 mm", "0.3 mm"]}},

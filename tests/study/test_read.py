@@ -10,7 +10,7 @@ from epsmesh.study.read import parse, read_study, read_text
 from epsmesh.study.toml import to_toml
 from epsmesh_identify.sections.kept import measurements_of, spread_of
 from tests import organs
-from tests.cases import BLADE, raw, refusal, study
+from tests.cases import BLADE, NO_SIZES, raw, refusal, study
 
 STUDIES = sorted(Path("studies").glob("*.toml"))
 
@@ -133,10 +133,7 @@ MISTAKES = {
     ),
     "a speed": ({"probe": {"speed": "1 mm/s"}}, ["probe.speed", "`ramp` in [probe.history]"]),
     "a radius beside an accuracy": (
-        {
-            "mesh": {"accuracy": "1 %", "epsilon": ["9 mm", "full"]}
-            | dict.fromkeys(("fine", "coarse", "rim", "growth", "degree"))
-        },
+        {"mesh": NO_SIZES | {"accuracy": "1 %", "epsilon": ["9 mm", "full"]}},
         ["mesh.epsilon", "has no effect with `accuracy`", 'outside = "free"'],
     ),
     "text for a truth": ({"solve": {"exact": "yes"}}, ['solve.exact = "yes"', "true or false"]),
@@ -347,6 +344,9 @@ WORDS = {
         {"probe": {"contact": "sliding"}},
         ["probe.contact", "along a known footprint", '"frictionless"'],
     ),
+    "a diameter": ({"probe": {"diameter": "3 mm"}}, ["probe.diameter", "`radius`, half"]),
+    "E": ({"material": {"E": "3 mm"}}, ["material.E", "`young`"]),
+    "nu": ({"material": {"nu": "3 mm"}}, ["material.nu", "`poisson`"]),
     "a tool of its own": ({"indenter": {}}, ["indenter", "the tool is [probe]"]),
 }
 

@@ -164,16 +164,6 @@ def test_a_needle_as_thick_as_a_thumb_is_doubted():
     assert any("probe.radius" in told and "Is 2 mm meant" in told for told in read_text(text, "needle.toml").warnings)
 
 
-@pytest.mark.parametrize(
-    ("section", "key", "words"),
-    [("probe", "diameter", "`radius`, half"), ("material", "E", "`young`"), ("material", "nu", "`poisson`")],
-)
-def test_another_name_of_a_key_is_answered_with_the_key(section, key, words):
-    content = raw()
-    content[section] |= {key: "3 mm"}
-    assert re.search(rf"{section}\.{key} = .*{re.escape(words)}", str(told(content)))
-
-
 @pytest.mark.parametrize("section", OTHER_SHAPES)
 def test_another_name_of_a_shape_is_answered_with_one_that_is_there(section):
     known = SECTIONS[section]

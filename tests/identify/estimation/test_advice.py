@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from epsmesh.study.read import parse
-from epsmesh.study.toml import to_toml
+from epsmesh.study.read import read_mapping
 from epsmesh_identify.estimation.advice import advice
 from epsmesh_identify.estimation.estimate import identify
 from tests.identify.estimation.synthetic import POISSON, YOUNG
@@ -23,8 +22,7 @@ PAD = {
 
 def study(**probe):
     """Return the study of a punch on a pad, with other keys of the probe."""
-    raw = PAD | {"probe": PAD["probe"] | probe}
-    return parse(raw, file="pad.toml", text=to_toml(raw, "pad.toml"))
+    return read_mapping(PAD | {"probe": PAD["probe"] | probe}, "pad")
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from epsmesh.study.read import parse
-from epsmesh.study.toml import to_toml
+from epsmesh.study.read import read_mapping
 from epsmesh_identify.estimation import design as module
 from epsmesh_identify.estimation.candidates import candidates, planned_trials
 from epsmesh_identify.estimation.design import USUAL, Designer, rank
@@ -17,7 +16,6 @@ from epsmesh_identify.surrogate.cases import SurrogateError, domain_of
 from epsmesh_identify.surrogate.wide import solve_wide
 from tests.identify.estimation.synthetic import noise
 
-FILE = "design.toml"
 BALL = {
     "body": {"shape": "cylinder", "radius": "60 mm", "height": "40 mm", "fixed": "bottom"},
     "material": {"young": "10 kPa", "poisson": 0.48},
@@ -31,8 +29,7 @@ PUNCH = {"shape": "disc", "radius": "1 mm", "depth": "0.1 mm", "contact": "frict
 
 def study(**changes):
     """Return the study of a ball with other sections."""
-    raw = BALL | changes
-    return parse(raw, file=FILE, text=to_toml(raw, FILE))
+    return read_mapping(BALL | changes, "design")
 
 
 def never(_):

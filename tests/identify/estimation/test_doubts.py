@@ -71,8 +71,7 @@ def test_a_soft_machine_is_no_doubt():
 )
 def test_what_an_error_of_the_radius_does(probe, radius, less):
     contact = "unilateral" if probe["shape"] in ("sphere", "paraboloid") else "frictionless"
-    unset = {"radius": None} if "radius" not in probe else {}
-    case = next(parse(raw(probe={**unset, **probe, "contact": contact})).cases())
+    case = next(parse(raw(probe={**probe, "contact": contact})).cases())
     said = list(doubts_of_radius([case], [YOUNG]))
     assert len(said) == bool(radius)
     assert not radius or (f"radius of {radius}" in said[0] and f"E is about {less} % less" in said[0])

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from epsmesh.study.read import parse
-from epsmesh.study.toml import to_toml
+from epsmesh.study.read import read_mapping
 from epsmesh_identify.estimation.experiment import Scenes, Specimen
 from epsmesh_identify.estimation.forward import SceneForce, unknown_domain
 from epsmesh_identify.estimation.kept import Kept
@@ -16,14 +15,11 @@ from epsmesh_identify.estimation.unknowns import unknowns
 from epsmesh_identify.experiment.curve import Curve
 from epsmesh_identify.surrogate.build import build
 from tests.identify.estimation.synthetic import noise
-from tests.identify.surrogate.scenes import BALL, solved_by
+from tests.identify.surrogate.scenes import LAYERED, solved_by
 
 TRUTH = {"young": 12e3, "skin_young": 60e3}
 DEPTH = np.linspace(-1e-4, 1e-4, 200)
-STUDY = BALL | {
-    "body": BALL["body"] | {"layer": [{"name": "skin", "thickness": "1 mm", "young": "50 kPa", "poisson": 0.45}]},
-    "identify": {"young": ["1 kPa", "100 kPa"], "skin_young": ["5 kPa", "500 kPa"], "may_hide": []},
-}
+RANGES = {"young": ["1 kPa", "100 kPa"], "skin_young": ["5 kPa", "500 kPa"], "may_hide": []}
 
 
 def _force(young, skin, depth):
@@ -35,7 +31,7 @@ def _force(young, skin, depth):
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """Two similar specimens, a table of their force that is wrong by percents, and what was solved for it."""
-    study, asked = parse(STUDY, file="many.toml", text=to_toml(STUDY, "many.toml")), []
+    study, asked = read_mapping(LAYERED | {"identify": RANGES}, "many"), []
     domain = unknown_domain(study, unknowns(study), 1.4e-4)
     solve = solved_by(
         lambda case: _force(case.material.young, case.body.layer[0].young, case.probe.depth), 1e-5, asked=asked

@@ -9,6 +9,8 @@ BALL = {
     "probe": {"shape": "sphere", "radius": "2 mm", "depth": "0.1 mm", "contact": "unilateral"},
     "mesh": {"accuracy": "0.1 %"},
 }
+SKIN = {"name": "skin", "thickness": "1 mm", "young": "50 kPa", "poisson": 0.45}
+LAYERED = BALL | {"body": BALL["body"] | {"layer": [SKIN]}}
 PUNCH = BALL | {"probe": {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "frictionless"}}
 
 

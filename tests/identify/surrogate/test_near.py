@@ -10,11 +10,10 @@ from epsmesh_identify.surrogate.build import build
 from epsmesh_identify.surrogate.cases import domain_of
 from epsmesh_identify.surrogate.forecast import forecast
 from epsmesh_identify.surrogate.near import smaller
-from tests.identify.surrogate.scenes import BALL, solved_by
+from tests.identify.surrogate.scenes import LAYERED, solved_by
 
 PUNCH = {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "bonded"}
-SKIN = {"name": "skin", "thickness": "1 mm", "young": "50 kPa", "poisson": 0.45}
-SCENE = BALL | {"probe": PUNCH, "body": BALL["body"] | {"layer": [SKIN]}}
+SCENE = LAYERED | {"probe": PUNCH}
 BOUNDS = {"young": (1e3, 1e5), "skin_young": (1e4, 1e6), "poisson": (0.0, 0.5)}
 FIT = {"young": 9e3, "skin_young": 7e4, "poisson": 0.42}
 

@@ -11,11 +11,8 @@ from epsmesh_identify.estimation.forward import forward_of, stored_in
 from epsmesh_identify.estimation.parts import Unknown
 from epsmesh_identify.surrogate.build import build
 from epsmesh_identify.surrogate.cases import SurrogateError, domain_of
-from tests.identify.surrogate.scenes import BALL, PUNCH, hertz, solved_by
+from tests.identify.surrogate.scenes import BALL, LAYERED, PUNCH, hertz, solved_by
 
-LAYERED = BALL | {
-    "body": BALL["body"] | {"layer": [{"name": "skin", "thickness": "1 mm", "young": "50 kPa", "poisson": 0.45}]},
-}
 DEPTH = np.linspace(1e-6, 1e-4, 30)
 YOUNG = ("young", 1e3, 1e6, "Pa")
 
