@@ -136,7 +136,7 @@ def _click(browser, x, y):
 
 def _where(browser, middle):
     """Return the pixel at which a point (mm) is seen."""
-    place = f"vector({list(middle)}).sub(vector(page.told.centre)).project(page.stage.camera)"
+    place = f"vector({list(middle)}).sub(vector(page.inputs.centre)).project(page.stage.camera)"
     x, y = browser.ask(f"{place}.toArray().slice(0, 2)")
     width, height = browser.ask("[page.stage.canvas.clientWidth, page.stage.canvas.clientHeight]")
     return (x + 1) / 2 * width, (1 - y) / 2 * height

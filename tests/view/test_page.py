@@ -51,7 +51,7 @@ def element(text, name):
 def numbers(page):
     """What the page tells its script, and its arrays by name, put together as the script does it."""
     text = page.read_text(encoding="utf-8")
-    told, raw = json.loads(element(text, "told")), zlib.decompress(b64decode(element(text, "numbers")))
+    told, raw = json.loads(element(text, "inputs")), zlib.decompress(b64decode(element(text, "numbers")))
     arrays, start = {}, 0
     for name, kind, count in told["arrays"]:
         width = np.dtype(kind).itemsize
@@ -109,7 +109,7 @@ def test_mesh_alone_has_no_force_and_no_displacement():
     found = compute_fields(solve_alone(made, case), MPI.COMM_SELF, mesh_only=True)
     text = render(found, "mesh")
     assert "<p>F = " not in text
-    assert [c["name"] for c in json.loads(element(text, "told"))["colours"]] == ["region", "element size"]
+    assert [c["name"] for c in json.loads(element(text, "inputs"))["colours"]] == ["region", "element size"]
 
 
 def test_a_triangle_that_bounds_nothing_is_refused(fields):
@@ -127,7 +127,7 @@ def test_a_ball_has_its_shape_and_its_depth():
     np.testing.assert_allclose(np.linalg.norm(below - centre, axis=1), 6e-3, rtol=1e-6)
     np.testing.assert_allclose(tool.moved, np.broadcast_to([0, 0, -0.5e-3], tool.moved.shape), atol=1e-12)
     assert found.drawn_factor == 1 < found.visible_factor
-    told = json.loads(element(render(found, "ball"), "told"))
+    told = json.loads(element(render(found, "ball"), "inputs"))
     assert (told["start"], told["factor"], told["keeps_depth"]) == (1, found.visible_factor, True)
 
 
@@ -353,8 +353,7 @@ def test_fits_a_phone_and_the_dark(browser, page, width):
     assert browser.ask("document.documentElement.scrollWidth") <= width
     assert browser.ask("getComputedStyle(document.body).backgroundColor") == "rgb(20, 23, 27)"
     assert browser.ask("document.getElementById('panel').open") == (width > 600)
-    ends = (
-        "[page.told.low, page.told.high].flatMap(end => vector(end).project(page.stage.camera).toArray().slice(0, 2))"
-    )
+    on_screen = "vector(end).project(page.stage.camera).toArray().slice(0, 2)"
+    ends = f"[page.inputs.low, page.inputs.high].flatMap(end => {on_screen})"
     assert np.abs(browser.ask(ends)).max() < 1
     assert browser.messages == []

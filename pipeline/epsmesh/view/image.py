@@ -35,13 +35,13 @@ def render(found: LabelMap, segments: list[Segment], given: dict[str, str]) -> s
         SCENE / "image.html.j2",
         [SCENE / "places.js", SCENE / "image.js"],
         [SCENE / "image.css"],
-        told={
+        inputs={
             "eye": _EYE.tolist(),
             "radius": float(np.linalg.norm(high - low) / 2),
             "centre": centre.tolist(),
             "low": (low - centre).tolist(),
             "high": (high - centre).tolist(),
-            "segments": [_told(one, colour, given) for one, colour in zip(segments, colours, strict=True)],
+            "segments": [_inputs(one, colour, given) for one, colour in zip(segments, colours, strict=True)],
             "shape": values.shape,
             "spacing": (_MM * np.linalg.norm(affine[:, :3], axis=0)).tolist(),
             "inverse": np.column_stack([inverse, -inverse @ (_MM * affine[:, 3])]).tolist(),
@@ -52,7 +52,7 @@ def render(found: LabelMap, segments: list[Segment], given: dict[str, str]) -> s
     )
 
 
-def _told(one: Segment, colour: str, given: dict[str, str]) -> dict[str, Any]:
+def _inputs(one: Segment, colour: str, given: dict[str, str]) -> dict[str, Any]:
     return {
         "title": one.title,
         "label": one.label,

@@ -31,7 +31,7 @@ def render(fields: Fields, title: str) -> str:
         SCENE / "view.html.j2",
         [SCENE / "mesh.js", SCENE / "view.js"],
         [],
-        told=_told(fields),
+        inputs=_inputs(fields),
         arrays=mesh_arrays(fields),
         title=title,
         facts=_facts(fields),
@@ -43,11 +43,11 @@ def render_scene(
     scripts: list[Path],
     styles: list[Path],
     *,
-    told: dict[str, Any],
+    inputs: dict[str, Any],
     arrays: dict[str, npt.NDArray[Any]],
     **content: Any,
 ) -> str:
-    """Return a page in three dimensions: ``told`` and ``arrays`` are for its scripts, ``content`` for its template.
+    """Return a page in three dimensions: ``inputs`` and ``arrays`` are for its scripts, ``content`` for its template.
 
     The library is compressed; a script puts it into the page, where the policy allows it by its hash.
     """
@@ -58,7 +58,7 @@ def render_scene(
         joined(SCENE / "scene.js", *scripts),
         base=SCENE,
         style=joined(SCENE / "scene.css", *styles),
-        told=json_in_page(told | {"ink": ink, "arrays": layout(arrays)}),
+        inputs=json_in_page(inputs | {"ink": ink, "arrays": layout(arrays)}),
         numbers=packed(arrays),
         library=compressed(library.encode(), 9),
         library_hash=hash_of(library),
@@ -78,7 +78,7 @@ def _facts(fields: Fields) -> list[str]:
     return [*facts, f"{count}, {fields.dofs:,} unknowns" if fields.dofs else count]
 
 
-def _told(fields: Fields) -> dict[str, Any]:
+def _inputs(fields: Fields) -> dict[str, Any]:
     """Return what the script needs besides arrays and colours; lengths in mm, places relative to the contact."""
     view = Viewpoint.of(fields.case.frame, fields.planes)
     low, high = (_MM * (end(fields.points, axis=0) - fields.contact) for end in (np.min, np.max))

@@ -12,7 +12,7 @@
 extern "C" {
 #endif
 
-enum { EPSMESH_SIDE = 11, EPSMESH_CELLS = EPSMESH_SIDE * EPSMESH_SIDE, EPSMESH_DEPTHS = 40, EPSMESH_TOLD = 4 };
+enum { EPSMESH_SIDE = 11, EPSMESH_CELLS = EPSMESH_SIDE * EPSMESH_SIDE, EPSMESH_DEPTHS = 40, EPSMESH_FILLS = 4 };
 
 /* Return the height (m) of a convex tip above its lowest point, which is at x = y = 0 (m, along the tip's axes). */
 typedef double (*epsmesh_height)(double x, double y, void *user);
@@ -24,7 +24,7 @@ typedef struct {
     epsmesh_height height;
     epsmesh_heights heights; /* one of both */
     void *user;
-    double reach, depths[EPSMESH_DEPTHS], outlines[EPSMESH_DEPTHS][2], fills[EPSMESH_TOLD][2];
+    double reach, depths[EPSMESH_DEPTHS], outlines[EPSMESH_DEPTHS][2], fills[EPSMESH_FILLS][2];
     double aspect, kernel[2 * EPSMESH_SIDE - 1][2 * EPSMESH_SIDE - 1];
     double matrix[EPSMESH_CELLS][EPSMESH_CELLS];
     unsigned char pressed[EPSMESH_CELLS];

@@ -107,7 +107,7 @@ static int made(int kind, double size) {
     return 1;
 }
 
-static void told(const char *name, double *took, long count) {
+static void print_times(const char *name, double *took, long count) {
     qsort(took, (size_t)count, sizeof *took, rising);
     printf("%-16s p50 %7.2f  p99 %7.2f  largest %9.1f us", name, took[count / 2], took[count - 1 - count / 100],
            took[count - 1]);
@@ -158,7 +158,7 @@ int main(int count, char **words) {
             sum += ask(kinds[kind], i);
             took[i] = now() - begin;
         }
-        told(NAMES[kinds[kind]], took, n), printf("\n");
+        print_times(NAMES[kinds[kind]], took, n), printf("\n");
     }
     ticks -= ticks % known;
     if (ticks) {
@@ -166,7 +166,7 @@ int main(int count, char **words) {
         sum += paced(kinds, known, ticks, took, late);
         printf("at 1 kHz, %ld ticks of each in turn\n", each);
         for (kind = 0; kind < known; kind++) {
-            told(NAMES[kinds[kind]], took + kind * each, each);
+            print_times(NAMES[kinds[kind]], took + kind * each, each);
             printf("  late %ld\n", late[kind]);
         }
     }

@@ -42,7 +42,7 @@ def render(surface: Surface, title: str) -> str:
         _TEMPLATES / "touch.html.j2",
         _SCRIPTS,
         [_TEMPLATES / "touch.css"],
-        told=_told(surface),
+        inputs=_inputs(surface),
         arrays=_arrays(surface),
         title=title,
         facts=_facts(surface),
@@ -121,8 +121,8 @@ def _arrays(surface: Surface) -> dict[str, Any]:
     return {name: np.frombuffer(data, "u1") for name, data in (("evaluator", EVALUATOR.read_bytes()), ("model", model))}
 
 
-def _told(surface: Surface) -> dict[str, Any]:
-    """Return what the script is told besides the arrays; the camera's lengths are in mm, along the face's axes."""
+def _inputs(surface: Surface) -> dict[str, Any]:
+    """Return the inputs of the script besides the arrays; the camera's lengths are in mm, along the face's axes."""
     model, table = surface.model, surface.table
     low, high = table.points.min(axis=0), table.points.max(axis=0)
     numbers = {name: np.asarray(getattr(model, name)).tolist() for name in ("origin", "axes", "young", "poisson")}

@@ -10,22 +10,22 @@ const STILL = 4; // pixels that a click may move
 const round1 = (value) => (Math.round(10 * value) / 10 || 0).toFixed(1);
 
 class Page {
-  constructor(told, { voxels, ...surfaces }) {
-    Object.assign(this, { told, voxels });
+  constructor(inputs, { voxels, ...surfaces }) {
+    Object.assign(this, { inputs, voxels });
     this.surfaces = new Surfaces(surfaces);
-    this.shown = told.segments.map(() => true);
-    this.chosen = told.segments.reduce((best, one, i, all) => (one.volume > all[best].volume ? i : best), 0);
-    this.stage = new Stage(told, 1e-3 * told.radius);
+    this.shown = inputs.segments.map(() => true);
+    this.chosen = inputs.segments.reduce((best, one, i, all) => (one.volume > all[best].volume ? i : best), 0);
+    this.stage = new Stage(inputs, 1e-3 * inputs.radius);
     this.stage.uniforms.edges.value = false;
-    this.stage.colour({ stops: told.segments.map((one) => one.colour), labels: true });
-    this.marker = this.stage.addSolid(told.ink.footprint);
-    this.rgb = told.segments.map((one) => rgb(one.colour).map((part) => Math.round(255 * part)));
+    this.stage.colour({ stops: inputs.segments.map((one) => one.colour), labels: true });
+    this.marker = this.stage.addSolid(inputs.ink.footprint);
+    this.rgb = inputs.segments.map((one) => rgb(one.colour).map((part) => Math.round(255 * part)));
     this.list();
     this.makeSlices();
     this.listen();
-    this.toVoxels = new THREE.Matrix4().set(...told.inverse.flat(), 0, 0, 0, 1);
+    this.toVoxels = new THREE.Matrix4().set(...inputs.inverse.flat(), 0, 0, 0, 1);
     this.toPatient = this.toVoxels.clone().invert();
-    this.voxel = told.shape.map((n) => (n - 1) / 2);
+    this.voxel = inputs.shape.map((n) => (n - 1) / 2);
     this.redraw();
     this.choose(this.chosen);
     this.drawSlices();
@@ -33,7 +33,7 @@ class Page {
   }
   list() {
     const list = document.getElementById("segments");
-    this.lines = this.told.segments.map((one, i) => {
+    this.lines = this.inputs.segments.map((one, i) => {
       const line = add(list, "li");
       const box = add(line, "input");
       Object.assign(box, { type: "checkbox", checked: true, title: `show ${one.title}`, ariaLabel: `show ${one.title}` });
@@ -73,7 +73,7 @@ class Page {
     const found = this.pick(this.moved);
     this.moved = null;
     document.getElementById("under").textContent = found
-      ? `${this.told.segments[found.owner].title}: ${this.patient(found.place).map(round1).join(", ")} mm`
+      ? `${this.inputs.segments[found.owner].title}: ${this.patient(found.place).map(round1).join(", ")} mm`
       : "Click on a surface or in a slice to choose a place.";
   }
   click(event) {
@@ -82,7 +82,7 @@ class Page {
   }
   // In the patient's frame, mm.
   patient(place) {
-    return place.map((part, i) => part + this.told.centre[i]);
+    return place.map((part, i) => part + this.inputs.centre[i]);
   }
   show(of) {
     this.shown = this.shown.map((_, i) => of(i));
@@ -96,7 +96,7 @@ class Page {
   }
   choose(i) {
     this.chosen = i;
-    const one = this.told.segments[i];
+    const one = this.inputs.segments[i];
     this.lines.forEach(({ line }, k) => line.classList.toggle("chosen", k === i));
     const [low, high] = one.box;
     const notes = [
@@ -107,7 +107,7 @@ class Page {
     document.getElementById("body").textContent = [...notes, one.block].join("\n");
   }
   whole() {
-    const { low, high } = this.told;
+    const { low, high } = this.inputs;
     const corners = Array.from({ length: 8 }, (_, k) => vector(low.map((end, i) => ((k >> i) & 1 ? high[i] : end))));
     this.stage.follow(() => {
       const reach = (along) => 1.1 * Math.max(...corners.map((corner) => Math.abs(corner.dot(along))));
@@ -119,14 +119,14 @@ class Page {
   // ---- a place ---------------------------------------------------------------------------------------------------
   // Choose a place (mm from the centre), of a label's surface or within the image.
   take(place, owner) {
-    const { segments } = this.told;
+    const { segments } = this.inputs;
     const patient = this.patient(place);
     this.voxel = vector(patient).applyMatrix4(this.toVoxels).toArray();
     const near = this.surfaces.nearest(place, segments.length);
     const own = owner ?? (this.labelAt(this.voxel) || this.chosen + 1) - 1;
     const on = owner === undefined ? near[own].point : place;
     const extent = Math.max(...segments[own].extent);
-    const inward = this.surfaces.inward(on, own, Math.max(AROUND * extent, 1.5 * Math.max(...this.told.spacing)));
+    const inward = this.surfaces.inward(on, own, Math.max(AROUND * extent, 1.5 * Math.max(...this.inputs.spacing)));
     if (own !== this.chosen) this.choose(own);
     this.mark(on, inward);
     const list = document.getElementById("place");
@@ -147,13 +147,13 @@ class Page {
   }
   // The position of a voxel's label, from 1; 0 is background.
   labelAt(voxel) {
-    const { shape } = this.told;
+    const { shape } = this.inputs;
     const [i, j, k] = voxel.map((part, axis) => Math.max(0, Math.min(shape[axis] - 1, Math.round(part))));
     return this.voxels[(i * shape[1] + j) * shape[2] + k];
   }
   // An arrow from outside to the place, and a ball there.
   mark(place, inward) {
-    const size = 0.045 * this.told.radius;
+    const size = 0.045 * this.inputs.radius;
     const line = [[0, 0], [0.35, 0.6], [0.5, 1.4], [0.16, 1.4], [0.16, 6], [0, 6]].map(([rho, z]) => new THREE.Vector2(rho * size, z * size));
     const outward = vector(inward).negate();
     const across = vector(Math.abs(inward[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]).cross(outward).normalize();
@@ -164,7 +164,7 @@ class Page {
 
   // ---- slices ----------------------------------------------------------------------------------------------------
   makeSlices() {
-    const { shape, spacing } = this.told;
+    const { shape, spacing } = this.inputs;
     this.panes = SLICES.map((slice, axis) => {
       const figure = add(document.getElementById("slices"), "figure");
       const canvas = add(figure, "canvas");
@@ -181,10 +181,10 @@ class Page {
     const voxel = [...this.voxel];
     voxel[across] = (1 - (event.clientX - left) / width) * canvas.width - 0.5;
     voxel[up] = (1 - (event.clientY - top) / height) * canvas.height - 0.5;
-    this.take(vector(voxel).applyMatrix4(this.toPatient).sub(vector(this.told.centre)).toArray());
+    this.take(vector(voxel).applyMatrix4(this.toPatient).sub(vector(this.inputs.centre)).toArray());
   }
   drawSlices() {
-    const { shape } = this.told;
+    const { shape } = this.inputs;
     const at = this.voxel.map((part, i) => Math.max(0, Math.min(shape[i] - 1, Math.round(part))));
     const steps = [shape[1] * shape[2], shape[2], 1];
     for (const { name, axis, across, up, ends, canvas, caption } of this.panes) {

@@ -310,9 +310,9 @@ async function start(Page, prepare = unpack) {
   const library = document.createElement("script");
   library.textContent = new TextDecoder().decode(await inflate("library"));
   document.head.append(library);
-  const told = JSON.parse(textOf("told"));
-  const arrays = await prepare(told.arrays);
-  if (document.createElement("canvas").getContext("webgl2")) page = new Page(told, arrays);
+  const inputs = JSON.parse(textOf("inputs"));
+  const arrays = await prepare(inputs.arrays);
+  if (document.createElement("canvas").getContext("webgl2")) page = new Page(inputs, arrays);
   else {
     const trouble = document.getElementById("trouble");
     trouble.textContent = "This browser does not draw in three dimensions (WebGL 2), or has it switched off.";

@@ -1,12 +1,12 @@
 // The page of a case: what is shown, and its legend.
 
 class Page {
-  constructor(told, { tool_points, tool_moved, tool_triangles, ...arrays }) {
-    this.told = told;
-    this.mesh = new Mesh(arrays, told.shift, told.largest);
-    this.stage = new Stage(told, 1e-3 * told.tool);
+  constructor(inputs, { tool_points, tool_moved, tool_triangles, ...arrays }) {
+    this.inputs = inputs;
+    this.mesh = new Mesh(arrays, inputs.shift, inputs.largest);
+    this.stage = new Stage(inputs, 1e-3 * inputs.tool);
     this.stage.beforeDrawing = () => this.prepare();
-    this.stage.addLines(told.outline);
+    this.stage.addLines(inputs.outline);
     const tool = new THREE.BufferGeometry().setIndex(new THREE.BufferAttribute(Uint32Array.from(tool_triangles), 1));
     tool.setAttribute("position", new THREE.BufferAttribute(tool_points, 3));
     this.stage.fill(this.stage.tool, tool.setAttribute("moved", new THREE.BufferAttribute(tool_moved, 3)));
@@ -25,19 +25,19 @@ class Page {
   }
   // Name what can be shown, and choose what is first; browsers keep fields over a reload.
   label() {
-    const { told } = this;
-    for (const { name } of told.colours) field("colour").append(new Option(name));
-    field("colour").selectedIndex = told.colours[0].labels.length > 1 ? 0 : 1;
+    const { inputs } = this;
+    for (const { name } of inputs.colours) field("colour").append(new Option(name));
+    field("colour").selectedIndex = inputs.colours[0].labels.length > 1 ? 0 : 1;
     field("plane").selectedIndex = 0;
-    document.getElementById("deformed").hidden = !told.factor;
-    Object.assign(field("deformation"), { max: told.factor, value: told.start });
-    field("ring").parentElement.hidden = !told.epsilon;
-    document.querySelector(".ring + span").textContent = `ε = ${length(told.epsilon || 0)}`;
-    for (const name of ["footprint", "held", "probe"]) document.querySelector(`i.${name}`).style.background = told.ink[name];
+    document.getElementById("deformed").hidden = !inputs.factor;
+    Object.assign(field("deformation"), { max: inputs.factor, value: inputs.start });
+    field("ring").parentElement.hidden = !inputs.epsilon;
+    document.querySelector(".ring + span").textContent = `ε = ${length(inputs.epsilon || 0)}`;
+    for (const name of ["footprint", "held", "probe"]) document.querySelector(`i.${name}`).style.background = inputs.ink[name];
   }
   // All corners of the box round the body.
   whole() {
-    const { low, high } = this.told;
+    const { low, high } = this.inputs;
     const centre = vector(low).add(vector(high)).multiplyScalar(0.5);
     const corners = Array.from({ length: 8 }, (_, k) => vector(low.map((end, i) => ((k >> i) & 1 ? high[i] : end))));
     this.stage.follow(() => {
@@ -47,14 +47,14 @@ class Page {
     });
   }
   close() {
-    const half = 3 * this.told.tool;
+    const half = 3 * this.inputs.tool;
     this.stage.follow(() => [vector([0, 0, 0]), half, half]);
   }
   get colour() {
-    return this.told.colours[field("colour").selectedIndex];
+    return this.inputs.colours[field("colour").selectedIndex];
   }
   get normal() {
-    return this.told[field("plane").value];
+    return this.inputs[field("plane").value];
   }
   recolour() {
     this.stage.colour(this.colour);
@@ -67,7 +67,7 @@ class Page {
     if (this.normal) {
       const heights = this.mesh.heights(this.normal);
       const [min, max] = ["min", "max"].map((end) => heights.reduce((a, b) => Math[end](a, b)));
-      Object.assign(field("offset"), { min, max, value: this.normal === this.told.outward ? -this.told.tool : 0 });
+      Object.assign(field("offset"), { min, max, value: this.normal === this.inputs.outward ? -this.inputs.tool : 0 });
     }
     this.recut();
   }
@@ -78,7 +78,7 @@ class Page {
     document.querySelector("#place output").textContent = length(offset);
     stage.section.visible = Boolean(normal);
     // What of the surface lies in the plane gives way to the section.
-    stage.uniforms.plane.value = normal ? [...normal, offset - 1e-5 * this.told.radius] : [0, 0, 0, 1];
+    stage.uniforms.plane.value = normal ? [...normal, offset - 1e-5 * this.inputs.radius] : [0, 0, 0, 1];
     if (normal) stage.fill(stage.section, this.mesh.section(normal, offset, this.colour).geometry());
     stage.redraw();
   }
@@ -88,9 +88,9 @@ class Page {
     document.querySelector("#deformed output").textContent = `× ${short(factor)}`;
     uniforms.factor.value = factor;
     // A tool that is not flat is drawn where it is: its shape is not drawn larger, either.
-    tool.material.uniforms.factor.value = this.told.keeps_depth ? Math.min(factor, 1) : factor;
+    tool.material.uniforms.factor.value = this.inputs.keeps_depth ? Math.min(factor, 1) : factor;
     tool.visible = field("probe").checked;
-    uniforms.epsilon.value = (field("ring").checked && this.told.epsilon) || 0;
+    uniforms.epsilon.value = (field("ring").checked && this.inputs.epsilon) || 0;
     for (const name of ["edges", "marks"]) uniforms[name].value = field(name).checked;
   }
 }

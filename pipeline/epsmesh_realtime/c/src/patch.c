@@ -241,18 +241,18 @@ static int settle(epsmesh_patch *t, const place *p, double depth, double turn, c
     return 0;
 }
 
-static double told_depth(const epsmesh_patch *t, int number) {
+static double fill_depth(const epsmesh_patch *t, int number) {
     double deepest = t->depths[EPSMESH_DEPTHS - 1];
-    return deepest * exp(log(SHALLOWEST) + number * (log(0.9) - log(SHALLOWEST)) / (EPSMESH_TOLD - 1));
+    return deepest * exp(log(SHALLOWEST) + number * (log(0.9) - log(SHALLOWEST)) / (EPSMESH_FILLS - 1));
 }
 
 /* Fill the contact on a patch that holds it: 0 if the tip does not. */
 static int within(epsmesh_patch *t, const place *p, double depth, double turn, spread *s) {
-    double first = log(told_depth(t, 0)), step = (log(0.9) - log(SHALLOWEST)) / (EPSMESH_TOLD - 1), size[2], share;
+    double first = log(fill_depth(t, 0)), step = (log(0.9) - log(SHALLOWEST)) / (EPSMESH_FILLS - 1), size[2], share;
     int i, k, grown;
     share = (log(depth) - first) / step;
-    share = share < 0 ? 0 : share > EPSMESH_TOLD - 1 ? EPSMESH_TOLD - 1 : share;
-    i = share < EPSMESH_TOLD - 2 ? (int)share : EPSMESH_TOLD - 2;
+    share = share < 0 ? 0 : share > EPSMESH_FILLS - 1 ? EPSMESH_FILLS - 1 : share;
+    i = share < EPSMESH_FILLS - 2 ? (int)share : EPSMESH_FILLS - 2;
     share -= i;
     outline_at(t, depth, size);
     for (k = 0; k < 2; k++) size[k] *= ((1 - share) * t->fills[i][k] + share * t->fills[i + 1][k]) / FILLED;
@@ -288,8 +288,8 @@ static epsmesh_status patch_make(epsmesh_patch *t, double reach) {
         outline_to(t, t->depths[i], t->outlines[i]);
     }
     memset(t->pressed, 1, sizeof t->pressed);
-    for (i = 0; i < EPSMESH_TOLD; i++) {
-        double outline[2], size[2], depth = told_depth(t, i);
+    for (i = 0; i < EPSMESH_FILLS; i++) {
+        double outline[2], size[2], depth = fill_depth(t, i);
         outline_at(t, depth, outline);
         t->fills[i][0] = t->fills[i][1] = 1;
         for (again = 0; again < 2; again++) {

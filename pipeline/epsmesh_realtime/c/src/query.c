@@ -189,7 +189,7 @@ static double bar_of(const epsmesh_model *m, const epsmesh_query *q, const asked
 }
 
 /* Return a contact in the body's coordinates, of a tool at `depth` by itself. */
-static epsmesh_touch told(const epsmesh_model *m, double young, double depth, const asked *a, const contact *k,
+static epsmesh_touch answer_of(const epsmesh_model *m, double young, double depth, const asked *a, const contact *k,
                           double error) {
     epsmesh_touch t;
     double force[3];
@@ -214,7 +214,7 @@ epsmesh_touch epsmesh_touch_at(const epsmesh_model *m, const epsmesh_query *q) {
     if (status != EPSMESH_OK) return all(status, (double)NAN);
     if (!surveyed(m, q, &a)) return all(EPSMESH_DAMAGED, (double)NAN);
     if (!press(m, q, &a, &k)) return all(EPSMESH_LARGE, (double)NAN);
-    return told(m, q->young, q->depth, &a, &k, bar_of(m, q, &a, &k));
+    return answer_of(m, q->young, q->depth, &a, &k, bar_of(m, q, &a, &k));
 }
 
 void epsmesh_touch_each(const epsmesh_model *m, size_t count, const epsmesh_query *q, epsmesh_touch *t) {

@@ -359,7 +359,7 @@ void epsmesh_touch_all(const epsmesh_model *m, int n, const epsmesh_query *q, ep
         contact k = s.k[i];
         if (!(k.force > 0)) t[i] = all(EPSMESH_NO_CONTACT, 0.0);
         k.stiffness *= s.inverse[i][i], k.aside[0] = s.aside[i][0], k.aside[1] = s.aside[i][1];
-        if (k.force > 0) t[i] = told(m, q[i].young, q[i].depth, &a[i], &k, errors[i]);
+        if (k.force > 0) t[i] = answer_of(m, q[i].young, q[i].depth, &a[i], &k, errors[i]);
         which[i] = t[i].status == EPSMESH_DAMAGED, refused |= which[i];
     }
     if (refused) refuse(n, t, which, EPSMESH_DAMAGED);

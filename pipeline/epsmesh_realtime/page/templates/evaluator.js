@@ -30,9 +30,9 @@ async function unpackModel(layout) {
 }
 
 class Model {
-  // `told`: origin, axes (rows x, y, outward), reach, is_round, is_flat, young, poisson.
-  constructor(told, c) {
-    Object.assign(this, told, { c });
+  // `inputs`: origin, axes (rows x, y, outward), reach, is_round, is_flat, young, poisson.
+  constructor(inputs, c) {
+    Object.assign(this, inputs, { c });
   }
   // Numbers in the evaluator's memory.
   numbers(at, count) {

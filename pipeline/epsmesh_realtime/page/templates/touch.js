@@ -48,17 +48,17 @@ function arrow(length, error, thick) {
 }
 
 class Page {
-  constructor(told, { c }) {
-    this.told = told;
-    this.model = new Model(told.model, c);
+  constructor(inputs, { c }) {
+    this.inputs = inputs;
+    this.model = new Model(inputs.model, c);
     this.surface = new Surface(this.model);
     this.made = new Vertices();
     this.largest = 0;
-    this.size = told.radius;
-    this.stage = new Stage(told, 1e-3 * told.radius);
-    this.stage.colour({ stops: told.stops });
+    this.size = inputs.radius;
+    this.stage = new Stage(inputs, 1e-3 * inputs.radius);
+    this.stage.colour({ stops: inputs.stops });
     this.stage.addLines([this.border()]);
-    this.arrow = this.stage.addSolid(told.ink.footprint);
+    this.arrow = this.stage.addSolid(inputs.ink.footprint);
     this.unanswered = new Unanswered(this);
     this.listen();
     this.whole();
@@ -137,7 +137,7 @@ class Page {
   }
   whole() {
     this.stage.follow(() => {
-      const centre = vector(this.told.centre).addScaledVector(this.stage.basis()[1], 0.25 * this.size);
+      const centre = vector(this.inputs.centre).addScaledVector(this.stage.basis()[1], 0.25 * this.size);
       return [centre, 1.05 * this.size, this.size];
     });
   }
@@ -175,7 +175,7 @@ class Page {
     const triangles = isIn ? this.surface.press(query, touch, true) : null;
     const took = performance.now() - began;
     this.fillBody(triangles, query.depth * MM);
-    describe({ stops: this.told.stops, limits: [0, Math.max(query.depth * MM, 0)], unit: "mm", linear: true });
+    describe({ stops: this.inputs.stops, limits: [0, Math.max(query.depth * MM, 0)], unit: "mm", linear: true });
     stage.fill(stage.body, this.made.geometry());
     stage.uniforms.edges.value = field("edges").checked;
     this.arrow.visible = isIn;
@@ -191,7 +191,7 @@ class Page {
     list.replaceChildren(...reasons.map((status) => {
       const item = document.createElement("li");
       item.className = status === "outside" ? "outside" : "other";
-      item.textContent = `${Math.round(100 * shares[status])} % of the face, ${status}: ${this.told.sentences[status]}`;
+      item.textContent = `${Math.round(100 * shares[status])} % of the face, ${status}: ${this.inputs.sentences[status]}`;
       return item;
     }));
   }
@@ -239,14 +239,14 @@ class Page {
     if (query.tool === "blade") tool.rotateZ(field("turn").valueAsNumber * DEGREE);
     const down = isIn || query.depth <= 0 ? -MM * query.depth : 0;
     tool.position.copy(vector(at)).addScaledVector(vector(spot.turn[2]), down);
-    tool.material.uniforms.colour.value = rgb(isIn ? this.told.ink.probe : this.told.ink.footprint);
+    tool.material.uniforms.colour.value = rgb(isIn ? this.inputs.ink.probe : this.inputs.ink.footprint);
   }
   tell(query, touch, took) {
     for (const { name } of document.querySelectorAll("#panel input[type=range]")) {
       field(name).previousElementSibling.textContent = short(field(name).valueAsNumber);
     }
     const isIn = touch.status === "ok";
-    say("status", isIn ? "" : this.told.sentences[touch.status]);
+    say("status", isIn ? "" : this.inputs.sentences[touch.status]);
     document.body.dataset.status = touch.status;
     const local = this.model.axes.map((axis) => inner(axis, touch.force));
     const normal = inner(this.foothold.spot.turn[2], local);

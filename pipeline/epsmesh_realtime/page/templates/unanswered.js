@@ -7,8 +7,8 @@ const SHALLOW = 1e-6;
 class Unanswered {
   // Parts of the stage by status: what is outside the region, and all else.
   constructor(page) {
-    const { stage, told } = page;
-    Object.assign(this, { page, outside: stage.addSolid(told.ink.held, 0.4), other: stage.addSolid(told.ink.footprint, 0.35) });
+    const { stage, inputs } = page;
+    Object.assign(this, { page, outside: stage.addSolid(inputs.ink.held, 0.4), other: stage.addSolid(inputs.ink.footprint, 0.35) });
     this.seen = "";
   }
   // Shade again if the tool has changed; its place and E do not matter. Return the statuses with their shares of the face.

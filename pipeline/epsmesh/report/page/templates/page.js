@@ -58,15 +58,15 @@ function apply() {
 }
 
 function write() {
-  const told = new URLSearchParams();
+  const chosen = new URLSearchParams();
   for (const { name, value, checked } of form.elements) {
-    if (name === "columns" ? checked : name && value) told.set(name, name === "columns" ? "all" : value);
+    if (name === "columns" ? checked : name && value) chosen.set(name, name === "columns" ? "all" : value);
   }
   const [sorted] = table.order();
-  if (sorted && sorted[1]) told.set("sort", columns[sorted[0]].name);
-  if (sorted && sorted[1] === "desc") told.set("order", "down");
-  if (table.page.len() !== step) told.set("rows", table.page.len());
-  history.replaceState(null, "", `#${[...told].length ? told : "cases"}`);
+  if (sorted && sorted[1]) chosen.set("sort", columns[sorted[0]].name);
+  if (sorted && sorted[1] === "desc") chosen.set("order", "down");
+  if (table.page.len() !== step) chosen.set("rows", table.page.len());
+  history.replaceState(null, "", `#${[...chosen].length ? chosen : "cases"}`);
 }
 
 function follow() {
