@@ -60,7 +60,6 @@ endif
 studies: setup ## run every study in studies/
 	$(EPSMESH) run $(filter-out studies/identify-%,$(wildcard studies/*.toml))
 	$(EPSMESH) identify studies/identify-*.toml
-	$(EPSMESH) sensitivity studies/sensitivity.toml
 
 docs: setup ## build the documentation; a warning is an error
 	$(PYTHON) -m sphinx -W --keep-going -n -q -E -a -b html docs $(DOCS)

@@ -203,9 +203,16 @@ def test_plan_story_and_store(epsmesh, small, whole, tmp_path):
     assert (listed["records"], listed["sound"]) == (planned["solves"], True)
 
 
-def test_a_check_status_and_figures(epsmesh, small, tmp_path):
-    assert "small.toml: fine; 12 cases (2 poisson × 3 epsilon × 2 outside)" in epsmesh("plan", "--check", small).stdout
+def test_plans_status_and_figures(epsmesh, small, tmp_path):
+    assert ": 12 cases (2 poisson × 3 epsilon × 2 outside)\n" in epsmesh("plan", small, "--output", tmp_path).stdout
+    other = tmp_path / "other.toml"
+    other.write_text(small.read_text())
+    both = epsmesh("plan", small, other, "--output", tmp_path)
+    assert [line.partition("; ")[0] for line in both.stdout.splitlines()] == [f"{x}: 12 cases" for x in (small, other)]
+    found = json.loads(epsmesh("plan", small, other, "--output", tmp_path, "--json").stdout)
+    assert [one["cases"] for one in found] == [12, 12]
+    other.write_text(small.read_text().replace("0.1 mm", "-0.1 mm"))
+    wrong = epsmesh("plan", small, other, "--output", tmp_path)
+    assert (wrong.exit_code, wrong.stdout, str(other) in wrong.stderr) == (2, "", True)
     assert "12 pending" in epsmesh("status", small, "--output", tmp_path).stdout
     assert epsmesh("report", small, "--figures", "--output", tmp_path).exit_code == 2
-    report = json.loads(epsmesh("plan", "--check", small, "--json").stdout)
-    assert report == [{"file": str(small), "errors": [], "warnings": [], "cases": 12}]

@@ -39,7 +39,7 @@ def installed(tmp_path_factory):
     return run
 
 
-@pytest.mark.parametrize("command", ["verify", "new", "view", "export", "status", "run", "identify", "sensitivity"])
+@pytest.mark.parametrize("command", ["verify", "new", "view", "export", "status", "run", "identify"])
 def test_every_command_loads(installed, command):
     done = installed("-m", "epsmesh", command, "--help")
     assert done.returncode == 0, done.stderr

@@ -25,7 +25,7 @@ def test_a_number_has_its_noun(number, noun, words):
     assert counted(number, noun) == words
 
 
-@pytest.mark.parametrize("command", [("plan",), ("plan", "--check"), ("run", "--verbose"), ("status",)])
+@pytest.mark.parametrize("command", [("plan",), ("plan", "--quiet"), ("run", "--verbose"), ("status",)])
 def test_one_case_is_no_cases(command, tmp_path, epsmesh):
     file = tmp_path / "one.toml"
     file.write_text(small_text(**ONE_CASE))

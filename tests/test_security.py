@@ -124,7 +124,7 @@ def test_a_study_names_any_file_that_can_be_read(folders, file, epsmesh):
     project, strange = folders
     path = written(project, file.format(strange=strange))
     assert read_study(path).shape == ()
-    assert epsmesh("plan", "--check", path).exit_code == 0
+    assert epsmesh("plan", path).exit_code == 0
 
 
 @pytest.mark.parametrize(
@@ -242,7 +242,7 @@ def test_no_file_writes_on_a_terminal_what_it_does_not_say(tmp_path):
     start = (data := bytearray(model.read_bytes())).index(b"check_bar")
     data[start : start + 3], data[start + 32 : start + 36] = b"\x1b[2", b"\xff" * 4
     model.write_bytes(data)
-    commands = [("plan", "--check", mine), ("status", "--store", store), ("touch", model), ("touch", mine)]
+    commands = [("plan", mine), ("status", "--store", store), ("touch", model), ("touch", mine)]
     for words in (*commands, *((*words, "--json") for words in commands)):
         status, said, errors = talk(*words)
         text = said + errors

@@ -1,5 +1,6 @@
-"""What stands for MPI's communicator where MPI is not installed: one process, and nobody to talk to."""
+"""What stands for MPI's communicator where MPI is not loaded: one process, and nobody to talk to."""
 
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -29,3 +30,10 @@ class Alone:
 
     def barrier(self) -> None:
         """Wait for nobody."""
+
+
+@dataclass(frozen=True)
+class Jobs(Alone):
+    """The communicator of a run that solves in ``count`` further processes, which have MPI each for itself."""
+
+    count: int

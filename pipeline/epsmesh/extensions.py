@@ -13,6 +13,8 @@ A distribution declares them, and epsmesh finds them wherever they are installed
 - ``epsmesh.files``: a kind of file by its ending, without the dot: the function of a path that ``epsmesh.open`` calls.
 - ``epsmesh.forecasts``: what else can be made of a study, by any name: a function of a study, a cost model and the
   number of ranks, which returns the :class:`Forecast` of it that `epsmesh plan` tells.
+- ``epsmesh.views``: files that are neither studies nor label maps, by any name: a function of the path of one, which
+  prints what is in it for `epsmesh view`.
 - ``epsmesh.packages``: under the name ``realtime``, the package that ``epsmesh.realtime`` is.
 - ``epsmesh.methods``: a method of what ``epsmesh.read`` returns, by its name: a function of the study, an
   :class:`epsmesh.api.RunnableStudy`.
@@ -84,12 +86,24 @@ class Forecast:
     line: str
 
 
+@dataclass(frozen=True)
+class Made:
+    """What a command has made: as ``data`` for scripts, and as lines."""
+
+    data: dict[str, Any]
+    lines: tuple[str, ...]
+
+
 def _as_it_is(study: Filled) -> Filled:
     return study
 
 
 def _nothing(_study: "Study") -> str:
     return ""
+
+
+def _nothing_further(_study: "Study", _output: Path) -> None:
+    return None
 
 
 def _no_work(_study: "Study", _cost: "CostModel") -> Iterable[Forecast]:
@@ -107,7 +121,10 @@ class Sections:
 
     ``read`` returns what the sections say, for ``Study.extra``. ``fill`` returns a study that has one of them with what
     it need not say, ``left_out`` what `epsmesh run` leaves out of it, "" for nothing. ``forecast`` tells what work
-    besides the cases costs; it raises a StudyError if that cannot be done, or a :class:`RefusedError`.
+    besides the cases costs; it raises a StudyError if that cannot be done, or a :class:`RefusedError`. ``further``
+    returns, for the folder of the results, what `epsmesh run` calls with the case store when the cases of a study are
+    computed, None for nothing. ``following`` ranks, with the case store, what to measure next, for `epsmesh plan
+    --next`; ``True`` is for no progress.
     """
 
     models: "Mapping[str, type[Section]]"
@@ -120,6 +137,8 @@ class Sections:
     fill: Callable[[Filled], Filled] = _as_it_is
     left_out: "Callable[[Study], str]" = _nothing
     forecast: "Callable[[Study, CostModel], Iterable[Forecast]]" = _no_work
+    further: "Callable[[Study, Path], Callable[[Path], Made] | None]" = _nothing_further
+    following: "Callable[[Study, Path, bool], Made] | None" = None
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,12 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from epsmesh.alone import Alone
+from epsmesh.alone import Alone, Jobs
+from epsmesh.errors import CompilerError
 from epsmesh.launcher import is_launched
 from epsmesh.plan.cost import CostModel
 from epsmesh.plan.plan import Plan, leave_out_stored, make_plan
@@ -28,7 +30,6 @@ from epsmesh.run.reading import open_to_read
 from epsmesh.run.record import Record
 from epsmesh.run.registry import Registered
 from epsmesh.run.store import Store, StoreError
-from epsmesh.solve import CompilerError
 from epsmesh.stages import stage
 from epsmesh.states import SKIPPED
 from epsmesh.study.sweep import Study
@@ -250,7 +251,7 @@ def ended_soon() -> Iterator[None]:
 
 def _compute(plan: Plan, opened: Opened, comm: "MPI.Comm", progress: Terminal | None) -> bool:
     """Carry out ``plan``, and return whether it was interrupted; collective."""
-    if plan.solves:
+    if plan.solves and not isinstance(comm, Jobs):
         load_solvers()  # before signals are handled
     try:
         with _interruptible() as signals:
@@ -286,11 +287,6 @@ def _execute(plan: Plan, opened: Opened, comm: "MPI.Comm", progress: Terminal | 
     if not plan.solves:
         with registered or nullcontext():
             return
-    from epsmesh.run.execute import execute  # noqa: PLC0415
-    from epsmesh.run.mesh_cache import MeshCache  # noqa: PLC0415
-
-    cache = MeshCache(opened.meshes) if opened.meshes else None
-
     outbox = Outbox(opened.store, plan) if opened.store else None
 
     def keep(record: Record) -> None:
@@ -301,6 +297,20 @@ def _execute(plan: Plan, opened: Opened, comm: "MPI.Comm", progress: Terminal | 
         if signals:
             raise KeyboardInterrupt
 
+    if isinstance(comm, Jobs):
+        from epsmesh.run import jobs  # noqa: PLC0415
+
+        assert opened.store and outbox and registered
+        # Forked before the progress has a thread; ended when all records are in the store.
+        workers = jobs.Workers(plan, comm.count, opened.store.path, opened.meshes)
+        with workers, progress or nullcontext(), registered, outbox:
+            ended = partial(fail_begun, opened.store)
+            jobs.execute(plan, workers, keep, registered, ended, known=opened.records, last=opened.again)
+        return
+    from epsmesh.run.execute import execute  # noqa: PLC0415
+    from epsmesh.run.mesh_cache import MeshCache  # noqa: PLC0415
+
+    cache = MeshCache(opened.meshes) if opened.meshes else None
     with progress or nullcontext(), registered or nullcontext(), opened.begun as begun:
         with outbox or nullcontext():
             execute(

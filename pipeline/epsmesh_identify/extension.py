@@ -1,10 +1,10 @@
 """What this package adds to epsmesh, as :mod:`epsmesh.extensions` finds it: sections of a study, a kind of dataset."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from epsmesh.extensions import Forecast, Kind, RefusedError, Sections
+from epsmesh.extensions import Forecast, Kind, Made, RefusedError, Sections
 from epsmesh.study.sweep import Study
 from epsmesh_identify.sections.columns import Columns, ColumnUnits, Sign
 from epsmesh_identify.sections.kept import measurements_of, spread_of
@@ -44,8 +44,8 @@ _TEXTS = {
     "parameter of the law, `contact_point` (larger is deeper), `baseline`, `drift`, `machine_stiffness`, "
     "`relaxation_share_1`, `relaxation_time_1`. It has a range, or a value with its error (95 %). What is not named is "
     "known. Optional; its lists are no sweeps.",
-    "sensitivity": "Parameters whose effect on the force `epsmesh sensitivity` compares. Besides the key below, the "
-    "name of a parameter is a key, as in [identify], and `depth`: it has a range, or a value with its error "
+    "sensitivity": "Parameters whose effect on the force `epsmesh run` compares, after the cases. Besides the key "
+    "below, the name of a parameter is a key, as in [identify], and `depth`: it has a range, or a value with its error "
     "(95 %). Forces do not depend on this section. Optional; its lists are no sweeps.",
 }
 
@@ -92,6 +92,20 @@ def draw(dataset: "xr.Dataset", stem: Path) -> list[Path]:
     return drawn(dataset, stem)
 
 
+def further(study: Study, output: Path) -> Callable[[Path], Made] | None:
+    """Return what makes the sensitivity of a study; None without the section."""
+    from epsmesh_identify.cli.sensitivity import sensitivity_of  # noqa: PLC0415
+
+    return sensitivity_of(study, output)
+
+
+def following(study: Study, store: Path, quiet: bool) -> Made:
+    """Rank which test to make next."""
+    from epsmesh_identify.cli.design import ranking  # noqa: PLC0415
+
+    return ranking(study, store, quiet)
+
+
 SECTIONS = Sections(
     models={"measurement": Measurement, "identify": Identify, "sensitivity": Sensitivity},
     texts=_TEXTS,
@@ -103,6 +117,8 @@ SECTIONS = Sections(
     fill=fill,
     left_out=left_out,
     forecast=forecast,
+    further=further,
+    following=following,
 )
 
 IDENTIFICATION = Kind("an identification", "identification of curves", is_identification, write_page, draw)

@@ -1,4 +1,4 @@
-"""What `epsmesh plan` tells of the forces that `epsmesh identify` and `sensitivity` need, and of an export."""
+"""What `epsmesh plan` tells of the forces that `epsmesh identify` and a sensitivity need."""
 
 from collections.abc import Iterator
 from typing import Any

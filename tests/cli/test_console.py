@@ -170,7 +170,7 @@ def test_fish_gets_a_tab_between_a_command_and_its_help(monkeypatch):
     }
     for name, value in asked.items():
         monkeypatch.setenv(name, value)
-    assert talk()[1].startswith("plan\tCheck a study")
+    assert talk()[1].startswith("plan\tCheck studies")
 
 
 def test_what_is_no_store_is_left_alone(epsmesh, tmp_path, monkeypatch):
@@ -196,7 +196,7 @@ def test_one_of_a_thing_is_called_so_and_letters_that_are_seen_are_written_as_th
     file = tmp_path / "µm.toml"
     one = {"mesh": {"epsilon": "4000 µm"}, "solve": {"exact": False}}
     file.write_text(small_text(title="Breadth in µm", **one))
-    for words in (("plan", "--check", file), ("plan", file), ("plan", file, "--json"), ("run", file), ("status", file)):
+    for words in (("plan", "-q", file), ("plan", file), ("plan", file, "--json"), ("run", file), ("status", file)):
         done = epsmesh(*words, "--output", tmp_path / "out")
         told = done.stdout + done.stderr
         assert done.exit_code == 0, told

@@ -3,7 +3,7 @@
 import pytest
 
 
-@pytest.mark.parametrize("words", [("plan", "--check"), ("plan",), ("status",)])
+@pytest.mark.parametrize("words", [("plan",), ("status",)])
 def test_a_study_is_found_by_its_name(epsmesh, tmp_path, monkeypatch, words):
     monkeypatch.chdir(tmp_path)
     assert epsmesh("new", "mine").exit_code == 0
@@ -17,7 +17,7 @@ def test_a_file_of_that_name_comes_first(epsmesh, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert epsmesh("new", "mine").exit_code == 0
     (tmp_path / "mine").write_text("title = 1")
-    assert epsmesh("plan", "--check", "mine").exit_code == 2
+    assert epsmesh("plan", "mine").exit_code == 2
 
 
 @pytest.mark.parametrize("word", ["mine", "studies/mine.toml"])
@@ -35,7 +35,7 @@ def test_the_model_of_a_study_is_found_by_the_study(epsmesh, tmp_path, monkeypat
     ("words", "told"),
     [
         (("run", "known.nc"), "a dataset is for `report` and `guide`, a model for `touch`"),
-        (("plan", "small.toml", "small.toml"), "with --check several files are looked at"),
+        (("plan", "small.toml", "0", "1"), "put the labels of a case into one pair of quotes"),
         (("touch", "small.toml"), "a model ends in .epsm: `epsmesh export small.toml` makes one"),
         (("touch", "known.nc"), "a model ends in .epsm: `epsmesh export known.toml` makes one"),
     ],

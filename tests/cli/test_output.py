@@ -51,7 +51,7 @@ def test_a_full_standard_output_is_told(tmp_path):
     (tmp_path / "small.toml").write_text(small_text(), encoding="utf-8")
     with open("/dev/full", "w") as full:  # noqa: PTH123
         done = subprocess.run(
-            command("plan", "--check", tmp_path / "small.toml"),
+            command("plan", tmp_path / "small.toml"),
             stdout=full,
             stderr=subprocess.PIPE,
             text=True,

@@ -1,5 +1,7 @@
-"""The command that tells what a run would do, before it is begun; and what a case is by its labels."""
+"""The command that checks studies, and tells what a run would do; and what a case is by its labels."""
 
+import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -7,7 +9,7 @@ import typer
 
 from epsmesh.cli.cases import find_case
 from epsmesh.cli.console import is_json_wanted, say, warning
-from epsmesh.cli.faults import BAD_INPUT, DONE, SOME_FAILED, as_data, fail, of_study, print_faults, refusing
+from epsmesh.cli.faults import DONE, SOME_FAILED, fail, of_study, refusing
 from epsmesh.cli.words import (
     DEFAULT_OUTPUT,
     File,
@@ -19,13 +21,14 @@ from epsmesh.cli.words import (
     Without,
     axes_of,
     by_name,
+    check_machine,
     check_names,
     check_store,
-    meant,
     read_all,
+    store_to_write,
     warn,
 )
-from epsmesh.extensions import further_forecasts
+from epsmesh.extensions import all_sections, further_forecasts
 from epsmesh.files import STORE_NAME
 from epsmesh.printable import counted
 from epsmesh.run.remaining import format_seconds
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
     from epsmesh.extensions import Forecast
     from epsmesh.plan.cost import CostModel
     from epsmesh.plan.plan import Plan
+    from epsmesh.plan.shard import Shard
     from epsmesh.run.record import Record
     from epsmesh.study.case import Case
     from epsmesh.study.sweep import Study
@@ -44,17 +48,35 @@ _TO_DO = {"meshes": "mesh", "systems": "equation system", "solves": "solve"}
 _MOST_STEPS = 20
 
 
+@dataclass(frozen=True)
+class Work:
+    """What a run is given: folder, case store, reductions that it does not use, ranks; its ``shard`` of a study.
+
+    A ``fresh`` one takes nothing from the store.
+    """
+
+    output: Path
+    store: Path | None
+    without: tuple[str, ...]
+    ranks: int
+    shard: "Shard | None" = None
+    fresh: bool = False
+
+
 def plan(
     file: File,
-    case: Annotated[
+    more: Annotated[
         list[str] | None,
         typer.Argument(
             metavar="[CASE]",
-            help='One case only: "poisson=0.3, epsilon=10 mm", or its number. With --check: more study files.',
+            help='One case only: "poisson=0.3, epsilon=10 mm", or its number. Or further study files.',
             show_default=False,
         ),
     ] = None,
-    check: Annotated[bool, typer.Option("--check", help="Only list the errors of study files.")] = False,
+    following: Annotated[
+        bool,
+        typer.Option("--next", help="Rank which test to measure next, by what it would do to each error bar."),
+    ] = False,
     output: Output = DEFAULT_OUTPUT,
     store: StoreFile = None,
     without: Without = None,
@@ -67,11 +89,14 @@ def plan(
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> None:
-    """Check a study, and show the work to do, the work skipped, and the reasons.
+    """Check studies, and show the work to do, the work skipped, and the reasons.
 
     It estimates time and memory, and the cost of an export. For one case it shows the steps, the source of its force,
-    what it shares with other cases, and the cost of changes. Exit status 1: no case fits into memory; 2: the study has
+    what it shares with other cases, and the cost of changes. Exit status 1: no case fits into memory; 2: a study has
     errors; all are listed.
+
+    --next computes forces, and keeps them in the store: it ranks further tests, such as a second radius, from the
+    values that the study declares.
 
     Example: epsmesh plan studies/figure3.toml
 
@@ -79,42 +104,81 @@ def plan(
 
     Example: epsmesh plan studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=free"
 
-    Example: epsmesh plan --check studies/*.toml
+    Example: epsmesh plan studies/*.toml
+
+    Example: epsmesh plan studies/identify-punch.toml --next
     """
-    more = case or []
-    if check:
-        _check([file, *(by_name(Path(word)) for word in more)])
-    if len(more) > 1 or any(word.endswith(".toml") for word in more):
-        fail("a plan is of one study, or of one case of it; with --check several files are looked at")
+    files, case = _told_apart(file, more or [])
+    studies = read_all(files, have_cases=case is not None)
+    of = Work(output, store, check_names(without), ranks)
+    if following:
+        _rank(studies, store_to_write(store, output), quiet=quiet)
+        return
+    if case is not None:
+        (study,) = studies
+        chosen = find_case(study, case)
+        _tell(*_planned(study, of), chosen)
+        return
+    show_plans(studies, of, memory, quiet=quiet, verbose=verbose)
+
+
+def _told_apart(file: Path, more: list[str]) -> tuple[list[Path], str | None]:
+    """Return the study files among the words of a command line, and its case."""
+    others = [by_name(Path(word)) for word in more]
+    are_files = [path.suffix == ".toml" or path.is_file() for path in others]
+    if all(are_files):
+        return [file, *others], None
+    if len(more) == 1:
+        return [file], more[0]
+    fail("a plan is of several studies, or of one case of one study: put the labels of a case into one pair of quotes")
+
+
+def _rank(studies: "list[Study]", store: Path, *, quiet: bool) -> None:
+    """Print which test to measure next."""
+    check_machine()
+    ranked = [one.following(study, store, quiet) for study in studies for one in all_sections() if one.following]
+    say({"status": DONE, "studies": [one.data for one in ranked]}, *(line for one in ranked for line in one.lines))
+
+
+def show_plans(
+    studies: "list[Study]", of: Work, memory: float | None = None, *, quiet: bool, verbose: bool
+) -> NoReturn:
+    """Print the plans of studies, one by a line each of several, and exit."""
+    several = len(studies) > 1
+    found = [_summary(study, of, memory, quiet=quiet or several, verbose=verbose) for study in studies]
+    if is_json_wanted():
+        say(found if several else found[0])
+    raise typer.Exit(SOME_FAILED if any(one.get("nothing_fits") for one in found) else DONE)
+
+
+def _summary(study: "Study", of: Work, memory: float | None, *, quiet: bool, verbose: bool) -> dict[str, Any]:
+    """Print the plan of a study, and return it as data."""
+    if study.lacking:
+        return _show_forecasts(study, quiet=quiet)
     from epsmesh.plan.describe import summary
     from epsmesh.run.room import MEMORY_SHARE, machine_room
 
-    (study,) = read_all([file], have_cases=bool(more))
-    if study.lacking:
-        _show_forecasts(study)
-    chosen = find_case(study, more[0]) if more else None
-    made, records = _planned(study, store or output / STORE_NAME, check_names(without))
-    if chosen is not None:
-        _tell(made, records, chosen)
-        return
-    found = summary(made, ranks)
+    made, records = _planned(study, of)
+    found = summary(made, of.ranks)
     room = machine_room() if memory is None else 1e9 * memory
     most = MEMORY_SHARE * room
     found |= {"memory_available": room, "too_large": sum(step["memory"] > most for step in found["steps"])}
-    found["besides"] = _besides(made, records, ranks)
-    forecasts = [*_forecasts(study, made.cost), *further_forecasts(study, made.cost, ranks)]
+    found["besides"] = _besides(made, records, of.ranks)
+    forecasts = [*_forecasts(study, made.cost), *further_forecasts(study, made.cost, of.ranks)]
     found["forecasts"] = [one.data for one in forecasts]
-    _show(study, found, forecasts, quiet=quiet, verbose=verbose)
     # Where all cases are too large, that of F_exact may still be solved: for nothing.
     asked = [step for step in found["steps"] if not step["exact"]] or found["steps"]
-    nothing_fits = bool(asked) and all(step["memory"] > most for step in asked)
-    if found["too_large"] and not as_json:
-        what = "no case fits" if nothing_fits else f"{found['too_large']} of {found['meshes']} steps do not fit"
+    found["nothing_fits"] = bool(asked) and all(step["memory"] > most for step in asked)
+    if is_json_wanted():
+        return found
+    _show(study, found, forecasts, quiet=quiet, verbose=verbose)
+    if found["too_large"]:
+        some = f"{found['too_large']} of {found['meshes']} steps do not fit"
         warning(
-            f"{what} into the {room / 1e9:.1f} GB of memory that are there, and will be refused: use larger elements, "
-            "a smaller epsilon, or a larger machine (--memory)"
+            f"{'no case fits' if found['nothing_fits'] else some} into the {room / 1e9:.1f} GB of memory that are "
+            "there, and will be refused: use larger elements, a smaller epsilon, or a larger machine (--memory)"
         )
-    raise typer.Exit(SOME_FAILED if nothing_fits else DONE)
+    return found
 
 
 def _besides(made: "Plan", records: "dict[str, Record]", ranks: int) -> dict[str, Any]:
@@ -127,30 +191,6 @@ def _besides(made: "Plan", records: "dict[str, Record]", ranks: int) -> dict[str
     rest = possible(made, records)
     found = summary(rest, ranks) if rest else {"solves": 0}
     return {name: found[name] for name in ("solves", "seconds", "memory")} if found["solves"] else {}
-
-
-def _check(files: list[Path]) -> NoReturn:
-    """Say of each study file everything that is wrong with it, and exit."""
-    from epsmesh.study.problems import StudyError
-    from epsmesh.study.read import read_study
-
-    report: list[dict[str, Any]] = []
-    for file in files:
-        try:
-            study = read_study(file)
-        except StudyError as wrong:
-            faults = of_study(wrong, meant(file))
-            report.append({"file": str(file), "errors": as_data(faults, BAD_INPUT)["errors"], "warnings": []})
-            print_faults(faults)
-            continue
-        cases = len(study)
-        report.append({"file": str(file), "errors": [], "warnings": list(study.warnings), "cases": cases})
-        if not is_json_wanted():
-            warn(study)
-            what = f"for `{study.does}`" if study.lacking else f"{counted(cases, 'case')}{axes_of(study)}"
-            print(f"{file}: fine; {what}")
-    say(report)
-    raise typer.Exit(BAD_INPUT if any(one["errors"] for one in report) else DONE)
 
 
 def _forecasts(study: "Study", cost: "CostModel") -> "list[Forecast]":
@@ -166,45 +206,45 @@ def _forecasts(study: "Study", cost: "CostModel") -> "list[Forecast]":
         fail(*of_study(wrong))
 
 
-def _show_forecasts(study: "Study") -> NoReturn:
-    """Print what the work costs for a study that has no cases besides, and exit."""
+def _show_forecasts(study: "Study", *, quiet: bool) -> dict[str, Any]:
+    """Print what the work costs for a study that has no cases besides; return it as data."""
     from epsmesh.plan.cost import CostModel
 
-    warn(study)
     found = _forecasts(study, CostModel())
-    data, lines = [one.data for one in found], (one.line for one in found)
-    say({"study": study.file, "forecasts": data}, study.title, *lines)
-    raise typer.Exit(DONE)
+    if not is_json_wanted():
+        if not quiet:
+            warn(study)
+        print(f"{study.file}: for `{study.does}`" if quiet else study.title)
+        print("\n".join(one.line for one in found))
+    return {"study": study.file, "warnings": list(study.warnings), "forecasts": [one.data for one in found]}
 
 
-def _planned(study: "Study", path: Path, without: tuple[str, ...]) -> "tuple[Plan, dict[str, Record]]":
+def _planned(study: "Study", of: Work) -> "tuple[Plan, dict[str, Record]]":
     """Return the plan of what is not on record, and the records that are."""
-    if not path.exists():
-        from epsmesh.plan.plan import make_plan
-
-        return make_plan(study, without=without), {}
+    from epsmesh.plan.shard import stores_of
     from epsmesh.run.reading import plan_the_rest
     from epsmesh.run.store import StoreError
 
+    path = of.store or (of.shard.store(of.output, study) if of.shard else of.output / STORE_NAME)
+    path = Path(os.devnull) / STORE_NAME if of.fresh else path  # there is none
     check_store(path)
+    beside = [] if of.fresh else [of.output / STORE_NAME] if of.shard else stores_of(of.output, study)
     with refusing(StoreError, file=path):
-        return plan_the_rest(study, path, without)
+        return plan_the_rest(study, path, of.without, shard=of.shard, beside=beside)
 
 
 def _show(study: "Study", found: dict[str, Any], forecasts: "list[Forecast]", *, quiet: bool, verbose: bool) -> None:
     """Print the summary of a plan, and what work there is besides."""
-    if is_json_wanted():
-        say(found)
-        return
     exact = f" ({found['exact']} of them for F_exact)" if found["exact"] else ""
-    to_do = f"{', '.join(counted(found[name], noun) for name, noun in _TO_DO.items())}{exact}"
+    to_do = f"to do: {', '.join(counted(found[name], noun) for name, noun in _TO_DO.items())}{exact}"
+    nothing = "" if found["solves"] else "; nothing to do"
     on = f"on {counted(found['ranks'], 'rank')}"
     cost = f"{format_seconds(found['seconds'])} {on}, {found['memory'] / 1e9:,.1f} GB for the largest step"
     if quiet:
-        print(f"{study.file}: {counted(found['cases'], 'case')}; to do: {to_do}{f'; {cost}' if found['steps'] else ''}")
+        print(f"{study.file}: {counted(found['cases'], 'case')}{nothing or f'; {to_do}; {cost}'}")
         return
     warn(study)
-    print(f"{study.title}: {counted(found['cases'], 'case')}{axes_of(study)}")
+    print(f"{study.title}: {counted(found['cases'], 'case')}{axes_of(study)}{nothing}")
     for skipped in found["skipped"]:
         print(f"  {skipped['name']:13} {skipped['count']:6}  {skipped['reason']}")
     if (unasked := found["exact_unasked"])["scenes"]:
@@ -212,8 +252,8 @@ def _show(study: "Study", found: dict[str, Any], forecasts: "list[Forecast]", *,
         print(f"  {'exact':13} {unasked['scenes']:6}  F_exact is not computed: `exact = true` would add {more}.")
     for note in found["notes"]:
         print(f"  {note}")
-    print(f"  to do: {to_do}")
-    if found["steps"]:
+    if found["solves"]:
+        print(f"  {to_do}")
         print(f"  estimate: {cost}")
         ground = f"{counted(found['fitted_to'], 'case')} on record" if found["fitted_to"] else "no case on record yet"
         if (slower := found["machine"]) != 1:

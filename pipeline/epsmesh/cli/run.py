@@ -3,17 +3,20 @@
 import sys
 import time
 from collections import Counter
+from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from shlex import quote
 from textwrap import shorten
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, TextIO, cast
 
 import typer
 
+from epsmesh.alone import Jobs
 from epsmesh.cli.console import error, print_json, warning
-from epsmesh.cli.faults import DONE, INTERRUPTED, SOME_FAILED, Fault, fail, of_results
+from epsmesh.cli.faults import DONE, INTERRUPTED, SOME_FAILED, Fault, fail, of_file, of_option, of_results, of_study
+from epsmesh.cli.plan import Work, show_plans
 from epsmesh.cli.words import (
     DEFAULT_MESHES,
     DEFAULT_OUTPUT,
@@ -35,12 +38,16 @@ from epsmesh.cli.words import (
     warn,
 )
 from epsmesh.files import STORE_NAME, result_files
+from epsmesh.launcher import is_launched
 from epsmesh.printable import counted
 from epsmesh.states import FAILED, FAILURES, PENDING, SKIPPED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
+    from mpi4py import MPI
+
+    from epsmesh.extensions import Made
     from epsmesh.plan.plan import Plan
     from epsmesh.plan.shard import Shard
     from epsmesh.run.progress import Terminal
@@ -60,6 +67,12 @@ def run(
     output: Output = DEFAULT_OUTPUT,
     store: StoreFile = None,
     meshes: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the mesh cache.")] = DEFAULT_MESHES,
+    jobs: Annotated[
+        int, typer.Option("--jobs", "-j", metavar="N", help="Compute in N processes side by side.", min=1)
+    ] = 1,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", "-n", help="Compute nothing: say what would be done, as `epsmesh plan` does.")
+    ] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute stored cases again.")] = False,
     without: Without = None,
     shard: Annotated[
@@ -75,73 +88,124 @@ def run(
     Stored cases are read, not computed again: run the same command to continue after an interruption. With --json
     standard output gets one object at the end, and progress goes to standard error.
 
+    -j N computes small cases side by side, without mpirun, with the same results; as many at once as memory allows. If
+    one of the processes ends, the others go on. `mpirun -n N` also divides large cases.
+
     --shard I/N splits a study into N independent runs. A shard writes no dataset: afterwards, a run without --shard
     merges the shards, computes missing cases, and writes it. If a case has two records, the one with a force is kept,
     else the later one. Shards stay unchanged.
 
     Example: epsmesh run studies/figure3.toml
 
+    Example: epsmesh run studies/figure3.toml -j 4
+
     Example: mpirun -n 4 epsmesh run studies/figure3.toml
 
     Example: epsmesh run studies/figure3.toml --shard 3/8
     """
-    studies, left_out = read_all(files), check_names(without)
+    studies = read_all(files)
     part = check_shard(shard, studies)
+    of = Work(output, store, check_names(without), jobs, part, fresh)
+    _check_jobs(jobs, studies)
+    if dry_run:
+        show_plans(studies, of, quiet=quiet, verbose=verbose)
     # If the default mesh cache cannot be written, meshes are not cached, and the run continues.
     store_to_write(store, output)
     check_output(folder=None if meshes == DEFAULT_MESHES else meshes)
     for study in () if part else studies:
         check_output(*result_files(output, study.name))
     _check_left_out(studies, output)
+    further = [] if part else [*_further(studies, output)]
     check_machine()
     from epsmesh import workflow
-    from epsmesh.plan.shard import stores_of
-    from epsmesh.run.store import StoreError
-    from epsmesh.solve import CompilerError
 
-    comm, found = workflow.world(), list[dict[str, Any]]()
-    speaks, failed = comm.rank == 0, False
+    comm = cast("MPI.Comm", Jobs(jobs)) if jobs > 1 else workflow.world()
+    found, ended = list[dict[str, Any]](), DONE
     for study in studies:
-        start = time.monotonic()
-        main = output / STORE_NAME
-        try:
-            plan, opened = workflow.prepare(
-                study,
-                comm,
-                store or (part.store(output, study) if part else main),
-                fresh=fresh,
-                without=left_out,
-                meshes=meshes,
-                shard=part,
-                beside=[main] if part else stores_of(output, study),
-            )
-            if speaks:
-                _announce(plan, opened, quiet=quiet or as_json, verbose=verbose)
-                if as_json and not quiet:
-                    warn(study)
-            show = partial(_progress, plan, is_shown=not as_json, verbose=verbose) if speaks and not quiet else None
-            with workflow.abort_on_exception(comm):
-                outcome = workflow.run(plan, opened, comm, output, show)
-        except (StoreError, CompilerError) as wrong:
-            fail(Fault(str(wrong), file=study.file), on_all_ranks=True)
-        except workflow.ResultsError as wrong:
-            fault, status = of_results(wrong, study.file)
-            fail(fault, status=status, on_all_ranks=True)
-        if speaks:
-            seconds = time.monotonic() - start
-            _conclude(plan, opened, outcome, seconds, part, quiet=as_json)
-            found.append(_as_data(plan, opened, outcome, seconds))
-        failed = failed or any(outcome.counts.get(state) for state in FAILURES)
-        if outcome.interrupted:
+        ended = max(ended, _run(study, comm, of, meshes, found, _Voice(quiet, verbose, as_json)))
+        if ended == INTERRUPTED:
             break
-    ended = INTERRUPTED if outcome.interrupted else SOME_FAILED if failed else DONE
-    if speaks and profile:
+    for number, make in further if ended != INTERRUPTED else ():
+        made = make(store or output / STORE_NAME)
+        if comm.rank == 0:
+            found[number]["further"].append(made.data)
+            for line in () if as_json else made.lines[-1:] if quiet else made.lines:
+                print(line, flush=True)
+    if comm.rank == 0 and profile:
         _print_stages(sys.stderr if as_json else sys.stdout)
-    if speaks and as_json:
+    if comm.rank == 0 and as_json:
         print_json({"status": ended, "studies": found})
-    if outcome.interrupted:
+    if ended == INTERRUPTED:
         workflow.end_ranks(comm, INTERRUPTED)
     raise typer.Exit(ended)
+
+
+@dataclass(frozen=True)
+class _Voice:
+    """How much a run prints."""
+
+    quiet: bool
+    verbose: bool
+    as_json: bool
+
+
+def _run(
+    study: "Study",
+    comm: "MPI.Comm",
+    of: Work,
+    meshes: Path,
+    found: list[dict[str, Any]],
+    voice: _Voice,
+) -> int:
+    """Run one study, print its result, and add it to what was ``found``; return the exit status. Collective."""
+    from epsmesh import workflow
+    from epsmesh.errors import CompilerError
+    from epsmesh.plan.shard import stores_of
+    from epsmesh.run.jobs import WorkerError
+    from epsmesh.run.store import StoreError
+
+    start, speaks, main = time.monotonic(), comm.rank == 0, of.output / STORE_NAME
+    store = of.store or (of.shard.store(of.output, study) if of.shard else main)
+    try:
+        plan, opened = workflow.prepare(
+            study,
+            comm,
+            store,
+            fresh=of.fresh,
+            without=of.without,
+            meshes=meshes,
+            shard=of.shard,
+            beside=[main] if of.shard else stores_of(of.output, study),
+        )
+        if speaks:
+            _announce(plan, opened, quiet=voice.quiet or voice.as_json, verbose=voice.verbose)
+            if voice.as_json and not voice.quiet:
+                warn(study)
+        is_shown = speaks and not voice.quiet
+        show = partial(_progress, plan, is_shown=not voice.as_json, verbose=voice.verbose) if is_shown else None
+        with workflow.abort_on_exception(comm):
+            outcome = workflow.run(plan, opened, comm, of.output, show)
+    except (StoreError, CompilerError, WorkerError) as wrong:
+        fail(Fault(str(wrong), file=study.file), on_all_ranks=True)
+    except workflow.ResultsError as wrong:
+        fault, status = of_results(wrong, study.file)
+        fail(fault, status=status, on_all_ranks=True)
+    if speaks:
+        seconds = time.monotonic() - start
+        _conclude(plan, opened, outcome, seconds, of.shard, quiet=voice.as_json)
+        found.append(_as_data(plan, opened, outcome, seconds))
+    if outcome.interrupted:
+        return INTERRUPTED
+    return SOME_FAILED if any(outcome.counts.get(state) for state in FAILURES) else DONE
+
+
+def _check_jobs(jobs: int, studies: "list[Study]") -> None:
+    """Exit if ranks have been started besides, or if a study times its cases."""
+    if jobs > 1 and is_launched():
+        fail(of_option("--jobs", jobs, "is for a run in one process, and a launcher has started this one: omit it"))
+    if jobs > 1 and (timed := [study for study in studies if study.solve.timing]):
+        why = "solve.timing = true compares times, which others would change: run it without --jobs"
+        fail(*(of_file(study.file, why) for study in timed))
 
 
 def _check_left_out(studies: "list[Study]", output: Path) -> None:
@@ -152,6 +216,18 @@ def _check_left_out(studies: "list[Study]", output: Path) -> None:
         for left_out in filter(None, (one.left_out(study) for one in added_to(study.raw))):
             check_kind(output / f"{study.name}.nc")
             warning(f"{study.file}: {left_out}")
+
+
+def _further(studies: "list[Study]", output: Path) -> "Iterator[tuple[int, Callable[[Path], Made]]]":
+    """Yield what is made of studies when their cases are computed, with their numbers; exit if it cannot be."""
+    from epsmesh.study.problems import StudyError
+    from epsmesh.study.schema import added_to
+
+    try:
+        for number, study in enumerate(studies):
+            yield from ((number, make) for one in added_to(study.raw) if (make := one.further(study, output)))
+    except StudyError as wrong:
+        fail(*of_study(wrong))
 
 
 def _progress(first: "Plan", plan: "Plan", *, is_shown: bool, verbose: bool) -> "Terminal":
@@ -203,6 +279,7 @@ def _as_data(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float)
         "unchanged": [str(file) for file in outcome.results.unchanged],
         "seconds": round(seconds, 3),
         "interrupted": outcome.interrupted,
+        "further": [],
     }
 
 

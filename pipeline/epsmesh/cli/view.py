@@ -24,6 +24,8 @@ from epsmesh.cli.words import (
 _ENDINGS = {"sofa": [".py", ".msh", ".npz"]}
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from mpi4py import MPI
 
     from epsmesh.study.case import Case
@@ -36,7 +38,7 @@ def view(
         Path,
         typer.Argument(
             metavar="FILE",
-            help="A study file (TOML), or a name in studies/; or a label map (NIfTI, NRRD, DICOM).",
+            help="A study file (TOML), or a name in studies/; a label map (NIfTI, NRRD, DICOM); a force curve (CSV).",
             show_default=False,
             callback=by_name,
         ),
@@ -84,6 +86,10 @@ def view(
     slices and places to choose.
 
     Example: epsmesh view meshes/liver.nii.gz
+
+    Of a force curve it prints what is in the file, and a [[measurement]] to paste into a study.
+
+    Example: epsmesh view studies/curves/ball.csv
     """
     export = export or ("vtu" if vtk else "sofa" if sofa else None)
     from epsmesh.shapes.files.labels import is_image
@@ -93,6 +99,10 @@ def view(
             option = "--mesh-only" if mesh_only else f"--export {export}"
             fail(Fault(f"{option}: is for a case of a study; of a label map, only the page is written", key=option))
         return view_image(Given(file, unit, names, case), output)
+    if viewer := _viewer(file):
+        if options := [*filter(None, (case, export, "--mesh-only" if mesh_only else "", unit, names))]:
+            fail(Fault(f"{options[0]}: is for a case of a study, or a label map; {file} is neither", key=options[0]))
+        return viewer(file)
     if unit or names:
         option = "--unit" if unit else "--names"
         fail(Fault(f"{option}: is for a label map; a study has it in [body]", key=option))
@@ -124,6 +134,16 @@ def view(
         fields = fields_of(study, chosen, comm, mesh_only, export, meshes)
         if fields is not None:
             _write(study, fields, stem, export)
+
+
+def _viewer(file: Path) -> "Callable[[Path], None] | None":
+    """Return what shows a file that is no study, of a package that adds it; None for a study."""
+    from epsmesh.extensions import found
+    from epsmesh.shapes.files.foreign import why_no_study
+
+    if file.suffix in ("", ".toml", ".nc") or not (file.is_file() or file.suffix == ".csv") or why_no_study(file):
+        return None
+    return next((one.load() for one in found("views").values()), None)
 
 
 def _check_sofa(study: "Study", case: "Case", mesh_only: bool) -> None:

@@ -114,7 +114,7 @@ def meant(file: Path) -> str:
     if file.is_dir():
         return f": give the files in it, such as {file / '*.toml'}"
     if file.exists():
-        return ""
+        return "" if file.suffix == ".toml" else "; `epsmesh view` shows what is in a curve, or in an image"
     known = {path.stem: path for path in (*file.parent.glob("*.toml"), *STUDIES.glob("*.toml"))}
     close = difflib.get_close_matches(file.stem, known, n=1, cutoff=0.5)
     return f"; did you mean {known[close[0]]}?" if close else "; `epsmesh new NAME` makes one"

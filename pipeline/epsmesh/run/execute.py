@@ -1,27 +1,24 @@
 """Run a plan on a communicator, and return the record of each case as soon as it exists."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 
 from mpi4py import MPI
 
 from epsmesh.plan.plan import Plan
 from epsmesh.plan.schedule import schedule
-from epsmesh.plan.steps import MeshStep, Solve, mesh_steps
+from epsmesh.plan.steps import mesh_steps
 from epsmesh.run.begun import Begun
 from epsmesh.run.compile import prepare
 from epsmesh.run.completion import complete
+from epsmesh.run.desk import Desk, Keep, apart
 from epsmesh.run.groups import run_phase
 from epsmesh.run.memory import FreeMemory, keep_imports, return_large_arrays
 from epsmesh.run.mesh_cache import MeshCache
 from epsmesh.run.progress import Progress
-from epsmesh.run.provenance import provenance
 from epsmesh.run.record import Record
 from epsmesh.run.runner import StepRunner
-from epsmesh.run.stop import reason_to_skip, waves
+from epsmesh.run.stop import waves
 from epsmesh.run.threads import one_thread
-from epsmesh.states import SKIPPED
-
-Keep = Callable[[Record], None]
 
 
 def execute(
@@ -44,7 +41,7 @@ def execute(
     keep_imports()
     return_large_arrays()
     records, delayed = comm.bcast((dict(known or {}), frozenset(last)))
-    desk = _Desk(plan, keep if comm.rank == 0 else None, progress, records)
+    desk = Desk(plan, keep if comm.rank == 0 else None, progress, records)
 
     def make(group: MPI.Comm, post: Keep) -> StepRunner:
         notes = begun or Begun()
@@ -56,7 +53,7 @@ def execute(
             prepare(comm, todo)
             memory = FreeMemory(comm).available()
             steps = mesh_steps(todo, shared=plan.shared)
-            for group in _apart(steps, delayed):
+            for group in apart(steps, delayed):
                 for phase in schedule(group, comm.size, plan.cost, memory, apart=plan.study.solve.timing):
                     run_phase(comm, phase, make, desk.take)
             desk.records = comm.bcast(desk.records)
@@ -80,41 +77,3 @@ def compute(plan: Plan, comm: MPI.Comm) -> dict[str, Record]:
         records.update(comm.bcast(records))
         todo = complete(plan, records, lambda _: {}) if plan.place_paths or plan.study.seeks_depths else None
     return records
-
-
-def _apart(steps: Sequence[MeshStep], delayed: Collection[str]) -> tuple[list[MeshStep], list[MeshStep]]:
-    """Return the steps without keys in ``delayed``, and those with some."""
-    late = [any(solve.key in delayed for solve in step.solves) for step in steps]
-    first, second = ([s for s, is_late in zip(steps, late, strict=True) if is_late == which] for which in (False, True))
-    return first, second
-
-
-class _Desk:
-    """Collects the records of a run: all on rank 0, those of earlier waves on every rank."""
-
-    def __init__(self, plan: Plan, keep: Keep | None, progress: Progress, known: dict[str, Record]):
-        self._plan, self._keep, self._progress = plan, keep, progress
-        self._solves = {solve.key: solve for solve in plan.solves}
-        self.records = known
-
-    def take(self, record: Record) -> None:
-        """Add a record; on rank 0, also keep and count it."""
-        self.records[record.key] = record
-        if self._keep is not None:
-            self._keep(record)
-            self._progress.done(self._solves[record.key].label, record.message if record.has_failed else "")
-
-    def skips(self, solve: Solve) -> bool:
-        """Return whether a solve is skipped, and record the reason; the same on every rank."""
-        reason = reason_to_skip(self._plan, solve, self.records.get)
-        if reason:
-            self.take(Record(solve.key, SKIPPED, reason, provenance=provenance(ranks=1)))
-        return bool(reason)
-
-    @property
-    def failed(self) -> int:
-        """The number of failed cases of the study."""
-        records = self.records
-        return sum(
-            len(solve.serves) for key, solve in self._solves.items() if key not in records or records[key].has_failed
-        )

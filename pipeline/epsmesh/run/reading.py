@@ -2,7 +2,7 @@
 
 import shutil
 import sqlite3
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 
 from epsmesh.plan.cost import CostModel
 from epsmesh.plan.plan import Plan, leave_out_stored, make_plan
+from epsmesh.plan.shard import Shard
 from epsmesh.run.completion import complete
 from epsmesh.run.record import Record
 from epsmesh.run.store import PATIENCE, SCHEMA, DamagedStoreError, Records, Row, StoreError, damaged, guard, reason
@@ -49,16 +50,24 @@ def known_of(path: Path, plan: Plan) -> tuple[dict[str, Record], CostModel]:
         return records, store.cost_model()
 
 
-def plan_the_rest(study: Study, path: Path, without: Collection[str] = ()) -> tuple[Plan, dict[str, Record]]:
-    """Return the plan of all that is not stored at ``path``, and the stored records.
+def plan_the_rest(
+    study: Study, path: Path, without: Collection[str] = (), *, shard: Shard | None = None, beside: Sequence[Path] = ()
+) -> tuple[Plan, dict[str, Record]]:
+    """Return the plan of all, or of a ``shard``, that is not stored at ``path``, nor ``beside``, and the records.
+
+    A timing study computes its cases again.
 
     Raises:
         StoreError: as :func:`known_of`.
         ValueError: if ``without`` has an unknown name.
     """
-    bare = make_plan(study, without=without)
+    bare = make_plan(study, without=without, shard=shard)
     records, cost = known_of(path, bare)
-    done = [key for key, record in records.items() if record.is_ok]
+    for other in beside:
+        with suppress(StoreError):  # a run leaves it out, too
+            records |= {key: record for key, record in known_of(other, bare)[0].items() if record.is_ok}
+    timed = {*bare.keys} if study.solve.timing else set[str]()
+    done = [key for key, record in records.items() if record.is_ok and key not in timed]
     return replace(leave_out_stored(bare, done, without), cost=cost), records
 
 

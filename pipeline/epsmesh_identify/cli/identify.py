@@ -3,7 +3,7 @@
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -24,9 +24,8 @@ from epsmesh.cli.words import (
 )
 from epsmesh.files import result_files
 from epsmesh.launcher import is_first_rank
-from epsmesh.printable import counted, printable, printable_lines
+from epsmesh.printable import counted, printable
 from epsmesh.run.remaining import format_seconds
-from epsmesh_identify.cli.design import design as rank
 from epsmesh_identify.cli.faults import refusing_cases
 
 if TYPE_CHECKING:
@@ -35,18 +34,12 @@ if TYPE_CHECKING:
     from epsmesh.study.sweep import Study
 
 _HOWTO = "docs/guide/identify.md"
-_OF_CURVES = "docs/guide/identify.md"
-# Endings of files that are no curves: studies by name or path, and datasets.
-_NO_CURVES = ("", ".toml", ".nc")
 
 
 def identify(
     files: Files,
     output: Output = DEFAULT_OUTPUT,
     store: StoreFile = None,
-    design: Annotated[
-        bool, typer.Option("--design", help="Rank which test to make next, by what it would do to each error bar.")
-    ] = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -57,24 +50,12 @@ def identify(
     over the ranges of the unknowns are cases in the store, computed once. An interrupted run goes on where it was. Of
     many files, those that are no curve have the status "failed", and the exit status is 1; ranks of mpirun share them.
 
-    Of a curve without a study (CSV, TXT, LVM), it prints what is in the file, and a [[measurement]] to paste into one.
-
-    With --design it fits no curves. It ranks further tests, such as a second radius, from the study's declared values.
+    `epsmesh view` shows what is in a curve, and `epsmesh plan --next` which test to make next.
 
     Example: epsmesh identify studies/identify-punch.toml
-
-    Example: epsmesh identify studies/identify-punch.toml --design
-
-    Example: epsmesh identify studies/curves/ball.csv
     """
-    if curves := [file for file in files if _is_curve(file)]:
-        _describe(curves, [file for file in files if file not in curves])
-        return
     studies = read_all(files, have_cases=False)
     path = store_to_write(store, output)
-    if design:
-        check_machine()
-        rank(studies, path, _HOWTO, quiet=quiet or is_json_wanted())
     from epsmesh_identify.sections.kept import measurements_of
 
     if without := [study.file for study in studies if not measurements_of(study)]:
@@ -96,28 +77,6 @@ def identify(
     raise typer.Exit(ended)
 
 
-def _is_curve(file: Path) -> bool:
-    """Tell the file of a curve, which is described, from a study."""
-    return file.suffix.lower() not in _NO_CURVES and (file.is_file() or file.suffix.lower() in (".csv", ".txt"))
-
-
-def _describe(curves: list[Path], others: list[Path]) -> None:
-    """Print what is in files of curves."""
-    from epsmesh_identify.experiment.describe import describe
-    from epsmesh_identify.experiment.reading import ExperimentError
-
-    if others:
-        fail(Fault(f"{others[0]}: is a study, and {curves[0]} is a curve: give files of one kind", str(others[0])))
-    texts = []
-    for path in curves:
-        with refusing(ExperimentError, file=path, howto=_OF_CURVES):
-            texts.append(describe(path))
-    if is_json_wanted():
-        print_json({"status": DONE, "curves": dict(zip(map(str, curves), texts, strict=True))})
-    else:
-        print("\n\n".join(map(printable_lines, texts)))
-
-
 def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict[str, Any]:
     """Identify the specimens of one study, write the results, print the answer, and return it as data."""
     from epsmesh_identify.estimation.dataset import write
@@ -127,7 +86,7 @@ def _identify(study: "Study", output: Path, store: Path, *, quiet: bool) -> dict
     from epsmesh_identify.report.identified import answer, failures
 
     start = time.monotonic()
-    no_curve = refusing(ExperimentError, file=study.file, howto=_OF_CURVES, on_all_ranks=True)
+    no_curve = refusing(ExperimentError, file=study.file, howto=_HOWTO, on_all_ranks=True)
     with refusing_cases(study, store), no_curve:
         dataset = identification(study, output, store, (lambda _: None) if quiet else _tell)
     failed = failures(dataset)

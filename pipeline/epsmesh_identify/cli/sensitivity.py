@@ -1,24 +1,13 @@
-"""The command that tells which parameter of a study matters most."""
+"""Which parameter of a study matters most: what `epsmesh run` makes of a study with the section [sensitivity]."""
 
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from epsmesh.cli.console import say
-from epsmesh.cli.faults import DONE
-from epsmesh.cli.words import (
-    DEFAULT_OUTPUT,
-    File,
-    Json,
-    Output,
-    Quiet,
-    StoreFile,
-    check_machine,
-    check_output,
-    read_all,
-    store_to_write,
-    warn,
-)
+from epsmesh.cli.words import check_output
+from epsmesh.extensions import Made
 from epsmesh.files import result_files
 from epsmesh.launcher import is_first_rank
 from epsmesh_identify.cli.faults import refusing_cases
@@ -33,41 +22,41 @@ _HOWTO = "docs/guide/identify.md"
 _ENDING = "_sensitivity"
 
 
-def sensitivity(
-    file: File,
-    output: Output = DEFAULT_OUTPUT,
-    store: StoreFile = None,
-    quiet: Quiet = False,
-    as_json: Json = False,
-) -> None:
-    """Tell how much of the spread of the force each parameter of a study makes.
+def sensitivity_of(study: "Study", output: Path) -> "Callable[[Path], Made] | None":
+    """Return what tells how much of the spread of the force each parameter of a study makes, with the case store.
 
-    The study's section [sensitivity] has the parameters with their ranges. A surrogate of the force over these ranges
-    is made of cases, which are kept in the case store. Results are Sobol's indices, with error bars.
+    None without a section [sensitivity]. Exit if the files cannot be written.
 
-    Example: epsmesh sensitivity studies/sensitivity.toml
+    Raises:
+        StudyError: if the study is not one scene.
     """
-    (study,) = read_all([file])
-    path, name = store_to_write(store, output), study.name + _ENDING
-    files = result_files(output, name)
+    from epsmesh_identify.sections.kept import spread_of
+
+    if not spread_of(study).varied:
+        return None
+    from epsmesh_identify.surrogate.sensitivity import spread_domain
+
+    spread_domain(study)
+    files = result_files(output, f"{study.name}{_ENDING}")
     check_output(*files)
-    check_machine()
-    if is_first_rank():
-        warn(study)
+    return partial(_make, study, files[0])
+
+
+def _make(study: "Study", file: Path, store: Path) -> Made:
+    """Compute the indices, and write them to a ``file`` with their figure, on the first rank; collective."""
     start = time.perf_counter()
-    dataset = _dataset(study, path)
+    dataset = _dataset(study, store)
     if not is_first_rank():
-        return
+        return Made({}, ())
     from epsmesh.netcdf import write_netcdf
     from epsmesh_identify.report.figures.sensitivity import draw
     from epsmesh_identify.report.sensitivity import answer
 
-    write_netcdf(dataset, files[0])
-    written = [files[0], *draw(dataset, output / name)]
+    write_netcdf(dataset, file)
+    written = [file, *draw(dataset, file.with_suffix(""))]
     seconds = time.perf_counter() - start
-    lines = [] if quiet else answer(dataset)
     wrote = f"{study.file}: wrote {', '.join(map(str, written))}; {seconds:.3g} s"
-    say({"status": DONE, "files": list(map(str, written)), "outputs": _as_data(dataset)}, *lines, wrote)
+    return Made({"sensitivity": _as_data(dataset), "files": list(map(str, written))}, (*answer(dataset), wrote))
 
 
 def _dataset(study: "Study", store: Path) -> "xr.Dataset":

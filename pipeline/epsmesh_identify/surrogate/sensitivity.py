@@ -70,7 +70,7 @@ def explain(study: Study, solve: Solve) -> list[Explained]:
         SurrogateError: if a case that a surrogate needs has no output.
     """
     if not spread_of(study).varied:
-        why = 'is required for `epsmesh sensitivity`: parameters with ranges, such as young = ["5 kPa", "20 kPa"]'
+        why = 'is required: parameters with ranges, such as young = ["5 kPa", "20 kPa"]'
         raise StudyError(study.file, [Problem("[sensitivity]", None, why)])
     return [_explained(study, _output(study, name), solve) for name in spread_of(study).outputs]
 

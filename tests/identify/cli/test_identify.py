@@ -259,18 +259,19 @@ def test_what_cannot_be_identified_is_refused_before_anything_is_computed(folder
 
 def test_a_curve_without_a_study_is_described(folder, epsmesh):
     path = folder / "curves" / "gel_8.csv"
-    result = epsmesh("identify", path)
+    result = epsmesh("view", path)
     assert result.exit_code == 0, result.output
     assert "150 rows of 2 columns" in result.stdout
     assert '[[measurement]]\nname = "gel_8"' in result.stdout
-    assert "[[measurement]]" in json.loads(epsmesh("identify", path, "--json").stdout)["curves"][str(path)]
-    assert epsmesh("identify", path, folder / "punch.toml").exit_code == 2
+    assert "[[measurement]]" in json.loads(epsmesh("view", path, "--json").stdout)["text"]
+    assert "is neither" in epsmesh("view", path, "0").stderr
+    assert "`epsmesh view` shows what is in a curve" in epsmesh("identify", path).stderr
     (folder / "evil.csv").write_text(path.read_text().replace("force", "\x1b]0;x\x07force"))
-    assert "\x1b" not in epsmesh("identify", folder / "evil.csv").output
+    assert "\x1b" not in epsmesh("view", folder / "evil.csv").output
     (folder / "evil.toml").write_text(PUNCH.format(file="evil.csv", may_hide="[]"))
     assert "\x1b" not in epsmesh("identify", folder / "evil.toml", "--output", folder / "results").output
     (folder / "letter.txt").write_text("Dear all,\n")
-    result = epsmesh("identify", folder / "letter.txt")
+    result = epsmesh("view", folder / "letter.txt")
     assert (result.exit_code, "no table of numbers" in result.stderr) == (2, True)
 
 
@@ -311,17 +312,17 @@ def test_design_needs_neither_curve_nor_mesh_but_a_depth(folder, epsmesh, tmp_pa
     scene, measured, rest = (folder / "none.toml").read_text().partition("[[measurement]]")
     path = tmp_path / "planned.toml"
     path.write_text(scene + measured + rest if has_measurement else scene + rest[rest.index("[identify]") :])
-    done = epsmesh("identify", path, "--design", "--output", tmp_path)
+    done = epsmesh("plan", path, "--next", "--output", tmp_path)
     assert done.exit_code == 2
     assert "probe.depth: is required: the depth of the planned test" in done.stderr
     path.write_text(path.read_text().replace('radius = "2 mm"', 'radius = "2 mm"\ndepth = "0.2 mm"'))
-    done = epsmesh("identify", path, "--design", "--output", tmp_path)
+    done = epsmesh("plan", path, "--next", "--output", tmp_path)
     assert done.exit_code == 0, done.output
     assert "as planned" in done.output
     assert "a further punch of radius 6.00 mm" in done.output
     if not has_measurement:
         return
-    data = json.loads(epsmesh("identify", path, "--design", "--json", "--output", tmp_path).stdout)
+    data = json.loads(epsmesh("plan", path, "--next", "--json", "--output", tmp_path).stdout)
     (study,) = data["studies"]
     assert {one["test"] for one in study["ranked"]} >= {"a further punch of radius 600 µm", "the same test, bonded"}
     assert all(one["half_widths"]["young"][0] > 0 for one in study["ranked"])
@@ -332,6 +333,6 @@ def test_design_needs_unknowns(folder, epsmesh, tmp_path):
     text = text.replace("poisson", 'young = "10 kPa"\npoisson').replace("[probe]", '[probe]\ndepth = "0.2 mm"')
     text += '[mesh]\naccuracy = "1 %"\n'
     (tmp_path / "known.toml").write_text(text)
-    done = epsmesh("identify", tmp_path / "known.toml", "--design", "--output", tmp_path)
+    done = epsmesh("plan", tmp_path / "known.toml", "--next", "--output", tmp_path)
     assert done.exit_code == 2
     assert "has no [identify]" in done.output

@@ -212,10 +212,11 @@ def test_the_command_writes_a_dataset_and_a_figure_and_tells_what_matters_most(e
     varied = {"young": ["5 kPa", "20 kPa"], "poisson": [0.2, 0.5]}
     study = tmp_path / "punch.toml"
     study.write_text(to_toml(PUNCH | {"body": body, "mesh": {"accuracy": "1 %"}, "sensitivity": varied}, "punch"))
-    ran = epsmesh("sensitivity", study, "--output", tmp_path, "--json")
-    found = json.loads(ran.stdout)["outputs"]["force"]["parameters"]
+    ran = epsmesh("run", study, "--output", tmp_path, "--json")
+    (further,) = json.loads(ran.stdout)["studies"][0]["further"]
+    found = further["sensitivity"]["force"]["parameters"]
     assert found["young"]["total"] > 0.9
     assert found["poisson"]["total"] < 0.1
     assert all((tmp_path / f"punch_sensitivity.{ending}").is_file() for ending in ("nc", "png", "svg"))
-    again = epsmesh("sensitivity", study, "--output", tmp_path)
+    again = epsmesh("run", study, "--output", tmp_path)
     assert "young matters most" in again.stdout
