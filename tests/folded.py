@@ -13,6 +13,7 @@ import numpy as np
 
 from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.shapes.files.crossings import crossings
+from epsmesh.shapes.files.stl import written
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
 from epsmesh.study.sweep import Study
@@ -104,8 +105,11 @@ def folded(seed: int) -> tuple[str, FloatArray, IntArray]:
             return kind, points, facets.astype(np.int64)
 
 
-def study_of(file: Path, points: FloatArray) -> Study:
-    """Return the study, at 1 %, of a disc on the highest point of a surface at which it fits."""
+def study_of(folder: Path, seed: int) -> Study:
+    """Return the study, at 1 %, of a disc on the highest point of the surface of a ``seed`` at which it fits."""
+    _, points, facets = folded(seed)
+    file = folder / "folded.stl"
+    file.write_bytes(written(points, facets))
     low, high = points[:, 2].min(), points[:, 2].max()
     for top in points[np.argsort(-points[:, 2])]:
         try:

@@ -23,12 +23,11 @@ from epsmesh.mesh.size import Sizes
 from epsmesh.plan.plan import make_plan
 from epsmesh.scene.model import Scene
 from epsmesh.shapes.bodies.surface import FromSurface
-from epsmesh.shapes.files.stl import written
 from epsmesh.shapes.frame import Frame
 from epsmesh.shapes.surface import Surface
 from epsmesh.study.read import parse
 from tests.cases import raw, study
-from tests.folded import folded, study_of
+from tests.folded import study_of
 from tests.mesh.test_mesh import area, volume
 from tests.organs import AXES, box, ellipsoid, sphere, write_stl
 from tests.sampling import sampled
@@ -282,10 +281,7 @@ def test_curved_edges_restore_what_chords_leave_out(file, growth):
 @sampled("seed", [7, 8], by_day=1)
 def test_a_folded_surface_is_meshed(tmp_path, seed):
     """Large elements cross in its folds: points are moved apart, or the file's own facets are kept."""
-    _, points, facets = folded(seed)
-    file = tmp_path / "folded.stl"
-    file.write_bytes(written(points, facets))
-    case = make_plan(study_of(file, points)).solves[0].case
+    case = make_plan(study_of(tmp_path, seed)).solves[0].case
     mesh = mesh_arrays(case, ())
     outside = np.unique(np.concatenate([*mesh.facets.values()]))
     off = case.body.surfaces()["skin"][0].distance(mesh.points[np.intersect1d(outside, mesh.cells[:, :4])])
@@ -316,10 +312,7 @@ def test_elements_are_small_where_found_contact_is_expected_to_end(file, tool):
 
 def test_a_footprint_next_to_a_fold_is_set_in_with_a_narrower_collar(tmp_path):
     """The surface is folded at a quarter of the radius from the disc; the disc itself fits."""
-    _, points, facets = folded(402)
-    file = tmp_path / "folded.stl"
-    file.write_bytes(written(points, facets))
-    case = make_plan(study_of(file, points)).solves[0].case
+    case = make_plan(study_of(tmp_path, 402)).solves[0].case
 
     def lift(places):
         return case.body.lift(case.frame, places)[0]

@@ -13,9 +13,8 @@ from epsmesh.plan.describe import summary
 from epsmesh.plan.plan import make_plan
 from epsmesh.plan.steps import MeshStep, OperatorStep, mesh_steps
 from epsmesh.run.problem import memory_of
-from epsmesh.shapes.files.stl import written
 from tests.cases import BLADE, solve, study
-from tests.folded import folded, study_of
+from tests.folded import study_of
 
 MESHES = {
     "coarse": {"fine": "5 mm", "rim": "1 mm"},
@@ -106,10 +105,7 @@ def test_a_plan_says_from_which_depth_on_tissue_is_expected_to_fold():
 
 def test_a_folded_surface_takes_longer_to_mesh(tmp_path):
     """Of one that is as large, and of a known mesh: its elements follow the folds, and are mended where they cross."""
-    _, points, facets = folded(307)
-    file = tmp_path / "folded.stl"
-    file.write_bytes(written(points, facets))
-    (solve,) = make_plan(study_of(file, points)).solves
+    (solve,) = make_plan(study_of(tmp_path, 307)).solves
     kind, cells, poisson = features(solve)
     plain = CostModel().seconds("mesh", kind.replace("folded", "curved"), cells, poisson)
     assert kind.endswith("folded") and 0.5 < cells / 4_505 < 2.0

@@ -123,12 +123,16 @@ def test_shares_and_times_of_relaxation_are_found():
     assert {"relaxation_share_1", "relaxation_time_1"} <= found.profiles.keys()
 
 
-def test_a_law_that_does_not_fit_has_no_bar_but_windows():
+def stiffening(by):
+    """Return a curve whose force is larger than Hertz's, by a share that goes as the square of the depth."""
     error = 0.001 * noise(np.random.default_rng(5), 300, 0.3)
-    right = measured(Ball(), {"young": 2e4}, error, 2e-4)
-    contact = np.maximum(right.curve.depth - 1e-4, 0.0) / 2e-4
-    stiff = replace(right.curve, force=right.curve.force * (1 + 0.6 * contact**2))
-    found = identify([replace(right, curve=stiff)], [YOUNG])
+    curve = measured(Ball(), {"young": 2e4}, error, 2e-4).curve
+    contact = np.maximum(curve.depth - 1e-4, 0.0) / 2e-4
+    return replace(curve, force=curve.force * (1 + by * contact**2))
+
+
+def test_a_law_that_does_not_fit_has_no_bar_but_windows():
+    found = identify([Measured(stiffening(0.6), Ball())], [YOUNG])
     assert found.verdict.startswith("does not fit")
     assert np.isnan(found.low).all() and np.isnan(found.high_hidden).all()
     young = [window.young for window in found.windows]
@@ -145,11 +149,7 @@ class Shallow(Ball):
 
 def test_values_of_a_law_that_does_not_fit_are_told_to_be_extrapolated():
     """Least squares takes what softens for earlier contact, so that the depth is beyond that of the known forces."""
-    error = 0.001 * noise(np.random.default_rng(5), 300, 0.3)
-    right = measured(Ball(), {"young": 2e4}, error, 2e-4)
-    contact = np.maximum(right.curve.depth - 1e-4, 0.0) / 2e-4
-    soft = replace(right.curve, force=right.curve.force * (1 - 0.3 * contact**2))
-    found = identify([Measured(soft, Shallow())], [YOUNG])
+    found = identify([Measured(stiffening(-0.3), Shallow())], [YOUNG])
     assert not found.fits
     assert any("values are an extrapolation" in sentence for sentence in found.notes)
 

@@ -1,7 +1,6 @@
 """Surrogates of wide layered bodies by an integral equation: which scenes it has, and what solves say to it."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -32,9 +31,14 @@ RANGES = (
 )
 
 
+def wide(**changes):
+    """Return the wide study with changes."""
+    return parse(changed(WIDE, **changes), file="wide.toml")
+
+
 def case(**changes):
-    """Return the only case of the wide study with changes."""
-    (found,) = parse(changed(WIDE, **changes), file="wide.toml").cases()
+    """Return its only case."""
+    (found,) = wide(**changes).cases()
     return found
 
 
@@ -48,10 +52,7 @@ def test_a_case_has_the_layers_of_its_body():
 
 def test_an_ellipse_with_equal_axes_is_a_disc():
     ellipse = DISC | {"shape": "ellipse", "axes": ["2 mm", "2 mm"], "radius": None}
-    found, disc = (
-        solve_wide(parse(changed(WIDE, probe={k: v for k, v in probe.items() if v}), file="wide.toml"))["force"]
-        for probe in (ellipse, DISC)
-    )
+    found, disc = (solve_wide(wide(probe=probe))["force"] for probe in (ellipse, DISC))
     assert float(found) == pytest.approx(float(disc), rel=1e-12)
 
 
@@ -68,7 +69,7 @@ LAYERS = {
 @pytest.mark.parametrize("layers", LAYERS)
 def test_forces_on_layers_are_those_of_solves(layers, tmp_path):
     """To 5e-6 on wider bodies and for balls, too (benchmarks/results/verify.md)."""
-    study = parse(changed(WIDE, body={"layer": LAYERS[layers]}, probe=DISC), file="wide.toml")
+    study = wide(body={"layer": LAYERS[layers]}, probe=DISC)
     solved = solve(study, MPI.COMM_SELF, tmp_path / "store.nc")
     assert float(solve_wide(study)["force"]) == pytest.approx(float(solved["force"]), rel=3e-5)
 
@@ -100,18 +101,17 @@ def test_three_solves_let_the_equation_replace_the_others_on_a_wide_body_only(tm
         asked.append(len(study))
         return solve(study, MPI.COMM_SELF, tmp_path / "store.nc")
 
-    wide = forward_of(parse(WIDE, file="wide.toml"), RANGES, 2e-4, counted)
+    found = forward_of(wide(), RANGES, 2e-4, counted)
     assert asked == [1, 1, 1]
     depth = np.array([2e-6, 5e-5, 1.3e-4, 2e-4])
     values = {"young": 8e3, "skin_young": 7e4, "skin_thickness": 1.1e-3}
     body = LayeredBody((Layer(7e4, 0.45, 1.1e-3), Layer(8e3, 0.3, 4.9e-3)))
     exact = body.force(profile_of(case().probe), depth)
-    assert np.all(np.abs(wide.force(depth, values) / exact - 1) < wide.error(depth, values))
-    assert wide.error(depth[1:], values) == pytest.approx(2e-3, abs=1.5e-3)
+    assert np.all(np.abs(found.force(depth, values) / exact - 1) < found.error(depth, values))
+    assert found.error(depth[1:], values) == pytest.approx(2e-3, abs=1.5e-3)
 
 
 def test_a_narrow_body_is_left_to_solves():
-    narrow = changed(WIDE, body={"radius": "4 mm"})
     asked = []
 
     def counted(study):
@@ -119,21 +119,19 @@ def test_a_narrow_body_is_left_to_solves():
         wrong = solve_wide(study)
         return wrong.assign(force=0.9 * wrong["force"])
 
-    found = forward_of(parse(narrow, file="narrow.toml"), RANGES[:1], 2e-4, counted)
-    values = {"young": 1e4}
-    wide = layered_body(case()).force(profile_of(case().probe), np.array([2e-4]))
-    assert found.force(np.array([2e-4]), values) == pytest.approx(0.9 * wide, rel=1e-3)
+    found = forward_of(wide(body={"radius": "4 mm"}), RANGES[:1], 2e-4, counted)
+    exact = layered_body(case()).force(profile_of(case().probe), np.array([2e-4]))
+    assert found.force(np.array([2e-4]), {"young": 1e4}) == pytest.approx(0.9 * exact, rel=1e-3)
     assert sum(asked) > 3
 
 
 def test_the_study_of_a_scene_without_layers_is_refused():
     with pytest.raises(ValueError, match="is no round frictionless tool"):
-        partial(solve_wide, parse(changed(WIDE, probe=DISC | {"contact": "bonded"}), file="bonded.toml"))()
+        solve_wide(wide(probe=DISC | {"contact": "bonded"}))
 
 
 def test_contact_too_wide_for_the_equation_is_a_case_without_force():
-    thin = changed(WIDE, body={"layer": [SKIN | {"thickness": "0.005 mm"}]}, probe={"depth": "1 mm"})
-    dataset = solve_wide(parse(thin, file="thin.toml"))
+    dataset = solve_wide(wide(body={"layer": [SKIN | {"thickness": "0.005 mm"}]}, probe={"depth": "1 mm"}))
     assert np.isnan(dataset["force"])
     assert dataset["status"] == "failed"
     assert "too wide" in str(dataset["message"].values)
@@ -145,12 +143,12 @@ def test_without_solver_the_bar_covers_what_the_sides_do(support, tmp_path):
         raise ModuleNotFoundError(name="dolfinx")
 
     body = {"layer": [SKIN], "radius": "16 mm", "fixed": support}
-    study = parse(changed(WIDE, body=body, probe=DISC), file="wide.toml")
+    study = wide(body=body, probe=DISC)
     domain = domain_of(study, {}, study.case((0,) * len(study.shape)).probe.depth)
     equation, differs = wide_solve(domain, missing)
     found, solved = equation(study), solve(study, MPI.COMM_SELF, tmp_path / "store.nc")
     off = abs(float(found["force"].squeeze()) / float(solved["force"].squeeze()) - 1)
     assert differs == 0.0 and 1e-5 < off < float((found["force_error"] / found["force"]).squeeze()) <= 0.02
-    near = parse(changed(WIDE, body=body | {"radius": "8 mm"}, probe=DISC), file="wide.toml")
+    near = wide(body=body | {"radius": "8 mm"}, probe=DISC)
     with pytest.raises(ModuleNotFoundError):
         wide_solve(replace(domain, scene=near), missing)
