@@ -59,6 +59,8 @@ The deforming surface, optional:
     surface_modes            (vertex, component, mode) int16, and
     surface_amounts          (mode, poisson_degree, y_degree, x_degree) float: Chebyshev coefficients, R (m/N for E = 1)
     surface_error            largest error of R on the test places, times the distance to the nearest side or the bottom
+    inside_points            (inside_vertex, component) float, and
+    inside_triangles         (inside_triangle, corner) int32: surfaces of inclusions, for pictures; optional
 
 For people: check_* (check) are touches by full solves and by the model, of calibration and test; ``about``, bytes, is a
 JSON object of texts: the body, the tools, the version and the study.

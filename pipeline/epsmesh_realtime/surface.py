@@ -1,5 +1,6 @@
 """The displacement of a body's whole surface for a touch, 60 times a second: a half-space's, plus R as a few modes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +17,7 @@ from epsmesh_realtime.table import Table
 from epsmesh_realtime.touch import Touch
 
 _PARTS = ("points", "triangles", "modes", "amounts", "error")
+_INSIDE = ("inside_points", "inside_triangles")
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +25,8 @@ class SurfaceTable:
     """Vertices ``points`` (n, 3) in m from the face's middle, along its axes, and outward ``triangles`` (m, 3).
 
     ``modes`` (n, 3, rank), whole numbers, times ``amounts`` (rank, ν, y, x), Chebyshev coefficients over ``poisson``
-    and ``reach``, are R in m/N for E = 1. ``error`` is the largest error of R × room at held-out places.
+    and ``reach``, are R in m/N for E = 1. ``error`` is the largest error of R × room at held-out places. ``inside`` are
+    points and triangles of the inclusions' surfaces, None if there are none: they are drawn only.
     """
 
     points: NDArray[np.float32]
@@ -33,6 +36,7 @@ class SurfaceTable:
     error: float
     reach: tuple[float, float]
     poisson: tuple[float, float]
+    inside: tuple[NDArray[np.float32], NDArray[np.int32]] | None = None
 
     def far(self, x: float, y: float, poisson: float) -> Array:
         """Return R (n, 3) for a force at x, y (m)."""
@@ -45,7 +49,11 @@ class SurfaceTable:
     def numbers(self) -> dict[str, ArrayLike]:
         """Return the arrays of a file."""
         kinds = {"points": "<f4", "triangles": "<i4", "modes": "<i2", "amounts": "<f4", "error": "<f8"}
-        return {f"surface_{name}": np.asarray(getattr(self, name), kind) for name, kind in kinds.items()}
+        found: dict[str, ArrayLike] = {
+            f"surface_{name}": np.asarray(getattr(self, name), kind) for name, kind in kinds.items()
+        }
+        parts = zip(_INSIDE, self.inside or (), ("<f4", "<i4"), strict=False)
+        return found | {name: np.asarray(values, kind) for name, values, kind in parts}
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +114,24 @@ def surface_of(data: bytes) -> Surface:
         again, only = "export it again, without --no-surface", "at large displacements there is only a force"
         raise ModelError(f"the model has no surface: {only if 'near' in found else again}")
     points, triangles, modes, amounts, error = (found[f"surface_{name}"] for name in _PARTS)
-    table = SurfaceTable(points, triangles, modes, amounts, float(error), model.table.reach, model.table.poisson)
+    of = model.table
+    inside = _inside(found)
+    table = SurfaceTable(points, triangles, modes, amounts, float(error), of.reach, of.poisson, inside)
     surface = Surface(model, table)
     vars(surface)["evaluator"] = evaluator
     return surface
+
+
+def _inside(found: Mapping[str, NDArray[Any]]) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:
+    """Return the inclusions' surfaces in a file's arrays, None if there are none.
+
+    Raises:
+        ModelError: if they are damaged.
+    """
+    if "inside_points" not in found:
+        return None
+    points, triangles = found["inside_points"], found.get("inside_triangles", np.empty(0))
+    whole = points.ndim == triangles.ndim == 2 and points.shape[1] == triangles.shape[1] == 3
+    if not whole or not np.isfinite(points).all() or triangles.min() < 0 or triangles.max() >= len(points):
+        raise ModelError("inside_points or inside_triangles has impossible numbers: the file is damaged")
+    return points.astype(np.float32), triangles.astype(np.int32)

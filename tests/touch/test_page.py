@@ -219,17 +219,22 @@ def test_places_without_an_answer_are_shaded_before_one_gets_there(browser, tmp_
         change(browser, **{"tool": tool, "x": 0, "y": 0, "depth": -0.1} | sizes)
         asked = {"radius": 1e-3 * sizes["radius"], "depth": max(1e-3 * sizes.get("depth", -0.1), 1e-9)}
         found = browser.ask("page.unanswered.statuses({...page.query, depth: Math.max(page.query.depth, 1e-9)})")
-        for status, u, v, wide, long in found[::7]:
-            x, y = u + wide / 2, v + long / 2
+        for status, x, y in found[::7]:
             inside = np.clip([x, y], *np.array([-1, 1])[:, None] * (1 - 1e-9) * np.array(model.table.reach))
             height = 0.0 if model.face.is_flat else model.spot(*inside.tolist()).height
             at = model.origin + np.array([x, y, height]) @ model.axes
-            assert status == model.query(tool, at=at.tolist(), **asked).status
+            assert status in ("", model.query(tool, at=at.tolist(), **asked).status)
         seen |= {row[0] for row in found}
         shown = browser.ask("[...document.querySelectorAll('#unanswered li')].map(one => one.textContent)")
-        assert {line.split(", ")[1].split(":")[0] for line in shown} == {row[0] for row in found} - {"ok"}
-        drawn_cells = browser.ask("page.unanswered.other.geometry.getAttribute('position').count") / 6
-        assert drawn_cells == sum(row[0] not in ("ok", "outside") for row in found)
+        assert {line.split(", ")[1].split(":")[0] for line in shown} == {row[0] for row in found} - {"ok", ""}
+        # What is shaded has no answer, and ends where the answers begin.
+        for part, is_in in (("outside", ("outside",)), ("other", {*seen} - {"ok", "", "outside"})):
+            points = browser.ask(f"[...page.unanswered.{part}.geometry.getAttribute('position').array]")
+            for x, y, _ in np.reshape(points, (-1, 3))[::11] / 1e3:
+                inside = np.clip([x, y], *np.array([-1, 1])[:, None] * (1 - 1e-9) * np.array(model.table.reach))
+                height = 0.0 if model.face.is_flat else model.spot(*inside.tolist()).height
+                at = model.origin + np.array([x, y, height]) @ model.axes
+                assert model.query(tool, at=at.tolist(), **asked).status in is_in
     assert seen >= ({"ok", "large"} if kind.get("curved") else {"ok", "outside"})
     # Dragging does not ask again; another size does.
     before = browser.ask("(page.unanswered.shares.marked = 1, page.unanswered.seen)")
@@ -238,6 +243,27 @@ def test_places_without_an_answer_are_shaded_before_one_gets_there(browser, tmp_
     change(browser, radius=2)
     assert browser.ask("page.unanswered.seen") != before
     assert browser.messages == []
+
+
+@in_browser
+def test_inclusions_are_seen_through_the_surface(browser, tmp_path):
+    made = random_surface()
+    hull = np.vstack([np.eye(3), -np.eye(3)]) * 4e-3 - [0, 0, 8e-3], np.array([[0, 1, 2], [3, 4, 5], [0, 1, 5]])
+    write_model(tmp_path / "model.epsm", made.model, {}, {}, replace(made.table, inside=hull))
+    surface = read_surface(tmp_path / "model.epsm")
+    np.testing.assert_allclose(surface.table.inside[0], hull[0], rtol=1e-6)
+    seen = []
+    for page in (made, surface):
+        browser.open(write_touch_page(page, tmp_path / "page.html", ""))
+        drawn(browser)
+        assert ("Inclusions are seen" in browser.ask("document.body.textContent")) == (page is surface)
+        browser.screenshot(tmp_path / "page.png", whole=False)
+        seen.append(imread(tmp_path / "page.png")[100:, :700, :3])
+    assert np.mean(np.abs(seen[0] - seen[1]).max(axis=-1) > 0.05) > 1e-3
+    assert browser.messages == []
+    write_model(tmp_path / "model.epsm", made.model, {}, {}, replace(made.table, inside=(hull[0], hull[1] + 9)))
+    with pytest.raises(ModelError, match="inside_points or inside_triangles has impossible numbers"):
+        read_surface(tmp_path / "model.epsm")
 
 
 def test_the_page_of_relaxing_tissue_says_that_it_shows_a_sudden_touch():

@@ -20,7 +20,7 @@ from epsmesh_realtime.export.ranks import ALONE, Ranks
 from epsmesh_realtime.export.region import MARGIN, Region
 from epsmesh_realtime.export.scope import ExportError, Scope
 from epsmesh_realtime.export.surface import tabulate_surface
-from epsmesh_realtime.export.surface_body import surface_body
+from epsmesh_realtime.export.surface_body import inclusions, surface_body
 from epsmesh_realtime.export.tabulate import Places, tabulate
 from epsmesh_realtime.model import Model
 from epsmesh_realtime.surface import SurfaceTable
@@ -131,7 +131,7 @@ def export(
     except ExportError as reason:
         unseen = str(reason)
     else:
-        seen = tabulate_surface(far, model.origin) if surface else None
+        seen = replace(tabulate_surface(far, model.origin), inside=inclusions(scope.body, model)) if surface else None
         model = replace(model, pairs=tabulate_pairs(far))
     return Exported(model, fitted, judged, error, places, seen, unseen)
 

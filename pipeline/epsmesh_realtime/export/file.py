@@ -33,11 +33,15 @@ _DIMENSIONS: Mapping[str, tuple[str, ...]] = {
     "pair_links": ("pair_node", "pair_mode", "pair_other"),
     "surface_points": ("vertex", "component"),
     "surface_triangles": ("triangle", "corner"),
+    "inside_points": ("inside_vertex", "component"),
+    "inside_triangles": ("inside_triangle", "corner"),
     "surface_modes": ("vertex", "component", "mode"),
     "surface_amounts": ("mode", "poisson_degree", "y_degree", "x_degree"),
 }
 _UNITS = {
-    **dict.fromkeys(("reciprocal", "height", "reach", "sides", "origin", "thickness", "off", "surface_points"), "m"),
+    **dict.fromkeys(
+        ("reciprocal", "height", "reach", "sides", "origin", "thickness", "off", "surface_points", "inside_points"), "m"
+    ),
     **dict.fromkeys(("bend", "c_ref", "bend_error", "pair_links"), "1/m"),
     **dict.fromkeys(("check_x", "check_y", "check_radius", "check_depth"), "m"),
     **dict.fromkeys(("check_full", "check_force"), "N"),

@@ -4,10 +4,13 @@ from functools import partial
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from epsmesh.mesh.distribute import BodyMesh, distribute
 from epsmesh.mesh.of_case import mesh_arrays
-from epsmesh.shapes.body import Layered
+from epsmesh.shapes.body import Body, Layered
+from epsmesh.shapes.shell import Shell
 from epsmesh.solve.far_field import PointForce
 from epsmesh_realtime.export.compliance import coarse_mesh, law_of
 from epsmesh_realtime.export.far import LoadedBody
@@ -26,6 +29,8 @@ _ON_FACE = 1e-9
 _DOUBT = 0.003
 # No part of a body may be above its region: largest cosine of the angle to the normal.
 _STRAIGHT_ABOVE = 0.9
+# Points of the surface of an ellipsoid.
+_POINTS = 500
 
 
 def surface_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE) -> LoadedBody:
@@ -45,6 +50,24 @@ def surface_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE
         off = _ON_FACE * region.thickness
         return LoadedBody(coarse_mesh(scope.case, region, ranks=ranks), region, on_plane, law, off=off, ranks=ranks)
     return _curved(scope, model, ranks)
+
+
+def inclusions(body: Body, model: Model) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:
+    """Return points (n, 3), in m from the face's middle along its axes, and triangles of the surfaces of inclusions."""
+    points, triangles, count = [], [], 0
+    for piece in body.embedded:
+        surface = piece.surface
+        if isinstance(surface, Shell):
+            places, facets = surface.triangles.points, surface.triangles.facets
+        else:
+            places = surface.sample(_POINTS)
+            facets = ConvexHull(places).simplices
+        points.append((places - model.origin) @ model.axes.T)
+        triangles.append(facets + count)
+        count += len(places)
+    if not points:
+        return None
+    return np.vstack(points).astype(np.float32), np.vstack(triangles).astype(np.int32)
 
 
 def _curved(scope: Scope, model: Model, ranks: Ranks) -> LoadedBody:

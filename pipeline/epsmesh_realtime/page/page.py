@@ -1,5 +1,6 @@
 """A real-time model as a page: one HTML file that holds the model, what evaluates it, and what draws it."""
 
+from dataclasses import replace
 from math import degrees, hypot
 from pathlib import Path
 from typing import Any
@@ -76,7 +77,9 @@ def _facts(surface: Surface) -> list[str]:
     return [
         *at_once,
         f"Valid within the grey line: {region}. Tools move {along}, {friction}.",
-        "Only the outer surface is drawn; layers and inclusions act on the force and are not shown.",
+        "Inclusions are seen through the surface; layers act on the force and are not shown."
+        if surface.table.inside
+        else "Only the outer surface is drawn; layers and inclusions act on the force and are not shown.",
         "Shaded: no answer for this tool at this depth.",
         "Drag on the body's face to move the tool, beside it to turn the body; scroll to zoom.",
     ]
@@ -116,9 +119,16 @@ def _beginning(slider: dict[str, Any], value: float) -> dict[str, Any]:
 
 
 def _arrays(surface: Surface) -> dict[str, Any]:
-    """Return the evaluator and the file of the model, which it loads."""
-    model = pack(surface.model.numbers() | surface.table.numbers())
-    return {name: np.frombuffer(data, "u1") for name, data in (("evaluator", EVALUATOR.read_bytes()), ("model", model))}
+    """Return the evaluator, the file of the model, which it loads, and the surfaces of inclusions (mm)."""
+    table = surface.table
+    model = pack(surface.model.numbers() | replace(table, inside=None).numbers())
+    points, triangles = table.inside or (np.empty((0, 3)), np.empty((0, 3)))
+    return {
+        "evaluator": np.frombuffer(EVALUATOR.read_bytes(), "u1"),
+        "model": np.frombuffer(model, "u1"),
+        "inside": (_MM * points).astype("<f4").ravel(),
+        "corners": triangles.astype("<i4").ravel(),
+    }
 
 
 def _inputs(surface: Surface) -> dict[str, Any]:
@@ -133,5 +143,6 @@ def _inputs(surface: Surface) -> dict[str, Any]:
         "centre": (_MM * (low + high) / 2).tolist(),
         "radius": float(_MM * np.linalg.norm(high - low) / 2),
         "stops": palette.YLGNBU,
+        "inclusion": palette.REGIONS[4],
         "sentences": SENTENCES | {"outside": _OUTSIDE},
     }

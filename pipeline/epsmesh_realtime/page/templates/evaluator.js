@@ -18,15 +18,15 @@ async function started(evaluator) {
   }
 }
 
-// Read the arrays of the page, and start the evaluator with the model.
+// Read the arrays of the page, and start the evaluator with the model; return what else there is to draw.
 async function unpackModel(layout) {
-  const { evaluator, model } = await unpack(layout);
+  const { evaluator, model, ...drawn } = await unpack(layout);
   const { exports: c } = await started(evaluator);
   const at = c.page_room(model.length);
   new Uint8Array(c.memory.buffer, at, model.length).set(model);
   const status = c.page_load(at, model.length);
   if (status) throw new Error(`the page's model is damaged: ${status}`);
-  return { c };
+  return { c, ...drawn };
 }
 
 class Model {

@@ -48,7 +48,7 @@ function arrow(length, error, thick) {
 }
 
 class Page {
-  constructor(inputs, { c }) {
+  constructor(inputs, { c, inside, corners }) {
     this.inputs = inputs;
     this.model = new Model(inputs.model, c);
     this.surface = new Surface(this.model);
@@ -59,10 +59,18 @@ class Page {
     this.stage.colour({ stops: inputs.stops });
     this.stage.addLines([this.border()]);
     this.arrow = this.stage.addSolid(inputs.ink.footprint);
+    this.addInclusions(inside, corners);
     this.unanswered = new Unanswered(this);
     this.listen();
     this.whole();
     this.update();
+  }
+  // Seen through the surface.
+  addInclusions(points, corners) {
+    const geometry = new THREE.BufferGeometry().setIndex(new THREE.BufferAttribute(Uint32Array.from(corners), 1));
+    const part = this.stage.addSolid(this.inputs.inclusion, 0.35);
+    part.material.depthTest = false;
+    this.stage.fill(part, geometry.setAttribute("position", new THREE.BufferAttribute(points, 3)));
   }
   listen() {
     for (const { name } of document.querySelectorAll("#panel [name]")) {
