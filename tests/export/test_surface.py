@@ -14,10 +14,10 @@ from epsmesh_realtime.export.far import far_fields
 from epsmesh_realtime.export.placed_force import PlacedForce
 from epsmesh_realtime.export.scope import scope_of
 from epsmesh_realtime.export.surface import tabulate_surface
-from epsmesh_realtime.export.surface_body import surface_body
+from epsmesh_realtime.export.surface_body import inclusions, surface_body
 from epsmesh_realtime.surface import SurfaceTable
 from tests.export.test_export import AS_USUAL, CYLINDER, DISC, DOME, SKIN, Known, study
-from tests.realtime.synthetic import point_force
+from tests.realtime.synthetic import point_force, random_surface
 
 POISSON = 0.4
 BOX = {"shape": "box", "size": ["40 mm", "50 mm", "20 mm"]}
@@ -35,6 +35,18 @@ def volume_within(table: SurfaceTable) -> float:
     """Return the volume (m³) that triangles hold which all face outwards."""
     a, b, c = (table.points[table.triangles[:, i]].astype(float) for i in range(3))
     return float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum() / 6)
+
+
+def test_surfaces_of_inclusions_are_drawn_where_they_are_from_the_middle_of_the_face():
+    ball = {"name": "lump", "at": ["5 mm", "-2 mm", "-9 mm"], "radius": "4 mm", "young": "50 kPa", "poisson": 0.4}
+    (case,) = study(body=BOX | {"inclusion": [ball]}).cases()
+    model = random_surface(turned=True).model
+    points, triangles = inclusions(case.body, model)
+    away = np.linalg.norm(model.origin + points @ model.axes - [5e-3, -2e-3, -9e-3], axis=1)
+    np.testing.assert_allclose(away, 4e-3, rtol=1e-4)
+    assert triangles.max() == len(points) - 1
+    (bare,) = study(body=BOX).cases()
+    assert inclusions(bare.body, model) is None
 
 
 @pytest.mark.parametrize(
