@@ -20,9 +20,11 @@ from epsmesh.solve.balance import check_balance
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.elements import elements_of
 from epsmesh.solve.elements.base import Elements
+from epsmesh.solve.held_body import equilibrate
+from epsmesh.solve.hyperelastic import HyperelasticBody
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Loads
-from epsmesh.solve.newton import EASY, LEFT, ON_THE_WAY, HyperelasticBody, LargeError
+from epsmesh.solve.newton import EASY, LEFT, ON_THE_WAY, LargeError
 from epsmesh.solve.path import Path, PathPoint, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import whole_force
@@ -47,7 +49,7 @@ def load_in_steps(body: HyperelasticBody, applied: Applied | None, state: PETSc.
     def solve_at(share: float) -> tuple[PathPoint, bool]:
         state.array[:] = path.last.state
         body.carry(applied, share)
-        iterations = body.equilibrate(state, goal, LEFT if share == 1.0 else ON_THE_WAY)
+        iterations = equilibrate(body, state, goal, LEFT if share == 1.0 else ON_THE_WAY)
         return PathPoint(share, state.array.copy()), iterations <= EASY
 
     try:
@@ -92,7 +94,7 @@ def sag(elements: Elements, law: MaterialLaw, loads: Loads | None, guess: FloatA
         else:
             state.array[:] = guess
             body.carry(applied)
-            body.equilibrate(state, body.held_of(state))
+            equilibrate(body, state, body.held_of(state))
         body.forces(state, forces)
         own = forces.array[: space.owned].reshape(-1, 3)[space.fixed_owned].sum(axis=0)
         resultant, size = body.on_terms(state)
@@ -177,7 +179,7 @@ def _sag_of_tool(body: HyperelasticBody, state: PETSc.Vec, unit: PETSc.Vec, step
             state.copy(last)
             for _ in range(_HALVINGS):
                 try:
-                    body.equilibrate(state, (here + step) * motion)
+                    equilibrate(body, state, (here + step) * motion)
                     break
                 except LargeError:
                     last.copy(state)

@@ -74,7 +74,6 @@ _ENLARGE, _RESULT, _TOO_SMALL = 14, 1, (-8, -9)
 
 _prefixes = itertools.count()
 INDEFINITE = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC
-INDEFINITE_MATRIX = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT
 
 
 @contextmanager
@@ -112,6 +111,15 @@ def check_converged(ksp: PETSc.KSP) -> int:
         name = names.get(reason, str(reason)).lower()
         raise SolveError(f"the linear solver did not converge: {name} after {ksp.its} iterations")
     return int(ksp.its)
+
+
+def is_truncated(ksp: PETSc.KSP, found: PETSc.Vec) -> bool:
+    """Return whether conjugate gradients ended at a direction of negative curvature, with a step ``found`` before.
+
+    Such a step reduces the energy (R. S. Dembo and T. Steihaug, Math. Program. 26, 190, 1983).
+    """
+    is_indefinite = ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT
+    return bool(is_indefinite and found.norm() > 0)
 
 
 def configure(solver: PETSc.KSP | PETSc.PC | PETSc.SNES, options: Mapping[str, Any], *, set_up: bool = False) -> None:

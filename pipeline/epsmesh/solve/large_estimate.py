@@ -24,8 +24,10 @@ from epsmesh.arrays import FloatArray
 from epsmesh.solve.compiled import assemble
 from epsmesh.solve.elements.base import Elements, Fields, Linearised
 from epsmesh.solve.elements.fields import Column
+from epsmesh.solve.held_body import equilibrate
+from epsmesh.solve.hyperelastic import HyperelasticBody, Preconditioner
 from epsmesh.solve.movement import Loads
-from epsmesh.solve.newton import HyperelasticBody, LargeError, Preconditioner
+from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.terms import DeadLoads, Term, product
 
@@ -124,7 +126,7 @@ def force_again(
         finer.interpolate(elements)
         finer.set_law(law)
         found.array[:] = finer.values
-        above.equilibrate(found, above.held_of(found), _AGAIN)
+        equilibrate(above, found, above.held_of(found), _AGAIN)
         above.forces(found, forces)
         owned = finer.displacements.owned
         unit.array[:owned] = column.prescribed[:owned]

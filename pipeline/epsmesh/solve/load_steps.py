@@ -21,10 +21,12 @@ from epsmesh.solve.elements.base import Elements, HierarchicalEstimate, Linearis
 from epsmesh.solve.elements.fields import Column, Fields
 from epsmesh.solve.ended import ended
 from epsmesh.solve.estimate import is_plain
+from epsmesh.solve.held_body import equilibrate, move
+from epsmesh.solve.hyperelastic import HyperelasticBody
 from epsmesh.solve.large_estimate import Decrements, FinerResiduals, combine, force_again
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Motion, Movement
-from epsmesh.solve.newton import EASY, LEFT, ON_THE_WAY, HyperelasticBody, LargeError
+from epsmesh.solve.newton import EASY, LEFT, ON_THE_WAY, LargeError
 from epsmesh.solve.path import Path, PathPoint, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.response import LoadResponse, Response, whole_force
@@ -173,7 +175,7 @@ class LoadSteps(Solver):
         self._put_unit(column, unit)
 
         def at() -> tuple[Fields, Fields]:
-            self._body.move(state, unit, rate)
+            move(self._body, state, unit, rate)
             return residuals.of_rate(state, rate), residuals.at(state)
 
         self._at(column, state)
@@ -266,7 +268,7 @@ class LoadSteps(Solver):
                 if not np.isfinite(body.energy(state)):
                     state.array[:] = load_path.last.state  # the first step of Newton's method then brings it there
                 left = LEFT if there == depth else ON_THE_WAY
-                iterations = body.equilibrate(state, base + there * held, left)
+                iterations = equilibrate(body, state, base + there * held, left)
                 body.forces(state, forces)
                 load_path.work.append((there, forces.dot(unit), body.energy(state) - begun))
                 return PathPoint(there, state.array.copy()), iterations <= EASY

@@ -23,9 +23,11 @@ from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.elements.base import Elements, Linearised
 from epsmesh.solve.elements.tangent import Prestress
 from epsmesh.solve.ended import ended
+from epsmesh.solve.held_body import equilibrate, move
 from epsmesh.solve.history import Course, History, between
+from epsmesh.solve.hyperelastic import HyperelasticBody
 from epsmesh.solve.movement import Movement
-from epsmesh.solve.newton import HyperelasticBody, LargeError
+from epsmesh.solve.newton import LargeError
 from epsmesh.solve.path import Path, PathPoint, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.relaxing import HistoryVariables, Points
@@ -139,7 +141,7 @@ class FootprintIndentation(Indentation):
         """Find the equilibrium at a share."""
         held = share * self.body.held_of(self._unit)
         state.array[self._space.prescribed_owned] = held
-        self.body.equilibrate(state, held)
+        equilibrate(self.body, state, held)
         self.body.forces(state, self._forces)
         residual = self._forces.array[: self._space.owned]
         (self.force,) = sums(self._space, [residual], [self._unit.array[: self._space.owned]]).on_probe
@@ -148,7 +150,7 @@ class FootprintIndentation(Indentation):
     def guess(self, state: PETSc.Vec) -> FloatArray:
         """Return the change of a state per share by the tangent there."""
         with self.body.state() as rate:
-            self.body.move(state, self._unit, rate)
+            move(self.body, state, self._unit, rate)
             return np.array(rate.array)
 
     def unit(self, state: PETSc.Vec, share: float) -> FloatArray:

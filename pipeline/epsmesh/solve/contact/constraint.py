@@ -29,7 +29,8 @@ class Constraint:
     ``frames`` (n, d, d) have the tangents and, in the last column, the tool's normal. ``held`` (n, d) are the slots of
     the frames whose displacement is prescribed, to ``values`` (n, d), m. ``turning`` (n, d, d), N/m, is λ H, which is
     subtracted from the tangent. ``forces`` (n, d), N, act on the nodes besides the reactions; where they are friction,
-    ``sliding`` is how they follow the reactions, for tissue that can solve for both.
+    ``sliding`` is how they follow the reactions, for tissue that can solve for both. ``is_there``: held slots are next
+    to where they are held.
     """
 
     frames: FloatArray
@@ -38,6 +39,7 @@ class Constraint:
     turning: FloatArray
     forces: FloatArray
     sliding: Sliding | None = None
+    is_there: bool = False
 
     @property
     def is_turned(self) -> bool:

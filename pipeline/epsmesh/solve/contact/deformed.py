@@ -13,7 +13,7 @@ The loop knows only nodes of a surface: a body in three dimensions and one in th
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, inf
 from typing import NamedTuple, Protocol
 
@@ -25,20 +25,20 @@ from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.coulomb import Slide
 from epsmesh.solve.contact.friction_step import FrictionIteration, FrictionStep, Placed
 from epsmesh.solve.contact.turned import turned_frames
-from epsmesh.solve.newton import LargeError
+from epsmesh.solve.newton import HALVINGS, LargeError, Moving, Newton, advance, is_less
 
 # Tension below this share of the mean reaction, and penetration below this share of the depth, are solver error.
 SLACK = 1e-6
 # Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
 LEFT, _CLOSED = 1e-8, 1e-8
-# Rounding of positions at which nodes are held, in units of the largest.
-_HELD = 1e-14
 # A residual below this that no longer falls is the rounding error of a body that is large compared with the contact.
 _ROUNDING = 1e-6
 # With friction: the residual of nodes that slide, where their friction is that of the iteration before, and of others.
 _LEFT_WITH_FRICTION, _LEFT_BESIDE = 1e-4, 1e-7
-# Most iterations of a load step, most times that one active set is solved, and most halvings of a step.
-_MOST, _MOST_REPEATS, _HALVINGS = 40, 7, 12
+# A decrease below this share of the energy is rounding.
+_NO_SLOPE = 1e-11
+# Most iterations of a load step, and most times that one active set is solved.
+_MOST, _MOST_REPEATS = 40, 7
 # Most iterations with friction on linear tissue, where directions of slip settle last, and each is a small solve.
 _MOST_LINEAR = 60
 # Without patience: the least share of the first increment that may be taken, and the number of iterations after which
@@ -48,7 +48,7 @@ _WHOLE, _SOON, _NEARLY_CLOSED = 0.5, 10, 1e-3
 _ONE_BY_ONE = 3
 
 
-class Tissue(Protocol):
+class Tissue(Moving, Protocol):
     """A body seen from n nodes of its surface, at its current state. Methods are collective.
 
     ``fixed`` (n, d) marks prescribed components.
@@ -71,9 +71,6 @@ class Tissue(Protocol):
         Raises:
             SolveError: if the linear solver fails.
         """
-
-    def advance(self, share: float) -> bool:
-        """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
 
 
 class SteppedTissue(Tissue, Protocol):
@@ -163,14 +160,8 @@ def solve_contact(
         LargeError: if the loop does not converge; a NoTouchError, if the tool touches no node.
         SolveError: if a linear solver fails.
     """
-    loop = _Loop(tissue, tool, active, friction_step, is_patient=is_patient, limit=limit, scale=scale)
-    most = _MOST_LINEAR if friction_step is not None and friction_step.is_linear else _MOST
-    for iteration in range(most + 1):
-        found = loop.judge(iteration)
-        if found is not None:
-            return found
-        loop.step(iteration)
-    raise LargeError(f"no equilibrium after {most} iterations")
+    loop = _InContact(tissue, tool, active, friction_step, is_patient=is_patient, limit=limit, scale=scale)
+    return loop.solve(_MOST_LINEAR if friction_step is not None and friction_step.is_linear else _MOST)
 
 
 def continue_linear(tissue: Tissue, tool: PlacedTool, touched: ContactSolution, friction_step: FrictionStep) -> None:
@@ -185,31 +176,7 @@ def continue_linear(tissue: Tissue, tool: PlacedTool, touched: ContactSolution, 
     tissue.advance(1.0)
 
 
-def hold(tissue: Tissue, held: BoolArray, goal: FloatArray, *, limit: float, most: int, halvings: int) -> None:
-    """Find the equilibrium in which components ``held`` (n, d) are at positions ``goal`` (n, d); collective.
-
-    What is bonded is contact whose components are all active, whatever the reaction. The residual at the end is at most
-    ``limit``, in units of the forces that hold the nodes. A step that turns tissue inside out is halved.
-
-    Raises:
-        LargeError: if there is none after ``most`` iterations, or tissue is turned inside out.
-        SolveError: if a linear solver fails.
-    """
-    nodes, dim = held.shape
-    frames, nothing = np.broadcast_to(np.eye(dim), (nodes, dim, dim)), np.zeros((nodes, dim, dim))
-    for iteration in range(most + 1):
-        left, forces = np.where(held, goal - tissue.positions(), 0.0), tissue.forces()
-        residual = hypot(tissue.unbalanced(), float(np.linalg.norm(np.where(held, 0.0, forces))))
-        is_there = np.abs(left).max() <= _HELD * np.abs(goal).max()
-        if is_there and residual <= limit * float(np.linalg.norm(np.where(held, forces, 0.0))):
-            return
-        if iteration < most:
-            tissue.linearise(Constraint(frames, held, left, nothing, np.zeros_like(left)))
-            _advance(tissue, halvings)
-    raise LargeError(f"no equilibrium after {most} iterations")
-
-
-class _Loop:
+class _InContact(Newton[ContactSolution]):
     """The iterations of :func:`solve_contact`: the ``active`` set, what was predicted, and the sets seen."""
 
     def __init__(
@@ -268,11 +235,12 @@ class _Loop:
         """
         active, normal = self._active, self._there.normal
         constraint = _constraint(self._place, normal, np.where(active, self._pressed, 0.0), active)
+        constraint = replace(constraint, is_there=self._is_closed)
         if self._friction is not None:
             constraint = self._friction.constrain(constraint, self._there, active)
         self._predicted = np.where(self._tissue.fixed, 0.0, self._tissue.linearise(constraint))
         self._reactions = np.einsum("ni,ni->n", self._predicted, normal)
-        if _advance(self._tissue) < _WHOLE and iteration == 0 and not self._is_patient:
+        if advance(self._tissue, HALVINGS, self._descent()) < _WHOLE and iteration == 0 and not self._is_patient:
             raise LargeError("the load step turns tissue inside out")
 
     def _with_care(self, active: BoolArray, following: BoolArray) -> BoolArray:
@@ -292,6 +260,27 @@ class _Loop:
         if following.tobytes() in self._seen:
             following = following & (active | ~followers)
         return following
+
+    def _descent(self) -> Callable[[float], bool] | None:
+        """Return what tells whether a share of the increment reduces the energy enough; None if that is not compared.
+
+        With the predicted reactions λ, it is the energy less λ·g: its slope is that of the linear system. Forces of
+        friction have no energy.
+        """
+        tissue, tool, slope = self._tissue, self._tool, self._tissue.slope
+        if slope is None or self._friction is not None or not self._is_closed:
+            return None
+        reactions = np.where(self._active, self._reactions, 0.0)
+        gained = float(reactions @ self._place.gap)
+        stored, slope = tissue.energy - gained, slope - gained
+        if slope <= _NO_SLOPE * abs(tissue.energy):
+            return None
+
+        def falls(share: float) -> bool:
+            gap = tool.distance(tissue.positions()).gap
+            return is_less(tissue.energy - float(reactions @ gap), stored, share, slope)
+
+        return falls
 
     def _exerted(self, iteration: int, forces: FloatArray, before: BoolArray) -> FloatArray:
         """Return the forces (n, d) of the tool on nodes of the set ``before``; the state of friction follows."""
@@ -317,6 +306,11 @@ class _Loop:
         """The largest gap (m) of active nodes."""
         return float(np.abs(self._place.gap[self._active]).max(initial=0.0))
 
+    @property
+    def _is_closed(self) -> bool:
+        """Whether active nodes are next to the tool."""
+        return self._open <= _NEARLY_CLOSED * self._tool.depth
+
     def _solution(self, iteration: int, forces: FloatArray) -> ContactSolution:
         active, friction = self._active, self._friction
         if friction is not None and not friction.is_sound(active):
@@ -325,8 +319,7 @@ class _Loop:
         return ContactSolution(active, exerted, self._place.gap, iteration, self._pressed, slide)
 
     def _check_patience(self, iteration: int) -> None:
-        is_late = not self._is_patient and iteration >= _SOON
-        if is_late and self._open > _NEARLY_CLOSED * self._tool.depth:
+        if not self._is_patient and iteration >= _SOON and not self._is_closed:
             raise LargeError(f"no equilibrium is near after {iteration} iterations")
 
     def _count(self) -> None:
@@ -365,19 +358,6 @@ def _pulls(tool: PlacedTool, active: BoolArray, pressed: FloatArray) -> bool:
     """Return whether the tool pulls at an active node whose force ``pressed`` (n), N, means something."""
     forces = pressed[active & ~tool.followers]
     return bool((forces < -SLACK * np.abs(forces).mean()).any()) if len(forces) else False
-
-
-def _advance(tissue: Tissue, most: int = _HALVINGS) -> float:
-    """Take the longest step, by halves, that leaves no tissue inside out; return it as a share of the whole one.
-
-    Raises:
-        LargeError: if there is none.
-    """
-    for halvings in range(most):
-        share = 0.5**halvings
-        if tissue.advance(share):
-            return share
-    raise LargeError("tissue is turned inside out")
 
 
 def _within_planes(normal: FloatArray, fixed: BoolArray) -> FloatArray:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
+from math import inf, nan
 
 import numpy as np
 
@@ -341,6 +341,8 @@ class LinearTissue:
     error, relative to the root of ``energy`` (J), of which an estimate will do. The body is in balance once a set is
     solved to the last one.
     """
+
+    energy, slope = nan, None  # steps are exact
 
     def __init__(self, elements: ContactElements, tolerances: Sequence[float], energy: float | None):
         """Begin with the fields of the ``elements``."""

@@ -15,8 +15,8 @@ from epsmesh.solve.contact.levels import Numbering, Surface
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.turned_tangent import FactorisedTangent, IteratedTangent, TurnedTangent
 from epsmesh.solve.elements.base import Elements
+from epsmesh.solve.hyperelastic import HyperelasticBody
 from epsmesh.solve.loads import Applied
-from epsmesh.solve.newton import HyperelasticBody
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.stages import stage
 
@@ -67,7 +67,9 @@ class DeformedBody:
         is_fixed = np.zeros(space.owned)
         is_fixed[space.prescribed_owned] = 1.0
         self.fixed = self._numbering.gather_vectors(is_fixed) > 0
-        self._is_current = False
+        self._is_current = False  # are the forces
+        self._energy: float | None = None
+        self.slope: float | None = None
         self.iterations = 0
 
     # ---- the interface --------------------------------------------------------------------------------
@@ -80,7 +82,7 @@ class DeformedBody:
     @state.setter
     def state(self, values: FloatArray) -> None:
         self._now.array[:] = values
-        self._from, self._is_current = values.copy(), False
+        self._from, self._is_current, self._energy = values.copy(), False, None
 
     def positions(self) -> FloatArray:
         """Return the nodes' deformed positions (n, 3), in m."""
@@ -121,6 +123,7 @@ class DeformedBody:
             self._numbering.add_vectors(right.array, constraint.forces / self._unit)
             target = LEFT * float(np.linalg.norm(self.forces())) / self._unit
             self._tangent.solve(constraint, right, self._change, target)
+            self.slope = None if self._body.is_mixed else -self._residual.dot(self._change)
             self._tangent.multiply(self._change, right)
             moved = self._numbering.gather_vectors(self._change.array[: self._space.owned])
             change = self._numbering.gather_vectors(self._unit * right.array[: self._space.owned])
@@ -130,7 +133,7 @@ class DeformedBody:
     def advance(self, share: float) -> bool:
         """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
         self._now.array[:] = self._from + share * self._change.array
-        self._is_current = False
+        self._is_current, self._energy = False, None
         return self.is_sound
 
     @property
@@ -141,7 +144,9 @@ class DeformedBody:
     @property
     def energy(self) -> float:
         """Energy (J) of the modelled part less the work of loads, NaN if tissue is inside out; collective."""
-        return self._body.energy(self._now)
+        if self._energy is None:
+            self._energy = self._body.energy(self._now)
+        return self._energy
 
     @property
     def places(self) -> FloatArray:

@@ -20,9 +20,10 @@ from epsmesh.solve.elements.base import Elements, Solver
 from epsmesh.solve.elements.displacement import DisplacementSolver
 from epsmesh.solve.elements.mixed import MixedElements, MixedSolver
 from epsmesh.solve.elements.pressures import without_columns
+from epsmesh.solve.hyperelastic import HyperelasticBody
 from epsmesh.solve.kernels.pressure import matrix_of
-from epsmesh.solve.krylov import INDEFINITE, check_converged, explained, factorised, keep, solver_of
-from epsmesh.solve.newton import HyperelasticBody, forcing
+from epsmesh.solve.krylov import INDEFINITE, check_converged, explained, factorised, is_truncated, keep, solver_of
+from epsmesh.solve.newton import forcing
 from epsmesh.solve.physics import MaterialLaw
 
 _MOST_ITERATIONS = 300
@@ -197,13 +198,14 @@ class IteratedTangent(TurnedTangent):
             load.array[:] = right.array
             self._rotate(load.array, "nji,nj->ni")
             load.array[self._held] = 0.0
-            self._iterate(self._preconditioner(constraint, stack), load, found, target, stack)
+            self._iterate(constraint, load, found, target, stack)
             self._rotate(found.array, "nij,nj->ni")
             change.axpy(1.0, found)
 
     def _iterate(
-        self, preconditioner: object, load: PETSc.Vec, found: PETSc.Vec, target: float, stack: ExitStack
+        self, constraint: Constraint, load: PETSc.Vec, found: PETSc.Vec, target: float, stack: ExitStack
     ) -> None:
+        preconditioner = self._preconditioner(constraint, stack)
         is_mixed, norm = isinstance(self._elements, MixedElements), load.norm()
         gained, self._before = norm / self._before if self._before else 1.0, norm
         tolerance = forcing(gained, target / norm if norm else 1.0)
@@ -212,12 +214,13 @@ class IteratedTangent(TurnedTangent):
             ksp = solver_of(kind, self._matrix, stack, preconditioner, **how)
             found.set(0.0)
             ksp.solve(load, found)
-            if ksp.getConvergedReason() > 0:
+            if ksp.getConvergedReason() > 0 or (constraint.is_there and is_truncated(ksp, found)):
                 break
             # Conjugate gradients end where the tangent is indefinite, as far from equilibrium.
             if ksp.getConvergedReason() == INDEFINITE and isinstance(self._solver, DisplacementSolver):
                 self._solver.linear.refine_eigenvalues()
-        self._body.iterations += check_converged(ksp)
+        is_enough = constraint.is_there and is_truncated(ksp, found)
+        self._body.iterations += int(ksp.its) if is_enough else check_converged(ksp)
 
     def _preconditioner(self, constraint: Constraint, stack: ExitStack) -> object:
         """Return the preconditioner of linear elasticity with the same nodes held along z."""

@@ -22,14 +22,13 @@ from epsmesh.mesh.meridian import Grading, MeridianArrays
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.conditions import Conditions
-from epsmesh.solve.contact.deformed import hold
 from epsmesh.solve.ended import ended
 from epsmesh.solve.load_steps import check_path
 from epsmesh.solve.meridian.in_time import RelaxingHalfPlane
 from epsmesh.solve.meridian.problem import Answer, MeridianSolver, best_of, error_bar
 from epsmesh.solve.meridian.system import HalfPlane, System, max_strain, meshes_of
-from epsmesh.solve.meridian.tissue import MeridianTissue
-from epsmesh.solve.newton import LargeError
+from epsmesh.solve.meridian.tissue import HeldNodes, MeridianTissue
+from epsmesh.solve.newton import LargeError, hold
 from epsmesh.solve.path import SHORTEST, Path, PathPoint, follow
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.time_steps import Indentation
@@ -38,7 +37,7 @@ from epsmesh.stages import stage
 DEGREE = 4
 # Meshes, tried in this order until the error bar is below the required accuracy.
 GRADINGS = tuple(Grading(floor, 1.0, 4.0) for floor in (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3))
-# Tolerance on the residual, relative to the forces at the probe; most Newton iterations, and halvings of one.
+# Tolerance on the residual, relative to the forces at the probe; most Newton iterations, and lengths of a step.
 _LEFT, _MOST_ITERATIONS, _HALVINGS = 1e-9, 14, 6
 # Fewest load steps.
 _FEWEST = 3
@@ -94,7 +93,7 @@ class LargeSystem(System):
         tissue = self._tissue
         tissue.state, pressed = state, np.zeros(tissue.fixed.shape, dtype=bool)
         pressed[:, -1] = True
-        hold(tissue, pressed, tissue.places - [0.0, depth], limit=_LEFT, most=_MOST_ITERATIONS, halvings=_HALVINGS)
+        hold(HeldNodes(tissue, pressed, tissue.places - [0.0, depth]), _LEFT, _MOST_ITERATIONS, _HALVINGS)
         return tissue.state
 
     @cached_property
@@ -121,8 +120,6 @@ class MeridianIndentation(Indentation):
     def equilibrate(self, state: PETSc.Vec, share: float) -> None:
         """Find the equilibrium at a share."""
         system, before = self._system, self._system.iterations
-        if not np.isfinite(system.forms.energy(state.array_r)):
-            raise LargeError("tissue is turned inside out")
         try:
             state.array[:] = system.equilibrate(state.array_r.copy(), share * self._depth)
         finally:

@@ -4,13 +4,18 @@ The interface is that of :mod:`epsmesh.solve.contact.deformed`, in two dimension
 forces per radian.
 """
 
+from math import hypot
+
 import numpy as np
 import scipy.sparse as sp
 
-from epsmesh.arrays import FloatArray, IntArray
-from epsmesh.solve.contact.deformed import Constraint
+from epsmesh.arrays import BoolArray, FloatArray, IntArray
+from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.meridian.system import FreeSystem
 from epsmesh.stages import stage
+
+# Rounding of positions at which nodes are held, in units of the largest.
+_ROUNDED = 1e-14
 
 
 class MeridianTissue:
@@ -26,6 +31,8 @@ class MeridianTissue:
         self.fixed = ~np.isin(dofs, system.free)
         self._now = self._from = self._change = np.zeros(system.forms.dofs)
         self._residual: FloatArray | None = None
+        self._energy: float | None = None
+        self.slope: float | None = None
         self.iterations = 0
 
     @property
@@ -35,7 +42,7 @@ class MeridianTissue:
 
     @state.setter
     def state(self, values: FloatArray) -> None:
-        self._now, self._residual = values, None
+        self._now, self._residual, self._energy = values, None, None
 
     def positions(self) -> FloatArray:
         """Return the nodes' deformed positions (n, 2)."""
@@ -96,7 +103,9 @@ class MeridianTissue:
     @property
     def energy(self) -> float:
         """The energy, NaN if tissue is inside out."""
-        return self.system.forms.energy(self._now)
+        if self._energy is None:
+            self._energy = self.system.forms.energy(self._now)
+        return self._energy
 
     def _blocks(self, blocks: FloatArray) -> sp.csr_matrix:
         """Return the matrix with ``blocks`` (n, 2, 2) at the nodes."""
@@ -109,3 +118,55 @@ class MeridianTissue:
         apart = np.ones(len(self._now))
         apart[self._dofs] = 0.0
         return apart
+
+
+class HeldNodes:
+    """A ``tissue`` whose components ``held`` (n, 2) go to positions ``goal`` (n, 2): see :class:`.newton.Held`."""
+
+    def __init__(self, tissue: MeridianTissue, held: BoolArray, goal: FloatArray):
+        """Begin at the tissue's state."""
+        self._tissue, self._held, self._goal = tissue, held, goal
+        nodes, dim = held.shape
+        self._frames, self._nothing = np.broadcast_to(np.eye(dim), (nodes, dim, dim)), np.zeros((nodes, dim, dim))
+
+    @property
+    def energy(self) -> float:
+        """The energy, NaN if tissue is inside out."""
+        return self._tissue.energy
+
+    @property
+    def slope(self) -> float | None:
+        """See :class:`.newton.Moving`."""
+        return self._tissue.slope
+
+    @property
+    def _todo(self) -> FloatArray:
+        return np.where(self._held, self._goal - self._tissue.positions(), 0.0)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether nodes are at their goal, but for rounding of positions."""
+        return bool(np.abs(self._todo).max() <= _ROUNDED * np.abs(self._goal).max())
+
+    def residual(self) -> tuple[float, float]:
+        """Return the norms of the residual and of the forces that hold the nodes."""
+        forces = self._tissue.forces()
+        left = float(np.linalg.norm(np.where(self._held, 0.0, forces)))
+        return hypot(self._tissue.unbalanced(), left), float(np.linalg.norm(np.where(self._held, forces, 0.0)))
+
+    def rounding(self) -> float:
+        """Return zero: factorisations leave no more than the tolerance."""
+        return 0.0
+
+    def linearise(self, tolerance: float) -> None:
+        """Find the increment.
+
+        Raises:
+            SolveError: if the factorisation fails.
+        """
+        values = self._todo
+        self._tissue.linearise(Constraint(self._frames, self._held, values, self._nothing, np.zeros_like(values)))
+
+    def advance(self, share: float) -> bool:
+        """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
+        return self._tissue.advance(share)
