@@ -20,7 +20,7 @@ class Springs:
     stiffness: FloatArray
     loads: FloatArray
     state: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
-    is_sound = True
+    is_sound, energy, slope = True, np.nan, None
 
     @property
     def fixed(self) -> BoolArray:
