@@ -19,6 +19,14 @@ class Broken:
     repairs: bool = False
 
 
+def _file(name: str, data: bytes, *words: str, unit: float = 1e-3) -> Broken:
+    return Broken(name, data, words, unit)
+
+
+def _mended(name: str, data: bytes, *words: str) -> Broken:
+    return Broken(name, data, words, repairs=True)
+
+
 def _near(points: FloatArray, place: tuple[float, float, float]) -> int:
     return int(np.linalg.norm(points - place, axis=1).argmin())
 
@@ -131,97 +139,77 @@ def corpus() -> list[Broken]:
     nan, inf = float("nan"), float("inf")
     inner = ball(2, (8.0, 8.0, 8.0))
     numbers = [
-        Broken("nan.stl", stl(_finite(good, nan)), ("not finite", "nan", "export")),
-        Broken("infinite.stl", stl(_finite(good, inf)), ("not finite", "inf")),
-        Broken("nan-text.stl", stl_text(_finite(ball(2), nan)), ("not finite", "nan")),
-        Broken("nan.ply", ply(_finite(good, nan), "ascii"), ("not finite", "point 18")),
-        Broken("nan.obj", obj(_finite(good, -inf)), ("not finite", "-inf")),
+        _file("nan.stl", stl(_finite(good, nan)), "not finite", "nan", "export"),
+        _file("infinite.stl", stl(_finite(good, inf)), "not finite", "inf"),
+        _file("nan-text.stl", stl_text(_finite(ball(2), nan)), "not finite", "nan"),
+        _file("nan.ply", ply(_finite(good, nan), "ascii"), "not finite", "point 18"),
+        _file("nan.obj", obj(_finite(good, -inf)), "not finite", "-inf"),
     ]
     files = [
-        Broken("empty.stl", b"", ("is empty",)),
-        Broken("short.stl", b"solid", ("truncated", "endsolid")),
-        Broken("truncated.stl", whole[:20_000], ("truncated", "1,280 facets", "it has 398:")),
-        Broken("header.stl", whole[:84], ("truncated", "it has 0:")),
-        Broken("truncated-text.stl", text[: len(text) // 2], ("truncated", "endsolid")),
-        Broken("truncated.ply", ply(good)[:5000], ("truncated", "vertex")),
-        Broken("truncated-faces.ply", ply(good)[:-500], ("truncated", "1,280 of face")),
-        Broken("truncated-text.ply", ply(good, "ascii")[:-400], ("truncated", "face")),
-        Broken("truncated.obj", _changed(lines, b"\nv ", b"\n# "), ("a facet names point 42 of 41")),
-        Broken(
-            "letter.stl", b"Dear colleague, here is the liver that you asked for.\n" * 9, ("not an STL file", "Dear")
+        _file("empty.stl", b"", "is empty"),
+        _file("short.stl", b"solid", "truncated", "endsolid"),
+        _file("truncated.stl", whole[:20_000], "truncated", "1,280 facets", "it has 398:"),
+        _file("header.stl", whole[:84], "truncated", "it has 0:"),
+        _file("truncated-text.stl", text[: len(text) // 2], "truncated", "endsolid"),
+        _file("truncated.ply", ply(good)[:5000], "truncated", "vertex"),
+        _file("truncated-faces.ply", ply(good)[:-500], "truncated", "1,280 of face"),
+        _file("truncated-text.ply", ply(good, "ascii")[:-400], "truncated", "face"),
+        _file("truncated.obj", _changed(lines, b"\nv ", b"\n# "), "a facet names point 42 of 41"),
+        _file("letter.stl", b"Dear colleague, here is the liver that you asked for.\n" * 9, "not an STL file", "Dear"),
+        _file("letter.ply", b"Dear colleague\n", "not a PLY file"),
+        _file("cornerless.obj", lines[: lines.index(b"\nf ")] + b"\nf \n", "a facet with 0 corners"),
+        _file("letter.obj", b"Dear colleague\n", "not an OBJ surface", "0 lines of points"),
+        _file("word.stl", _changed(text, b"vertex", b"corner"), "`vertex` occurs 239 times in 80 facets"),
+        _file("comma.stl", text.replace(b".", b","), "line 4", "three numbers"),
+        _file("comma.obj", lines.replace(b".", b","), "line", "three coordinates"),
+        _file("names.obj", _changed(lines, b"\nf 1", b"\nf one"), "line", "numbers of points"),
+        _file("zero.obj", _changed(lines, b"\nf ", b"\nf 0 "), "line", "from 1 on"),
+        _file("really-ply.stl", ply(good), "content is that of `.ply`", "rename"),
+        _file("really-stl.obj", whole, "content is that of `.stl`", "rename"),
+        _file("really-stl.ply", text, "content is that of `.stl`", "rename"),
+        _file("organ.vtk", b"# vtk DataFile", "is a file of VTK, which is not read", ".stl, .ply, .obj"),
+        _file(
+            "cloud.ply", _changed(ply(good, "ascii"), b"element face", b"element edge"), "no surface", "vertex, edge"
         ),
-        Broken("letter.ply", b"Dear colleague\n", ("not a PLY file",)),
-        Broken("cornerless.obj", lines[: lines.index(b"\nf ")] + b"\nf \n", ("a facet with 0 corners",)),
-        Broken("letter.obj", b"Dear colleague\n", ("not an OBJ surface", "0 lines of points")),
-        Broken("word.stl", _changed(text, b"vertex", b"corner"), ("`vertex` occurs 239 times in 80 facets",)),
-        Broken("comma.stl", text.replace(b".", b","), ("line 4", "three numbers")),
-        Broken("comma.obj", lines.replace(b".", b","), ("line", "three coordinates")),
-        Broken("names.obj", _changed(lines, b"\nf 1", b"\nf one"), ("line", "numbers of points")),
-        Broken("zero.obj", _changed(lines, b"\nf ", b"\nf 0 "), ("line", "from 1 on")),
-        Broken("really-ply.stl", ply(good), ("content is that of `.ply`", "rename")),
-        Broken("really-stl.obj", whole, ("content is that of `.stl`", "rename")),
-        Broken("really-stl.ply", text, ("content is that of `.stl`", "rename")),
-        Broken("organ.vtk", b"# vtk DataFile", ("is a file of VTK, which is not read", ".stl, .ply, .obj")),
-        Broken(
-            "cloud.ply", _changed(ply(good, "ascii"), b"element face", b"element edge"), ("no surface", "vertex, edge")
-        ),
-        Broken("fraction.ply", _changed(ply(good, "ascii"), b"\n3 ", b"\n3.5 "), ("3.5, which is not an integer",)),
-        Broken("format.ply", _changed(ply(good, "ascii"), b"ascii", b"morse"), ("`format morse 1.0`",)),
-        Broken("flat.ply", _changed(ply(good, "ascii"), b"float z", b"float w"), ("x, y, w", "needed are x, y and z")),
-        Broken("words.ply", ply(good, "ascii").replace(b".", b","), ("not numbers",)),
-        Broken("wrong-point.ply", ply((good[0], good[1] + 1)), ("a facet names point 642", "0 to 641")),
-        Broken("line.ply", ply((good[0], good[1][:, :2])), ("2 corners",)),
-        Broken("none-text.stl", b"solid organ\nendsolid organ\n", ("has no facets",)),
-        Broken("none.stl", stl((good[0], good[1][:0])), ("no facets",)),
-        Broken("none.ply", ply((good[0], good[1][:0])), ("no facets",)),
-        Broken("huge.ply", _changed(ply(good), b"face 1280", b"face 4000000"), ("4,000,000 facets", "Decimation")),
+        _file("fraction.ply", _changed(ply(good, "ascii"), b"\n3 ", b"\n3.5 "), "3.5, which is not an integer"),
+        _file("format.ply", _changed(ply(good, "ascii"), b"ascii", b"morse"), "`format morse 1.0`"),
+        _file("flat.ply", _changed(ply(good, "ascii"), b"float z", b"float w"), "x, y, w", "needed are x, y and z"),
+        _file("words.ply", ply(good, "ascii").replace(b".", b","), "not numbers"),
+        _file("wrong-point.ply", ply((good[0], good[1] + 1)), "a facet names point 642", "0 to 641"),
+        _file("line.ply", ply((good[0], good[1][:, :2])), "2 corners"),
+        _file("none-text.stl", b"solid organ\nendsolid organ\n", "has no facets"),
+        _file("none.stl", stl((good[0], good[1][:0])), "no facets"),
+        _file("none.ply", ply((good[0], good[1][:0])), "no facets"),
+        _file("huge.ply", _changed(ply(good), b"face 1280", b"face 4000000"), "4,000,000 facets", "Decimation"),
     ]
     units = [
-        Broken("metres.stl", whole, ("80 m across", '"mm" or "cm"'), unit=1.0),
-        Broken("millimetres.stl", stl((good[0] / 1e3, good[1])), ("0.08 mm across", '"m"'), unit=1e-3),
-        Broken("microns.stl", stl((good[0] * 1e3, good[1])), ("80 m across", '"um"'), unit=1e-3),
-        Broken("point.stl", stl((good[0] * 0, good[1])), ("0 mm across", "no usual unit")),
-        Broken("galaxy.obj", obj((good[0] * 1e18, good[1])), ("km across", "no usual unit")),
+        _file("metres.stl", whole, "80 m across", '"mm" or "cm"', unit=1.0),
+        _file("millimetres.stl", stl((good[0] / 1e3, good[1])), "0.08 mm across", '"m"', unit=1e-3),
+        _file("microns.stl", stl((good[0] * 1e3, good[1])), "80 m across", '"um"', unit=1e-3),
+        _file("point.stl", stl((good[0] * 0, good[1])), "0 mm across", "no usual unit"),
+        _file("galaxy.obj", obj((good[0] * 1e18, good[1])), "km across", "no usual unit"),
     ]
     shapes = [
-        Broken(
-            "hole.stl", stl(_without(good, (0, 0, 20))), ("not closed", "1 hole", "mm long", "repair"), repairs=True
-        ),
-        Broken(
-            "holes.ply",
-            ply(_without(good, (0, 0, 20), (40, 0, 0))),
-            ("2 holes, the largest", "Close Holes"),
-            repairs=True,
-        ),
-        Broken("facet.obj", obj((good[0], good[1][1:])), ("1 hole", "3 open edges"), repairs=True),
-        Broken("half.stl", stl((good[0], good[1][good[0][good[1]].mean(axis=1)[:, 2] > 0])), ("not closed", "1 hole")),
-        Broken("sheet.stl", stl(_sheet()), ("not closed", "1 hole")),
-        Broken("slit.stl", stl(_slit(good)), ("not closed", "4 open edges"), repairs=True),
-        Broken("torn.ply", ply(_half_welded()), ("not closed", "318 holes")),
-        Broken("fin.stl", stl(_fin(good)), ("1 edges have more than two facets", "Non Manifold"), repairs=True),
-        Broken("wall.stl", stl(_wall(good)), ("edges have more than two facets", "inner walls"), repairs=True),
-        Broken("inverted-some.stl", stl(_turned(good, 5)), ("5 facets are inverted", "Re-Orient"), repairs=True),
-        Broken("klein.ply", ply(_klein()), ("one-sided surface",)),
-        Broken("flat.stl", stl(ball(axes=(40.0, 30.0, 1e-6))), ("no volume", "sheet")),
-        Broken("two.stl", stl(both(good, ball(2, centre=(90, 0, 0)))), ("2 separate shells", "beside", "cm³")),
-        Broken(
-            "crumb.stl", stl(both(good, ball(1, (1, 1, 1), (60, 0, 0)))), ("2 separate shells", "beside"), repairs=True
-        ),
-        Broken(
-            "cavity.stl", stl(both(good, (inner[0], inner[1][:, ::-1]))), ("2 separate shells", "inside"), repairs=True
-        ),
-        Broken("nested.obj", obj(both(good, ball(3, (38.0, 28.0, 18.0)))), ("2 separate shells", "inside")),
-        Broken(
-            "overlapping.stl", stl(both(good, ball(3, centre=(30, 5, 5)))), ("2 separate shells", "across", "Union")
-        ),
-        Broken("twice-moved.stl", stl(both(good, (good[0] + 1e-2, good[1]))), ("2 separate shells",)),
-        Broken("pierced.stl", stl(_moved(good, (0, 0, 20), (0, 0, -40))), ("pairs of facets cross", "repair")),
-        Broken(
-            "tangled.ply",
-            ply(_moved(good, (0, 0, 20), (14, 2, 19.5))),
-            ("pairs of facets cross", "MeshLab"),
-            repairs=True,
-        ),
-        Broken("pinched.stl", stl(_pinched()), ("1 points join parts", "(0, 0, 0)"), repairs=True),
+        _mended("hole.stl", stl(_without(good, (0, 0, 20))), "not closed", "1 hole", "mm long", "repair"),
+        _mended("holes.ply", ply(_without(good, (0, 0, 20), (40, 0, 0))), "2 holes, the largest", "Close Holes"),
+        _mended("facet.obj", obj((good[0], good[1][1:])), "1 hole", "3 open edges"),
+        _file("half.stl", stl((good[0], good[1][good[0][good[1]].mean(axis=1)[:, 2] > 0])), "not closed", "1 hole"),
+        _file("sheet.stl", stl(_sheet()), "not closed", "1 hole"),
+        _mended("slit.stl", stl(_slit(good)), "not closed", "4 open edges"),
+        _file("torn.ply", ply(_half_welded()), "not closed", "318 holes"),
+        _mended("fin.stl", stl(_fin(good)), "1 edges have more than two facets", "Non Manifold"),
+        _mended("wall.stl", stl(_wall(good)), "edges have more than two facets", "inner walls"),
+        _mended("inverted-some.stl", stl(_turned(good, 5)), "5 facets are inverted", "Re-Orient"),
+        _file("klein.ply", ply(_klein()), "one-sided surface"),
+        _file("flat.stl", stl(ball(axes=(40.0, 30.0, 1e-6))), "no volume", "sheet"),
+        _file("two.stl", stl(both(good, ball(2, centre=(90, 0, 0)))), "2 separate shells", "beside", "cm³"),
+        _mended("crumb.stl", stl(both(good, ball(1, (1, 1, 1), (60, 0, 0)))), "2 separate shells", "beside"),
+        _mended("cavity.stl", stl(both(good, (inner[0], inner[1][:, ::-1]))), "2 separate shells", "inside"),
+        _file("nested.obj", obj(both(good, ball(3, (38.0, 28.0, 18.0)))), "2 separate shells", "inside"),
+        _file("overlapping.stl", stl(both(good, ball(3, centre=(30, 5, 5)))), "2 separate shells", "across", "Union"),
+        _file("twice-moved.stl", stl(both(good, (good[0] + 1e-2, good[1]))), "2 separate shells"),
+        _file("pierced.stl", stl(_moved(good, (0, 0, 20), (0, 0, -40))), "pairs of facets cross", "repair"),
+        _mended("tangled.ply", ply(_moved(good, (0, 0, 20), (14, 2, 19.5))), "pairs of facets cross", "MeshLab"),
+        _mended("pinched.stl", stl(_pinched()), "1 points join parts", "(0, 0, 0)"),
     ]
     return [*numbers, *files, *units, *shapes]
