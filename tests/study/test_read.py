@@ -185,9 +185,7 @@ MISTAKES = {
     "axis of no length": ({"probe": {"axis": [0, 0, 0]}}, ["probe.axis", "not all zero"]),
     "axis out of the body": ({"probe": {"axis": [0, 0, 1]}}, ["probe.axis", "180°", "at most 60°"]),
     "inclined axis": ({"probe": {"axis": [2, 0, -1]}}, ["probe.axis", "63.4°", "at most 60°"]),
-    "inclined axis near an edge": (
-        {"probe": {"axis": [1, 0, -1], "at": ["16 mm", "0 mm"]}}, ["probe.at", "edge"],
-    ),
+    "inclined axis near an edge": ({"probe": {"axis": [1, 0, -1], "at": ["16 mm", "0 mm"]}}, ["probe.at", "edge"]),
     "direction along the axis": (
         {"probe": BLADE | {"axis": [1, 0, -1], "direction": [-1, 0, 1.1]}}, ["probe.direction", "at least 10°"],
     ),
@@ -204,16 +202,13 @@ MISTAKES = {
         ["probe.at", "misses the body"],
     ),
     "footprint round an ellipsoid": (
-        {"body": ELLIPSOID, "probe": {"radius": "29 mm"}},
-        ["probe.at", "turns by", "at most 45°"],
+        {"body": ELLIPSOID, "probe": {"radius": "29 mm"}}, ["probe.at", "turns by", "at most 45°"],
     ),
     "no room beside the probe": (
         {"body": {"shape": "cylinder", "radius": "3.5 mm", "height": "9 mm", "fixed": "sides"}},
         ["body.fixed", "leaves 0.5 mm", "`rim` below 0.5 mm"],
     ),
-    "no room in the column": (
-        {"mesh": {"outside": "fixed", "epsilon": "3.2 mm"}}, ["mesh.epsilon", "leaves 0.2 mm"],
-    ),
+    "no room in the column": ({"mesh": {"outside": "fixed", "epsilon": "3.2 mm"}}, ["mesh.epsilon", "leaves 0.2 mm"]),
     "held column as wide as the disc": (
         {"mesh": {"outside": "fixed", "epsilon": "3 mm"}},
         ['mesh.epsilon = "3 mm"', "above 3 mm, the radius of the tool", "must be above 3 mm", '"coarse" or "free"'],

@@ -48,9 +48,7 @@ ERRORS = {
     "unit in the name contradicts the header": (
         GOOD, {}, {"columns": {"force": "force (µN)", "depth": 2}}, ["has the unit mN", "force (µN)"],
     ),
-    "no unit": (
-        PLAIN, {}, {"columns": {"depth": "z", "force": "F"}}, ["`z`", "no unit", 'units = {depth = "mm"}'],
-    ),
+    "no unit": (PLAIN, {}, {"columns": {"depth": "z", "force": "F"}}, ["`z`", "no unit", 'units = {depth = "mm"}']),
     "volts": (
         GOOD | {"deflection (V)": FORCE}, {}, {"columns": {"depth": 2, "force": "deflection (V)"}},
         ["`deflection (V)`", "cannot be force", "unknown unit `V`"],
@@ -67,9 +65,7 @@ ERRORS = {
         GOOD, {"separator": ";", "decimal": ",", "change": lambda x: [*x[:99], "9,9;1.234;5,1", *x[100:]]}, {},
         ["line 100", "`depth (mm)`", '"1.234" is no number'],
     ),
-    "no such column": (
-        GOOD, {}, {"columns": {"depth": "indentation"}}, ['no column "indentation"', "`depth (mm)`"],
-    ),
+    "no such column": (GOOD, {}, {"columns": {"depth": "indentation"}}, ['no column "indentation"', "`depth (mm)`"]),
     "column beyond the last": (GOOD, {}, {"columns": {"force": 7}}, ["columns.force = 7", "there are 3"]),
     "one column for two": (
         GOOD, {}, {"columns": {"depth": 2, "force": 3, "time": 2}}, ["`depth (mm)`", "depth and time"],
@@ -89,9 +85,7 @@ ERRORS = {
     "empty column": (
         GOOD | {"force (mN)": np.nan * TIME}, {}, {"columns": {"force": 3}}, ["`force (mN)`", "no values"],
     ),
-    "decimal commas between commas": (
-        GOOD, {"decimal": ","}, {}, ["a header of 3", "decimal commas", "semicolons"],
-    ),
+    "decimal commas between commas": (GOOD, {"decimal": ","}, {}, ["a header of 3", "decimal commas", "semicolons"]),
     "rows in no order": (GOOD, {"change": shuffled}, {}, ["time falls", "no order"]),
     "rows in no order, without time": (
         {k: GOOD[k] for k in ("depth (mm)", "force (mN)")}, {"change": shuffled}, {}, ["`depth (mm)`", "to and fro"],
@@ -103,10 +97,7 @@ ERRORS = {
         ["line 51", "`depth (mm)`", "in no order"],
     ),
     "a code for a missing force": (
-        GOOD,
-        {"change": cell(120, 2, "-999")},
-        {},
-        ["line 121", "`force (mN)`", "-0.999", "missing value"],
+        GOOD, {"change": cell(120, 2, "-999")}, {}, ["line 121", "`force (mN)`", "-0.999", "missing value"],
     ),
     "codes for missing depths": (
         GOOD,
@@ -120,12 +111,8 @@ ERRORS = {
     ),
     "sign of the force wrong": (GOOD, {}, {"force_sign": -1}, ["`force (mN)`", "never rises", "signs"]),
     "sign of the depth wrong": (GOOD, {}, {"depth_sign": -1}, ["no approach", "sign.depth"]),
-    "retract for an approach": (
-        {k: v[::-1] for k, v in list(GOOD.items())[1:]}, {}, {}, ["no approach", "retract"],
-    ),
-    "no contact": (
-        GOOD | {"force (mN)": 0.02 * np.cos(9.1 * np.arange(200.0))}, {}, {}, ["never rises", "noise"],
-    ),
+    "retract for an approach": ({k: v[::-1] for k, v in list(GOOD.items())[1:]}, {}, {}, ["no approach", "retract"]),
+    "no contact": (GOOD | {"force (mN)": 0.02 * np.cos(9.1 * np.arange(200.0))}, {}, {}, ["never rises", "noise"]),
     "constant force": (GOOD | {"force (mN)": 0 * TIME + 3}, {}, {}, ["`force (mN)`", "never changes"]),
     "constant depth": (GOOD | {"depth (mm)": 0 * TIME + 3}, {}, {}, ["`depth (mm)`", "never changes"]),
     "window of nothing": (
@@ -210,15 +197,11 @@ TOLD = {
     "metres for millimetres": (
         {"depth (m)": 1e3 * DEPTH, "force (mN)": FORCE, "time (s)": TIME}, {}, ["depth changes by 2 m", "unit"],
     ),
-    "sign of depth": (
-        GOOD | {"depth (mm)": -1e3 * DEPTH}, {}, ["depth falls", "`depth (mm)`", "sign is changed"],
-    ),
+    "sign of depth": (GOOD | {"depth (mm)": -1e3 * DEPTH}, {}, ["depth falls", "`depth (mm)`", "sign is changed"]),
     "sign of force": (
         GOOD | {"force (mN)": -1e3 * FORCE}, {}, ["force is negative", "`force (mN)`", "sign is changed"],
     ),
-    "two times": (
-        {"clock time (s)": TIME + 5, **GOOD}, {}, ["time could be clock time (s), time (s)", "not read"],
-    ),
+    "two times": ({"clock time (s)": TIME + 5, **GOOD}, {}, ["time could be clock time (s), time (s)", "not read"]),
 }  # fmt: skip
 
 
