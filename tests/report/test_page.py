@@ -16,6 +16,7 @@ from epsmesh.report import page
 from epsmesh.report.dataset import write
 from epsmesh.report.figures import choose, draw
 from epsmesh.report.guide import USUAL_ACCURACY, guide, guide_if_any
+from epsmesh.report.headline import headline
 from epsmesh.report.page import render, write_page
 from epsmesh.report.page.cases import case_table
 from epsmesh.report.page.facts import reproduce
@@ -169,6 +170,17 @@ def test_table_says_what_the_dataset_says():
     assert "force_exact_ratio" not in columns  # no F_exact was asked for
     assert columns["epsilon"].words[-1] == "full"
     assert columns["epsilon"].keys[-1] == max(columns["epsilon"].keys)
+
+
+def test_one_case_is_seen_rather_than_drawn_over_nothing():
+    data = dataset(mesh={"epsilon": "8 mm"})
+    seen, drawn = (Reader(render(data, "one", scene)).tags for scene in ("<p>a scene</p>", ""))
+    assert [[tag for tag, _ in tags if tag in ("iframe", "figure")] for tags in (seen, drawn)] == [
+        ["iframe"],
+        ["figure"],
+    ]
+    force, bar = 1e3 * data["force"].item(), 100 * float(data["force_error"] / data["force"])
+    assert headline(data) == [f"F = {force:.4g} mN ± {bar:.2g} % at a depth of 0.2 mm."]
 
 
 def test_every_kind_of_figure_is_in_the_page_once():

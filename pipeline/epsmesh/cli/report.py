@@ -189,7 +189,7 @@ def _scene_at_hand(dataset: "xr.Dataset") -> str:
 
 
 def _of_answer(dataset: "xr.Dataset", study: "Study") -> "Case":
-    """Return the case that limits the answer of the report.
+    """Return the case that limits the answer of the report; of a study of one case, that.
 
     Raises:
         DatasetError: if there is no answer.
@@ -197,6 +197,8 @@ def _of_answer(dataset: "xr.Dataset", study: "Study") -> "Case":
     from epsmesh.report.guide import USUAL_ACCURACY, guide
     from epsmesh.report.table import DatasetError, case_at
 
+    if study.shape == ():
+        return next(iter(study.cases()))
     found = guide(dataset, USUAL_ACCURACY)
     verdict = found.answer or found.best
     case = case_at(dataset, study, verdict.labels | (verdict.limit or {})) if verdict else None

@@ -62,6 +62,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         name=name,
         style=joined(_VENDOR / "dataTables.min.css", _TEMPLATES / "page.css"),
         scene=scene,
+        is_one=over_time["force"].size == 1,  # seen rather than drawn over nothing
         scene_scripts=_SCRIPT.findall(scene)[:2],
         facts=[fact for fact in facts(dataset) if not (guide and fact[0] == _TOLD)],
         failures=[line for state in FAILURES for line in by_status(dataset, state)],
