@@ -20,7 +20,7 @@ def name_of(requirement):
 
 
 REQUIRED = {name_of(one) for one in PROJECT["dependencies"]}
-OPTIONAL = {name_of(one) for extra in ("solver", "images", "organs", "view", "repair") for one in EXTRAS[extra]}
+OPTIONAL = {name_of(one) for extra in ("solver", "images", "organs", "repair") for one in EXTRAS[extra]}
 OPTIONAL -= {PROJECT["name"]}
 # Distributions whose modules have other names.
 MODULES = {
