@@ -171,6 +171,10 @@ def dataset_page() -> str:
     return "\n".join(lines) + "\n"
 
 
+# A default that a help text names.
+_DEFAULT = re.compile(r" \[default:? ([^\]]*)\]")
+
+
 def commands_page() -> str:
     """Return the page of every command with its arguments and options."""
     root: Any = typer.main.get_command(app)
@@ -206,9 +210,10 @@ def _parameter(parameter: Any) -> str:
     name = "/".join((name, *parameter.secondary_opts))
     if not required and parameter.metavar:
         name = f"{name} {parameter.metavar}"
-    default = parameter.default
-    shown = "" if default in (None, False) or parameter.required else f"`{default}`"
-    return _row(f"`{name}`", _escaped(parameter.help or ""), "required" if parameter.required else shown)
+    said = _DEFAULT.search(parameter.help or "")
+    default = _escaped(said[1]) if said else "no" if parameter.default is False else f"`{parameter.default or 'none'}`"
+    text = _escaped(_DEFAULT.sub("", parameter.help or ""))
+    return _row(f"`{name}`", text, "required" if parameter.required else default)
 
 
 def _table(heads: tuple[str, ...]) -> list[str]:

@@ -113,7 +113,7 @@ contact = "frictionless"
 [mesh]
 accuracy = "5 %"
 TOML
-        "$work/venv/bin/epsmesh" export studies/touched.toml --accuracy 5% -o body.epsm >exported 2>&1 || fail "export says $(cat exported)"
+        "$work/venv/bin/epsmesh" export studies/touched.toml --accuracy 5% --model body.epsm >exported 2>&1 || fail "export says $(cat exported)"
         ask='touch = realtime.read("body.epsm").query("disc", radius=2e-3, at=(0.0, 0.0, 0.0), depth=1e-4); print(touch.status, *touch.force)'
         with=$("$work/venv/bin/python" -c "import epsmesh; realtime = epsmesh.realtime; $ask")
         without=$("$work/bare/bin/python" -c "import epsmesh_realtime as realtime; $ask")

@@ -81,7 +81,7 @@ say "identification"
 tests=(tests/solve/test_physics.py tests/mesh/test_mesh.py tests/run/test_store.py tests/realtime/test_model.py)
 if [[ ! $short ]]; then
     "$epsmesh" new model --like quick >/dev/null
-    "$epsmesh" export model --no-surface --checks 4 -o box.epsm || (($? == 1)) # few checks need not calibrate
+    "$epsmesh" export model --no-surface --checks 4 --model box.epsm || (($? == 1)) # few checks need not calibrate
     "$venv/python" - <<'PYTHON'
 import epsmesh
 

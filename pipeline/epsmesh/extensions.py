@@ -50,14 +50,16 @@ class RefusedError(Exception):
 class Filled:
     """A study as its file has it, and with what it need not say since a section makes up for it.
 
-    ``given`` becomes ``Study.raw``; ``whole`` is read. ``lacking`` are errors of a run of its cases, and ``does`` is
-    the command that does without them. ``borrowed`` has sections that are those of a table of another section, by the
-    key of this table. ``of_one_force`` names the sections that need one force of each case, as messages name them.
+    ``given`` becomes ``Study.raw``; ``whole`` is read. ``lacking`` are errors of a run of its cases, and ``does``
+    is the command that does without them. ``doubts`` are warnings. ``borrowed`` has sections that are those of a
+    table of another section, by the key of this table. ``of_one_force`` names the sections that need one force of
+    each case, as messages name them.
     """
 
     given: Mapping[str, Any]
     whole: Mapping[str, Any]
     lacking: "tuple[Problem, ...]" = ()
+    doubts: "tuple[Problem, ...]" = ()
     does: str = ""
     borrowed: Mapping[str, str] = field(default_factory=dict)
     of_one_force: str = ""

@@ -38,7 +38,7 @@ accuracy = "1 %"
 )
 def test_what_cannot_be_exported_is_refused(tmp_path, contact, arguments, word):
     (tmp_path / "mine.toml").write_text(STUDY.format(contact=contact))
-    ran = epsmesh("export", tmp_path / "mine.toml", "-o", tmp_path / "model.nc", *arguments)
+    ran = epsmesh("export", tmp_path / "mine.toml", "--model", tmp_path / "model.nc", *arguments)
     assert ran.exit_code == 2
     assert word in ran.stderr
     assert not list(tmp_path.rglob("*.nc"))
@@ -57,7 +57,7 @@ LONGEST = 30
 )
 def test_a_refused_tool_is_named_by_its_key(tmp_path, line, word):
     (tmp_path / "mine.toml").write_text(STUDY.format(contact="bonded").replace("[mesh]", f"{line}\n[mesh]"))
-    ran = epsmesh("export", tmp_path / "mine.toml", "-o", tmp_path / "model.nc")
+    ran = epsmesh("export", tmp_path / "mine.toml", "--model", tmp_path / "model.nc")
     assert (ran.exit_code, word in ran.stderr) == (2, True), ran.stderr
 
 
@@ -83,7 +83,7 @@ def lives(process):
 def test_an_export_ends_with_any_of_its_ranks(tmp_path, number):
     """The others wait for it in a call that would never be answered."""
     (tmp_path / "mine.toml").write_text(STUDY.format(contact="frictionless"))
-    arguments = ("export", tmp_path / "mine.toml", "-o", tmp_path / "model.nc")
+    arguments = ("export", tmp_path / "mine.toml", "--model", tmp_path / "model.nc")
     export = subprocess.Popen(
         command(*arguments, ranks=2), cwd=ROOT, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )

@@ -141,7 +141,7 @@ def test_view_writes_a_film_of_the_path(ran, epsmesh):
 
 def test_a_path_has_no_real_time_model(ran, epsmesh):
     folder, _ = ran
-    done = epsmesh("export", folder / "pad.toml", "--output", folder / "pad.epsm")
+    done = epsmesh("export", folder / "pad.toml", "--output", folder)
     assert done.exit_code == 2 and "probe.insertion: a path has no real-time model" in done.stderr
 
 

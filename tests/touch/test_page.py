@@ -316,15 +316,15 @@ def test_fits_a_phone_and_the_dark(browser, tmp_path):
 
 def test_the_command_writes_a_file_and_says_what_is_no_model(epsmesh, tmp_path):
     write_surface(tmp_path / "model.epsm")
-    done = epsmesh("touch", tmp_path / "model.epsm", "-o", tmp_path / "page.html")
+    done = epsmesh("touch", tmp_path / "model.epsm", "--output", tmp_path)
     assert done.exit_code == 0, done.output
-    assert "<canvas" in (tmp_path / "page.html").read_text()
+    assert "<canvas" in (tmp_path / "model.html").read_text()
     write_random(tmp_path / "bare.epsm")
-    for path, word in (("bare.epsm", "surface"), ("page.html", "no real-time model"), ("none.epsm", "No such file")):
-        wrong = epsmesh("touch", tmp_path / path, "-o", tmp_path / "x.html")
+    for path, word in (("bare.epsm", "surface"), ("model.html", "no real-time model"), ("none.epsm", "No such file")):
+        wrong = epsmesh("touch", tmp_path / path, "--output", tmp_path)
         assert wrong.exit_code == 2
         assert word in wrong.output
-    assert not (tmp_path / "x.html").exists()
+    assert {path.name for path in tmp_path.iterdir()} == {"model.epsm", "model.html", "bare.epsm"}
 
 
 def test_the_command_opens_the_page_until_it_is_interrupted(epsmesh, tmp_path, monkeypatch):

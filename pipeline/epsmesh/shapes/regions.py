@@ -27,7 +27,7 @@ class Layer(Region):
 
     thickness: Annotated[
         Length | None,
-        Words("Thickness of the layer. Optional for the last layer, which then reaches the bottom.", '"2 mm"'),
+        Words("Thickness of the layer.", '"2 mm"', default="required; the last layer may reach the bottom"),
     ] = None
     toughness: Annotated[
         Toughness | None,

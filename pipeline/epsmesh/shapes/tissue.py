@@ -63,6 +63,8 @@ FIBRE = ("fibre_x", "fibre_y", "fibre_z")
 _ALIGNED = 1e-9
 # Most terms of Ogden's law.
 MOST_TERMS = 3
+# Of parameters, as the reference says it.
+_OF_LAW = "none; required with this law, but where it is the material's"
 # Values of those that may be omitted.
 _DEFAULTS = {"c3": 0.0}
 _Tissue = TypeVar("_Tissue", bound="Tissue")
@@ -160,6 +162,7 @@ class Tissue(Section):
             "mooney-rivlin: C2 / (C1 + C2), where C1 (I1 - 3) + C2 (I2 - 3) is the strain energy; from 0 to 1. yeoh: "
             "C2 / C1, where C1 x + C2 x^2 + C3 x^3 is the strain energy and x = I1 - 3.",
             "0.3",
+            default=_OF_LAW,
         ),
     ] = None
     c3: Annotated[float | None, Field(ge=0, le=1000), Words("yeoh: C3 / C1.", "0.1", default="0 with yeoh")] = None
@@ -172,17 +175,22 @@ class Tissue(Section):
         Words(
             "holzapfel: fibres in a neo-Hookean tissue of young and poisson. They bear tension alone.",
             "{direction = [1, 0, 0], k1 = 0.5, k2 = 2.0}",
+            default=_OF_LAW,
         ),
     ] = None
     limit: Annotated[
         float | None,
         Field(ge=0.01, le=1e6),
-        Words("gent: the value J_m of I1 - 3 at which the tissue cannot be stretched farther.", "2.0"),
+        Words("gent: the value J_m of I1 - 3 at which the tissue cannot be stretched farther.", "2.0", default=_OF_LAW),
     ] = None
     alpha: Annotated[
         float | None,
         Field(ge=0.25, le=100),
-        Words("veronda-westmann: exponent of the strain energy. Larger values stiffen at smaller strains.", "2.0"),
+        Words(
+            "veronda-westmann: exponent of the strain energy. Larger values stiffen at smaller strains.",
+            "2.0",
+            default=_OF_LAW,
+        ),
     ] = None
 
     density: Annotated[

@@ -77,6 +77,7 @@ def parse(raw: Mapping[str, Any], *, file: str = "study", text: str = "", filled
     filled = filled or Filled(own, own)
     for one in further_ones:
         filled = one.fill(filled)
+    problems.warnings += filled.doubts
     given, whole = filled.given, _beside(dict(filled.whole), Path(file).parent)
     _check_top(whole, problems)
     axes: list[Axis] = []

@@ -103,10 +103,17 @@ class ColumnUnits(BaseModel):
     deflection: Annotated[LengthUnit | None, Words("Unit of the deflection.", '"nm"', default=_OF_HEADER)] = None
 
 
+_FOUND = "that which the curve shows"
+
+
 class Sign(BaseModel):
     """Signs of recorded values: 1 as they are, -1 if deeper or pressed is negative."""
 
     model_config = Section.model_config
 
-    depth: Annotated[Literal[1, -1] | None, Words("-1 if the recorded depth falls as the tool advances.", "-1")] = None
-    force: Annotated[Literal[1, -1] | None, Words("-1 if the recorded force is negative under pressure.", "-1")] = None
+    depth: Annotated[
+        Literal[1, -1] | None, Words("-1 if the recorded depth falls as the tool advances.", "-1", default=_FOUND)
+    ] = None
+    force: Annotated[
+        Literal[1, -1] | None, Words("-1 if the recorded force is negative under pressure.", "-1", default=_FOUND)
+    ] = None

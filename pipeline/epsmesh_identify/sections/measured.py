@@ -1,6 +1,6 @@
 """What a study of measured curves need not declare: meshes, the tool's depth, and values of what is to be found."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from math import sqrt
 from typing import Any
@@ -26,6 +26,9 @@ _ABSENT = "is required for the study's cases; only `epsmesh identify` does witho
 _OF_MEASUREMENTS = (
     "is that of each measurement, and required for the study's cases; only `epsmesh identify` does without it"
 )
+_BOTH = (
+    "is found from the curves; material.{key} is not used for that, but for the study's cases and `epsmesh plan --next`"
+)
 _VALUES = "has no value of what [identify] is to find; only `epsmesh identify` does without it"
 
 
@@ -35,8 +38,22 @@ def completed(study: Filled) -> Filled:
     given, _ = _completed(study.given)
     whole.setdefault("mesh", _MESH)
     return replace(
-        study, given=given, whole=whole, lacking=(*study.lacking, *lacking), does=_DOES, of_one_force=OF_ONE_FORCE
+        study,
+        given=given,
+        whole=whole,
+        lacking=(*study.lacking, *lacking),
+        doubts=tuple(_declared_too(study.given)),
+        does=_DOES,
+        of_one_force=OF_ONE_FORCE,
     )
+
+
+def _declared_too(raw: Mapping[str, Any]) -> Iterator[Problem]:
+    """Yield a warning for each value of the material of which [identify] has a range, too."""
+    material, identify = raw.get("material"), raw.get("identify")
+    if isinstance(material, dict) and isinstance(identify, dict):
+        for key in material.keys() & identify.keys() & _ANY.keys():
+            yield Problem(f"identify.{key}", None, _BOTH.format(key=key))
 
 
 def with_borrowed(study: Filled) -> Filled:

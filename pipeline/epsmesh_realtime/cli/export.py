@@ -9,7 +9,7 @@ import typer
 from epsmesh import __version__
 from epsmesh.cli.console import say, warning
 from epsmesh.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option, of_unwritten, refusing
-from epsmesh.cli.words import DEFAULT_OUTPUT, Json, by_name, check_machine, check_output, read_all
+from epsmesh.cli.words import DEFAULT_OUTPUT, Json, Output, by_name, check_machine, check_output, read_all
 from epsmesh.files import MODEL_ENDING, write_new
 from epsmesh.printable import counted
 
@@ -40,15 +40,10 @@ def export(
         ),
     ] = None,
     accuracy: Annotated[str, typer.Option(help='Largest error of a force, against a full solve: "1%".')] = "1%",
-    output: Annotated[
+    output: Output = DEFAULT_OUTPUT,
+    model: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="MODEL",
-            help="File of the model [default: results/STUDY.epsm].",
-            show_default=False,
-        ),
+        typer.Option(metavar="FILE", help="File of the model [default: DIR/STUDY.epsm].", show_default=False),
     ] = None,
     checks: Annotated[
         int, typer.Option(min=4, max=_MOST_CHECKS, help="Full solves: half calibrate the error bar, half test it.")
@@ -82,9 +77,9 @@ def export(
     calibrate its error bar and test it. Under mpirun the ranks share the solves. Exit status 1: the bar covers the
     error of less than 95 % of the test touches.
 
-    Example: epsmesh export studies/quick.toml --accuracy 1% -o box.epsm
+    Example: epsmesh export studies/quick.toml --accuracy 1% --model box.epsm
 
-    Example: mpirun -n 2 epsmesh export studies/quick.toml -o box.epsm
+    Example: mpirun -n 2 epsmesh export studies/quick.toml
 
     Example: epsmesh export results/quick.epsm --fmu quick.fmu
 
@@ -106,8 +101,8 @@ def export(
     wanted = _share(accuracy)
     file = by_name(file)
     (study,) = read_all([file])
-    path = output or DEFAULT_OUTPUT / f"{study.name}{MODEL_ENDING}"
-    check_output(path)
+    path = model or output / f"{study.name}{MODEL_ENDING}"
+    check_output(path, option="--output DIR` or `--model FILE")
     check_machine()
     _check_evaluator()
     with refusing(ExportError, file=file, howto=_HOWTO):

@@ -28,10 +28,8 @@ def touch(
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output",
-            "-o",
-            metavar="PAGE",
-            help="Write the page to this HTML file; do not serve it.",
+            metavar="DIR",
+            help="Write the page into this folder, named like the model; do not serve it.",
             show_default=False,
         ),
     ] = None,
@@ -44,17 +42,18 @@ def touch(
 
     Example: epsmesh touch results/quick.epsm
 
-    Example: epsmesh touch results/quick.epsm -o quick.html
+    Example: epsmesh touch results/quick.epsm --output pages
     """
     from epsmesh_realtime import BuildError, ModelError, read_surface
     from epsmesh_realtime.page.page import render, write_touch_page
 
-    if output is not None:
-        check_output(output)
+    page = None if output is None else output / f"{model.stem}.html"
+    if page is not None:
+        check_output(page)
     try:
         surface = read_surface(model)
-        if output is not None:
-            path = write_touch_page(surface, output, model.name)
+        if page is not None:
+            path = write_touch_page(surface, page, model.name)
             size = path.stat().st_size
             say({"file": str(path), "bytes": size}, f"wrote {path} ({size / 1e6:.1f} MB): open it in a browser")
             return

@@ -294,3 +294,10 @@ def test_a_value_that_nothing_gives_is_required():
     assert not parse(raw() | {"measurement": [CURVE]}).lacking
     with pytest.raises(StudyError, match=r"material\.poisson: is required"):
         parse(raw() | {"material": {"young": "1 kPa"}, "measurement": [CURVE]})
+
+
+def test_a_value_of_what_is_to_be_found_is_said_to_be_no_part_of_that():
+    found = {"measurement": [CURVE], "identify": {"young": ["1 kPa", "100 kPa"]}}
+    (warning,) = parse(raw() | found).warnings
+    assert "identify.young: is found from the curves; material.young is not used for that" in warning
+    assert not parse(raw() | found | {"material": {"poisson": 0.3}}).warnings
