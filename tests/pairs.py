@@ -110,12 +110,12 @@ def _flat_needle(study: Study) -> None:
     study["probe"].update(shape="disc", edge="0.2 mm")
 
 
-def _indenter(**keys: Any) -> Callable[[Study], None]:
-    """Return the change to a tool that finds its contact, whose edge asks for smaller elements."""
+def _indenter(rim: str = "0.3 mm", **keys: Any) -> Callable[[Study], None]:
+    """Return the change to a tool that finds its contact, whose edge asks for smaller elements: ``rim``."""
 
     def change(study: Study) -> None:
         _probe(**keys, contact="unilateral")(study)
-        study["mesh"]["rim"] = "0.3 mm"
+        study["mesh"]["rim"] = rim
 
     return change
 
@@ -207,6 +207,14 @@ def _relaxing_round_scene(study: Study) -> None:
     _relaxation(study)
 
 
+def _relaxing_under_traction(study: Study) -> None:
+    """Tissue that has crept under a load, on which contact is found, and otherwise a law of large displacements."""
+    _relaxation(study)
+    _traction(study)
+    if study["probe"].get("contact") != "unilateral":
+        study["material"].setdefault("law", "neo-hookean")
+
+
 def _accuracy(study: Study) -> None:
     mesh = study["mesh"]
     kept = ("epsilon",) if mesh["outside"] != "coarse" else ()
@@ -248,11 +256,12 @@ FEATURES = (
     Feature("blade", "probe", _probe(**_BLADE)),
     Feature("sphere", "probe", _indenter(shape="sphere", radius="5 mm")),
     Feature("sticking sphere", "probe", _indenter(shape="sphere", radius="5 mm", friction="stick")),
+    Feature("rubbing sphere", "probe", _indenter(shape="sphere", radius="5 mm", friction=0.3)),
     Feature("cone", "probe", _indenter(shape="cone", angle="70 deg", radius="8 mm", tip="1 mm")),
     Feature("paraboloid", "probe", _indenter(shape="paraboloid", radius="5 mm", shaft="5 mm")),
-    Feature("pyramid", "probe", _indenter(shape="pyramid", angle="50 deg", sides=3, tip="0.5 mm")),
+    Feature("pyramid", "probe", _indenter("0.1 mm", shape="pyramid", angle="50 deg", sides=3, tip="0.5 mm")),
     Feature("rounded disc", "probe", _indenter(shape="disc", radius="4 mm", edge="1 mm")),
-    Feature("wedge", "probe", _indenter(shape="wedge", angle="75 deg", length="8 mm", tip="1 mm")),
+    Feature("wedge", "probe", _indenter("0.15 mm", shape="wedge", angle="75 deg", length="8 mm", tip="1 mm")),
     Feature("cut", "probe", _probe(**_CUT)),
     Feature("slit", "probe", _probe(**_SLIT)),
     Feature("insertion", "probe", _insertion),
@@ -265,6 +274,7 @@ FEATURES = (
     Feature("relaxation", "relaxation", _relaxation),
     Feature("relaxing regions", "relaxation", _relaxing_regions),
     Feature("relaxing round scene", "relaxation", _relaxing_round_scene),
+    Feature("relaxing under traction", "relaxation", _relaxing_under_traction),
     Feature("gravity", "gravity", _update("load", gravity=["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"])),
     Feature("traction", "traction", _traction),
     Feature("free", "outside", _update("mesh", outside="free")),

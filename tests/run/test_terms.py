@@ -32,6 +32,11 @@ def study(tool, **more):
     return {"body": box, "material": material, "probe": tools[tool], "mesh": mesh, "load": springs} | more
 
 
+def floating(tool, stiffness, kind="spring"):
+    load = {kind: [{"on": "bottom", "stiffness": stiffness}]}
+    return epsmesh.read(study(tool, body=box | {"fixed": "none"}, load=load), "floating").run(output=sys.argv[2])
+
+
 """
 RUN = """
 found = {"keys": [key.name for key in keys_of("load.spring")], "about": text_of("load.spring")}
@@ -40,7 +45,12 @@ for tool in tools:
     result = epsmesh.read(study(tool), tool).run(output=sys.argv[2])
     fixed = epsmesh.read(study(tool, body=box | {"fixed": "bottom+sides"}, load={}), "fixed").run(output=sys.argv[2])
     found[tool] = [*result.force.values.tolist(), float(fixed.force)]
+    lies = epsmesh.read(study(tool, body=box | {"fixed": "bottom"}, load={}), "lies").run(output=sys.argv[2])
+    found[f"{tool} instead"] = [float(floating(tool, "1 MPa/mm").force), float(lies.force)]
+found["soft"] = float(floating("bonded", "1 Pa/mm").force)
+found["rolls"] = str(floating("bonded", "1 kPa/mm", "roller").message.values)
 for name, changes in {
+    "floats": {"body": box | {"fixed": "none"}, "load": {}},
     "slit": {"probe": {"shape": "blade", "length": "10 mm", "width": "1 mm", "depth": "0.1 mm", "incision": "4 mm"}},
     "history": {"probe": tools["bonded"] | {"history": {"ramp": "1 s", "hold": "1 s"}}},
     "face": {"load": {"spring": [{"on": "floor", "stiffness": "10 kPa/mm"}]}},
@@ -72,9 +82,11 @@ print(json.dumps({
 
 
 def spring(folder, changed=""):
-    """Write the page's term into a folder, with a line more."""
+    """Write the page's term into a folder, with a line more, and one like it that holds no body."""
     (text,) = re.findall(r'```python\n("""Springs.*?)```', PAGE, re.DOTALL)
     (folder / "spring.py").write_text(text + changed, encoding="utf-8")
+    rolls = text.replace("class Spring", "class Roller").replace("inner(at.u, at.u)", "dot(at.u, at.normal) ** 2")
+    (folder / "roller.py").write_text(rolls, encoding="utf-8")
 
 
 def printed(script, folder):
@@ -106,6 +118,19 @@ def test_springs_are_between_a_free_and_a_fixed_face(found, contact):
     soft, stiff, fixed = found[contact]
     assert soft < stiff < fixed * 1.001
     assert stiff == pytest.approx(fixed, rel=0.01)
+
+
+def test_springs_replace_a_support(found):
+    """Stiff ones are a fixed face; on soft ones the body moves like a rigid one, whose force is k A d."""
+    for contact in ("bonded", "found"):
+        stiff, fixed = found[f"{contact} instead"]
+        assert stiff == pytest.approx(fixed, rel=3e-4)
+    assert found["soft"] == pytest.approx(1e3 * 0.04**2 * 0.2e-3, rel=0.03)
+
+
+def test_what_nothing_holds_is_refused(found):
+    assert "nothing holds the body: fix a face, or add [[load.roller]] or [[load.spring]]" in found["floats"]
+    assert "nothing of the body is fixed, and the terms of [load] let it move along" in found["rolls"]
 
 
 def test_pairs_that_it_and_all_terms_exclude_are_refused(found):

@@ -1,4 +1,4 @@
-"""Found contact in time steps: Lee and Radok while it grows, Ting while it shrinks, and its loss."""
+"""Found contact in time steps: Lee and Radok while it grows, Ting while it shrinks, its loss, friction and loads."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -23,15 +23,22 @@ MESH = {"rim": "0.5 mm", "fine": "4 mm", "coarse": "6 mm", "growth": 1.5}
 LINEAR, LARGE = {"poisson": 0.4}, {"poisson": 0.4, "law": "neo-hookean"}
 HOLD = (0.0, 1.0, 4.0), (0.0, 1.0, 1.0)
 BACK = (0.0, 1.0, 1.5), (0.0, 1.0, 0.0)
+LONG = (0.0, 1.0, 500.0), (0.0, 1.0, 1.0)
+LEFT = 1 - sum(share for share, _ in TERMS)
+GRAVITY = {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}
+HEAVY = {"density": "1060 kg/m^3"}
+DISC = {"shape": "disc", "radius": "3 mm", "depth": "0.5 mm"}
 
 
-def followed(motion, terms: Terms, steps: int, comm=MPI.COMM_SELF, probe=BALL, **changes) -> tuple[History, Solution]:
+def followed(
+    motion, terms: Terms, steps: int, comm=MPI.COMM_SELF, probe=BALL, planes=("x", "y"), **changes
+) -> tuple[History, Solution]:
     """Return the history of a ball, ``steps`` for each part of the motion, and the static solution at its depth."""
     times = np.unique(np.concatenate([np.linspace(a, b, steps + 1) for a, b in pairwise(motion[0])]))
     breaks = frozenset(np.flatnonzero(np.isin(times, motion[0])).tolist())
     course = Course(tuple(times), tuple(np.interp(times, *motion)), breaks)
     case = study(**{"probe": probe, "mesh": MESH} | changes).case(())
-    with Spaces(mesh_case(case, ("x", "y"), comm)) as spaces, problem_of(spaces, case) as problem:
+    with Spaces(mesh_case(case, planes, comm)) as spaces, problem_of(spaces, case) as problem:
         law = law_of(case)
         law = MaterialLaw(tuple(replace(each, relaxation=terms) for each in law.parameters))
         solution = problem.answer(Request(law, movement_of(case), course=course))
@@ -111,11 +118,113 @@ def test_a_law_of_large_displacements_relaxes_while_held_and_lets_go():
     assert np.abs(found.imbalance).max() < 0.1 * found.dissipated[-1]
 
 
+# ---- friction ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("material", [LINEAR, pytest.param(LARGE, marks=pytest.mark.nightly)], ids=["linear", "large"])
+def test_friction_in_time_is_that_of_the_load_path(material):
+    """Without relaxation; and next to no friction is none, with relaxation."""
+    found, static = followed(HOLD, (), 6, probe=BALL | {"friction": 0.3}, material=material)
+    assert found.forces[6, 2] == pytest.approx(static.reaction[2], rel=6e-4)  # other steps
+    assert found.forces[-1, 2] == pytest.approx(found.forces[6, 2], rel=1e-6)  # nothing relaxes
+    (small, _), (none, _) = (
+        followed(HOLD, TERMS, 2, probe=BALL | more, material=material) for more in ({"friction": 1e-6}, {})
+    )
+    assert small.forces[:, 2] == pytest.approx(none.forces[:, 2], rel=1e-6)
+    assert small.dissipated == pytest.approx(none.dissipated, abs=5e-5 * none.dissipated[-1])  # residuals differ
+
+
+def test_work_of_a_tool_that_rubs_and_returns_is_its_heat():
+    """Elastic tissue keeps nothing; tissue that sticks turns nothing into heat."""
+    found, _ = followed(BACK, (), 6, probe=BALL | {"friction": 0.1}, material=LINEAR)
+    assert not found.forces[-1].any()
+    work = found.imbalance[-1] + found.dissipated[-1]
+    assert found.dissipated[-1] == pytest.approx(work, rel=0.1)
+    assert found.dissipated[-1] > 0
+    assert np.diff(found.dissipated).min() > -0.05 * found.dissipated[-1]
+    sticks, _ = followed(HOLD, (), 3, probe=BALL | {"friction": "stick"}, material=LINEAR)
+    assert abs(sticks.dissipated[-1]) < 1e-3 * found.forces[6, 2] * 1e-3
+
+
+@pytest.mark.nightly
+def test_tissue_with_friction_relaxes_and_lets_go():
+    found, _ = followed(BACK, TERMS, 6, probe=BALL | {"friction": 0.3}, material=LARGE)
+    smooth, _ = followed(BACK, TERMS, 6, material=LARGE)
+    assert found.forces[:, 2] == pytest.approx(smooth.forces[:, 2], abs=0.01 * smooth.forces[6, 2])
+    assert not found.forces[-2:].any()
+    assert found.dissipated[-1] > 0
+    assert np.abs(found.imbalance).max() < 0.2 * found.dissipated[-1]
+
+
+@pytest.mark.nightly
+def test_friction_on_a_quarter_is_that_of_the_whole():
+    changes = {"probe": BALL | {"friction": 0.3}, "material": LINEAR, "mesh": MESH | {"rim": "0.8 mm"}}
+    quarter, whole = (followed(HOLD, TERMS, 3, planes=planes, **changes)[0] for planes in (("x", "y"), ()))
+    assert quarter.forces[:, 2] == pytest.approx(whole.forces[:, 2], rel=0.02)
+    assert quarter.dissipated[-1] == pytest.approx(whole.dissipated[-1], rel=0.02)
+
+
+# ---- loads ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("material", [LINEAR, LARGE], ids=["linear", "large"])
+@pytest.mark.parametrize("probe", [BALL, DISC], ids=["ball", "disc"])
+def test_under_loads_tissue_that_does_not_relax_has_the_static_force(probe, material):
+    found, static = followed(HOLD, (), 3, probe=probe, material=material | HEAVY, load=GRAVITY)
+    assert found.forces[3:, 2] == pytest.approx(static.reaction[2], rel=1e-7)
+    if probe is BALL:
+        assert found.sag == pytest.approx(static.contact.sag, rel=1e-9)
+        assert found.load_energy == pytest.approx(static.contact.load_energy, rel=1e-9)
+
+
+@pytest.mark.parametrize("material", [LINEAR, LARGE], ids=["linear", "large"])
+@pytest.mark.parametrize("probe", [BALL, DISC], ids=["ball", "disc"])
+def test_under_loads_tissue_relaxes_to_the_softer_one_under_the_same_loads(probe, material):
+    scene = {"probe": probe, "load": GRAVITY}
+    found, static = followed(LONG, TERMS, 4, material=material | HEAVY, **scene)
+    softer = material | HEAVY | {"young": f"{10 * LEFT} kPa"}
+    _, left = followed(((0.0, 1.0), (0.0, 1.0)), (), 1, material=softer, **scene)
+    assert found.forces[-1, 2] == pytest.approx(left.reaction[2], rel=1e-5)
+    assert left.reaction[2] < found.forces[:, 2].max() < static.reaction[2] * (1.0 if material is LINEAR else 1.1)
+    if probe is BALL:
+        assert found.sag == pytest.approx(left.contact.sag, rel=1e-6)
+    assert (np.diff(found.dissipated) >= 0).all()
+    assert np.abs(found.imbalance).max() < 0.2 * found.dissipated[-1]
+
+
+def test_a_bonded_tool_on_linear_tissue_does_not_feel_the_loads():
+    """Superposition; the force counts from the surface as the loads leave it."""
+    changes = {"probe": DISC, "material": LINEAR | HEAVY}
+    (loaded, _), (alone, _) = (followed(HOLD, TERMS, 3, load=load, **changes) for load in (GRAVITY, {}))
+    assert loaded.forces[:, 2] == pytest.approx(alone.forces[:, 2], rel=1e-7)
+    assert loaded.dissipated == pytest.approx(alone.dissipated, rel=1e-6)
+
+
+def test_a_study_with_friction_and_loads_over_time():
+    relaxing = HEAVY | {"relaxation": [{"share": 0.4, "time": "0.5 s"}]}
+    probe = BALL | {"friction": 0.3, "history": {"ramp": "1 s", "hold": "2 s", "steps": 4}}
+    ((_, found),) = solve(material=LINEAR | relaxing, probe=probe, mesh=MESH, load=GRAVITY).items()
+    assert found.status == "ok", found.message
+    _, static = followed(HOLD, (), 1, material=LINEAR | HEAVY, load=GRAVITY)
+    assert found.sag == pytest.approx(static.contact.sag / 0.6, rel=1e-6)
+    assert np.isnan(found.friction_force)
+    assert found.load_force == 0.0
+
+
 @pytest.mark.mpi
 @pytest.mark.nightly
 def test_ranks_agree():
     own, shared = (followed(BACK, TERMS, 3, comm, material=LARGE)[0] for comm in (MPI.COMM_SELF, MPI.COMM_WORLD))
     assert shared.forces[:, 2] == pytest.approx(own.forces[:, 2], abs=1e-6 * own.forces[3, 2])
+
+
+@pytest.mark.mpi
+@pytest.mark.nightly
+def test_ranks_agree_on_friction_under_loads():
+    changes = {"probe": BALL | {"friction": 0.3}, "material": LINEAR | HEAVY, "load": GRAVITY}
+    own, shared = (followed(BACK, TERMS, 3, comm, **changes)[0] for comm in (MPI.COMM_SELF, MPI.COMM_WORLD))
+    assert shared.forces[:, 2] == pytest.approx(own.forces[:, 2], abs=1e-5 * own.forces[3, 2])
+    assert shared.dissipated[-1] == pytest.approx(own.dissipated[-1], rel=1e-4)
 
 
 def test_a_study_of_found_contact_over_time_has_force_and_area():

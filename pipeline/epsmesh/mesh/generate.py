@@ -220,7 +220,7 @@ def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
     if not len(cells):
         raise MeshError("gmsh made no tetrahedra")
     regions = _regions() if scene.body.regions else None
-    facets = {}
+    facets = {FIXED: np.empty((0, 3), dtype=np.int64)}
     for dim, group in gmsh.model.getPhysicalGroups(2):
         name = gmsh.model.getPhysicalName(dim, group)
         facets[name] = position[corners_of(2, gmsh.model.getEntitiesForPhysicalGroup(dim, group))]

@@ -167,7 +167,8 @@ def _crept(
 
     Its stresses are the elastic ones, and its displacements larger. Strains of loads and depth are then in no ratio.
     """
-    shares = [sum(share for share, _ in case.relaxations[0]) for case in cases]
+    # Of a case in time steps, the record has those of tissue that has crept.
+    shares = [0.0 if case.way.in_time else sum(share for share, _ in case.relaxations[0]) for case in cases]
     softer = 1 / (1 - _variable(last, "sag", dims, [np.array(share) for share in shares]))
     peaks = _variable(last, "sag", dims, [np.array(convolution.peak) for convolution in convolutions])
     found = {name: (softer * last[name]).assign_attrs(last[name].attrs) for name in ("sag", "load_energy")}

@@ -40,6 +40,8 @@ BARS = (
     "torque_error",
 )
 _OF_FRICTION = ("slip_area", "friction_force", "torque")
+# What loads add to a force that counts from the first touch of the surface as they leave it.
+_NOT_PRESSED = {"load_force": 0.0, "load_force_error": 0.0, "load_force_vector": (0.0, 0.0, 0.0)}
 TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
 
 
@@ -82,7 +84,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         energy_release=solution.release / _front_length(case) if case.way.motion is Motion.SLIT else nan,
         energy_release_error=solution.release_bar,
         largest=solution.largest,
-        **_of_contact(solution.contact),
+        **_of_contact(solution.contact, has_history=solution.history is not None),
         **_of_loads(case, solution),
         balance=solution.balance,
         course=_course(case, solution.history),
@@ -118,23 +120,27 @@ def _course(case: Case, history: History | None) -> dict[str, tuple[float, ...]]
     return {name: tuple(map(float, values)) for name, values in found.items()}
 
 
-def _of_contact(contact: ContactResult | None) -> dict[str, Any]:
-    """Return the fields of a record for unilateral contact, none for a prescribed footprint."""
+def _of_contact(contact: ContactResult | None, *, has_history: bool) -> dict[str, Any]:
+    """Return the fields of a record for unilateral contact, none for a prescribed footprint.
+
+    Those of friction depend on the path, and are missing ``has_history``.
+    """
     if contact is None:
         return {}
-    found = {name: getattr(contact, name) for name in _OF_FRICTION}
-    found |= {f"{name}_error": getattr(contact, f"{name}_bar") for name in _OF_FRICTION}
+    found = {name: nan if has_history else getattr(contact, name) for name in _OF_FRICTION}
+    found |= {f"{name}_error": nan if has_history else getattr(contact, f"{name}_bar") for name in _OF_FRICTION}
     found |= {"contact_area": contact.area, "contact_area_error": contact.bar}
     return found | {"contact_radius": contact.radius, "contact_radius_error": contact.bar / 2}
 
 
 def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:
     """Return the fields of a record for loads, none without loads."""
-    loaded, contact = solution.load_response, solution.contact
+    loaded, contact, history = solution.load_response, solution.contact, solution.history
+    if history is not None:  # in tissue that has crept
+        loads = {"load_energy": history.load_energy, "sag": history.sag}
+        return loads if contact is None or isnan(history.sag) else {**_NOT_PRESSED, **loads}
     if contact and not isnan(contact.sag):  # loads bend the surface, and the depth counts from the first touch
-        none = (0.0, 0.0, 0.0)
-        touching = {"load_force": 0.0, "load_force_error": 0.0, "load_force_vector": none}
-        return touching | {"load_energy": contact.load_energy, "sag": contact.sag}
+        return _NOT_PRESSED | {"load_energy": contact.load_energy, "sag": contact.sag}
     if loaded is None:
         return {}
     force, axis = solution.load_force, (0.0, 0.0, -1.0)

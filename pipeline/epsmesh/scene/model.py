@@ -26,6 +26,7 @@ from epsmesh.shapes.files.loaded import UNITS
 from epsmesh.shapes.frame import Frame
 from epsmesh.shapes.ovoid import Ovoid
 from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.support import NONE
 from epsmesh.shapes.surface import Surface, Tube
 
 # Names of the physical groups. Every boundary face is in exactly one of them.
@@ -252,7 +253,7 @@ def _name_groups(scene: Scene, footprint: list[int], regions: dict[int, list[int
         points = _sample(tag, isinstance(scene.body, FromCad)) * scene.scale
         name = next((name for name, test in tests if test(points)), FREE)
         groups[FIXED if name == CUT and scene.column_fixed else name].append(tag)
-    if not groups[FIXED]:
+    if not groups[FIXED] and scene.body.fixed != NONE:
         raise SceneError("no face of the kept part of the body is fixed: the tissue would float")
     for name, tags in groups.items():
         if tags:

@@ -39,9 +39,9 @@ class Body(Section, ABC):
         Fixed,
         Words(
             "Support of the body: its bottom, its sides, both, or all tissue below a height. "
-            "Displacements are zero there.",
+            'Displacements are zero there. "none": a term of [load] holds the body.',
             '"bottom"',
-            takes='"bottom" | "sides" | "bottom+sides" | {below = length}',
+            takes='"bottom" | "sides" | "bottom+sides" | {below = length} | "none"',
         ),
     ] = "bottom"
     inclusion: Annotated[

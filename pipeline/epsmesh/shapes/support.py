@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict
@@ -16,7 +16,8 @@ from epsmesh.shapes.surface import Surface
 from epsmesh.units import Coordinate
 
 Surfaces = Mapping[str, tuple[Surface, ...]]
-FaceNames = Literal["bottom", "sides", "bottom+sides"]
+NONE = "none"
+FaceNames = Literal["bottom", "sides", "bottom+sides", "none"]
 HeldOnHalfPlane = FaceNames | float
 
 # Largest length of elements, in widths of a strip that they must fill.
@@ -64,14 +65,14 @@ class Support(ABC):
 
 @dataclass(frozen=True)
 class Faces(Support):
-    """Whole faces are fixed, by the body's names for them."""
+    """Whole faces are fixed, by the body's names for them; none if terms of the energy hold it."""
 
     fixed: FaceNames
 
     @property
     def names(self) -> tuple[str, ...]:
         """The faces."""
-        return tuple(self.fixed.split("+"))
+        return () if self.fixed == NONE else tuple(self.fixed.split("+"))
 
     def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
         """Return whether the face is one of these."""
@@ -184,8 +185,11 @@ class NamedFace(BaseModel, Support):
 def _fixed(value: Any) -> Any:
     if isinstance(value, dict):
         return Below.read(value)
-    if value not in ("bottom", "sides", "bottom+sides"):
-        raise PydanticCustomError("not_supported", "must be 'bottom', 'sides', 'bottom+sides' or {below = \"-15 mm\"}")
+    if value not in get_args(FaceNames):
+        raise PydanticCustomError(
+            "not_supported",
+            "must be 'bottom', 'sides', 'bottom+sides' or {below = \"-15 mm\"}; 'none' if a term of [load] holds it",
+        )
     return value
 
 

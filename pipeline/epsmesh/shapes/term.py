@@ -61,6 +61,8 @@ class BodyTerm(Section):
 
     # What it is, for the author of a study.
     ABOUT: ClassVar[str] = ""
+    # Whether it may hold a body of which nothing is fixed (body.fixed = "none"); the solver checks that it does.
+    HOLDS: ClassVar[bool] = False
     # Features (pipeline/epsmesh/study/capabilities/features.py) that exclude it, each with the reason.
     EXCLUDES: ClassVar[Mapping[str, str]] = {}
 

@@ -27,6 +27,7 @@ from epsmesh.solve.movement import Loads
 from epsmesh.solve.newton import EASY, LEFT, ON_THE_WAY, LargeError
 from epsmesh.solve.path import Path, PathPoint, follow
 from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.relaxing import crept
 from epsmesh.solve.response import whole_force
 from epsmesh.solve.spaces import Spaces
 from epsmesh.stages import stage
@@ -72,10 +73,18 @@ def without_tool(elements: Elements) -> Iterator[Elements]:
 
 
 @stage("loads")
-def sag(elements: Elements, law: MaterialLaw, loads: Loads | None, guess: FloatArray | None = None) -> FloatArray:
+def sag(
+    elements: Elements,
+    law: MaterialLaw,
+    loads: Loads | None,
+    guess: FloatArray | None = None,
+    *,
+    has_crept: bool = False,
+) -> FloatArray:
     """Return the state (owned dofs) of ``elements`` without a tool under ``loads`` and terms; collective.
 
-    ``guess`` is an initial guess of it. The forms' fields are then that state.
+    ``guess`` is an initial guess of it. The forms' fields are then that state. ``has_crept``: relaxing tissue has
+    carried them for long.
 
     Raises:
         LargeError: if there is no equilibrium.
@@ -85,8 +94,10 @@ def sag(elements: Elements, law: MaterialLaw, loads: Loads | None, guess: FloatA
     applied = None if loads is None else space.applied(loads)
     with ExitStack() as stack:
         linear = elements.linearised(law, stack, direct=elements.is_direct("auto"))
-        body = HyperelasticBody(elements, law, linear.preconditioner)
+        body = HyperelasticBody(elements, law, linear.preconditioner, prestressed=has_crept)
         stack.callback(body.close)
+        if has_crept:
+            body.impose(crept(body.points, law))
         state, forces = (stack.enter_context(body.state()) for _ in range(2))
         elements.set_law(law)
         if guess is None:
@@ -103,10 +114,12 @@ def sag(elements: Elements, law: MaterialLaw, loads: Loads | None, guess: FloatA
         return np.array(state.array)
 
 
-def start_under_loads(elements: Elements, law: MaterialLaw, loads: Loads | None) -> FloatArray:
+def start_under_loads(
+    elements: Elements, law: MaterialLaw, loads: Loads | None, *, has_crept: bool = False
+) -> FloatArray:
     """Return the state (owned dofs) of ``elements`` with a bonded tool at which the tool has no force; collective.
 
-    Without loads, and terms that act like them, it is zero.
+    Without loads, and terms that act like them, it is zero. ``has_crept``: see :func:`sag`.
 
     Raises:
         SolveError: see :func:`sag`.
@@ -114,7 +127,7 @@ def start_under_loads(elements: Elements, law: MaterialLaw, loads: Loads | None)
     if loads is None and not elements.displacements.is_loaded:
         return np.zeros(elements.unknowns)
     with without_tool(elements) as free:
-        sag(free, law, loads)
+        sag(free, law, loads, has_crept=has_crept)
         elements.interpolate(free)
     return elements.values
 

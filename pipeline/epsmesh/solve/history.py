@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, nan
 
 import numpy as np
 
@@ -37,6 +37,13 @@ class Course:
         shares = tuple(map(float, self.share_at(times)))
         return replace(self, times=tuple(times.tolist()), shares=shares, breaks=frozenset(2 * n for n in self.breaks))
 
+    def coarse(self) -> "Course":
+        """Return the course of every other time, all breaks included."""
+        kept = sorted(self.halves())
+        breaks = frozenset(number for number, own in enumerate(kept) if own in self.breaks)
+        times, shares = (tuple(values[number] for number in kept) for values in (self.times, self.shares))
+        return replace(self, times=times, shares=shares, breaks=breaks)
+
     def halves(self) -> frozenset[int]:
         """Return the numbers of the times of a course of every other time, all breaks included."""
         found, last = {0, *self.breaks, len(self.times) - 1}, 0
@@ -55,6 +62,8 @@ class History:
     the distance of nodes at the edge of contact, along the axis (N).
     ``dissipated`` (n) is the energy (J) turned into heat since the beginning, ``imbalance`` (n) the difference (J) of
     work and of what is stored and dissipated. ``areas`` (n, m²) are those of unilateral contact, NaN without.
+    ``sag`` (m) is how much farther the tool moves to the first touch under loads, ``load_energy`` (J) their strain
+    energy without it; both NaN without loads, and where a footprint is prescribed.
     """
 
     times: FloatArray
@@ -63,6 +72,17 @@ class History:
     dissipated: FloatArray
     imbalance: FloatArray
     areas: FloatArray
+    sag: float = nan
+    load_energy: float = nan
+
+    def with_half_the_steps(self, coarse: "History", numbers: list[int]) -> "History":
+        """Return the history with the change of the force from that of every other time, ``numbers``, in its bars.
+
+        With friction, whose law is that of the end of a step, an error is about as large as that change.
+        """
+        change = np.abs(self.forces[numbers, 2] - coarse.forces[:, 2])
+        more = between(dict(zip(numbers, change.tolist(), strict=True)), len(self.times))
+        return replace(self, bars=self.bars + more)
 
     @property
     def bar(self) -> float:

@@ -17,7 +17,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from epsmesh.arrays import FloatArray
-from epsmesh.solve import SolveError
 from epsmesh.solve.cell_values import CellValues, plain_share
 from epsmesh.solve.conditions import Conditions, Front
 from epsmesh.solve.contact.search import ContactSearch
@@ -37,6 +36,7 @@ from epsmesh.solve.prescribed import PrescribedMotion, respond
 from epsmesh.solve.response import LoadResponse, Response, shares
 from epsmesh.solve.solution import Problem, Request, Solution
 from epsmesh.solve.spaces import Spaces
+from epsmesh.solve.terms import check_hold
 from epsmesh.solve.time_steps import Indentation, TimeSteps, follow_course
 from epsmesh.stages import recorded, stage
 
@@ -78,9 +78,11 @@ class QuasiStaticProblem(Problem):
         ``condense``: see ``ContactSearch``.
 
         Raises:
-            SolveError: if footprint and support share a point: no displacement satisfies both.
+            SolveError: if footprint and support share a point: no displacement satisfies both; or if nothing holds the
+                body.
         """
         self.elements: Elements = elements_of(spaces, degree, conditions, element)
+        check_hold(self.elements.displacements)
         self.constraint: Constraint = PrescribedMotion(self.elements, reuse=reuse)
         if tool is not None:
             self.constraint = ContactSearch(spaces, self.elements, tool, reuse=reuse, condense=condense)
@@ -150,8 +152,6 @@ class QuasiStaticProblem(Problem):
             LargeError: if the time steps do not reach its end.
         """
         assert asked.course is not None
-        if self.elements.displacements.is_loaded:
-            raise SolveError("time steps begin at rest: a term that acts without a displacement has made tissue creep")
         self.elements.set_law(asked.law)
 
         def begin() -> TimeSteps:

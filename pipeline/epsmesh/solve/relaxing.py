@@ -10,6 +10,9 @@ time, exactly
 S(t + Δt) is then A S₀(t + Δt) + H, with A = 1 − Σ g + Σ g r and the known H = Σ e h − g r S₀(t): the stress of the
 energy A ψ + H : E. A step is one static solve of that energy.
 
+Loads that have acted for long leave h = 0: the tissue that they have made creep has the elastic stress S₀ of a larger
+strain, of which 1 − Σ g is left. A movement begins there as it does at rest.
+
 Heat. The viscous strain of a term lags behind E as its stress does, to second order in the lag: with
 ε' = E' − ε/τ a term dissipates h : ε/τ and stores h : ε/2. For linear laws this is exact. For others, the difference of
 the work to both sums is the error.
@@ -17,12 +20,14 @@ the work to both sums is the error.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Protocol
 
 import numpy as np
 
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.elements.tangent import Prestress
+from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.point_law import SYMMETRIC
 from epsmesh.viscoelastic import Terms, heat_of, kept_of
 
@@ -72,8 +77,13 @@ class HistoryVariables:
         self._before = np.zeros(size)
         self.heat = self.stored = 0.0
 
+    def begin(self, stress: list[FloatArray], strain: list[FloatArray]) -> None:
+        """Begin in tissue that has crept, whose elastic stress and strain are these, by part."""
+        self._now.elastic, self._now.deformation = self._flat(stress), self._flat(strain)
+        self._before = self._now.elastic
+
     def prestress(self, step: float) -> Prestress:
-        """Return the change of the energy for a ``step`` of time (s)."""
+        """Return the change of the energy for a ``step`` of time (s); an infinite one leaves no stress of the terms."""
         shares, times = self._table[..., 0], self._table[..., 1]
         factors = 1 - (shares * (1 - kept_of(step / times)[1])).sum(axis=1)
         stress = np.zeros_like(self._now.elastic)
@@ -133,3 +143,8 @@ class HistoryVariables:
             np.moveaxis(part.reshape(-1, *shape), 0, 2)
             for part, shape in zip(np.split(values, ends, axis=1), self._shapes, strict=True)
         ]
+
+
+def crept(points: Points, law: MaterialLaw) -> Prestress:
+    """Return the change of the energy of a ``law`` a long time after the last movement."""
+    return HistoryVariables(points, [each.relaxation for each in law.parameters]).prestress(inf)

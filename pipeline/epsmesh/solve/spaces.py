@@ -210,11 +210,17 @@ class ElasticSpace:
     @cached_property
     def is_loaded(self) -> bool:
         """Whether terms have forces without displacement; collective."""
+        with self.at_rest():
+            largest = max((float(np.abs(term.forces()).max(initial=0.0)) for term in self.terms), default=0.0)
+        return bool(self.terms) and self.comm.allreduce(largest, op=MPI.MAX) > 0
+
+    @contextmanager
+    def at_rest(self) -> Iterator[None]:
+        """Set the displacement of the forms to zero for a while."""
         now = self.forms.displacement.x.array.copy()
         self.forms.displacement.x.array[:] = 0.0
-        largest = max((float(np.abs(term.forces()).max(initial=0.0)) for term in self.terms), default=0.0)
+        yield
         self.forms.displacement.x.array[:] = now
-        return bool(self.terms) and self.comm.allreduce(largest, op=MPI.MAX) > 0
 
     @cached_property
     def places(self) -> FloatArray:

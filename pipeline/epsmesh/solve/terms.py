@@ -19,11 +19,14 @@ from epsmesh import compat
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.scene.model import FREE, PROBE
-from epsmesh.solve.compiled import MORE, assemble, general_form, vector
+from epsmesh.solve import SolveError
+from epsmesh.solve.compiled import MORE, assemble, general_form, global_sum, vector
 from epsmesh.solve.kernels.product import SparsePart
 from epsmesh.solve.loads import boundary_of
 from epsmesh.solve.measures import dx, has_curved_cells
 
+# Stiffness of a rigid motion that is free, in units of the largest: rounding.
+_FREE = 1e-9
 # Quadrature degrees that the map of a curved facet adds.
 _CURVED = 3
 # Tells which facets a term acts on, from their corners (n, 3, 3) and outward unit normals (n, 3), in m.
@@ -181,6 +184,36 @@ class DeadLoads:
 
     def operator(self, into: PETSc.Mat | None = None) -> None:
         """Return None."""
+
+
+def check_hold(space: Any) -> None:
+    """Check that the terms of an elastic space without support leave no rigid motion free; collective.
+
+    Motions that planes of symmetry exclude are not considered.
+
+    Raises:
+        SolveError: if they leave one.
+    """
+    if space.comm.allreduce(len(space.fixed_owned)):
+        return
+    places = space.places.reshape(-1, 3)
+    *centre, count = global_sum(space.comm, np.array([*places.sum(axis=0), len(places)]))
+    away = places - np.array(centre) / count
+    away /= np.sqrt(global_sum(space.comm, np.array([(away**2).sum()]))[0] / count)
+    axes, mirrored = np.eye(3), set(space.body.mirrored)
+    motions = {f"move along {'xyz'[n]}": np.tile(axes[n], (len(places), 1)) for n in range(3) if n not in mirrored}
+    motions |= {f"turn about {'xyz'[n]}": np.cross(axes[n], away) for n in range(3) if mirrored <= {n}}
+    modes = np.array([motion.ravel() for motion in motions.values()])
+    with space.at_rest():
+        forces = sum((np.array([product(term, mode) for mode in modes]) for term in space.terms), np.zeros(modes.shape))
+    stiffness = global_sum(space.comm, (modes @ forces.T).ravel()).reshape(len(modes), -1)
+    values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
+    if values[0] <= _FREE * abs(values[-1]):
+        free = [*motions][int(np.abs(vectors[:, 0]).argmax())]
+        raise SolveError(
+            f"nothing of the body is fixed, and the terms of [load] let it {free}: fix a face, or add a term that "
+            "prevents it"
+        )
 
 
 def product(term: Term, direction: FloatArray) -> FloatArray:

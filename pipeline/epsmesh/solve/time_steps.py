@@ -20,6 +20,7 @@ from petsc4py import PETSc
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.balance import sums
 from epsmesh.solve.compiled import global_sum
+from epsmesh.solve.dead_loads import start_under_loads
 from epsmesh.solve.elements.base import Elements, Linearised
 from epsmesh.solve.elements.tangent import Prestress
 from epsmesh.solve.ended import ended
@@ -90,7 +91,8 @@ class Indentation(ABC):
 
     ``force`` (3), N, is that of the tool on the modelled part, ``rate`` (J) the work per share, and ``area`` (m²) the
     contact of the whole body, NaN unless it ``is_found``. ``rough`` is the relative error of the force by the distance
-    of nodes at the edge of contact, where that of the mesh does not have it.
+    of nodes at the edge of contact, where that of the mesh does not have it. A tool that ``rubs`` has friction, which
+    has turned ``rubbed`` (J) into heat. ``sag`` (m) and ``load_energy`` (J, of the modelled part) are those of loads.
     """
 
     is_found: ClassVar[bool]
@@ -100,6 +102,18 @@ class Indentation(ABC):
     rate: float
     area: float = np.nan
     rough: float = 0.0
+    rubs: bool = False
+    rubbed: float = 0.0
+    sag: float = np.nan
+    load_energy: float = np.nan
+
+    def start(self) -> FloatArray | None:
+        """Return the state before the movement under loads, which have acted for long; None at rest.
+
+        Raises:
+            SolveError: if there is none.
+        """
+        return None
 
     @abstractmethod
     def equilibrate(self, state: PETSc.Vec, share: float) -> None:
@@ -119,7 +133,7 @@ class Indentation(ABC):
 
 
 class FootprintIndentation(Indentation):
-    """A body whose footprint has a prescribed ``movement``."""
+    """A body whose footprint has a prescribed ``movement``; under loads, from where it has sagged on."""
 
     is_found = False
     body: HyperelasticBody
@@ -128,6 +142,7 @@ class FootprintIndentation(Indentation):
         self, elements: Elements, law: MaterialLaw, linearised: Linearised, movement: Movement, stack: ExitStack
     ):
         """Set up; what is made is freed with the ``stack``."""
+        self._elements, self._law, self._loads = elements, law, movement.loads
         self._space, self._amount = elements.displacements, movement.amounts[0]
         self.body = HyperelasticBody(elements, law, linearised.preconditioner, prestressed=True)
         stack.callback(self.body.close)
@@ -135,11 +150,20 @@ class FootprintIndentation(Indentation):
         owned = self._space.owned
         for motion, amount in zip(movement.motions, movement.amounts, strict=True):
             self._unit.array[:owned] += amount * self._space.held(motion)[:owned]
+        self._start: FloatArray = np.zeros(elements.unknowns)
         self.force, self.rate = np.zeros(3), 0.0
+
+    def start(self) -> FloatArray | None:
+        """Return the sagged state, in which the tool has no force; None without loads."""
+        if self._loads is None and not self._space.is_loaded:
+            return None
+        self._start = start_under_loads(self._elements, self._law, self._loads, has_crept=True)
+        self.body.carry(None if self._loads is None else self._space.applied(self._loads))
+        return self._start
 
     def equilibrate(self, state: PETSc.Vec, share: float) -> None:
         """Find the equilibrium at a share."""
-        held = share * self.body.held_of(self._unit)
+        held = self._start[self._space.prescribed_owned] + share * self.body.held_of(self._unit)
         state.array[self._space.prescribed_owned] = held
         equilibrate(self.body, state, held)
         self.body.forces(state, self._forces)
@@ -155,7 +179,7 @@ class FootprintIndentation(Indentation):
 
     def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
         """Return the displacement per metre, as a secant."""
-        return np.asarray(state.array_r / (share * self._amount))
+        return np.asarray((state.array_r - self._start) / (share * self._amount))
 
 
 def follow_course(begin: Callable[[], "TimeSteps"], course: Course) -> tuple[History, int]:
@@ -171,6 +195,10 @@ def follow_course(begin: Callable[[], "TimeSteps"], course: Course) -> tuple[His
         steps = begin()
         found = steps.follow(course)
         iterations += steps.iterations
+        if steps.rubs:
+            half = begin()
+            found = found.with_half_the_steps(half.follow(course.coarse()), sorted(course.halves()))
+            iterations += half.iterations
         if found.bar <= course.accuracy or refinements == _MOST_REFINEMENTS:
             break
         course = course.refined()
@@ -198,6 +226,16 @@ class TimeSteps:
         self._place, self._indentation, self._body = _Place(), indentation, indentation.body
         self._variables = HistoryVariables(self._body.points, [each.relaxation for each in law.parameters])
         self._state, self._before = (stack.enter_context(self._body.state()) for _ in range(2))
+        self._at_start = 0.0
+        if (start := indentation.start()) is not None:
+            self._state.array[:] = self._before.array[:] = start
+            self._variables.begin(*self._body.stresses(self._state))
+            self._at_start = self._elastic()
+
+    @property
+    def rubs(self) -> bool:
+        """Whether there is friction: the force then depends on the path, and its error falls with the step."""
+        return self._indentation.rubs
 
     @property
     def iterations(self) -> int:
@@ -231,6 +269,8 @@ class TimeSteps:
             dissipated=whole * np.array(heat),
             imbalance=whole * np.array(imbalance),
             areas=np.array(areas),
+            sag=self._indentation.sag,
+            load_energy=whole * self._indentation.load_energy,
         )
 
     def _reach(self, time: float, share: float, course: Course) -> None:
@@ -303,11 +343,14 @@ class TimeSteps:
         """Return what is dissipated and what is stored (J) of the modelled part."""
         if not self._place.has_moved:
             return 0.0, 0.0
-        self._body.impose(None, self._variables.rest)
-        elastic = self._body.energy(self._state)
         own = np.array([self._variables.heat, self._variables.stored])
         heat, stored = self._body.unit * global_sum(self._body.comm, own)
-        return float(heat), elastic + float(stored)
+        return float(heat) + self._indentation.rubbed, self._elastic() - self._at_start + float(stored)
+
+    def _elastic(self) -> float:
+        """Return the energy (J) of the modelled part with what is left of the modulus after a long time."""
+        self._body.impose(None, self._variables.rest)
+        return self._body.energy(self._state)
 
     def _stopped(self, course: Course, why: LargeError) -> LargeError:
         """Return the error of steps that end before the end of the course."""

@@ -12,7 +12,7 @@ from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.axis import Axis
-from epsmesh.study.capabilities.features import features_of, needs_time_steps
+from epsmesh.study.capabilities.features import features_of, is_loaded, needs_time_steps
 from epsmesh.study.capabilities.obstacles import obstacle
 from epsmesh.study.closure import FarRegion
 from epsmesh.study.loads import Load
@@ -192,7 +192,7 @@ class Case:
     @property
     def is_bent(self) -> bool:
         """Whether loads bend the surface on which contact is found, or terms act: F is then proportional to nothing."""
-        return self.way.has_terms or (self.load.acts and self.way.is_found)
+        return self.way.has_terms or (self.way.is_loaded and self.way.is_found)
 
     @property
     def is_plain(self) -> bool:
@@ -287,6 +287,7 @@ class Case:
             {"bonded": Constraint.BONDED, "frictionless": Constraint.SLIDING}.get(probe.contact, found),
             needs_time_steps(self),
             Dimension.SECTION if probe.crack else Dimension.BODY,
+            is_loaded=is_loaded(self),
             has_terms=bool(self.load.terms),
             motion=self._motion,
         )

@@ -11,7 +11,7 @@ from epsmesh.shapes.from_file import FromFile
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section, in_mm
-from epsmesh.shapes.support import Faces, NamedFace
+from epsmesh.shapes.support import NONE, Faces, NamedFace
 from epsmesh.study.axis import Axis
 from epsmesh.study.loads import FREE, Cap, Load, Traction
 from epsmesh.study.problems import Problems, nearest
@@ -32,6 +32,9 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         if axis.section == "load" and axis.piece and not axis.owner:
             problems.error(axis.path, None, "is swept: give its table a `name`")
     for body, load in product(bodies, loads):
+        if body.fixed == NONE and not any(term.HOLDS for term in load.terms):
+            with problems.about(body=body):
+                _nothing_holds(problems)
         for name in TERMS:
             for number, term in enumerate(getattr(load, name), start=1):
                 with problems.about(body=body):
@@ -44,6 +47,12 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         for number, traction in enumerate(load.traction, start=1):
             with problems.about(body=body):
                 _check_traction(body, probes, traction, f"load.traction[{number}].on", problems)
+
+
+def _nothing_holds(problems: Problems) -> None:
+    able = " or ".join(f"[[load.{name}]]" for name, kind in TERMS.items() if kind.HOLDS)
+    more = f", or add {able}" if able else "; a term that would hold it instead is a file that you add"
+    problems.error("body.fixed", NONE, f"nothing holds the body: fix a face{more}")
 
 
 def _check_traction(body: Body, probes: Sequence[Probe], traction: Traction, key: str, problems: Problems) -> None:

@@ -49,8 +49,8 @@ class Dimension(Enum):
 class Way:
     """How a case is solved.
 
-    ``laws`` are the sorted names of its regions' laws, :data:`LINEAR` at small displacements. ``has_terms`` says that
-    the energy has other terms than those of laws and dead loads.
+    ``laws`` are the sorted names of its regions' laws, :data:`LINEAR` at small displacements. ``is_loaded`` says that
+    dead loads act, ``has_terms`` that the energy has other terms than theirs and those of laws.
     """
 
     element: str = "displacement"
@@ -58,6 +58,7 @@ class Way:
     constraint: Constraint = Constraint.BONDED
     in_time: bool = False
     dimension: Dimension = Dimension.BODY
+    is_loaded: bool = False
     has_terms: bool = False
     motion: Motion = Motion.PRESS
 
@@ -68,8 +69,8 @@ class Way:
 
     @property
     def is_nonlinear(self) -> bool:
-        """Whether it is solved by Newton's method, whatever the contact and the time."""
-        return self.is_large or self.has_terms
+        """Whether it is solved by Newton's method, whatever the time: so is friction on a surface that loads bend."""
+        return self.is_large or self.has_terms or (self.rubs and self.is_loaded)
 
     @property
     def is_mixed(self) -> bool:

@@ -66,7 +66,9 @@ def _lines(probe: Probe, length: float) -> FloatArray:
         return np.array([[*_line(probe, np.zeros(2), end, length), top] for end in edge])
     along, across = probe.outline().max(axis=0)
     sides = np.array([0.0, _ACROSS * across])
-    starts = (np.array([x, 0.0]) for x in np.linspace(-along, along, _LINES))
+    # A tool whose ends rise above the shaft is cut there.
+    first, last = _at_height(probe, np.array([[-along, 0.0], [along, 0.0]]), length)[:, 0]
+    starts = (np.array([x, 0.0]) for x in np.linspace(first, last, _LINES))
     halves = ((_line(probe, s, -sides, length), _line(probe, s, sides, length)) for s in starts)
     sections = [[*left[::-1], *right, left[-1]] for left, right in halves]
     ends = [[section[0]] * len(section) for section in (sections[0], sections[-1])]

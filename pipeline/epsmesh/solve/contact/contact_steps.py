@@ -196,7 +196,7 @@ def press_with_friction(
     return iterations
 
 
-def _friction_step(
+def friction_step(
     tissue: SteppedTissue,
     tool_at: Callable[[float], PlacedTool],
     last: ContactPathPoint,
@@ -248,10 +248,8 @@ def _step(
     tissue.state = path.guess(depth)
     if not tissue.is_sound:
         tissue.state = last.state
-    friction_step = None if friction is None else _friction_step(tissue, tool_at, last, depth, friction)
-    if friction is not None and friction_step is not None and friction.is_linear and last.touched is not None:
-        continue_linear(tissue, tool, last.touched, friction_step)
-        friction_step = _friction_step(tissue, tool_at, last, depth, friction)
-    return solve_contact(
-        tissue, tool, first_set(tissue, tool, active), friction_step, is_patient=is_patient, limit=limit
-    )
+    of_step = None if friction is None else friction_step(tissue, tool_at, last, depth, friction)
+    if friction is not None and of_step is not None and friction.is_linear and last.touched is not None:
+        continue_linear(tissue, tool, last.touched, of_step)
+        of_step = friction_step(tissue, tool_at, last, depth, friction)
+    return solve_contact(tissue, tool, first_set(tissue, tool, active), of_step, is_patient=is_patient, limit=limit)

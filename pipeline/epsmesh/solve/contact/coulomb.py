@@ -191,7 +191,7 @@ def most_simplified(depth: float, deepest: float) -> float:
 
     At a smaller depth, where few nodes touch, the share may be larger, since that force is smaller.
     """
-    return _MOST_SIMPLIFIED * deepest / depth
+    return _MOST_SIMPLIFIED * deepest / depth if depth else inf
 
 
 def largest_friction(law: FloatArray, normal: FloatArray) -> FloatArray:

@@ -74,6 +74,8 @@ class FrictionIteration:
 
     def is_sound(self, active: BoolArray) -> bool:
         """Return whether nodes whose state was simplified carry little of the force, or friction no part of it."""
+        if not active.any():
+            return True
         there = active & self._simple.nodes & ~self._with.neighbours.is_corner
         pressed = np.abs(self.normal)
         share = float(pressed[there].sum()) / float(pressed[active].sum())

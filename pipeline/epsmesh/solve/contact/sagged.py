@@ -14,6 +14,7 @@ from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.dead_loads import sag
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Loads
+from epsmesh.solve.relaxing import crept
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +43,21 @@ class Sagged:
         return replace(tool, distance=lambda points, depth: tool.distance(points, depth + self.sag))
 
 
-def sagged_body(body: DeformedBody, tool: Tool, loads: Loads | None, guess: FloatArray | None = None) -> Sagged:
+def sagged_body(
+    body: DeformedBody, tool: Tool, loads: Loads | None, guess: FloatArray | None = None, *, has_crept: bool = False
+) -> Sagged:
     """Return a body under its loads, whose state is then that; ``guess`` is an initial guess of it; collective.
+
+    ``has_crept``: relaxing tissue has carried them for long, and the energy of the ``body`` is then what is left.
 
     Raises:
         SolveError: see :func:`epsmesh.solve.dead_loads.sag`.
     """
     if loads is None and not body.elements.displacements.is_loaded:
         return Sagged(np.zeros(body.elements.unknowns))
-    body.state = sag(body.elements, body.law, loads, guess)
+    body.state = sag(body.elements, body.law, loads, guess, has_crept=has_crept)
+    if has_crept:
+        body.hyperelastic.impose(crept(body.hyperelastic.points, body.law))
     energy = body.energy
     return Sagged(
         body.state,

@@ -77,7 +77,8 @@ class ContactSearch:
             ContactError: if the contact does not settle, reaches the support, or reaches the candidates' edge where
                 the probe does not end.
         """
-        if not asked.law.is_linear or self._elements.displacements.terms:
+        is_bent = asked.movement.loads is not None and self._tool.friction > 0
+        if not asked.law.is_linear or self._elements.displacements.terms or is_bent:
             return self._solve_large(asked, stack)
         law, movement, strict = asked.law, asked.movement, _STRICTER * asked.tolerance
         columns = self._elements.columns(movement, stack)
@@ -125,8 +126,8 @@ class ContactSearch:
 
     def in_time(self, asked: Request, found: Equilibrium, stack: ExitStack) -> ToolIndentation:
         """Return the tissue that the tool presses in time steps; the ``stack`` frees it; collective."""
-        depth = found.movement.amounts[0]
-        return ToolIndentation(self._surface, self._elements, self._tool, asked.law, depth, stack)
+        (depth, *_), loads = found.movement.amounts, found.movement.loads
+        return ToolIndentation(self._surface, self._elements, self._tool, asked.law, depth, loads, stack)
 
     # ---- far field ------------------------------------------------------------------------------------
 

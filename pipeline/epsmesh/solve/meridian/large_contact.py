@@ -176,8 +176,8 @@ class RoundToolIndentation(ContactIndentation):
         tissue = at_rest.tissue
         tissue.state = np.zeros_like(tissue.state)
         self.body = RelaxingHalfPlane.of(tissue.system.forms, at_rest.law, at_rest.unit)
-        self._touch, self._depth = at_rest, depth
-        super().__init__(tissue, tissue.places, self.body.unit)
+        self._touch = at_rest
+        super().__init__(tissue, tissue.places, self.body.unit, depth, at_rest.friction_to(depth))
 
     def _placed(self, share: float) -> PlacedTool:
         return replace(self._touch.placed(share * self._depth), depth=self._depth)

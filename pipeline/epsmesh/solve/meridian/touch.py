@@ -94,7 +94,8 @@ class MeridianTouch:
         Raises:
             LargeError: if the path ends before; ``reached`` are the depth and the force there.
         """
-        friction = self._friction(depth / self.unit)
+        friction = self.friction_to(depth / self.unit)
+        assert friction is not None
         return self._at_end(
             lambda path, there: press_with_friction(self.tissue, self.placed, path, there, friction, steps), depth
         )
@@ -165,8 +166,10 @@ class MeridianTouch:
         beside = radii > (1 + _BESIDE) * self.tool.limit
         return np.where(beside, _OUT_OF_REACH, self.tool.gap(np.minimum(radii, self.tool.limit)) / self.unit)
 
-    def _friction(self, deepest: float) -> Friction:
-        """Return the friction on a load path to the depth ``deepest`` (units of the mesh)."""
+    def friction_to(self, deepest: float) -> Friction | None:
+        """Return the friction on a load path to the depth ``deepest`` (units of the mesh), None without."""
+        if not self.tool.friction:
+            return None
         radii, nobody = self.tissue.places[:, 0], np.zeros(len(self.tissue.places), dtype=bool)
         # Forces are per radian: the stiffness of a node is its radius times a modulus. None follows its neighbours.
         penalty = self.law.plane_moduli[0] / self.law.lame_mu[0] * np.maximum(radii, radii[1])

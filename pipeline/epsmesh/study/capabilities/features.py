@@ -121,7 +121,8 @@ def _may_cut_a_ring(scene: Scene) -> bool:
     return _is_inserted(scene) and getattr(scene.probe, "crack_shape", "plane") != "plane"
 
 
-def _is_loaded(scene: Scene) -> bool:
+def is_loaded(scene: Scene) -> bool:
+    """Return whether dead loads act: gravity, tractions, or pressure in hollow regions."""
     return scene.load.acts or bool(scene.body.pressures)
 
 
@@ -138,7 +139,8 @@ def needs_time_steps(scene: Scene) -> bool:
     """Return whether the force over time is no elastic force times a function of time."""
     if scene.probe.history is None:
         return False
-    return _is_large(scene) or len(_relaxations(scene)) > 1 or bool(scene.load.terms)
+    is_followed = scene.probe.friction > 0 or (scene.probe.is_unilateral and is_loaded(scene))
+    return _is_large(scene) or len(_relaxations(scene)) > 1 or bool(scene.load.terms) or is_followed
 
 
 def _is_off_axis(scene: Scene) -> bool:
@@ -186,12 +188,6 @@ FEATURES: dict[str, Feature] = {
     ),
     "given force": Feature("probe.force", lambda s: s.probe.force is not None, write=lambda force: f"{force:.6g} N"),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
-    "bent surface of a linear law": Feature(
-        "load",
-        lambda s: _is_loaded(s) and s.probe.is_unilateral and not _is_large(s),
-        ("body", "probe", "material"),
-    ),
-    "bent surface": Feature("load", lambda s: _is_loaded(s) and s.probe.is_unilateral, ("body", "probe")),
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),
     "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),
     "open slit": Feature("probe.ends", lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
@@ -226,7 +222,7 @@ FEATURES: dict[str, Feature] = {
     "degree 1": Feature("mesh.degree", lambda s: s.mesh.degree == 1, write=int),
     "mixed elements": Feature("mesh.element", lambda s: s.mesh.element == "mixed"),
     "accuracy": Feature("mesh.accuracy", lambda s: s.mesh.accuracy is not None),
-    "loads": Feature("load", _is_loaded, ("body",)),
+    "loads": Feature("load", is_loaded, ("body",)),
     "terms": Feature("load", lambda s: bool(s.load.terms)),
     **{name: Feature(f"load.{name}", partial(_has_term, name=name), write=lambda _: None) for name in TERMS},
     # Of a case: the sections of a scene have none.

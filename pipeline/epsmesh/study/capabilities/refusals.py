@@ -117,17 +117,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("friction", "half ball", f"the far field is known only for forces along the tool's axis: {_COARSE}"),
     Refusal(
         "friction",
-        "bent surface of a linear law",
-        "friction of linear laws is followed from the unloaded surface on: use a law of large displacements, or omit "
-        "[load] or friction",
-    ),
-    Refusal(
-        "friction",
-        "history",
-        f"friction depends on the path, and F is not the elastic force times a function of time: {_STATIC}",
-    ),
-    Refusal(
-        "friction",
         "inclined touch of a linear law",
         "the tool touches beside its axis, where its surface is inclined, and with a linear law friction is across the "
         "axis: turn the axis to the surface's normal, use a law of large displacements, or omit friction",
@@ -194,16 +183,10 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal(
         "history",
-        "bent surface",
-        f"loads bend the surface on which contact is found, and the force is no power of the depth: {_STATIC}",
-    ),
-    Refusal(
-        "history",
         "slit",
         f"the opening of the slit has no history, and the energy release rate depends on the front's speed: {_STATIC}",
     ),
     Refusal("time steps", "six motions", f'{_IN_STEPS}, of one movement: use motion = "press"'),
-    Refusal("time steps", "loads", f"{_IN_STEPS}, and the tissue has crept under the loads before: {_NO_LOADS}"),
     Refusal("time steps in three dimensions", "accuracy", STEPS_IN_SPACE),
     Refusal("time steps", "half ball", f"{_IN_STEPS}, and the far field has none: {_COARSE}"),
     # Large strains.
