@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import hypot, inf, isqrt
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -23,6 +23,7 @@ from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from epsmesh.mesh.boxes import halve_boxes, triangulate
 from epsmesh.mesh.distribute import exterior_facets
 from epsmesh.scene.model import CUT, FIXED, FREE, PROBE
+from epsmesh.shapes.support import HeldOnHalfPlane
 
 Corner = tuple[float, float]
 
@@ -97,7 +98,7 @@ class Meridian:
     radius: float
     height: float
     probe_radius: float
-    fixed: Literal["bottom", "sides", "bottom+sides"] | float = "bottom"
+    fixed: HeldOnHalfPlane = "bottom"
     column: float = inf
     column_fixed: bool = False
     interfaces: tuple[float, ...] = ()

@@ -208,7 +208,7 @@ def check_hold(space: Any) -> None:
         forces = sum((np.array([product(term, mode) for mode in modes]) for term in space.terms), np.zeros(modes.shape))
     stiffness = global_sum(space.comm, (modes @ forces.T).ravel()).reshape(len(modes), -1)
     values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
-    if values[0] <= _FREE * abs(values[-1]):
+    if not values[0] > _FREE * abs(values[-1]):
         free = [*motions][int(np.abs(vectors[:, 0]).argmax())]
         raise SolveError(
             f"nothing of the body is fixed, and the terms of [load] let it {free}: fix a face, or add a term that "
