@@ -22,6 +22,7 @@ _SAME_CASE = {
     "relaxation",
     "relaxing regions",
     "relaxing round scene",
+    "relaxing under traction",
     "F_exact",
     "model 3d",
     "swept E",
