@@ -224,6 +224,7 @@ class TimeSteps:
         """
         self._law, self._depth, self._mirrored, self._has_own_mesh = law, depth, mirrored, has_own_mesh
         self._place, self._indentation, self._body = _Place(), indentation, indentation.body
+        self._relaxes = any(each.relaxation for each in law.parameters)
         self._variables = HistoryVariables(self._body.points, [each.relaxation for each in law.parameters])
         self._state, self._before = (stack.enter_context(self._body.state()) for _ in range(2))
         self._at_start = 0.0
@@ -302,7 +303,7 @@ class TimeSteps:
         """
         place, body = self._place, self._body
         step, change = time - place.time, share - place.share
-        if not (place.has_moved or share):  # at rest
+        if not (change or self._relaxes) or not (place.has_moved or share):  # elastic tissue that is held, or at rest
             place.time = time
             return
         self._body.impose(self._variables.prestress(step))
