@@ -316,7 +316,7 @@ def test_the_scene_of_a_report_is_drawn(browser, page, tmp_path):
     path = write_report(dataset(), tmp_path / "report.html", page.read_text(encoding="utf-8"))
     browser.look_like(900, 600)
     browser.open(path)
-    browser.ask("document.getElementById('scene').scrollIntoView()")
+    browser.ask("document.querySelector('iframe').scrollIntoView()")
     for _ in range(50):
         browser.ask("new Promise(done => setTimeout(done, 200))")
         browser.screenshot(tmp_path / "seen.png", whole=False)
