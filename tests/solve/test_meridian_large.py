@@ -76,8 +76,8 @@ def test_force_is_that_of_other_elements(poisson, depth, ratio):
 def test_the_force_is_the_derivative_of_the_energy():
     law = MaterialLaw.of_moduli(1.0, 0.45, "yeoh", c2=0.2, c3=0.05)
     system = LargeSystem(meshes_of(BODY.mesh(Grading(0.1))), 3, law, bonded=True)
-    _, path = system.press(0.2)
-    state, _ = system.press(0.2)
+    _, path = system.reach(0.2)
+    state, _ = system.reach(0.2)
     energies = [system.forces(system.equilibrate(state, depth))[2] for depth in (0.199, 0.201)]
     assert (energies[1] - energies[0]) / 0.002 == pytest.approx(path[-1, 1], rel=1e-5)
 

@@ -10,7 +10,13 @@ from mpi4py import MPI
 from epsmesh.run.meshing import mesh_case
 from epsmesh.run.problem import law_of, tool_of
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, Friction, press, press_with_friction
+from epsmesh.solve.contact.contact_steps import (
+    ContactPath,
+    ContactPathPoint,
+    Friction,
+    reach_contact,
+    reach_contact_with_friction,
+)
 from epsmesh.solve.contact.large import placed_tool
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.tissue import DeformedBody
@@ -33,7 +39,7 @@ def test_drag_at_constant_depth_is_the_law_times_the_force():
         body = DeformedBody(problem.elements, Surface(spaces), law_of(case), "direct", stack)
         tool, path = tool_of(case), ContactPath(ContactPathPoint(0.0, np.zeros_like(body.state)))
         friction = Friction.on(body.candidates, body.law, FRICTION, DEPTH)
-        press_with_friction(body, lambda depth: placed_tool(body, tool, depth), path, DEPTH, friction, 4)
+        reach_contact_with_friction(body, lambda depth: placed_tool(body, tool, depth), path, DEPTH, friction, 4)
 
         def beside(travel):
             shift = np.array([travel - DEPTH, 0.0, 0.0])
@@ -42,7 +48,7 @@ def test_drag_at_constant_depth_is_the_law_times_the_force():
         along = replace(friction, advance=np.array([1.0, 0.0, 0.0]))
         drags = []
         for share in (0.05, 0.75):
-            press(body, beside, path, (1 + share) * DEPTH, along)
+            reach_contact(body, beside, path, (1 + share) * DEPTH, along)
             touched = path.last.touched
             across, _, up = -touched.forces.sum(axis=0)
             drags.append(-across / up)

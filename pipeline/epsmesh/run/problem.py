@@ -191,7 +191,7 @@ def _motions_of(case: Case, meshed: Case) -> Movement:
     if motion is Motion.FAR:
         return Movement.along(travel).with_far(_moved(far_field_of(case), meshed.frame.point))
     # Across a plane of symmetry, sliding gives no axial force, and pressing gives no lateral force.
-    return Movement.along(travel, apart=mirror_planes(case) != movement_planes(case))
+    return Movement.along(travel, decoupled=mirror_planes(case) != movement_planes(case))
 
 
 @lru_cache(_FAR_FIELDS)

@@ -47,11 +47,11 @@ def load_in_steps(body: HyperelasticBody, applied: Applied | None, state: PETSc.
     """
     path, goal = Path(PathPoint(0.0, state.array.copy())), body.held_of(state)
 
-    def solve_at(share: float) -> tuple[PathPoint, bool]:
+    def solve_at(amount: float) -> tuple[PathPoint, bool]:
         state.array[:] = path.last.state
-        body.carry(applied, share)
-        iterations = equilibrate(body, state, goal, LEFT if share == 1.0 else ON_THE_WAY)
-        return PathPoint(share, state.array.copy()), iterations <= EASY
+        body.carry(applied, amount)
+        iterations = equilibrate(body, state, goal, LEFT if amount == 1.0 else ON_THE_WAY)
+        return PathPoint(amount, state.array.copy()), iterations <= EASY
 
     try:
         follow(path, solve_at, 1.0)

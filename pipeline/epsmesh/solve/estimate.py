@@ -124,13 +124,13 @@ def error_bar(
     return share / (1 - min(share, _MOST))
 
 
-def stiffness_bars(stiffness: FloatArray, relative: FloatArray, *, apart: bool = False) -> FloatArray:
+def stiffness_bars(stiffness: FloatArray, relative: FloatArray, *, decoupled: bool = False) -> FloatArray:
     """Return the 95 % bars on the entries of a stiffness (n, n), from the ``relative`` ones on its diagonal (n).
 
-    With ``apart``, symmetry makes the entries between motions exactly zero: their bars are zero.
+    With ``decoupled``, symmetry makes the entries between motions exactly zero: their bars are zero.
     """
     root = np.sqrt(np.abs(relative * np.diag(stiffness)))
-    return np.diag(root**2) if apart else np.outer(root, root)
+    return np.diag(root**2) if decoupled else np.outer(root, root)
 
 
 def extrapolate(

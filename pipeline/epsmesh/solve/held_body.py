@@ -116,8 +116,8 @@ class HeldBody:
                 raise
         self.slope = None if self._body.is_mixed else -self._residual.dot(self._step)
 
-    def advance(self, share: float) -> bool:
-        """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
-        self._state.waxpy(share, self._step, self._from)
+    def advance(self, fraction: float) -> bool:
+        """Set the state to the last one linearised plus a ``fraction`` of its increment; return whether J > 0."""
+        self._state.waxpy(fraction, self._step, self._from)
         self.energy, self._norms = self._body.energy(self._state) / self._body.unit, None
         return bool(np.isfinite(self.energy))

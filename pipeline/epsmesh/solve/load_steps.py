@@ -182,25 +182,26 @@ class LoadSteps(Solver):
         found = [*at()]
         if held is not None:
             state.array[:] = self._load_path.start.state
-            rate_there, there = at()
-            changes = combine(1.0, found[1], -1.0, there), combine(-1.0, rate_there, 1.0, found[0])
-            found = [found[0], *changes, there]
+            rate_at_end, at_end = at()
+            changes = combine(1.0, found[1], -1.0, at_end), combine(-1.0, rate_at_end, 1.0, found[0])
+            found = [found[0], *changes, at_end]
             state.array[:] = held.state
             found.append(residuals.at(state))
         estimate = Decrements(self._linear, found)
-        taken, rest = estimate.between(0, 1)
+        decrement, rest = estimate.between(0, 1)
         if held is not None:
-            taken, rest = (float(np.add(a, b)) for a, b in zip((taken, rest), estimate.between(2, 3), strict=True))
-        taken, rest = taken / column.amount, rest / column.amount
-        if not abs(taken) < self.products(columns).stationary[0, 0]:
+            held_rest = estimate.between(2, 3)
+            decrement, rest = (float(np.add(a, b)) for a, b in zip((decrement, rest), held_rest, strict=True))
+        decrement, rest = decrement / column.amount, rest / column.amount
+        if not abs(decrement) < self.products(columns).stationary[0, 0]:
             raise LargeError(
                 f"no error bar: it needs elements of degree {finer.degree}, which fail at the probe's edge; "
                 "use a smaller depth, a larger rim, or degree 2"
             )
-        decrements, unseen = np.array([[taken]]), np.array([rest])
+        decrements, unseen = np.array([[decrement]]), np.array([rest])
         if held is not None:
             mixed, (own, own_rest) = estimate.products[0, 4], estimate.between(4, 4)
-            decrements, unseen = np.array([[taken, mixed], [mixed, own]]), np.array([rest, own_rest])
+            decrements, unseen = np.array([[decrement, mixed], [mixed, own]]), np.array([rest, own_rest])
         return HierarchicalEstimate(
             finer,
             [],
@@ -235,20 +236,20 @@ class LoadSteps(Solver):
         state.array[: self._space.owned] = column.prescribed[: self._space.owned]
 
     def _checked_path(self, state: PETSc.Vec, column: Column) -> FloatArray:
-        """Continue ``state`` as :meth:`_press`, in many steps if the force of a few does not tell the work."""
+        """Continue ``state`` as :meth:`_reach`, in many steps if the force of a few does not tell the work."""
         with self._body.state() as start:
             start.array[:] = self._load_path.start.state
             size = max(self._law.lame_mu) * self._volume() + abs(self._body.energy(start))
-        path = self._press(state, column, _FEWEST)
+        path = self._reach(state, column, _FEWEST)
         try:
             check_path(path, _ROUNDING * size)
         except LargeError:
             self._load_path.restart()
-            path = self._press(state, column, _MANY)
+            path = self._reach(state, column, _MANY)
             check_path(path, _ROUNDING * size)
         return path
 
-    def _press(self, state: PETSc.Vec, column: Column, fewest: int) -> FloatArray:
+    def _reach(self, state: PETSc.Vec, column: Column, fewest: int) -> FloatArray:
         """Continue ``state`` along the load path to the depth of a column, in at least ``fewest`` steps from its start.
 
         Return the path: depth, force and energy of each step. A step is halved where Newton's method does not converge.
@@ -263,15 +264,15 @@ class LoadSteps(Solver):
             self._put_unit(column, unit)
             held = body.held_of(unit)
 
-            def solve_at(there: float) -> tuple[PathPoint, bool]:
-                state.array[:] = load_path.continued(there)
+            def solve_at(amount: float) -> tuple[PathPoint, bool]:
+                state.array[:] = load_path.continued(amount)
                 if not np.isfinite(body.energy(state)):
                     state.array[:] = load_path.last.state  # the first step of Newton's method then brings it there
-                left = LEFT if there == depth else ON_THE_WAY
-                iterations = equilibrate(body, state, base + there * held, left)
+                left = LEFT if amount == depth else ON_THE_WAY
+                iterations = equilibrate(body, state, base + amount * held, left)
                 body.forces(state, forces)
-                load_path.work.append((there, forces.dot(unit), body.energy(state) - begun))
-                return PathPoint(there, state.array.copy()), iterations <= EASY
+                load_path.work.append((amount, forces.dot(unit), body.energy(state) - begun))
+                return PathPoint(amount, state.array.copy()), iterations <= EASY
 
             try:
                 follow(load_path, solve_at, depth, fewest=fewest)

@@ -96,13 +96,13 @@ class Motion:
 class Movement:
     """Movement of the probe: ``motions`` times their amounts (m, or rad); translations have orthogonal directions.
 
-    ``apart`` says that symmetry decouples the motions: none does work in another. ``loads`` are dead loads on the
+    ``decoupled`` says that symmetry decouples the motions: none does work in another. ``loads`` are dead loads on the
     tissue.
     """
 
     motions: tuple[Motion, ...]
     amounts: tuple[float, ...]
-    apart: bool = False
+    decoupled: bool = False
     loads: Loads | None = None
 
     @property
@@ -116,14 +116,14 @@ class Movement:
         return np.array([motion.share for motion in self.motions])
 
     @staticmethod
-    def along(travel: Vector, *, apart: bool = False) -> "Movement":
+    def along(travel: Vector, *, decoupled: bool = False) -> "Movement":
         """Return the movement of a probe along ``travel`` (m): it presses by −z and slides by x and y."""
         x, y, z = travel
         slide = hypot(x, y)
         press = Motion((0.0, 0.0, -1.0))
         if not slide:
             return Movement((press,), (-z,))
-        return Movement((press, Motion((x / slide, y / slide, 0.0))), (-z, slide), apart)
+        return Movement((press, Motion((x / slide, y / slide, 0.0))), (-z, slide), decoupled)
 
     @staticmethod
     def all(travel: Vector, centre: Vector) -> "Movement":

@@ -53,8 +53,8 @@ class Moving(Protocol):
     def energy(self) -> float: ...  # noqa: D102
     @property
     def slope(self) -> float | None: ...  # noqa: D102
-    def advance(self, share: float) -> bool:
-        """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
+    def advance(self, fraction: float) -> bool:
+        """Set the state to the last one linearised plus a ``fraction`` of its increment; return whether J > 0."""
 
 
 class Held(Moving, Protocol):
@@ -104,21 +104,21 @@ class Newton(ABC, Generic[Found]):
 
 
 def advance(body: Moving, halvings: int, falls: Callable[[float], bool] | None = None) -> float:
-    """Take the longest step, by halves, that leaves no tissue inside out and ``falls``; return its share; collective.
+    """Take the longest step, by halves, with no tissue inside out and ``falls``; return its fraction; collective.
 
     Raises:
         LargeError: if there is none among so many.
     """
     for halving in range(halvings):
-        share = 0.5**halving
-        if body.advance(share) and (falls is None or falls(share)):
-            return share
+        fraction = 0.5**halving
+        if body.advance(fraction) and (falls is None or falls(fraction)):
+            return fraction
     raise LargeError("tissue is turned inside out")
 
 
-def is_less(after: float, before: float, share: float, slope: float) -> bool:
-    """Return whether a ``share`` of a step reduces an energy enough (L. Armijo, Pacific J. Math. 16, 1, 1966)."""
-    return after <= before - _GAIN * share * slope
+def is_less(after: float, before: float, fraction: float, slope: float) -> bool:
+    """Return whether a ``fraction`` of a step reduces an energy enough (L. Armijo, Pacific J. Math. 16, 1, 1966)."""
+    return after <= before - _GAIN * fraction * slope
 
 
 def hold(body: Held, limit: float, most: int, on_the_way: int = HALVINGS) -> int:
@@ -166,14 +166,14 @@ class _Hold(Newton[int]):
             advance(self._body, self._on_the_way)
         else:
             stored = self._body.energy
-            advance(self._body, HALVINGS, lambda share: self._falls(share, stored))
+            advance(self._body, HALVINGS, lambda fraction: self._falls(fraction, stored))
 
-    def _falls(self, share: float, stored: float) -> bool:
+    def _falls(self, fraction: float, stored: float) -> bool:
         """Return whether the energy falls below the ``stored`` one, or else the residual: rounding may hide it."""
         body = self._body
-        if body.slope is not None and is_less(body.energy, stored, share, body.slope):
+        if body.slope is not None and is_less(body.energy, stored, fraction, body.slope):
             return True
-        return is_less(body.residual()[0], self._left, share, self._left)
+        return is_less(body.residual()[0], self._left, fraction, self._left)
 
 
 def forcing(gained: float, needed: float = 0.0) -> float:

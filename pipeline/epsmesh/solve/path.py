@@ -92,13 +92,13 @@ def follow(
     while (reached := path.reached) < to:
         left = to - reached
         step = min(longest, to / fewest, left)
-        there = to if step > (1 - _SLIVER) * left else reached + step
+        amount = to if step > (1 - _SLIVER) * left else reached + step
         try:
-            point, is_easy = solve_at(there)
+            point, is_easy = solve_at(amount)
         except LargeError:
-            longest = (there - reached) / 2
+            longest = (amount - reached) / 2
             if longest < shortest * to:
                 raise
             continue
         path.add(point)
-        path.step = longest = max(longest, (there - reached) * (_LONGER if is_easy else 1.0))
+        path.step = longest = max(longest, (amount - reached) * (_LONGER if is_easy else 1.0))

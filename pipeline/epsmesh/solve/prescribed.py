@@ -181,7 +181,7 @@ def _balanced(response: Response) -> Response:
     Raises:
         SolveError: if forces do not balance.
     """
-    force, taken = float(response.forces[0, 2]), float(response.stiffness[0, 0])
-    balance = max(response.balance, abs(force - taken) / taken)
+    force, stiffness = float(response.forces[0, 2]), float(response.stiffness[0, 0])
+    balance = max(response.balance, abs(force - stiffness) / stiffness)
     check_balance(balance)
     return replace(response, balance=balance)

@@ -192,7 +192,7 @@ class QuasiStaticProblem(Problem):
                 ]
             )
         solution = solution.with_bars(
-            decrements, stiffness_bars(form, relative), elements.element, apart=movement.apart
+            decrements, stiffness_bars(form, relative), elements.element, decoupled=movement.decoupled
         )
         front, tip = (
             advance and above and advance.with_finer(above, elements.degree, solution.energy_bar)

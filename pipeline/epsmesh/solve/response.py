@@ -74,11 +74,11 @@ def reaction(
     Raises:
         SolveError: if one of them is not finite, or a motion has no energy.
     """
-    taken = np.diag(stationary)
-    if not (np.all(np.isfinite(stationary)) and np.all(np.isfinite(on_probe)) and taken.min() > 0):
-        raise SolveError(f"the solution is not finite or has no energy (2U = {taken.min():g} J for a unit of travel)")
+    work = np.diag(stationary)
+    if not (np.all(np.isfinite(stationary)) and np.all(np.isfinite(on_probe)) and work.min() > 0):
+        raise SolveError(f"the solution is not finite or has no energy (2U = {work.min():g} J for a unit of travel)")
     stiffness = 2.0 ** len(mirrored) * (stationary + stationary.T) / 2
-    if movement.apart:
+    if movement.decoupled:
         stiffness = np.diag(np.diag(stiffness))
     return Response(movement, stiffness, -whole_force(on_probe, mirrored), balance)
 
@@ -153,7 +153,7 @@ def load_response_of(
     if not (np.all(np.isfinite(energies)) and np.all(np.isfinite(works)) and np.all(np.isfinite(on_probe))):
         raise SolveError("the response to the loads is not finite")
     form = (energies + energies.T) / 2
-    if movement.apart:
+    if movement.decoupled:
         form[:-1, :-1] = np.diag(np.diag(form[:-1, :-1]))
     form[:, -1] -= works
     form[-1, :] -= works

@@ -136,14 +136,14 @@ class Solution:
             z = abs(self.reaction[2]) * self.tip.without_loads().bar
         return x, y, z
 
-    def with_bars(self, decrements: FloatArray, bars: FloatArray, element: str, *, apart: bool) -> "Solution":
+    def with_bars(self, decrements: FloatArray, bars: FloatArray, element: str, *, decoupled: bool) -> "Solution":
         """Return the solution with decrements and bars; with loads they have one row more than motions.
 
-        With ``apart``, symmetry makes the entries between motions exactly zero.
+        With ``decoupled``, symmetry makes the entries between motions exactly zero.
         """
         count = len(self.response.movement.motions)
         decrements, bars = decrements.copy(), bars.copy()
-        if apart:
+        if decoupled:
             for matrix in (decrements, bars):
                 matrix[:count, :count] = np.diag(np.diag(matrix)[:count])
         loaded = self.load_response and replace(

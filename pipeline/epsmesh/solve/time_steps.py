@@ -45,12 +45,12 @@ _OF_DIFFERENCE = 2 / 3
 
 @dataclass
 class _Place:
-    """How far the steps have come: time (s), share of the movement, its last change, and energies (J)."""
+    """How far the steps have come: time (s), fraction of the movement, its last change, and energies (J)."""
 
     time: float = 0.0
-    share: float = 0.0
+    fraction: float = 0.0
     changed: float = 0.0
-    rate: float = 0.0  # work per share
+    rate: float = 0.0  # work per fraction
     work: float = 0.0
     has_moved: bool = False
 
@@ -87,12 +87,13 @@ class Body(Protocol):
 
 
 class Indentation(ABC):
-    """A relaxing ``body`` and what presses it, at the equilibrium at a share of the movement. Methods are collective.
+    """A relaxing ``body`` and what presses it, in equilibrium at a fraction of the movement. Methods are collective.
 
-    ``force`` (3), N, is that of the tool on the modelled part, ``rate`` (J) the work per share, and ``area`` (m²) the
-    contact of the whole body, NaN unless it ``is_found``. ``rough`` is the relative error of the force by the distance
-    of nodes at the edge of contact, where that of the mesh does not have it. A tool that ``rubs`` has friction, which
-    has turned ``rubbed`` (J) into heat. ``sag`` (m) and ``load_energy`` (J, of the modelled part) are those of loads.
+    ``force`` (3), N, is that of the tool on the modelled part, ``rate`` (J) the work per fraction, and ``area`` (m²)
+    the contact of the whole body, NaN unless it ``is_found``. ``rough`` is the relative error of the force by
+    the distance of nodes at the edge of contact, where that of the mesh does not have it. A tool that ``rubs`` has
+    friction, which has turned ``rubbed`` (J) into heat. ``sag`` (m) and ``load_energy`` (J, of the modelled part)
+    are those of loads.
     """
 
     is_found: ClassVar[bool]
@@ -116,8 +117,8 @@ class Indentation(ABC):
         return None
 
     @abstractmethod
-    def equilibrate(self, state: PETSc.Vec, share: float) -> None:
-        """Find the equilibrium at a ``share`` from an initial guess, ``state``.
+    def equilibrate(self, state: PETSc.Vec, fraction: float) -> None:
+        """Find the equilibrium at a ``fraction`` from an initial guess, ``state``.
 
         Raises:
             LargeError: if Newton's method does not converge; ``state`` is then undefined.
@@ -125,10 +126,10 @@ class Indentation(ABC):
 
     @abstractmethod
     def guess(self, state: PETSc.Vec) -> FloatArray | None:
-        """Return the change of a state per share by the tangent there, None if there is no such guess."""
+        """Return the change of a state per fraction by the tangent there, None if there is no such guess."""
 
     @abstractmethod
-    def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
+    def unit(self, state: PETSc.Vec, fraction: float) -> FloatArray:
         """Return the displacement, a state, per metre of the tool in which stresses do the work of the force."""
 
 
@@ -161,9 +162,9 @@ class FootprintIndentation(Indentation):
         self.body.carry(None if self._loads is None else self._space.applied(self._loads))
         return self._start
 
-    def equilibrate(self, state: PETSc.Vec, share: float) -> None:
-        """Find the equilibrium at a share."""
-        held = self._start[self._space.prescribed_owned] + share * self.body.held_of(self._unit)
+    def equilibrate(self, state: PETSc.Vec, fraction: float) -> None:
+        """Find the equilibrium at a fraction."""
+        held = self._start[self._space.prescribed_owned] + fraction * self.body.held_of(self._unit)
         state.array[self._space.prescribed_owned] = held
         equilibrate(self.body, state, held)
         self.body.forces(state, self._forces)
@@ -172,14 +173,14 @@ class FootprintIndentation(Indentation):
         self.rate = float(self._forces.dot(self._unit))
 
     def guess(self, state: PETSc.Vec) -> FloatArray:
-        """Return the change of a state per share by the tangent there."""
+        """Return the change of a state per fraction by the tangent there."""
         with self.body.state() as rate:
             move(self.body, state, self._unit, rate)
             return np.array(rate.array)
 
-    def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
+    def unit(self, state: PETSc.Vec, fraction: float) -> FloatArray:
         """Return the displacement per metre, as a secant."""
-        return np.asarray((state.array_r - self._start) / (share * self._amount))
+        return np.asarray((state.array_r - self._start) / (fraction * self._amount))
 
 
 def follow_course(begin: Callable[[], "TimeSteps"], course: Course) -> tuple[History, int]:
@@ -252,8 +253,8 @@ class TimeSteps:
         """
         halves, errors = course.halves(), dict[int, float]()
         forces, heat, imbalance, areas, rough = [], [], [], [], []
-        for number, (time, share) in enumerate(zip(course.times, course.shares, strict=True)):
-            self._reach(time, share, course)
+        for number, (time, fraction) in enumerate(zip(course.times, course.shares, strict=True)):
+            self._reach(time, fraction, course)
             if number in halves:
                 errors[number] = self._step_error()
             forces.append(self._force())
@@ -274,17 +275,17 @@ class TimeSteps:
             load_energy=whole * self._indentation.load_energy,
         )
 
-    def _reach(self, time: float, share: float, course: Course) -> None:
-        """Continue to a time and a share of the movement; a step is halved where Newton's method does not converge."""
+    def _reach(self, time: float, fraction: float, course: Course) -> None:
+        """Continue to a time and a fraction of the movement; a step is halved if Newton's method does not converge."""
         place = self._place
-        begun, rise = place.time, share - place.share
+        begun, rise = place.time, fraction - place.fraction
         if time == begun and not rise:
             return
 
         def solve_at(part: float) -> tuple[PathPoint, bool]:
             before = 1 - part
             try:
-                self._step(time - before * (time - begun), share - before * rise)
+                self._step(time - before * (time - begun), fraction - before * rise)
             except LargeError:
                 place.changed = 0.0  # the tangent is a better guess than the last step
                 raise
@@ -295,15 +296,17 @@ class TimeSteps:
         except LargeError as error:
             raise self._stopped(course, error) from error
 
-    def _step(self, time: float, share: float) -> None:
-        """Find the equilibrium at a later time (s) and share of the movement.
+    def _step(self, time: float, fraction: float) -> None:
+        """Find the equilibrium at a later time (s) and fraction of the movement.
 
         Raises:
             LargeError: if Newton's method does not converge.
         """
         place, body = self._place, self._body
-        step, change = time - place.time, share - place.share
-        if not (change or self._relaxes) or not (place.has_moved or share):  # elastic tissue that is held, or at rest
+        step, change = time - place.time, fraction - place.fraction
+        if not (change or self._relaxes) or not (
+            place.has_moved or fraction
+        ):  # elastic tissue that is held, or at rest
             place.time = time
             return
         self._body.impose(self._variables.prestress(step))
@@ -311,20 +314,20 @@ class TimeSteps:
             trial.array[:] = self._state.array
             if change and (rate := self._rate()) is not None:
                 trial.array[:] += change * rate
-            self._indentation.equilibrate(trial, share)
+            self._indentation.equilibrate(trial, fraction)
             self._before.array[:] = self._state.array
             self._state.array[:] = trial.array
         rate_of_work = self._indentation.rate
         place.work += change * (place.rate + rate_of_work) / 2
         self._variables.advance(step, *body.stresses(self._state))
-        place.time, place.share, place.rate, place.has_moved = time, share, rate_of_work, True
+        place.time, place.fraction, place.rate, place.has_moved = time, fraction, rate_of_work, True
         place.changed = change or place.changed
         if not change:
             self._before.array[:] = self._state.array
             place.changed = 0.0
 
     def _rate(self) -> FloatArray | None:
-        """Return the change of the state per share of the movement: that of the last step, or by the tangent."""
+        """Return the change of the state per fraction of the movement: that of the last step, or by the tangent."""
         if self._place.changed:
             return np.asarray((self._state.array - self._before.array) / self._place.changed)
         return self._indentation.guess(self._state)
@@ -332,9 +335,9 @@ class TimeSteps:
     def _step_error(self) -> float:
         """Return the change (N) of the modelled part's force along the first motion by steps of twice the length."""
         stress = self._variables.advance_coarse()
-        if not self._place.share:
+        if not self._place.fraction:
             return 0.0
-        return abs(self._body.force_of(stress, self._state, self._indentation.unit(self._state, self._place.share)))
+        return abs(self._body.force_of(stress, self._state, self._indentation.unit(self._state, self._place.fraction)))
 
     def _force(self) -> FloatArray:
         """Return the force (N) of the tissue on the probe, of the whole body."""
@@ -356,7 +359,7 @@ class TimeSteps:
     def _stopped(self, course: Course, why: LargeError) -> LargeError:
         """Return the error of steps that end before the end of the course."""
         place, (*_, force) = self._place, self._force()
-        reached, times = (place.share * self._depth, float(force)), (place.time, course.times[-1])
+        reached, times = (place.fraction * self._depth, float(force)), (place.time, course.times[-1])
         return ended(
             why,
             self._law,

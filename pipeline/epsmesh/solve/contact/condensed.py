@@ -70,9 +70,9 @@ class CondensedTissue:
         self._from, self._to = self.state, np.stack([forces, self.moved(forces)])
         return forces
 
-    def advance(self, share: float) -> bool:
-        """Set the state to the last one linearised plus a ``share`` of its increment."""
-        self.state = self._from + share * (self._to - self._from)
+    def advance(self, fraction: float) -> bool:
+        """Set the state to the last one linearised plus a ``fraction`` of its increment."""
+        self.state = self._from + fraction * (self._to - self._from)
         return True
 
     def moved(self, forces: FloatArray) -> FloatArray:

@@ -81,7 +81,7 @@ class Friction:
         return cls(coefficient, np.array([0.0, 0.0, -1.0]), penalty, candidates.neighbours, depth)
 
 
-def press(
+def reach_contact(
     tissue: SteppedTissue,
     tool_at: Callable[[float], PlacedTool],
     path: ContactPath,
@@ -98,18 +98,18 @@ def press(
     if start.touched is None and path.step == inf and friction is None:
         path.step = _first_step(tissue, tool_at, start.amount, depth)
 
-    def solve_at(there: float) -> tuple[ContactPathPoint, bool]:
+    def solve_at(amount: float) -> tuple[ContactPathPoint, bool]:
         nonlocal iterations
-        is_patient = friction is not None or there - path.reached <= _LARGE * depth
-        limit = _ON_THE_WAY if friction is None and there < depth else 0.0
+        is_patient = friction is not None or amount - path.reached <= _LARGE * depth
+        limit = _ON_THE_WAY if friction is None and amount < depth else 0.0
         try:
-            touched = _step(tissue, tool_at, path, there, friction, is_patient=is_patient, limit=limit)
+            touched = _step(tissue, tool_at, path, amount, friction, is_patient=is_patient, limit=limit)
         except SolveError as error:
             raise LargeError(str(error)) from error
         if friction is None or not friction.is_linear:  # small displacements go round no tool
             check_outside(tissue, touched, deepest)
         iterations += touched.iterations
-        return ContactPathPoint(there, tissue.state, touched), touched.iterations <= _EASY
+        return ContactPathPoint(amount, tissue.state, touched), touched.iterations <= _EASY
 
     try:
         follow(path, solve_at, depth)
@@ -162,7 +162,7 @@ def _end(
     path.points[-1] = ContactPathPoint(last.amount, tissue.state, touched)
 
 
-def press_with_friction(
+def reach_contact_with_friction(
     tissue: SteppedTissue,
     tool_at: Callable[[float], PlacedTool],
     path: ContactPath,
@@ -180,16 +180,16 @@ def press_with_friction(
     """
     iterations = 0
     for number in range(1, steps + 1):
-        there = depth * (number / steps) ** 2
+        amount = depth * (number / steps) ** 2
         if path.last.touched is None:
             tissue.state = path.last.state
             nothing = np.zeros(len(tissue.fixed), dtype=bool)
-            if number < steps and not first_set(tissue, tool_at(there), nothing).any():
-                path.add(ContactPathPoint(there, path.last.state))
+            if number < steps and not first_set(tissue, tool_at(amount), nothing).any():
+                path.add(ContactPathPoint(amount, path.last.state))
                 continue
         path.step = inf
         try:
-            iterations += press(tissue, tool_at, path, there, friction)
+            iterations += reach_contact(tissue, tool_at, path, amount, friction)
         except LargeError:
             if number > steps // 2:
                 raise
@@ -209,8 +209,8 @@ def friction_step(
     before = tissue.positions()
     tissue.state = guess
 
-    def gap(points: FloatArray, there: float) -> FloatArray:
-        return tool_at(there).distance(points).gap
+    def gap(points: FloatArray, amount: float) -> FloatArray:
+        return tool_at(amount).distance(points).gap
 
     references = meeting_places(gap, (before, after), (last.amount, depth), friction.advance)
     nothing = np.zeros(len(before), dtype=bool)

@@ -67,9 +67,9 @@ class Slide:
         share = np.clip(most / np.maximum(self.sizes, _TINY), 0.0, 1.0)
         return np.asarray(share[:, None, None] * across)
 
-    def towards(self, other: "Slide", share: float) -> "Slide":
-        """Return ``other`` with directions a ``share`` of the way from these: for directions that swing to and fro."""
-        middle = (1 - share) * self.directions + share * other.directions
+    def towards(self, other: "Slide", fraction: float) -> "Slide":
+        """Return ``other`` with directions a ``fraction`` of the way from these, for those that swing to and fro."""
+        middle = (1 - fraction) * self.directions + fraction * other.directions
         return Slide(other.sliding, other.sizes[:, None] * np.where(self.sliding[:, None], middle, other.directions))
 
     def following(

@@ -170,9 +170,9 @@ def continue_linear(tissue: Tissue, tool: PlacedTool, touched: ContactSolution, 
     Raises:
         SolveError: if a linear solver fails.
     """
-    place, there = _placed(tissue, tool)
-    constraint = _constraint(place, there.normal, touched.pressed, touched.active)
-    tissue.linearise(FrictionIteration(friction_step).constrain(constraint, there, touched.active))
+    place, placed = _placed(tissue, tool)
+    constraint = _constraint(place, placed.normal, touched.pressed, touched.active)
+    tissue.linearise(FrictionIteration(friction_step).constrain(constraint, placed, touched.active))
     tissue.advance(1.0)
 
 
@@ -276,9 +276,9 @@ class _InContact(Newton[ContactSolution]):
         if slope <= _NO_SLOPE * abs(tissue.energy):
             return None
 
-        def falls(share: float) -> bool:
+        def falls(fraction: float) -> bool:
             gap = tool.distance(tissue.positions()).gap
-            return is_less(tissue.energy - float(reactions @ gap), stored, share, slope)
+            return is_less(tissue.energy - float(reactions @ gap), stored, fraction, slope)
 
         return falls
 

@@ -385,6 +385,6 @@ class LinearTissue:
         self._moved, self._reactions = state.moved, np.where(active, state.reactions, 0.0)
         return self.forces()
 
-    def advance(self, share: float) -> bool:
+    def advance(self, fraction: float) -> bool:
         """Return that there is no limit: the whole increment was taken."""
         return True

@@ -39,12 +39,12 @@ def estimate_of(
     ``of_force`` are the share of F that one degree more removes, and the relative bar of F, ``of_area`` is that of the
     area besides the size of elements at its edge.
     """
-    taken, bar = of_force
+    decrement, bar = of_force
     at_edge = contact.area.bar
     return HierarchicalEstimate(
         elements,
         [],
-        decrements=np.array([[taken * contact.force / depth]]),
+        decrements=np.array([[decrement * contact.force / depth]]),
         relative=np.array([bar]),
         area_bar=at_edge + of_area,
         at_edge=at_edge,

@@ -146,8 +146,8 @@ class LinearContact:
         covered = float(candidates.areas[candidates.closed(found.active)].sum())
         if covered < _COVERED * touching:
             return found_again_bar(found_again(elements, self.obstacle_above(), found), area_bar)
-        taken, unseen = area_fixed(elements, candidates.held_facets(found.active))
-        share, unseen = taken / found.state.energy, unseen / found.state.energy
+        removed, unseen = area_fixed(elements, candidates.held_facets(found.active))
+        share, unseen = removed / found.state.energy, unseen / found.state.energy
         if self.surface.is_ended:  # the probe ends there, and the pressure is singular
             degree, element, plain = self._plug.degree, self._plug.element, plain_share(self._plug.body)
             return share, error_bar(share, degree, element, plain=plain, unseen=unseen)

@@ -76,9 +76,9 @@ class FrictionIteration:
         """Return whether nodes whose state was simplified carry little of the force, or friction no part of it."""
         if not active.any():
             return True
-        there = active & self._simple.nodes & ~self._with.neighbours.is_corner
+        simple = active & self._simple.nodes & ~self._with.neighbours.is_corner
         pressed = np.abs(self.normal)
-        share = float(pressed[there].sum()) / float(pressed[active].sum())
+        share = float(pressed[simple].sum()) / float(pressed[active].sum())
         return share <= self._with.simplified or self._with.friction * share <= _NO_PART
 
     def friction(self, place: "Placed") -> FloatArray:

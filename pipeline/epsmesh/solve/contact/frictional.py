@@ -17,7 +17,7 @@ from epsmesh.arrays import BoolArray, FloatArray, IntArray
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve.contact.active_set import ContactError
 from epsmesh.solve.contact.condensed import CondensedTissue
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, Friction, press_with_friction
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, Friction, reach_contact_with_friction
 from epsmesh.solve.contact.coulomb import Slide
 from epsmesh.solve.contact.deformed import SLACK, ContactSolution, PlacedTool
 from epsmesh.solve.contact.found import LinearContact, Rubbed
@@ -53,7 +53,7 @@ def rub(contact: LinearContact) -> LinearContact:
         compliance[np.ix_(free, free)] = body.compliance(components)
         tissue = CondensedTissue(compliance, candidates.points[nodes], ~is_free[nodes])
         heights, own = obstacle.bounds[nodes] + depth, neighbours.of(nodes)
-        both = [_press(tissue, heights, own, depth, friction, steps) for steps in (_STEPS, _STEPS // 2)]
+        both = [_contact_in_steps(tissue, heights, own, depth, friction, steps) for steps in (_STEPS, _STEPS // 2)]
         fine, coarse = (_of_all(candidates, nodes, one) for one in both)
         moved, unknowns = body.moved(fine.forces)
         gap = obstacle.bounds - moved[:, 2]
@@ -71,7 +71,7 @@ def _around(candidates: Candidates, active: BoolArray) -> BoolArray:
     return found
 
 
-def _press(
+def _contact_in_steps(
     tissue: CondensedTissue, heights: FloatArray, neighbours: Neighbours, depth: float, friction: float, steps: int
 ) -> ContactSolution:
     """Return the equilibrium at a ``depth`` (m), reached in ``steps``; infinite ``friction`` sticks.
@@ -82,17 +82,17 @@ def _press(
         ContactError: if no node touches, or a step does not settle however small it is.
     """
 
-    def tool_at(there: float) -> PlacedTool:
+    def tool_at(amount: float) -> PlacedTool:
         def distance(points: FloatArray) -> Distance:
-            return Distance.along_axis(heights - there, points - tissue.places)
+            return Distance.along_axis(heights - amount, points - tissue.places)
 
-        return PlacedTool(distance, neighbours.complete, neighbours.followers, there)
+        return PlacedTool(distance, neighbours.complete, neighbours.followers, amount)
 
     tissue.state = np.zeros_like(tissue.state)
     path = ContactPath(ContactPathPoint(0.0, tissue.state))
     of = Friction(friction, _ADVANCE, tissue.penalty, neighbours, depth, is_linear=True)
     try:
-        iterations = press_with_friction(tissue, tool_at, path, depth, of, steps)
+        iterations = reach_contact_with_friction(tissue, tool_at, path, depth, of, steps)
     except LargeError as error:
         raise ContactError(
             f"contact with friction does not settle ({error}): use smaller elements below the probe, or less friction"

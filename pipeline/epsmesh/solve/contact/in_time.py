@@ -56,8 +56,8 @@ class ContactIndentation(Indentation):
         self._start, self._last = tissue.state, ContactPathPoint(0.0, tissue.state)
         self.force, self.rate, self.area = np.zeros(3), 0.0, 0.0
 
-    def equilibrate(self, state: PETSc.Vec, share: float) -> None:
-        """Find equilibrium and contact at a share.
+    def equilibrate(self, state: PETSc.Vec, fraction: float) -> None:
+        """Find equilibrium and contact at a fraction.
 
         Raises:
             LargeError: if the loop does not converge.
@@ -68,25 +68,25 @@ class ContactIndentation(Indentation):
         if not tissue.is_sound:
             tissue.state = self._last.state
         try:
-            touched = self._touched(share)
+            touched = self._touched(fraction)
             self._check(touched)
         except LargeError:
             raise
         except SolveError as error:
             raise LargeError(str(error)) from error
-        now = ContactPathPoint(share * self._depth, tissue.state, touched)
+        now = ContactPathPoint(fraction * self._depth, tissue.state, touched)
         if self.rubs:
-            self.rubbed += self._unit * self._heat(touched, share)
+            self.rubbed += self._unit * self._heat(touched, fraction)
         self._last = now
         self._scale = max(self._scale, float(np.linalg.norm(touched.pressed)))
-        self._measure(touched, share)
+        self._measure(touched, fraction)
         state.array[:] = now.state
 
-    def _touched(self, share: float) -> ContactSolution:
+    def _touched(self, fraction: float) -> ContactSolution:
         """Return contact at a share, from the state of the tissue on."""
-        tissue, placed, last, step = self._found_on, self._placed(share), self._last, None
+        tissue, placed, last, step = self._found_on, self._placed(fraction), self._last, None
         if self._friction is not None:
-            step = friction_step(tissue, self._at, last, share * self._depth, self._friction)
+            step = friction_step(tissue, self._at, last, fraction * self._depth, self._friction)
             self._references = step.references
         active = np.zeros(len(self._places), dtype=bool) if last.touched is None else last.touched.active
         return solve_contact(tissue, placed, first_set(tissue, placed, active), step, scale=_SCALE * self._scale)
@@ -94,16 +94,16 @@ class ContactIndentation(Indentation):
     def _at(self, depth: float) -> PlacedTool:
         return self._placed(depth / self._depth)
 
-    def _heat(self, touched: ContactSolution, share: float) -> float:
+    def _heat(self, touched: ContactSolution, fraction: float) -> float:
         """Return the work of friction since the last point: the mean forces along the tool, times the slips there."""
         positions, before = self._found_on.positions(), self._last.touched
-        place = Placed(positions, self._placed(share).distance(positions).normal)
+        place = Placed(positions, self._placed(fraction).distance(positions).normal)
         forces = touched.forces if before is None else touched.forces + before.forces
         return -float((forces * place.slips(self._references)).sum()) / 2
 
     @abstractmethod
-    def _placed(self, share: float) -> PlacedTool:
-        """Return the tool at a share."""
+    def _placed(self, fraction: float) -> PlacedTool:
+        """Return the tool at a fraction."""
 
     @abstractmethod
     def _check(self, touched: ContactSolution) -> None:
@@ -114,7 +114,7 @@ class ContactIndentation(Indentation):
         """
 
     @abstractmethod
-    def _measure(self, touched: ContactSolution, share: float) -> None:
+    def _measure(self, touched: ContactSolution, fraction: float) -> None:
         """Set force, rate of work and area.
 
         Raises:
@@ -125,7 +125,7 @@ class ContactIndentation(Indentation):
         """Return nothing: the tangent does not know which nodes the tool will touch."""
         return
 
-    def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
+    def unit(self, state: PETSc.Vec, fraction: float) -> FloatArray:
         """Return the displacement, scaled such that the forces at the nodes do the work of the force in it."""
         tissue, touched = self._found_on, self._last.touched
         moved = 0.0 if touched is None else float((touched.forces * (tissue.positions() - self._places)).sum())
@@ -165,13 +165,13 @@ class ToolIndentation(ContactIndentation):
         """Return the sagged state; None without loads."""
         return self._start if self._is_loaded else None
 
-    def _placed(self, share: float) -> PlacedTool:
-        return replace(placed_tool(self._tissue, self._tool, share * self._depth), depth=self._depth)
+    def _placed(self, fraction: float) -> PlacedTool:
+        return replace(placed_tool(self._tissue, self._tool, fraction * self._depth), depth=self._depth)
 
     def _check(self, touched: ContactSolution) -> None:
         check_outside(self._tissue, touched, self._depth)
 
-    def _measure(self, touched: ContactSolution, share: float) -> None:
+    def _measure(self, touched: ContactSolution, fraction: float) -> None:
         tissue = self._tissue
         check_edge(self._tool, tissue.candidates, touched.active)
         self.force = touched.forces.sum(axis=0)

@@ -29,8 +29,8 @@ from epsmesh.solve.contact.contact_steps import (
     ContactPathPoint,
     Friction,
     check_outside,
-    press,
-    press_with_friction,
+    reach_contact,
+    reach_contact_with_friction,
 )
 from epsmesh.solve.contact.corrections import Corrections
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
@@ -106,7 +106,7 @@ class LargeContact:
         if self._path is None:
             self._path = ContactPath(ContactPathPoint(0.0, self._sagged.state))
         try:
-            iterations = press(body, lambda there: placed_tool(body, tool, there), self._path, depth)
+            iterations = reach_contact(body, lambda amount: placed_tool(body, tool, amount), self._path, depth)
         except LargeError as error:
             raise stopped(body, self._path, depth, error) from error
         touched = self._path.last.touched
@@ -124,8 +124,8 @@ class LargeContact:
         for steps in (self.STEPS // 2, self.STEPS):
             path = ContactPath(ContactPathPoint(0.0, smooth.sagged.state))
             try:
-                iterations += press_with_friction(
-                    body, lambda there: placed_tool(body, tool, there), path, depth, friction, steps
+                iterations += reach_contact_with_friction(
+                    body, lambda amount: placed_tool(body, tool, amount), path, depth, friction, steps
                 )
             except LargeError as error:
                 raise stopped(body, path, depth, error, self._tool.friction) from error
@@ -254,11 +254,11 @@ class LargeContactSolution:
         finer, here = self._found_again(movement.loads, stack), self.surface_contact
         share, at_edge = 1 - finer.force / self.force, here.area.bar
         least = AT_EDGE_LARGE[self.body.elements.degree]
-        taken, bar = found_again_bar(share, at_edge, least, at_end=self._at_sharp_end())
+        decrement, bar = found_again_bar(share, at_edge, least, at_end=self._at_sharp_end())
         # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue
         # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
         of_area = nan if here.is_ended else bar + abs(finer.surface_contact.whole_area / here.whole_area - 1)
-        return estimate_of(finer.body.elements, here, self.depth, (taken, bar), of_area)
+        return estimate_of(finer.body.elements, here, self.depth, (decrement, bar), of_area)
 
     @stage("contact sets")
     def _found_again(self, loads: Loads | None, stack: ExitStack) -> "LargeContactSolution":
@@ -296,16 +296,16 @@ class LargeContactSolution:
             return placed_tool(body, tool, depth)
 
         tool = sagged.placed(self.tool, body)
-        there = tool_at(self.depth)
+        placed = tool_at(self.depth)
         active = self.body.candidates.raised(self.touched.active, body.candidates)
         if body.is_sound:
             with suppress(SolveError):
-                first = first_set(body, there, active)
-                touched = solve_contact(body, there, first, is_patient=False, limit=_FOUND_AGAIN)
+                first = first_set(body, placed, active)
+                touched = solve_contact(body, placed, first, is_patient=False, limit=_FOUND_AGAIN)
                 check_outside(body, touched, self.depth)
                 return touched
         path = ContactPath(ContactPathPoint(0.0, sagged.state))
-        press(body, tool_at, path, self.depth)
+        reach_contact(body, tool_at, path, self.depth)
         assert path.last.touched is not None
         return path.last.touched
 

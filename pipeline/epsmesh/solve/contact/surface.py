@@ -49,8 +49,8 @@ class FacetNodes:
 
     def distances(self, other: "FacetNodes") -> FloatArray:
         """Return the distances (k, l) to the nodes of another degree, in edge lengths of an equilateral facet."""
-        here, there = self.corners @ _EQUILATERAL, other.corners @ _EQUILATERAL
-        return np.asarray(np.linalg.norm(here[:, None] - there[None], axis=2))
+        own, others = self.corners @ _EQUILATERAL, other.corners @ _EQUILATERAL
+        return np.asarray(np.linalg.norm(own[:, None] - others[None], axis=2))
 
     def values(self, points: FloatArray) -> FloatArray:
         """Return the shape functions at points (q, 3) in barycentric coordinates, (q, k)."""
@@ -126,9 +126,9 @@ class Neighbours:
     def mean(self, vectors: FloatArray, chosen: BoolArray) -> FloatArray:
         """Return ``vectors`` (n, t), at corners the sum of those of the ``chosen`` neighbours, zero if they cancel."""
         corner, beside = self.beside.T
-        there = np.where(chosen[beside, None], vectors[beside], 0.0)
-        total, size = np.zeros_like(vectors), np.bincount(corner, np.linalg.norm(there, axis=1), len(vectors))
-        np.add.at(total, corner, there)
+        kept = np.where(chosen[beside, None], vectors[beside], 0.0)
+        total, size = np.zeros_like(vectors), np.bincount(corner, np.linalg.norm(kept, axis=1), len(vectors))
+        np.add.at(total, corner, kept)
         total[np.linalg.norm(total, axis=1) <= _CANCELLED * size] = 0.0
         return np.where(self.is_corner[:, None], total, vectors)
 

@@ -104,12 +104,12 @@ class Sweep:
         others = [known for known in self._known if known.depth != depth]
         self._known = [*others, _Known(depth, found, unknowns)][-_REMEMBERED:]
 
-    def keep_bar(self, depth: float, taken: float, share: float, far: FarField | None = None) -> None:
+    def keep_bar(self, depth: float, decrement: float, share: float, far: FarField | None = None) -> None:
         """Remember two shares at a ``depth`` (m): of the energy that one degree more removes, and of the force's bar.
 
         ``far`` is the far field on the cut face, or None; bars are not shared between different far fields.
         """
-        self._bars.setdefault(far, {})[depth] = taken, share
+        self._bars.setdefault(far, {})[depth] = decrement, share
 
     def bar(self, depth: float, far: FarField | None = None) -> tuple[float, float] | None:
         """Return both shares from two neighbouring depths with known bars; only on a condensed surface."""
@@ -120,6 +120,6 @@ class Sweep:
         ends = max(below), min(above)
         if ends[1] > NEAR * ends[0]:
             return None
-        taken, share = max((bars[end] for end in ends), key=lambda pair: pair[1])
+        decrement, share = max((bars[end] for end in ends), key=lambda pair: pair[1])
         factor = _SAFE if ends[0] < ends[1] else 1.0
-        return factor * taken, factor * share
+        return factor * decrement, factor * share

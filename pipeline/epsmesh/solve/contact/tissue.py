@@ -130,9 +130,9 @@ class DeformedBody:
         self.iterations += 1
         return self.forces() + change + np.einsum("nij,nj->ni", constraint.turning, moved)
 
-    def advance(self, share: float) -> bool:
-        """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
-        self._now.array[:] = self._from + share * self._change.array
+    def advance(self, fraction: float) -> bool:
+        """Set the state to the last one linearised plus a ``fraction`` of its increment; return whether J > 0."""
+        self._now.array[:] = self._from + fraction * self._change.array
         self._is_current, self._energy = False, None
         return self.is_sound
 

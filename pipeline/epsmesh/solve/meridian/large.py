@@ -62,7 +62,7 @@ class LargeSystem(System):
         on_probe, on_support = (2 * pi * float(residual[dofs].sum()) for dofs in (self.probe, self.support))
         return on_probe, on_support, 2 * pi * self.forms.energy(state)
 
-    def press(self, depth: float, shortest: float = SHORTEST) -> tuple[FloatArray, FloatArray]:
+    def reach(self, depth: float, shortest: float = SHORTEST) -> tuple[FloatArray, FloatArray]:
         """Return the state at a ``depth``, and the path to it: depth, force and energy of each step.
 
         The ``shortest`` step is in units of the depth.
@@ -72,11 +72,11 @@ class LargeSystem(System):
         """
         path, work = Path(PathPoint(0.0, np.zeros(self.forms.dofs))), [(0.0, 0.0, 0.0)]
 
-        def solve_at(there: float) -> tuple[PathPoint, bool]:
-            state = self.equilibrate(path.last.state, there)
+        def solve_at(amount: float) -> tuple[PathPoint, bool]:
+            state = self.equilibrate(path.last.state, amount)
             on_probe, _, energy = self.forces(state)
-            work.append((there, -on_probe, energy))
-            return PathPoint(there, state), True
+            work.append((amount, -on_probe, energy))
+            return PathPoint(amount, state), True
 
         try:
             follow(path, solve_at, depth, fewest=_FEWEST, shortest=shortest)
@@ -117,11 +117,11 @@ class MeridianIndentation(Indentation):
         self.body = RelaxingHalfPlane.of(system.forms, law, unit)
         self.force, self.rate = np.zeros(3), 0.0
 
-    def equilibrate(self, state: PETSc.Vec, share: float) -> None:
-        """Find the equilibrium at a share."""
+    def equilibrate(self, state: PETSc.Vec, fraction: float) -> None:
+        """Find the equilibrium at a fraction."""
         system, before = self._system, self._system.iterations
         try:
-            state.array[:] = system.equilibrate(state.array_r.copy(), share * self._depth)
+            state.array[:] = system.equilibrate(state.array_r.copy(), fraction * self._depth)
         finally:
             self.body.iterations += system.iterations - before
         work = self.body.unit * float(system.forms.residual(state.array_r)[system.probe].sum())
@@ -131,9 +131,9 @@ class MeridianIndentation(Indentation):
         """Return nothing: Newton's first step is the guess by the tangent."""
         return
 
-    def unit(self, state: PETSc.Vec, share: float) -> FloatArray:
+    def unit(self, state: PETSc.Vec, fraction: float) -> FloatArray:
         """Return the displacement per metre, as a secant."""
-        return np.asarray(state.array_r / (share * self._depth * self._unit))
+        return np.asarray(state.array_r / (fraction * self._depth * self._unit))
 
 
 class LargeSolver(MeridianSolver):
@@ -183,7 +183,7 @@ class LargeMeridian(LargeSolver):
                 LargeSystem(meshes, degree, law, bonded=self._bonded) for degree in (self._degree - 1, self._degree)
             )
         try:
-            state, path = coarse.press(deep, SHORTEST if before is None else _SHORTEST_OF_FINER)
+            state, path = coarse.reach(deep, SHORTEST if before is None else _SHORTEST_OF_FINER)
         except LargeError as stop:
             raise stopped(stop, arrays, law, depth, is_found=False) from stop
         check_path(path, _ROUNDING * float(np.ptp(arrays.points, axis=0).prod()))

@@ -157,15 +157,15 @@ class LargeMeridianContact(LargeSolver):
         """
         coarse, fine, bars = at(self._degree - 1), at(self._degree), np.zeros(4)
         if self._tool.friction:
-            rough = coarse.pressed_with_friction(depth, steps // 2).results
-            coarse = coarse.pressed_with_friction(depth, steps)
-            fine, bars = fine.pressed_with_friction(depth, steps), np.abs(rough - coarse.results)
+            rough = coarse.at_depth_with_friction(depth, steps // 2).results
+            coarse = coarse.at_depth_with_friction(depth, steps)
+            fine, bars = fine.at_depth_with_friction(depth, steps), np.abs(rough - coarse.results)
         else:
-            coarse = coarse.pressed(depth)
+            coarse = coarse.at_depth(depth)
             try:
                 fine = fine.raised(coarse, depth)
             except LargeError:  # its own path tells how far it comes
-                fine = fine.pressed(depth)
+                fine = fine.at_depth(depth)
         return fine, bars + _BETWEEN_DEGREES * np.abs(coarse.results - fine.results)
 
 
@@ -179,13 +179,13 @@ class RoundToolIndentation(ContactIndentation):
         self._touch = at_rest
         super().__init__(tissue, tissue.places, self.body.unit, depth, at_rest.friction_to(depth))
 
-    def _placed(self, share: float) -> PlacedTool:
-        return replace(self._touch.placed(share * self._depth), depth=self._depth)
+    def _placed(self, fraction: float) -> PlacedTool:
+        return replace(self._touch.placed(fraction * self._depth), depth=self._depth)
 
     def _check(self, touched: ContactSolution) -> None:
         check_support(self._touch.tissue, touched)
 
-    def _measure(self, touched: ContactSolution, share: float) -> None:
+    def _measure(self, touched: ContactSolution, fraction: float) -> None:
         found, is_touched = replace(self._touch, touched=touched), bool(touched.active.any())
         self.body.iterations = self._touch.tissue.iterations
         of_force = self.body.unit / self._touch.unit

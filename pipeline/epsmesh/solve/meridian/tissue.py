@@ -73,7 +73,7 @@ class MeridianTissue:
             tangent = self.system.forms.stiffness(self._now)
             turn, turned = None, tangent
             if constraint.is_turned:
-                turn = self._blocks(constraint.frames) + sp.diags(self._apart())
+                turn = self._blocks(constraint.frames) + sp.diags(self._not_in_contact())
                 turned = (turn.T @ (tangent - self._blocks(constraint.turning)) @ turn).tocsr()
         change: FloatArray = np.zeros_like(self._now)
         held = dofs[constraint.held]
@@ -90,9 +90,9 @@ class MeridianTissue:
         self.iterations += 1
         return np.where(self.fixed, 0.0, (self.residual() + tangent @ self._change)[dofs])
 
-    def advance(self, share: float) -> bool:
-        """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
-        self.state = self._from + share * self._change
+    def advance(self, fraction: float) -> bool:
+        """Set the state to the last one linearised plus a ``fraction`` of its increment; return whether J > 0."""
+        self.state = self._from + fraction * self._change
         return self.is_sound
 
     @property
@@ -113,11 +113,11 @@ class MeridianTissue:
         size = len(self._now)
         return sp.csr_matrix((blocks.reshape(-1, 4).ravel(), (rows.ravel(), columns.ravel())), shape=(size, size))
 
-    def _apart(self) -> FloatArray:
+    def _not_in_contact(self) -> FloatArray:
         """Return 1 at all dofs but those of the nodes."""
-        apart = np.ones(len(self._now))
-        apart[self._dofs] = 0.0
-        return apart
+        free = np.ones(len(self._now))
+        free[self._dofs] = 0.0
+        return free
 
 
 class HeldNodes:
@@ -167,6 +167,6 @@ class HeldNodes:
         values = self._todo
         self._tissue.linearise(Constraint(self._frames, self._held, values, self._nothing, np.zeros_like(values)))
 
-    def advance(self, share: float) -> bool:
-        """Set the state to the last one linearised plus a ``share`` of its increment; return whether J > 0."""
-        return self._tissue.advance(share)
+    def advance(self, fraction: float) -> bool:
+        """Set the state to the last one linearised plus a ``fraction`` of its increment; return whether J > 0."""
+        return self._tissue.advance(fraction)

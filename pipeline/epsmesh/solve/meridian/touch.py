@@ -20,7 +20,13 @@ from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.contact.checks import check_energy, check_support, force_of
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, Friction, press, press_with_friction
+from epsmesh.solve.contact.contact_steps import (
+    ContactPath,
+    ContactPathPoint,
+    Friction,
+    reach_contact,
+    reach_contact_with_friction,
+)
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
 from epsmesh.solve.contact.surface import Neighbours
 from epsmesh.solve.meridian.forms import Meshes
@@ -70,25 +76,25 @@ class MeridianTouch:
         tissue = MeridianTissue(system, dofs[order], places[order])
         return MeridianTouch(tissue, tool, law, arrays.unit, wide**2 * high / 2)
 
-    def pressed(self, depth: float) -> "MeridianTouch":
+    def at_depth(self, depth: float) -> "MeridianTouch":
         """Return the contact without friction at the end of the load path to a ``depth`` (m).
 
         Raises:
             LargeError: if the path ends before; ``reached`` are the depth and the force there.
         """
-        return self._at_end(lambda path, there: press(self.tissue, self.placed, path, there), depth)
+        return self._at_end(lambda path, amount: reach_contact(self.tissue, self.placed, path, amount), depth)
 
     def along(self, depths: Sequence[float]) -> Iterator["MeridianTouch"]:
         """Yield the contact without friction at rising ``depths`` (m) of one load path, as far as it goes."""
         path = ContactPath(ContactPathPoint(0.0, np.zeros_like(self.tissue.state)))
         for depth in depths:
             try:
-                press(self.tissue, self.placed, path, depth / self.unit)
+                reach_contact(self.tissue, self.placed, path, depth / self.unit)
             except LargeError:
                 return
             yield replace(self, touched=path.last.touched)
 
-    def pressed_with_friction(self, depth: float, steps: int) -> "MeridianTouch":
+    def at_depth_with_friction(self, depth: float, steps: int) -> "MeridianTouch":
         """Return the contact with friction at the end of a load path of at least so many ``steps`` to a ``depth`` (m).
 
         Raises:
@@ -96,9 +102,11 @@ class MeridianTouch:
         """
         friction = self.friction_to(depth / self.unit)
         assert friction is not None
-        return self._at_end(
-            lambda path, there: press_with_friction(self.tissue, self.placed, path, there, friction, steps), depth
-        )
+
+        def reach(path: ContactPath, amount: float) -> int:
+            return reach_contact_with_friction(self.tissue, self.placed, path, amount, friction, steps)
+
+        return self._at_end(reach, depth)
 
     def _at_end(self, follow: Callable[[ContactPath, float], int], depth: float) -> "MeridianTouch":
         path = ContactPath(ContactPathPoint(0.0, np.zeros_like(self.tissue.state)))
@@ -106,8 +114,8 @@ class MeridianTouch:
         try:
             follow(path, depth / self.unit)
         except LargeError as error:
-            there = replace(self, touched=path.last.touched)
-            raise LargeError(str(error), (path.reached, there.force) if path.last.touched else None) from error
+            last = replace(self, touched=path.last.touched)
+            raise LargeError(str(error), (path.reached, last.force) if path.last.touched else None) from error
         return replace(self, touched=path.last.touched)
 
     def raised(self, coarse: "MeridianTouch", depth: float) -> "MeridianTouch":

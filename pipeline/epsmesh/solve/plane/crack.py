@@ -17,7 +17,7 @@ from epsmesh.mesh.cracked import ACROSS, AHEAD, FACE, CrackGrading, cracked_quar
 from epsmesh.mesh.meridian import meridian_mesh
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, press
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, reach_contact
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool
 from epsmesh.solve.meridian.forms import MeridianForms
 from epsmesh.solve.meridian.system import FreeSystem
@@ -93,7 +93,7 @@ def section(law: MaterialLaw, ratio: float) -> tuple[FloatArray, FloatArray]:
 def _open(tissue: MeridianTissue, path: ContactPath, ratio: float) -> None:
     """Continue a path of radii to a ``ratio``; from rest, the first states are those of a lens."""
     for share in _LENS if path.last.touched is None else (1.0,):
-        press(tissue, lambda radius: _cylinder(tissue, radius), path, share * ratio)
+        reach_contact(tissue, lambda radius: _cylinder(tissue, radius), path, share * ratio)
 
 
 class _OpenCrack(NamedTuple):

@@ -17,7 +17,7 @@ from epsmesh.mesh.hole import LEVEL, slice_round_hole
 from epsmesh.mesh.meridian import meridian_mesh
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
-from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, press
+from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, reach_contact
 from epsmesh.solve.contact.deformed import PlacedTool
 from epsmesh.solve.meridian.forms import MeridianForms
 from epsmesh.solve.meridian.system import FreeSystem
@@ -67,7 +67,7 @@ def open_hole(law: MaterialLaw, mesh: HoleMesh, is_enough: Callable[[Hole], bool
     growth = _FIRST
     while len(found) < 2 or not is_enough(_hole(found)):
         try:
-            press(tissue, lambda wider: _cylinder(tissue, wider), path, np.sqrt(1 + growth) - 1)
+            reach_contact(tissue, lambda wider: _cylinder(tissue, wider), path, np.sqrt(1 + growth) - 1)
         except SolveError as error:
             raise SolveError(f"a hole that is opened to {np.sqrt(1 + growth):.3g} times its radius: {error}") from error
         tissue.state, touched = path.last.state, path.last.touched
@@ -97,7 +97,7 @@ def section(law: MaterialLaw, across: float) -> tuple[FloatArray, FloatArray]:
     path = ContactPath(ContactPathPoint(0.0, np.zeros_like(tissue.state)))
     steps = max(round(np.log((across**2 - 1) / _FIRST) / np.log(_FACTOR)), 1)
     for growth in np.geomspace(_FIRST, across**2 - 1, steps + 1):
-        press(tissue, lambda wider: _cylinder(tissue, wider), path, np.sqrt(1 + growth) - 1)
+        reach_contact(tissue, lambda wider: _cylinder(tissue, wider), path, np.sqrt(1 + growth) - 1)
     dofs, places = tissue.system.forms.on(LEVEL)
     radii, first = np.unique(places[:, 0].round(9), return_index=True)
     moved = path.last.state[dofs[first, 0]]

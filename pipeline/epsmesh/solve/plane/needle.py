@@ -44,8 +44,8 @@ class NeedleSolver(MeridianSolver):
         coarse, fine = self._cuts(law, self._toughness / (law.lame_mu[0] * self._radius))
         check_balance(max(coarse.balance, fine.balance))
         round_off = _ROUND_OFF * fine.balance
-        error, touched = max(_apart(coarse[:3], fine[:3])) + round_off, fine.touched * self._radius * depth
-        of_touched = _apart(coarse[3:4], fine[3:4])[0] + round_off
+        error, touched = max(_differences(coarse[:3], fine[:3])) + round_off, fine.touched * self._radius * depth
+        of_touched = _differences(coarse[3:4], fine[3:4])[0] + round_off
         # Per length, forces are in units of μ R, energies of μ R².
         share, along = depth / self._radius, law.lame_mu[0] * self._radius * depth * fine.pressure
         return Answer(
@@ -72,7 +72,7 @@ class NeedleSolver(MeridianSolver):
         )
 
 
-def _apart(coarse: Sequence[float], fine: Sequence[float]) -> list[float]:
+def _differences(coarse: Sequence[float], fine: Sequence[float]) -> list[float]:
     return [abs(a / b - 1) for a, b in zip(coarse, fine, strict=True)]
 
 

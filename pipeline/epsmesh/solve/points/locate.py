@@ -105,8 +105,8 @@ class Locator:
         left = np.full(len(points), np.inf)
         todo = np.arange(len(points))
         for _ in range(_MOST):
-            there, jacobian = self._map(cells[todo], at[todo])
-            rest = points[todo] - there
+            mapped, jacobian = self._map(cells[todo], at[todo])
+            rest = points[todo] - mapped
             left[todo] = np.linalg.norm(rest, axis=1) / self._sizes[cells[todo]]
             keep = left[todo] > _LEFT
             todo, rest, jacobian = todo[keep], rest[keep], jacobian[keep]
