@@ -131,7 +131,8 @@ def _inside(found: Mapping[str, NDArray[Any]]) -> tuple[NDArray[np.float32], NDA
     if "inside_points" not in found:
         return None
     points, triangles = found["inside_points"], found.get("inside_triangles", np.empty(0))
-    whole = points.ndim == triangles.ndim == 2 and points.shape[1] == triangles.shape[1] == 3
-    if not whole or not np.isfinite(points).all() or triangles.min() < 0 or triangles.max() >= len(points):
+    is_whole = points.ndim == triangles.ndim == 2 and points.shape[1] == triangles.shape[1] == 3 and triangles.size
+    is_whole = is_whole and np.isfinite(points).all() and np.issubdtype(triangles.dtype, np.integer)
+    if not is_whole or triangles.min() < 0 or triangles.max() >= len(points):
         raise ModelError("inside_points or inside_triangles has impossible numbers: the file is damaged")
     return points.astype(np.float32), triangles.astype(np.int32)
