@@ -130,7 +130,7 @@ def test_springs_replace_a_support(found):
 
 def test_what_nothing_holds_is_refused(found):
     assert "nothing holds the body: fix a face, or add [[load.roller]] or [[load.spring]]" in found["floats"]
-    assert "nothing of the body is fixed, and the terms of [load] let it move along" in found["rolls"]
+    assert "nothing of the body is fixed, and the terms that act on it let it move along" in found["rolls"]
 
 
 def test_pairs_that_it_and_all_terms_exclude_are_refused(found):

@@ -15,7 +15,6 @@ from epsmesh.run.problem import tool_at
 from epsmesh.script.given import (
     body_of,
     check_apart,
-    check_held,
     check_place,
     element_of,
     parameters,
@@ -104,8 +103,6 @@ class Problem:
             check_apart(self.body)
         else:
             check_place(self.body, tool, at)
-        if "fixed" not in groups:
-            check_held(self._energies, self.body)
 
     @property
     def conditions(self) -> Conditions:
@@ -139,7 +136,7 @@ class Problem:
 
         Raises:
             ValueError: if the depth is not positive.
-            SolveError: if there is no equilibrium, the solver does not converge, or the solution fails a check.
+            SolveError: if nothing holds the body, no equilibrium is found, or the solution fails a check.
         """
         if not depth > 0:
             raise ValueError(f"depth = {depth}: must be a positive number of metres")

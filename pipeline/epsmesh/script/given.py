@@ -1,12 +1,10 @@
 """What a problem is given, and whether it can work: mesh, groups, laws, tool and supports, told before a solve."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
 
 import numpy as np
-import ufl
-from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 from pydantic import ValidationError
@@ -18,7 +16,6 @@ from epsmesh.scene.model import FIXED, FREE, MIRROR, PROBE
 from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.registry import PROBES, specialised
-from epsmesh.solve.compiled import general_form, vector_space
 from epsmesh.solve.laws import LAWS
 from epsmesh.solve.loads import boundary_of
 from epsmesh.solve.physics import MaterialLaw, Parameters
@@ -54,8 +51,6 @@ _OF_STUDIES = frozenset(
 _ALONG, _ABOVE = 20, 2e-3
 # The area of the facets of a flat tool with a sharp edge, in units of its own: they are the footprint, and a polygon.
 _LEAST_AREA, _MOST_AREA = 0.8, 1.0 + 1e-6
-# A rigid motion that changes the energy by less than this share of what the stiffest one does is free.
-_FREE_MOTION = 1e-9
 
 
 def probe_of(tool: Mapping[str, Any], depth: float) -> Probe:
@@ -134,43 +129,6 @@ def check_apart(body: BodyMesh) -> None:
             f'groups "tool" and "fixed": both have the node at ({x:.4g}, {y:.4g}, {z:.4g}) m: '
             "leave free facets between them"
         )
-
-
-def check_held(terms: Sequence[Callable[[Any], Any]], body: BodyMesh) -> None:
-    """Check that energies, functions of the displacement, hold a body without a support; collective.
-
-    At rest, tissue does not resist rigid motions. Planes of symmetry do.
-
-    Raises:
-        ValueError: if a rigid motion is free.
-    """
-    space = vector_space(body.mesh, 1)
-    u, first, other = (fem.Function(space) for _ in range(3))
-    curvature = sum(ufl.derivative(ufl.derivative(energy(u), u, first), u, other) for energy in terms)
-    curvature, extent = ufl.algorithms.expand_derivatives(curvature), _extent(body.mesh)
-    motions = [number for number in range(6) if _is_symmetric(number, body.mirrored)]
-
-    def set_to(function: Any, number: int) -> None:
-        axis, is_turn = divmod(number, 2)
-        unit = np.eye(3)[axis]
-        function.interpolate(lambda x: (np.cross(unit, x.T / extent) if is_turn else 0 * x.T + unit).T)
-
-    energies = np.zeros((len(motions), len(motions)))
-    if not curvature.empty():
-        form = general_form(curvature)
-        for row, column in np.ndindex(energies.shape):
-            set_to(first, motions[row])
-            set_to(other, motions[column])
-            energies[row, column] = body.comm.allreduce(fem.assemble_scalar(form))
-    stiffness = np.linalg.eigvalsh((energies + energies.T) / 2)
-    if not stiffness[0] > _FREE_MOTION * stiffness[-1]:
-        raise ValueError('groups: without "fixed", terms must hold the body against all rigid motions; these do not')
-
-
-def _is_symmetric(motion: int, mirrored: Sequence[int]) -> bool:
-    """Return whether planes normal to the axes ``mirrored`` leave a rigid motion: translations and turns by turns."""
-    axis, is_turn = divmod(motion, 2)
-    return all((axis == normal) == bool(is_turn) for normal in mirrored)
 
 
 def parameters(table: Mapping[str, Any]) -> Parameters:

@@ -211,7 +211,7 @@ def check_hold(space: Any) -> None:
     if not values[0] > _FREE * abs(values[-1]):
         free = [*motions][int(np.abs(vectors[:, 0]).argmax())]
         raise SolveError(
-            f"nothing of the body is fixed, and the terms of [load] let it {free}: fix a face, or add a term that "
+            f"nothing of the body is fixed, and the terms that act on it let it {free}: fix a face, or add a term that "
             "prevents it"
         )
 
