@@ -354,7 +354,7 @@ def test_a_word_of_other_programs_has_a_sentence_that_says_what_to_write(word):
 
 
 def test_missing_file():
-    with pytest.raises(StudyError, match=r"nowhere\.toml: file: No such file"):
+    with pytest.raises(StudyError, match=r"nowhere\.toml: No such file"):
         read_study("nowhere.toml")
 
 

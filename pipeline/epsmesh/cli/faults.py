@@ -57,7 +57,14 @@ def of_unwritten(problem: OSError, path: str | Path | None = None) -> Fault:
 def of_study(wrong: "StudyError", hint: str = "") -> list[Fault]:
     """Return the errors of a study file, one for each problem; ``hint`` is appended to each message."""
     return [
-        Fault(f"{printable(wrong.file)}: {one}{hint}", wrong.file, one.key, one.value, one.allowed, one.howto or None)
+        Fault(
+            f"{printable(wrong.file)}: {one}{hint}",
+            wrong.file,
+            one.key or None,
+            one.value,
+            one.allowed,
+            one.howto or None,
+        )
         for one in wrong.problems
     ]
 

@@ -31,14 +31,12 @@ _PAGES = {
 }
 # The page about all keys.
 _ALL = "guide/study"
-# No page helps to find a file.
-_NONE = ("file",)
 
 
 def page_of(key: str) -> str:
     """Return the page about a ``key`` of a study file, as a path in the project's folder."""
     plain = re.sub(r"\[\d*\]", "", key.partition(":")[0]).strip("[]")
-    if plain in _NONE:
+    if not plain:
         return ""
     page = _first(plain, _PAGES) or next(
         (_first(plain, one.pages) for one in extensions.sections_of([plain.partition(".")[0]])), ""

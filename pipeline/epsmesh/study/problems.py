@@ -43,7 +43,8 @@ class Problem:
     def __str__(self) -> str:
         found = "" if self.found is None else f" = {shortened(_toml(self.found))}"
         names = ", ".join(f'{section} "{name}"' for section, name in self.tables)
-        return printable(f"{shortened(self.key)}{found}: {self.allowed}{f' ({shortened(names)})' if names else ''}")
+        key = f"{shortened(self.key)}{found}: " if self.key else ""  # else it is the whole file
+        return printable(f"{key}{self.allowed}{f' ({shortened(names)})' if names else ''}")
 
     @property
     def value(self) -> Any:

@@ -35,23 +35,23 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
     except (OSError, ValueError) as error:  # a name with a NUL is a ValueError
-        raise _refused(str(path), "file", getattr(error, "strerror", None) or str(error)) from None
+        raise _refused(str(path), "", getattr(error, "strerror", None) or str(error)) from None
     if why := why_no_study(path):
-        raise _refused(str(path), "file", why)
+        raise _refused(str(path), "", why)
     _check_size(len(data), str(path))
     try:
         text = data.decode("utf-8-sig")  # some editors begin a file with the mark of its encoding
     except UnicodeDecodeError as error:
         if path.suffix != ".toml":
-            raise _refused(str(path), "file", _NO_STUDY) from None
-        raise _refused(str(path), "file", f"is not UTF-8 text: {error}") from None
+            raise _refused(str(path), "", _NO_STUDY) from None
+        raise _refused(str(path), "", f"is not UTF-8 text: {error}") from None
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     try:
         return text, toml_of(text, str(path))
     except StudyError:
         if path.suffix in (".toml", ""):
             raise
-        raise _refused(str(path), "file", _NO_STUDY) from None
+        raise _refused(str(path), "", _NO_STUDY) from None
 
 
 def toml_of(text: str, file: str) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def toml_of(text: str, file: str) -> dict[str, Any]:
 
 def _check_size(size: int, file: str) -> None:
     if size > _MOST_BYTES:
-        raise _refused(file, "file", f"is larger than {_MOST_BYTES / 1e6:g} MB: this is no study")
+        raise _refused(file, "", f"is larger than {_MOST_BYTES / 1e6:g} MB: this is no study")
 
 
 def _refused(file: str, what: str, why: str) -> StudyError:

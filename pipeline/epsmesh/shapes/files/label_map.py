@@ -71,7 +71,7 @@ class LabelMap:
                 raise SurfaceError(f"`{label}` is the name of labels {several}: give the number")
         if not self.names:
             raise SurfaceError(
-                f'names no labels, and the study has label = "{label}": give the number, one of '
+                f'names no labels, and asked for is label = "{label}": give the number, one of '
                 f'{_listed(self.labels)}, or `names`, such as names = "labels.txt"'
             )
         there = [self.names[number] for number in self.labels if number in self.names]
