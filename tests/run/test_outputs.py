@@ -116,6 +116,30 @@ def test_what_has_no_bar_or_no_value_is_told_and_the_force_is_kept(tmp_path):
     assert 0 < found["energy_of_tissue_error"] < 0.1 * found["energy_of_tissue"]
 
 
+MEAN = """
+import numpy as np
+import ufl
+from dolfinx import fem
+
+
+def mean(solution):
+    dx = ufl.dx(solution.mesh, metadata={"quadrature_degree": 6})
+    one = fem.Constant(solution.mesh, np.float64(1.0))
+    moved, volume = (fem.assemble_scalar(fem.form(each * dx)) for each in (solution.displacement[2], one))
+    return moved / volume
+"""
+
+
+def test_a_mean_is_the_integral_over_the_volume(tmp_path):
+    (tmp_path / "outputs.py").write_text(MEAN)
+    outputs = [
+        {"name": "own", "function": "outputs.py:mean", "unit": "m"},
+        {"name": "mean", "region": "body", "of": "displacement_z", "reduce": "mean"},
+    ]
+    (record,) = records(outputs, file=tmp_path / "study.toml")
+    assert record.largest["mean"] == pytest.approx(record.largest["own"], rel=1e-6)
+
+
 def test_dataset_has_the_outputs_and_a_changed_function_is_computed_again(tmp_path):
     (tmp_path / "outputs.py").write_text(CODE)
     outputs = [OUTPUTS[0], {"name": "energy_of_tissue", "function": "outputs.py:energy", "unit": "J"}]
