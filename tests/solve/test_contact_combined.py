@@ -103,7 +103,11 @@ def test_depths_without_loads_have_their_own_bars_beside_loads():
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("changes", [{"load": GRAVITY, "material": TISSUE}, {"mesh": BALL}], ids=["loads", "far field"])
+@pytest.mark.parametrize(
+    "changes",
+    [{"load": GRAVITY, "material": TISSUE}, {"mesh": BALL}, {"mesh": BALL, "probe": SPHERE | {"friction": 0.3}}],
+    ids=["loads", "far field", "far field and friction"],
+)
 def test_ranks_agree(changes):
     together, alone = (record(comm, **changes) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
     together = MPI.COMM_WORLD.bcast(together)
@@ -163,6 +167,51 @@ def test_flat_tool_over_a_half_ball_is_the_prescribed_one():
     found, held = (record(probe=DISC | {"contact": contact}, mesh=BALL) for contact in ("unilateral", "frictionless"))
     assert found.force == pytest.approx(held.force, rel=1e-7)
     assert found.energy == pytest.approx(held.energy, rel=1e-6)
+
+
+@pytest.mark.parametrize("outside", ["halfspace", "green"])
+def test_friction_over_a_half_ball_begins_at_none(outside):
+    slippery, smooth = (record(probe=SPHERE | {"friction": mu}, mesh=BALL | {"outside": outside}) for mu in (1e-9, 0))
+    assert slippery.force == pytest.approx(smooth.force, rel=1e-7)
+    assert slippery.energy == pytest.approx(smooth.energy, rel=1e-7)
+    assert slippery.force_error == pytest.approx(smooth.force_error, rel=1e-4)
+
+
+@pytest.mark.parametrize("poisson", [0.2, 0.47])
+@pytest.mark.parametrize("friction", [0.3, "stick"])
+def test_friction_over_a_half_ball_is_that_of_the_body(friction, poisson):
+    material, probe = {"poisson": poisson}, SPHERE | {"friction": friction}
+    whole, part = (record(mesh=mesh, probe=probe, material=material) for mesh in ({}, BALL | {"outside": "green"}))
+    assert part.force == pytest.approx(whole.force, rel=0.006)
+    for name in ("slip_area", "friction_force"):
+        (value, bar), (other, its_bar) = ((getattr(r, name), getattr(r, f"{name}_error")) for r in (whole, part))
+        assert abs(value - other) <= bar + its_bar
+
+
+def test_far_field_of_friction_that_is_left_out_decays_as_that_of_a_bonded_footprint():
+    """By (a/ε)³, with a = 2 mm: 2.1, 3 and 6 a. The ratio to the force without friction leaves the mesh's error out."""
+    body = {"shape": "cylinder", "radius": "60 mm", "height": "60 mm"}
+    mesh = {"fine": "6 mm", "coarse": "20 mm", "growth": 0.35, "outside": "green"}
+    probe = SPHERE | {"depth": "0.4 mm"}
+    ratios = []
+    for epsilon in ("4.3 mm", "6 mm", "12 mm"):
+        scene = {"body": body, "mesh": mesh | {"epsilon": epsilon}}
+        sticks, smooth = (record(**scene, probe=probe | {"friction": mu}).force for mu in ("stick", 0))
+        ratios.append(sticks / smooth)
+    near, middle, far = ratios
+    assert 0.002 < near - far < 0.005
+    assert middle - far == pytest.approx((near - far) / 3, rel=0.4)
+
+
+def test_friction_over_half_balls_of_a_quarter_and_the_whole_agree():
+    """Off the middle no half ball knows the resultant of friction: the far field is that of an axial force."""
+    scene = {"probe": SPHERE | {"friction": 0.3}, "mesh": BALL | {"outside": "green", "rim": "0.6 mm"}}
+    quarter, whole = record(**scene), record(**scene | {"mesh": scene["mesh"] | {"model": "3d"}})
+    assert quarter.force == pytest.approx(whole.force, rel=1e-4)
+    assert quarter.force_vector[:2] == (0.0, 0.0)
+    beside = record(**scene | {"probe": scene["probe"] | {"at": ["9 mm", "0 mm"]}})
+    assert np.isnan(beside.force_vector[0])
+    assert beside.force_vector[1:] == (0.0, beside.force)
 
 
 @pytest.mark.parametrize("poisson", [pytest.param(0.49, marks=pytest.mark.nightly), 0.5])

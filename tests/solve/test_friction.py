@@ -145,7 +145,6 @@ def test_half_a_body_and_a_quarter_agree():
         ({"probe": SPHERE | {"friction": 2.5}}, 'a number from 0 to 2, or "stick"'),
         ({"probe": SPHERE | {"friction": "rough"}}, 'a number from 0 to 2, or "stick"'),
         ({"probe": DISC | {"contact": "bonded", "friction": 0.3}}, 'use contact = "unilateral"'),
-        ({"probe": SPHERE | {"friction": 0.3}, "mesh": {"epsilon": "9 mm", "outside": "halfspace"}}, "far field"),
     ],
 )
 def test_what_friction_is_not_for(changes, reason):

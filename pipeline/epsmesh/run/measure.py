@@ -161,7 +161,7 @@ def _known_of(case: Case, force: Vector) -> Vector:
     ends are not computed.
     """
     x, y, z = force
-    if case.way.motion is Motion.FAR and case.way.constraint is Constraint.BONDED:
+    if case.way.motion is Motion.FAR and (case.way.constraint is Constraint.BONDED or case.way.rubs):
         return x and nan, y and nan, z
     if case.way.slides_in_slit:
         along = case.frame.upright.along

@@ -69,13 +69,18 @@ class FreeResponse:
 
 @dataclass(eq=False)
 class FarShare:
-    """A ``unit`` of the far ``field``, twice its energy on both sides of the cut (J), and its current amplitude."""
+    """A ``unit`` of the far ``field``, twice its energy ``beyond`` the cut (J), and its current amplitude."""
 
     field: FarField
     unit: FreeResponse
-    stiffness: float
+    beyond: float
     share: float = 0.0
     _slope: float = 0.0
+
+    @property
+    def stiffness(self) -> float:
+        """Twice the energy (J) of a unit on both sides of the cut."""
+        return self.unit.energy + self.beyond
 
     def wanted(self, reactions: FloatArray) -> float:
         """Return the amplitude that belongs to ``reactions`` (n, N)."""

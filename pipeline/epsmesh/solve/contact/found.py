@@ -26,7 +26,7 @@ from epsmesh.solve.contact.sweep import Sweep
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.elements.base import Elements, HierarchicalEstimate
-from epsmesh.solve.elements.fields import Column
+from epsmesh.solve.elements.fields import Column, add_far
 from epsmesh.solve.estimate import error_bar, found_again_bar, found_bar
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.response import Response, reaction
@@ -41,13 +41,14 @@ _COVERED = 0.3
 class Rubbed:
     """Contact with friction on all candidates: ``fine``, which ``moved`` them (n, 3), m, and its ``unknowns``.
 
-    ``coarse`` is that from half as many load steps.
+    ``coarse`` is that from half as many load steps, ``far_share`` the amplitude of the far field.
     """
 
     fine: ContactSolution
     coarse: ContactSolution
     moved: FloatArray
     unknowns: Unknowns
+    far_share: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +57,7 @@ class LinearContact:
 
     ``smooth`` is that without friction, with the ``unknowns`` of the elements, ``rubbed`` that with friction, or None.
     ``loaded`` is the response to loads before contact, or None. ``obstacle_above`` is the obstacle of the next degree.
+    ``far`` is the column of the far field, or None, and ``smooth_share`` its amplitude without friction.
     """
 
     sweep: Sweep
@@ -65,6 +67,8 @@ class LinearContact:
     unknowns: Unknowns
     loaded: FreeResponse | None
     obstacle_above: Callable[[], Obstacle]
+    far: Column | None = None
+    smooth_share: float = 0.0
     rubbed: Rubbed | None = None
 
     @property
@@ -95,6 +99,24 @@ class LinearContact:
         is_flat = np.ptp(self.obstacle.bounds) <= _SAME * self.obstacle.depth
         return None if self.smooth.active.all() and is_flat else self.smooth.state.energy / 2
 
+    @property
+    def far_share(self) -> float:
+        """The amplitude of the far field per depth; zero without one."""
+        share = self.smooth_share if self.rubbed is None else self.rubbed.far_share
+        return share / self.obstacle.depth
+
+    def put(self, column: Column) -> None:
+        """Make the contact, with its far field, the solution of a unit of the ``column``.
+
+        Raises:
+            SolveError: if the amplitude of the far field is not finite.
+        """
+        unknowns = self.unknowns if self.rubbed is None else self.rubbed.unknowns
+        self._plug.put(column, unknowns, self.obstacle.depth)
+        if self.far is not None:
+            column.prescribed = np.zeros_like(column.prescribed)
+            add_far(column, self.far, self.far_share)
+
     def summary(self, sag: float) -> ContactResult:
         """Return the whole contact; ``sag`` (m) is that of the first touch."""
         energy = nan if self.loaded is None else 2.0 ** len(self._plug.body.mirrored) * self.loaded.energy / 2
@@ -113,6 +135,8 @@ class LinearContact:
             work, energy = float(state.reactions[active] @ state.moved[active]), state.energy
         else:
             work, across = float((self.rubbed.moved * touched.forces).sum()), touched.forces[:, :2].sum(axis=0)
+            if (far := self.sweep.elements.far) is not None:
+                energy += self.rubbed.far_share**2 * far.beyond
         balance = max(abs(support / force - 1), abs(work / energy - 1))
         on_probe = np.array([[*across, -force]]) / depth
         return reaction(movement, np.array([[force / depth]]), on_probe, self._plug.body.mirrored, balance)
@@ -127,9 +151,9 @@ class LinearContact:
         depth = self.obstacle.depth
         if self.rubbed is not None:
             smooth = replace(self, rubbed=None)
-            self._plug.put(columns[0], self.unknowns, depth)
+            smooth.put(columns[0])
             found = smooth.hierarchical_estimate(columns, movement, stack, keep=keep)
-            self._plug.put(columns[0], self.rubbed.unknowns, depth)
+            self.put(columns[0])
             return half_the_steps(found, self.surface, smooth.surface.force)
         known = self.sweep.bar(depth, movement.far) if self.loaded is None else None
         if known is None:

@@ -6,9 +6,14 @@ ball grows by equal widths. As in linear elasticity, the normal of the contact i
 
 The error bar is that of frictionless contact on the same mesh, plus the change of the force from half as many load
 steps, plus a share of what friction adds.
+
+A far field on a cut face adds φ φᵀ / k to the compliance, with all components of its unit φ
+(:mod:`epsmesh.solve.contact.elements`). The friction of a tool that presses along its axis has no resultant: its far
+field, which is neglected, decays by one order faster than that of the pressure, as under a bonded footprint.
 """
 
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -41,7 +46,9 @@ def rub(contact: LinearContact) -> LinearContact:
     sweep, obstacle, friction = contact.sweep, contact.obstacle, contact.tool.friction
     candidates, depth = obstacle.candidates, obstacle.depth
     body, neighbours = sweep.elements.without_tool, candidates.neighbours
-    is_free = body.is_free()
+    is_free, far = body.is_free(), sweep.elements.far
+    of_unit = np.zeros(is_free.shape) if far is None else body.gathered(far.unit.unknowns[0])
+    stiffness = inf if far is None else far.stiffness
     reachable = np.isfinite(obstacle.bounds) & is_free[:, 2]
     touched = contact.smooth.active
     while True:
@@ -51,15 +58,19 @@ def rub(contact: LinearContact) -> LinearContact:
         compliance = np.zeros((is_free[nodes].size,) * 2)
         free = np.flatnonzero(is_free[nodes])
         compliance[np.ix_(free, free)] = body.compliance(components)
+        if far is not None:
+            compliance += np.outer(of_unit[nodes], of_unit[nodes]) / stiffness
         tissue = CondensedTissue(compliance, candidates.points[nodes], ~is_free[nodes])
         heights, own = obstacle.bounds[nodes] + depth, neighbours.of(nodes)
         both = [_contact_in_steps(tissue, heights, own, depth, friction, steps) for steps in (_STEPS, _STEPS // 2)]
         fine, coarse = (_of_all(candidates, nodes, one) for one in both)
         moved, unknowns = body.moved(fine.forces)
+        share = float((of_unit * fine.forces).sum()) / stiffness
+        moved += share * of_unit
         gap = obstacle.bounds - moved[:, 2]
         through = (gap < -SLACK * depth) & reachable & ~near & ~neighbours.followers
         if not through.any():
-            return replace(contact, rubbed=Rubbed(replace(fine, gap=gap), coarse, moved, unknowns))
+            return replace(contact, rubbed=Rubbed(replace(fine, gap=gap), coarse, moved, unknowns, share))
         touched = touched | through
 
 

@@ -29,7 +29,7 @@ from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.sweep import Sweep
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.elements.base import Elements, Equilibrium
-from epsmesh.solve.elements.fields import Column, close_far
+from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.solution import Request
@@ -92,9 +92,6 @@ class ContactSearch:
         first, found = self._find(sweep, obstacle, (_LOOSE, strict), loaded)
         check_edge(self._tool, self.candidates, found.active)
         unknowns = elements.unknowns()
-        self._elements.put(columns[0], unknowns, depth)
-        if elements.far is not None:
-            movement = close_far(columns, movement, elements.far.share / depth)
         iterations = first + found.touched.iterations
         contact = LinearContact(
             sweep=sweep,
@@ -104,13 +101,17 @@ class ContactSearch:
             unknowns=unknowns,
             loaded=loaded,
             obstacle_above=lambda: self._obstacle(self._surface.of(self._elements.degree + 1), depth, loaded),
+            far=None if elements.far is None else columns.pop(1),
+            smooth_share=0.0 if elements.far is None else elements.far.share,
         )
         if self._tool.friction:
             contact = rub(contact)
             assert contact.rubbed is not None
-            self._elements.put(columns[0], contact.rubbed.unknowns, depth)
             iterations += contact.rubbed.fine.iterations
         self.contact = contact
+        contact.put(columns[0])
+        if elements.far is not None:
+            movement = movement.closed(contact.far_share)
         response = contact.response(columns[0], movement)
         check_balance(response.balance)
         if self._reuse:
@@ -142,7 +143,7 @@ class ContactSearch:
         if elements.far is None or elements.far.field != movement.far:
             unit = elements.free_response(far, tolerance)
             beyond = movement.far.stiffness(mu) / 2.0 ** len(self._elements.body.mirrored)
-            elements.couple(FarShare(movement.far, unit, unit.energy + beyond))
+            elements.couple(FarShare(movement.far, unit, beyond))
         else:
             self._elements.put(far, elements.far.unit.unknowns)
 

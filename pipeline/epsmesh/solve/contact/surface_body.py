@@ -41,7 +41,7 @@ class SurfaceBody:
         own, load = self._dofs >= 0, np.zeros(self._space.owned)
         load[self._dofs[own]] = forces[own] / self._unit
         (unknowns,) = self.solved([(load,)])
-        return self._gathered(unknowns[0]), unknowns
+        return self.gathered(unknowns[0]), unknowns
 
     @stage("condensation")
     def compliance(self, components: IntArray) -> FloatArray:
@@ -57,7 +57,7 @@ class SurfaceBody:
                 found[:, first : first + len(some)] = self._solver.linear.solve_many(loads)[dofs]
                 continue
             for number, (moved, *_) in enumerate(self.solved([(load,) for load in loads.T]), start=first):
-                found[:, number] = self._gathered(moved)[nodes, axes]
+                found[:, number] = self.gathered(moved)[nodes, axes]
         return (found + found.T) / 2
 
     def solved(self, loads: list[tuple[FloatArray, ...]]) -> list[tuple[FloatArray, ...]]:
@@ -79,7 +79,8 @@ class SurfaceBody:
             self._solver.solve(columns, _EXACT)
             return [tuple(np.array(part.array) for part in column.unknown) for column in columns]
 
-    def _gathered(self, values: FloatArray) -> FloatArray:
+    def gathered(self, values: FloatArray) -> FloatArray:
+        """Return displacements (n, 3) of all candidates from ``values`` on owned dofs."""
         own = self._dofs >= 0
         found = np.zeros(self._dofs.shape)
         found[own] = values[self._dofs[own]]

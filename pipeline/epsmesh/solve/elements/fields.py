@@ -150,10 +150,18 @@ def close_far(columns: list[Column], movement: Movement, share: float) -> Moveme
     Raises:
         SolveError: if the share is not finite.
     """
+    add_far(columns[0], columns.pop(1), share)
+    return movement.closed(share)
+
+
+def add_far(tool: Column, far: Column, share: float) -> None:
+    """Add ``share`` of the far field to the motion of the tool.
+
+    Raises:
+        SolveError: if the share is not finite.
+    """
     if not np.isfinite(share):
         raise SolveError("the amplitude of the far field is not a finite number")
-    tool, far = columns[0], columns.pop(1)
     for part, of_field in zip(tool.unknown, far.unknown, strict=True):
         part.axpy(share, of_field)
     tool.prescribed = tool.prescribed + share * far.prescribed
-    return movement.closed(share)

@@ -114,7 +114,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "frictionless contact",
         'a frictionless blade slides without force: use contact = "bonded"',
     ),
-    Refusal("friction", "half ball", f"the far field is known only for forces along the tool's axis: {_COARSE}"),
     Refusal(
         "friction",
         "inclined touch of a linear law",
