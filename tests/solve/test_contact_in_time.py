@@ -134,6 +134,23 @@ def test_friction_in_time_is_that_of_the_load_path(material):
     assert small.dissipated == pytest.approx(none.dissipated, abs=5e-5 * none.dissipated[-1])  # residuals differ
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_bars_of_few_steps_hold(friction):
+    """The bar is from half as many steps, although the rate may change at each time; 16 times the steps tell it."""
+    changes = {"material": {"poisson": 0.2}, "probe": BALL | {"depth": "2 mm", "friction": friction}}
+    one = (0.0, 1.0), (0.0, 1.0)
+    few, many = (followed(one, ((0.5, 0.1),), steps, **changes)[0] for steps in (1, 16))
+    assert few.times.tolist() == [0.0, 0.5, 1.0]
+    assert 0 < abs(few.forces[-1, 2] - many.forces[-1, 2]) <= few.bars[-1] + many.bars[-1]
+    assert few.bars[-1] < 0.05 * few.forces[-1, 2]
+
+
+def test_a_jump_with_friction_has_the_bar_of_its_steps():
+    found, static = followed(((0.0, 1.0), (1.0, 1.0)), (), 1, probe=BALL | {"friction": 0.3}, material={"poisson": 0.2})
+    assert abs(found.forces[0, 2] - static.reaction[2]) <= found.bars[0] + 1e-3 * static.reaction[2]
+    assert 1e-5 < found.bars[0] / static.reaction[2] < 0.01
+
+
 def test_work_of_a_tool_that_rubs_and_returns_is_its_heat():
     """Elastic tissue keeps nothing; tissue that sticks turns nothing into heat."""
     found, _ = followed(BACK, (), 6, probe=BALL | {"friction": 0.1}, material=LINEAR)

@@ -6,7 +6,7 @@ from math import inf, nan
 
 import numpy as np
 
-from epsmesh.arrays import FloatArray
+from epsmesh.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,23 @@ class Course:
 
     def refined(self) -> "Course":
         """Return the course with one more time between any two."""
-        assert self.share_at is not None
+        return self._with_middles(np.arange(1, len(self.times)))
+
+    def with_halves(self) -> "Course":
+        """Return the course with one more time between any two breaks that follow each other.
+
+        Steps of twice the length, which tell the error, do not go beyond a break.
+        """
+        return self._with_middles(np.array([n for n in sorted(self.breaks) if n - 1 in self.breaks], dtype=int))
+
+    def _with_middles(self, numbers: IntArray) -> "Course":
+        """Return the course with one more time before each of those with these ``numbers``, which rise."""
         own = np.array(self.times)
-        times = np.insert(own, np.arange(1, len(own)), (own[1:] + own[:-1]) / 2)
-        shares = tuple(map(float, self.share_at(times)))
-        return replace(self, times=tuple(times.tolist()), shares=shares, breaks=frozenset(2 * n for n in self.breaks))
+        times = np.insert(own, numbers, (own[numbers] + own[numbers - 1]) / 2)
+        share_at = self.share_at or (lambda at: np.interp(at, own, self.shares))
+        shares = tuple(map(float, share_at(times)))
+        breaks = frozenset(n + int(np.searchsorted(numbers, n, side="right")) for n in self.breaks)
+        return replace(self, times=tuple(times.tolist()), shares=shares, breaks=breaks)
 
     def coarse(self) -> "Course":
         """Return the course of every other time, all breaks included."""

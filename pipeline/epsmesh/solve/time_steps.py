@@ -191,13 +191,14 @@ def follow_course(begin: Callable[[], "TimeSteps"], course: Course) -> tuple[His
     Raises:
         LargeError: see :meth:`TimeSteps.follow`.
     """
-    iterations = 0
+    course, iterations = course.with_halves(), 0
     for refinements in range(_MOST_REFINEMENTS + 1):
         steps = begin()
         found = steps.follow(course)
         iterations += steps.iterations
         if steps.rubs:
             half = begin()
+            half.fewest = _FEWEST / 2
             found = found.with_half_the_steps(half.follow(course.coarse()), sorted(course.halves()))
             iterations += half.iterations
         if found.bar <= course.accuracy or refinements == _MOST_REFINEMENTS:
@@ -207,7 +208,10 @@ def follow_course(begin: Callable[[], "TimeSteps"], course: Course) -> tuple[His
 
 
 class TimeSteps:
-    """Time steps of a body of a ``law`` whose regions may relax, to a ``depth`` (m). Methods are collective."""
+    """Time steps of a body of a ``law`` whose regions may relax, to a ``depth`` (m). Methods are collective.
+
+    ``fewest`` is the least number of steps of the whole movement.
+    """
 
     def __init__(
         self,
@@ -228,7 +232,7 @@ class TimeSteps:
         self._relaxes = any(each.relaxation for each in law.parameters)
         self._variables = HistoryVariables(self._body.points, [each.relaxation for each in law.parameters])
         self._state, self._before = (stack.enter_context(self._body.state()) for _ in range(2))
-        self._at_start = 0.0
+        self._at_start, self.fewest = 0.0, float(_FEWEST)
         if (start := indentation.start()) is not None:
             self._state.array[:] = self._before.array[:] = start
             self._variables.begin(*self._body.stresses(self._state))
@@ -292,7 +296,7 @@ class TimeSteps:
             return PathPoint(part, self._state.array), True
 
         try:
-            follow(Path(PathPoint(0.0, self._state.array)), solve_at, 1.0, fewest=max(1.0, _FEWEST * abs(rise)))
+            follow(Path(PathPoint(0.0, self._state.array)), solve_at, 1.0, fewest=max(1.0, self.fewest * abs(rise)))
         except LargeError as error:
             raise self._stopped(course, error) from error
 
