@@ -65,7 +65,7 @@ docs: setup ## build the documentation; a warning is an error
 	$(PYTHON) -m sphinx -W --keep-going -n -q -E -a -b html docs $(DOCS)
 	@echo $(DOCS)/index.html
 
-test: ## run the day's tests: those with the marker `mpi` on 2 ranks, the others serially
+test: ## run the day's tests: those with the marker `mpi` on 2 ranks, the others side by side on one each
 	@scripts/setup.sh
 	$(PYTHON) -m pytest $(SIDE_BY_SIDE) -m "not slurm and not nightly and not mpi" $(UNCONCERNED) $(PYTEST_ARGS) </dev/null $(NONE_OK)
 	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m "mpi and not nightly" -p no:cacheprovider \

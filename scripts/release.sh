@@ -72,7 +72,7 @@ try() { # from the file $1: version, a new study, its run, its report
         "$epsmesh" run studies/mine.toml --quiet
         "$epsmesh" report studies/mine.toml >/dev/null
         "$epsmesh" new punch --like identify-punch >/dev/null
-        "$epsmesh" identify studies/curves/*.csv >/dev/null
+        for curve in studies/curves/*.csv; do "$epsmesh" view "$curve" >/dev/null; done
         "$work/venv/bin/python" - <<'PYTHON'
 import epsmesh
 

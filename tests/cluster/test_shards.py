@@ -114,7 +114,7 @@ def test_more_shards_than_steps_and_a_run_of_the_whole_that_takes_them_in(whole,
     outputs = [run(study, tmp_path, meshes, "--shard", f"{number}/12").stdout for number in range(1, 13)]
     assert sum("nothing to do" in output for output in outputs) >= 3
     told = epsmesh("status", study, "--output", tmp_path).stdout
-    assert "12 shards in" in told and f"`epsmesh run {study}` merges them" in told
+    assert "12 shards in" in told and f"`epsmesh run {study}` with the same --output merges them" in told
     whole_run = run(study, tmp_path, meshes)
     assert (whole_run.exit_code, "to do" in whole_run.stdout) == (0, False), whole_run.output
     assert_same(tmp_path / "small.nc", folder / "small.nc", alike=False)

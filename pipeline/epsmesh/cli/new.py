@@ -71,12 +71,13 @@ def new(
         fail(of_file(path, "exists already, and is not changed; give another name"))
     except OSError as problem:
         fail(of_file(path, problem.strerror or str(problem)))
+    command = "run" if "\n[mesh" in text or "\n[[mesh" in text else "identify"
     data: dict[str, Any] = {"file": str(path)}
     data |= {"carried": [str(file) for file in carried]} if carried else {}
     say(
         data,
         *(f"{file}: copied with the study, which names it" for file in carried),
-        f"{path}: edit it, then `epsmesh plan {path}` and `epsmesh run {path}`",
+        f"{path}: edit it, then `epsmesh plan {path}` and `epsmesh {command} {path}`",
     )
 
 

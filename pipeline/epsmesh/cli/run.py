@@ -334,7 +334,7 @@ def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, sh
         # A shard may have F_exact but no case; if there are fewer steps than shards, it may have nothing.
         found = found if sum(outcome.counts.values()) else "F_exact" if plan.part else "nothing to do"
         name = f"{name}, shard {shard}"
-        where = f"when all shards are done, merge them: `epsmesh run {quote(plan.study.file)}`"
+        where = f"when all shards are done, merge them: `epsmesh run {quote(plan.study.file)}` with the same --output"
     else:
         where = str(outcome.results)
     return f"{name}: {found}{read_back}; {where}; {format_seconds(seconds)}"

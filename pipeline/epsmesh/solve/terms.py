@@ -187,14 +187,14 @@ class DeadLoads:
 
 
 def check_hold(space: Any) -> None:
-    """Check that the terms of an elastic space without support leave no rigid motion free; collective.
+    """Check that terms of an elastic space without support leave no rigid motion free; collective.
 
     Motions that planes of symmetry exclude are not considered.
 
     Raises:
         SolveError: if they leave one.
     """
-    if space.comm.allreduce(len(space.fixed_owned)):
+    if not space.terms or space.comm.allreduce(len(space.fixed_owned)):
         return
     places = space.places.reshape(-1, 3)
     *centre, count = global_sum(space.comm, np.array([*places.sum(axis=0), len(places)]))
