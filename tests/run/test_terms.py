@@ -13,7 +13,7 @@ PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 STUDIES = """
 import json, sys
 import epsmesh.shapes.terms
-epsmesh.shapes.terms.__path__.append(sys.argv[1])
+epsmesh.shapes.terms.__path__.insert(0, sys.argv[1])
 import epsmesh
 from epsmesh.study.json_schema import study_schema
 from epsmesh.study.keys import keys_of, text_of

@@ -58,7 +58,7 @@ def status(
 ) -> None:
     """Count a study's cases by state, or show all runs and check the case store.
 
-    Cases are ok, failed, partial, skipped, no contact or pending. For a run with --without, give the same --without here.
+    Cases are ok, failed, partial, skipped, no contact or pending. For a run with --without, give the same here.
 
     Without a study, your runs of the last two weeks are shown, from any folder and machine with this home: done, left,
     the case in work, the last sign of life, and whether a run was killed. Then the store's records are checked, and
@@ -111,7 +111,8 @@ def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) ->
     lines += [f"  failed: {case}: {message}" for case, message in failed]
     if counts[PENDING] and (shards := len(stores_of(output, study))):
         lines.append(
-            f"  {counted(shards, 'shard')} in {output / 'shards'} not counted: `epsmesh run {file}` with the same --output merges them"
+            f"  {counted(shards, 'shard')} in {output / 'shards'} not counted: `epsmesh run {file}` with the same "
+            "--output merges them"
         )
     runs = runs_of(file)
     more = {"failures": [{"case": c, "message": m} for c, m in failed], "runs": as_data(runs)}
