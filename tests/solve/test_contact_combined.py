@@ -67,6 +67,16 @@ def test_loads_on_a_quarter_a_half_and_the_whole_agree():
     assert quarter.sag == pytest.approx(whole.sag, rel=1e-6)
 
 
+def test_friction_begins_at_none_where_loads_move_a_sloping_surface_across_the_axis():
+    """The gaps of a linear law are above undeformed places with and without friction, and so is the first touch."""
+    ball = {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "at": ["9 mm", "0 mm"]}
+    scene = {"material": TISSUE | {"young": "3 kPa"}, "load": {"gravity": ["9.81 m/s^2", "0 m/s^2", "0 m/s^2"]}}
+    mesh = {"fine": "5 mm", "coarse": "8 mm", "rim": "1 mm"}
+    none, little = (record(probe=ball | {"friction": f}, mesh=mesh, **scene) for f in (0, 1e-6))
+    assert little.force == pytest.approx(none.force, rel=1e-5)
+    assert little.sag == pytest.approx(none.sag, rel=1e-6)
+
+
 def test_force_is_not_scaled_where_loads_bend_the_surface():
     """Not with the modulus: a softer body bends more. At twice the stiffness and load, F is twice as large."""
     load = pulled(1)

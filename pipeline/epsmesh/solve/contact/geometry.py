@@ -42,12 +42,15 @@ class Touch:
             return heights
         known = known or candidates
         moved = loaded.moved if known is candidates else _interpolated(known, loaded.moved, candidates)
-        return np.asarray(heights - moved - self.sag(known, loaded))
+        return np.asarray(heights - moved - self.sag(known, loaded.moved))
 
-    def sag(self, candidates: Candidates, loaded: FreeResponse) -> float:
-        """Return how much farther (m) the probe moves to touch the surface that loads have deformed."""
-        moved = loaded.moved[candidates.facets]
-        return self._first(candidates, moved) - self._first(candidates, np.zeros_like(moved))
+    def sag(self, candidates: Candidates, moved: FloatArray) -> float:
+        """Return how much farther (m) the probe moves to touch the surface whose nodes loads ``moved`` (n) along z.
+
+        The gaps are those of linear laws, above undeformed places: a move across the axis changes none.
+        """
+        risen = moved[candidates.facets]
+        return self._first(candidates, risen) - self._first(candidates, np.zeros_like(risen))
 
     def sag_at(self, candidates: Candidates, points: FloatArray) -> float:
         """Return how much farther (m) the probe moves to touch the surface with its nodes at deformed ``points``."""

@@ -64,5 +64,13 @@ def sagged_body(
         body.applied,
         energy,
         energy + body.work_of_loads,
-        Touch(tool.height, tool.first).sag_at(body.candidates, body.positions()),
+        _sag_of(tool, body),
     )
+
+
+def _sag_of(tool: Tool, body: DeformedBody) -> float:
+    """Return how much farther (m) a tool moves to touch a ``body`` in its state, with the gaps of the law."""
+    touch, positions = Touch(tool.height, tool.first), body.positions()
+    if body.law.is_linear:
+        return touch.sag(body.candidates, (positions - body.places)[:, 2])
+    return touch.sag_at(body.candidates, positions)

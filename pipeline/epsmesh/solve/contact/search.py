@@ -116,7 +116,7 @@ class ContactSearch:
         check_balance(response.balance)
         if self._reuse:
             sweep.keep(depth, found, unknowns)
-        sag = nan if loaded is None else self._touch.sag(self.candidates, loaded)
+        sag = nan if loaded is None else self._touch.sag(self.candidates, loaded.moved)
         return Equilibrium(contact, columns, movement, iterations, response, contact=contact.summary(sag))
 
     def _solve_large(self, asked: Request, stack: ExitStack) -> Equilibrium:
