@@ -101,7 +101,7 @@ def test_a_shard_that_was_killed_goes_on_to_the_same_dataset(whole, meshes, tmp_
     assert len(read_rows(tmp_path / "shards" / "small.1-of-2.sqlite")) > 0
     again = run(study, tmp_path, meshes, "--shard", "1/2")
     assert again.exit_code == 0, again.output
-    assert "tried again, after the others" in again.stderr
+    assert "will be solved after the others" in again.stderr
     (ended,) = shards_of(study, tmp_path)
     assert (ended["shard"], ended["state"], ended["left"]) == ("1/2", "ended", 0)
     assert run(study, tmp_path, meshes, "--shard", "2/2").exit_code == 0

@@ -210,10 +210,5 @@ def test_what_cannot_be_is_refused_by_name_and_place(given):
     disc = {"probe": PROBE | {"contact": "frictionless", "at": ["-4 mm", "4 mm"]}}
     with pytest.raises(ExportError, match=r"body\.region meets the surface"):
         scope_of(study(**given(TUMOUR, LOBE) | disc))
-    under = {"name": "vessel", "label": 7, "hollow": True, "pressure": "1 kPa"}
-    sections = given(under, LOBE | {"relaxation": [{"share": 0.4, "time": "2 s"}]})
-    sections["probe"] |= {"history": {"ramp": "1 s", "hold": "10 s", "steps": 4}}
-    with pytest.raises(StudyError, match=r"under the loads before: omit \[load\], and pressure in hollow regions"):
-        study(**sections)
     with pytest.raises(StudyError, match=r"footprint of the disc misses.*`smooth` removes those of voxels"):
         study(**given(TUMOUR, LOBE, smooth="0 mm"))

@@ -218,7 +218,7 @@ def test_fits_a_phone_and_the_dark(browser, page, width, tmp_path):
         ("organ.vtp", "save its surface as .stl or .ply"),
         ("organ.stl", 'has shape = "surface" and file = "organ.stl"'),
         ("organ.step", 'has shape = "cad" and file = "organ.step"'),
-        ("curve.lvm", "a study file is TOML, and ends in .toml"),
+        ("curve.lvm", "is binary: export it as text, such as CSV"),
     ],
 )
 def test_a_file_of_another_kind_is_told_what_to_do_with_it(tmp_path, name, told):
