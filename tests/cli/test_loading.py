@@ -63,7 +63,7 @@ def test_help_loads_no_study_no_plan_and_no_shape():
 @pytest.mark.parametrize("command", ["plan", "status"])
 def test_a_study_loads_the_shapes_that_it_names_alone(command, study, tmp_path):
     modules = loaded(command, study, within=tmp_path)
-    assert not libraries(modules) & (_SLOW | _ELSEWHERE - ({"sqlite3"} if command == "status" else set()))
+    assert not libraries(modules) & (_SLOW | _ELSEWHERE - {"sqlite3"})
     # An export, which a plan tells the cost of, presses blades, too.
     assert shapes(modules) == {"box", "disc"} | ({"blade"} if command == "plan" else set())
     assert "epsmesh_identify" not in modules

@@ -11,6 +11,8 @@ FAR = 3.0
 class Spring:
     """A free unknown x with the energy (x² - 1)² / 4, inside out beyond ``FAR``, beside one that goes to a ``goal``."""
 
+    is_compared = True
+
     def __init__(self, x: float, goal: float = 0.0, *, has_energy: bool = True):
         self.x, self.held, self.goal, self.has_energy = x, 0.0, goal, has_energy
         self.slope: float | None = None
@@ -63,6 +65,18 @@ def test_without_a_least_energy_the_residual_falls():
     body = Spring(0.9, has_energy=False)
     hold(body, 1e-12, 40)
     assert body.x == pytest.approx(1.0, abs=1e-11)
+
+
+def test_steps_that_are_not_compared_are_whole_though_the_residual_rises():
+    body = Spring(0.65)
+    body.is_compared = False
+    (left, _), _ = body.residual(), hold(body, 1e-12, 40)
+    assert body.x == pytest.approx(1.0, abs=1e-11)
+    assert set(body.shares) == {1.0}
+    first = Spring(0.65)
+    first.linearise(0.1)
+    first.advance(1.0)
+    assert first.residual()[0] > left
 
 
 def test_a_step_that_moves_what_is_held_is_whole_or_ends_the_load_step():

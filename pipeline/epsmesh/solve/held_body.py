@@ -57,6 +57,8 @@ class HeldBody:
     Energies and forces are in the unit of the law.
     """
 
+    is_compared = True
+
     def __init__(self, body: HyperelasticBody, state: PETSc.Vec, goal: FloatArray, stack: ExitStack):
         """Begin at the state, which :meth:`advance` changes; collective."""
         self._body, self._state, self._goal = body, state, goal

@@ -58,7 +58,13 @@ class Moving(Protocol):
 
 
 class Held(Moving, Protocol):
-    """A body with prescribed displacements that have a goal. Methods are collective."""
+    """A body with prescribed displacements that have a goal. Methods are collective.
+
+    ``is_compared`` says that steps must reduce the energy or the residual. A factorised tangent may be indefinite:
+    its steps lead to equilibria past which the energy and the residual first rise.
+    """
+
+    is_compared: bool
 
     @property
     def is_there(self) -> bool:
@@ -162,7 +168,7 @@ class _Hold(Newton[int]):
     def step(self, iteration: int) -> None:
         """Take a step."""
         self._body.linearise(self._tolerance)
-        if not self._is_there:
+        if not (self._is_there and self._body.is_compared):
             advance(self._body, self._on_the_way)
         else:
             stored = self._body.energy

@@ -123,6 +123,8 @@ class MeridianTissue:
 class HeldNodes:
     """A ``tissue`` whose components ``held`` (n, 2) go to positions ``goal`` (n, 2): see :class:`.newton.Held`."""
 
+    is_compared = False
+
     def __init__(self, tissue: MeridianTissue, held: BoolArray, goal: FloatArray):
         """Begin at the tissue's state."""
         self._tissue, self._held, self._goal = tissue, held, goal
