@@ -41,7 +41,7 @@ def describe(path: Path, reading: Reading | None = None) -> str:
     head = [
         "[[measurement]]",
         f"name = {_text(path.stem)}",
-        f"file = {_text(path.as_posix())} # from the study's folder",
+        f"file = {_text(path.resolve().as_posix())} # or its path from the study's folder",
     ]
     whole = None
     try:

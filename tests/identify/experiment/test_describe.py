@@ -98,9 +98,9 @@ def test_a_deflection_is_no_depth_but_that_of_a_spring(tmp_path):
     assert np.ptp(curve.force) == pytest.approx(np.ptp(FORCE[: FORCE.argmax() + 1]), rel=1e-3)
 
 
-def test_a_pasted_block_names_the_file_from_where_the_user_is(tmp_path, monkeypatch):
+def test_a_pasted_block_names_the_file_for_a_study_in_any_folder(tmp_path, monkeypatch):
     (tmp_path / "curves").mkdir()
     write(tmp_path / "curves" / "a.csv", COLUMNS)
     monkeypatch.chdir(tmp_path)
     (table,) = block(describe(Path("curves") / "a.csv"))["measurement"]
-    assert (table["name"], table["file"]) == ("a", "curves/a.csv")
+    assert (table["name"], table["file"]) == ("a", (tmp_path / "curves" / "a.csv").as_posix())
