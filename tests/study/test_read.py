@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from epsmesh.plan.key import case_key
@@ -448,3 +449,16 @@ def test_several_materials_beside_layers_are_told_to_be_a_sweep():
     content = raw(body={"layer": layers}) | {"material": materials}
     (warning,) = (text for text in parse(content).warnings if "[[material]]" in text)
     assert "one material below the layers (a, b)" in warning
+
+
+BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"]}
+
+
+@pytest.mark.parametrize("degrees", [0, 2, 17, 30])
+def test_contact_beside_the_axis_of_a_linear_law_is_warned_of(degrees):
+    axis = [np.sin(np.radians(degrees)), 0.0, -np.cos(np.radians(degrees))]
+    ball = {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "contact": "unilateral", "axis": axis}
+    told = " ".join(study(probe=ball, body=BOX).warnings)
+    assert (f"inclined by {degrees}° to its axis" in told) == (degrees > 4)
+    large = {"material": {"law": "neo-hookean"}}
+    assert "inclined" not in " ".join(study(probe=ball, body=BOX, **large).warnings)
