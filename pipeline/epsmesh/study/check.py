@@ -69,11 +69,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     problems.each(check_linear, body=bodies, material=materials, mesh=meshes)
     problems.each(check_support, body=bodies, mesh=meshes)
     way = next((axis for axis in axes if axis.off), None)
-    placed = _placed(bodies, probes, way, problems)
-    if linear:
-        for body, probe in placed:
-            with problems.about(body=body, probe=probe):
-                _warn_of_tilt(body, probe, problems)
+    placed = _placed(bodies, probes, way, problems, is_linear=bool(linear))
     for body, probe in placed:
         for check in (check_column, check_ball, check_gap, check_slit_in):
             problems.each(check, body=(body,), probe=(probe,), mesh=meshes)
@@ -143,7 +139,7 @@ def _check_times(probes: Sequence[Probe], axes: tuple[Axis, ...], problems: Prob
 
 
 def _placed(
-    bodies: Sequence[Body], probes: Sequence[Probe], way: Axis | None, problems: Problems
+    bodies: Sequence[Body], probes: Sequence[Probe], way: Axis | None, problems: Problems, *, is_linear: bool
 ) -> list[tuple[Body, Probe]]:
     """Return the bodies with the probes that have a place on them, and report those that have none."""
     sane = [probe for probe in probes if _has_place(probe, problems)]
@@ -153,6 +149,8 @@ def _placed(
         with problems.about(body=body, probe=probe):
             if _check_place(body, probe, way, problems, refused):
                 placed.append((body, probe))
+                if is_linear:  # here, where the first touch was found just now
+                    _warn_of_tilt(body, probe, problems)
     for (body_name, probe_name, why), lost in refused.items():
         places = [[in_mm(x) for x in probe.at] for probe in lost]
         more = f"; the same for {len(places) - 1} more places, up to {', '.join(places[-1])}" if len(places) > 1 else ""

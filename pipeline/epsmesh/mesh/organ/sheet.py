@@ -173,14 +173,6 @@ class Sheet:
         theirs = ~mine if other is None else kinds == other
         return edges[mine.any(axis=1) & theirs.any(axis=1)]
 
-    def border_of_regions(self) -> tuple[IntArray, IntArray]:
-        """Return edges (k, 2) of the body's surface, lower number first, at which regions meet, and these regions."""
-        skin = self.skin
-        edges, facets = edges_of(skin.facets)
-        behind = skin.sides[:, 0][facets]
-        differ = behind[:, 0] != behind[:, 1]
-        return edges[differ], behind[differ]
-
 
 def edges_of(facets: IntArray) -> tuple[IntArray, IntArray]:
     """Return the edges (k, 2) of a closed surface, lower number first, and the two facets (k, 2) of each.

@@ -194,11 +194,6 @@ class MeridianTouch:
         """F on the tool, against its advance."""
         return 2 * pi * force_of(self._contact)
 
-    @property
-    def force_in_metres(self) -> float:
-        """F in units of μ times m²."""
-        return self.force * self.unit**2
-
     @cached_property
     def balance(self) -> float:
         """The relative difference of the forces on tool and support."""
