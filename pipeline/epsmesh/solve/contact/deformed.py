@@ -44,7 +44,9 @@ _MOST_LINEAR = 60
 # Without patience: the least share of the first increment that may be taken, and the number of iterations after which
 # gaps of active nodes are at most so large, in units of the depth.
 _WHOLE, _SOON, _NEARLY_CLOSED = 0.5, 10, 1e-3
-# A set that is solved so often ends changes of many nodes at once.
+# A node certainly pulls or penetrates if it does so this many times as much as a step's prediction was wrong.
+_CERTAIN = 10.0
+# A set that is tried so often ends changes of many nodes at once.
 _ONE_BY_ONE = 3
 
 
@@ -195,6 +197,7 @@ class _InContact(Newton[ContactSolution]):
         self._is_patient, self._limit, self._scale = is_patient, limit, scale
         self._predicted, self._reactions = np.zeros(tissue.fixed.shape), np.full(len(active), np.inf)
         self._before, self._repeats, self._seen = inf, 0, Counter([active.tobytes()])
+        self._refuted = set[bytes]()
 
     def judge(self, iteration: int) -> ContactSolution | None:
         """Evaluate the state and take the next set; return the solution if that is one; collective.
@@ -206,11 +209,14 @@ class _InContact(Newton[ContactSolution]):
         self._place, self._there = _placed(tissue, tool)
         normal, forces = self._there.normal, tissue.forces()
         following = _next_set(tool, before, self._reactions, self._place.gap)
+        along = np.einsum("ni,ni->n", forces, normal)
+        if iteration and self._is_refuted(before, following, along):
+            self._refuted.add(before.tobytes())
         self._active = active = self._with_care(before, following)
         is_same, is_rough = np.array_equal(active, before), self._limit > 0
         # A rough solution has the next set: forces of nodes that leave it are residuals.
         pressing = before & active if is_rough else before
-        self._pressed = np.where(pressing, np.einsum("ni,ni->n", forces, normal), 0.0)
+        self._pressed = np.where(pressing, along, 0.0)
         exerted = self._exerted(iteration, forces, before)
         if is_same and self._scale is None and not active.any():
             raise NoTouchError("the probe does not touch a single node: use smaller elements below it")
@@ -247,9 +253,9 @@ class _InContact(Newton[ContactSolution]):
         """Return the ``following`` set with single changes where sets repeat, and without followers that alternate.
 
         A follower that enters may push its neighbours out, leave with them, and enter when they return: followers enter
-        only if the set with them was not solved before. There is an end to that. Between such entries, the sets are
-        those of a linear complementarity problem at each linearisation, in which single changes, the first one each,
-        cannot repeat (K. G. Murty, Opsearch 11, 42, 1974).
+        only if the set with them is not refuted, and was not tried too often. There is an end to that. Between such
+        entries, the sets are those of a linear complementarity problem at each linearisation, in which single changes,
+        the first one each, cannot repeat (K. G. Murty, Opsearch 11, 42, 1974).
         """
         tool, followers = self._tool, self._tool.followers
         if self._repeats >= _ONE_BY_ONE:
@@ -257,9 +263,22 @@ class _InContact(Newton[ContactSolution]):
             following = active.copy()
             following[changes[:1]] ^= True
             following = tool.complete(following)
-        if following.tobytes() in self._seen:
+        key = following.tobytes()
+        if key in self._refuted or self._seen[key] >= _ONE_BY_ONE:
             following = following & (active | ~followers)
         return following
+
+    def _is_refuted(self, before: BoolArray, following: BoolArray, along: FloatArray) -> bool:
+        """Return whether a step shows that its set ``before`` is not that of contact, with normal forces ``along`` (n).
+
+        A node certainly pulls or penetrates: by much more than what the step did not foresee. On linear tissue it
+        foresees all.
+        """
+        changed = (before != following) & ~self._tool.followers
+        leaving, entering, gap = changed & before, changed & following, self._place.gap
+        pull, missed = -self._reactions[leaving], np.abs(along - self._reactions)[leaving]
+        left_open = np.abs(gap[before]).max(initial=0.0)
+        return bool((pull > _CERTAIN * missed).any() or (-gap[entering] > _CERTAIN * left_open).any())
 
     def _descent(self) -> Callable[[float], bool] | None:
         """Return what tells whether a share of the increment reduces the energy enough; None if that is not compared.
