@@ -58,7 +58,7 @@ probe = {shape = "disc", radius = "3 mm", depth = "0.2 mm"}
 mesh = {epsilon = "full", fine = "6 mm", coarse = "8 mm", rim = "1 mm", growth = 0.8}
 [solve]
 exact = true
-tolerance = 1e-8
+energy_tolerance = 1e-8
 """
 
 

@@ -20,7 +20,7 @@ from epsmesh.solve.physics import MaterialLaw
 from epsmesh.study.schema import Material
 from tests.cases import solve, study
 from tests.sampling import sampled
-from tests.verification.laws import FURTHER, YOUNG, Cube, Stress
+from tests.verification.laws import FURTHER, YOUNG, Cube, Stress, rounding
 
 LARGE = tuple(FURTHER)
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}
@@ -31,11 +31,6 @@ def density(law, gradient, of=None, pressure=None):
     """Return the energy for a matrix F, by the value of its UFL expression."""
     of = {"lame_mu": 1.0, "lame_lambda": 2.0} | FURTHER.get(law, {}) | (of or {})
     return float(LAWS[law].density(ufl.as_matrix(np.asarray(gradient).tolist()), of, pressure).value)
-
-
-def rounding(law):
-    """Principal stretches are known to 1e-8 only."""
-    return 1e-7 if law == "ogden" else 1e-10
 
 
 def gradients(seed, size=0.25, count=5):

@@ -31,6 +31,11 @@ YOUNG, POISSON = 10e3, 0.4
 _ON_FACE = 1e-9
 
 
+def rounding(law: str) -> float:
+    """Return the relative rounding error of stresses: principal stretches, of Ogden's law, are known to 1e-8 only."""
+    return 1e-7 if law == "ogden" else 1e-10
+
+
 @dataclass(frozen=True)
 class Stress:
     """Closed forms of the stress of a ``law`` with μ and K (Pa); W is the energy over μ, W₁ = ∂W/∂Ī₁, W₂ = ∂W/∂Ī₂.
