@@ -294,6 +294,7 @@ FEATURES = (
     Feature("F_exact", "exact", _update("solve", exact=True)),
     Feature("swept E", "young", _update("material", young=["10 kPa", "20 kPa"])),
     Feature("output", "output", _output),
+    Feature("influence", "influence", _update("solve", influence=True)),
 )  # fmt: skip
 
 

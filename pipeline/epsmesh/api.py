@@ -164,7 +164,7 @@ class RunnableStudy:
                 study, case, unreached = at_its_depth(self.declared, case, comm)
                 if unreached:
                     raise CaseFailure(unreached)
-                solved = solve_fields(solve_alone(study, case), comm, cache=cache)
+                solved = solve_fields(solve_alone(study, case), comm, influence=True, cache=cache)
         except agreed as failure:
             raise RuntimeError(f"{case}: {failure}") from failure
         if solved.record.status in FAILURES:

@@ -43,8 +43,9 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     parts = [
         *head,
         "" if half_width is None else _mesh_text(case.mesh, folded and case.is_full, half_width, case.way.element),
-        text_of(case.solve, ("timing", "repeats", "exact")),
+        text_of(case.solve, ("timing", "repeats", "exact", "influence")),
         *tail,
+        *(["influence"] if case.solve.influence else []),
         *map(_output_text, case.outputs),
         *_rim_text(case),
     ]

@@ -102,9 +102,10 @@ class OperatorStep:
     def is_condensed(self) -> bool:
         """Whether unilateral contact has enough depths for each material to condense a small body.
 
-        With an accuracy it does not apply: each depth then has its own error bar.
+        With an accuracy it does not apply: each depth then has its own error bar. Nor where the influence of each is
+        wanted, whose contact is that of the whole body.
         """
-        is_plain = self.case.way.is_found and not self.case.solve.timing
+        is_plain = self.case.way.is_found and not (self.case.solve.timing or self.case.solve.influence)
         return is_plain and all(
             len(sweep) >= FEWEST_DEPTHS and all(solve.goal is None for solve in sweep) for sweep in self.sweeps
         )

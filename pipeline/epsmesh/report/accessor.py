@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # More curves than this are drawn as bands, from the least to the most over the scenes.
 _MOST_CURVES = 7
 # Dimensions of what a case has several of.
-_INNER = ("component", "movement", "reaction")
+_INNER = ("component", "movement", "reaction", "region", "decided")
 # The coordinate with the unit of each entry of a stiffness.
 _UNIT = "stiffness_unit"
 

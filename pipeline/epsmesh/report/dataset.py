@@ -19,6 +19,7 @@ from epsmesh.plan.plan import Plan
 from epsmesh.quantities import LARGEST, MESH_DIMENSIONS, RUN, attributes, quantity_of
 from epsmesh.report.along_path import along_path
 from epsmesh.report.history import over_time
+from epsmesh.report.influence import add_influence
 from epsmesh.report.uncertainty import uncertainties
 from epsmesh.report.values import at_full_order, with_flags
 from epsmesh.run.given_force import at_force, with_depths
@@ -123,6 +124,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if "stiffness" in variables:
         coordinates |= _motions()
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
+    dataset = add_influence(dataset, study, cases, flat)
     dataset = along_path(over_time(dataset, study, cases, flat), plan, records)
     if any(case.is_closed for case in cases if not case.no_contact):
         dataset["force_error"].attrs["comment"] = _OF_CLOSURE

@@ -6,14 +6,17 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from dolfinx import fem
 
 from epsmesh import compat
 from epsmesh.arrays import FloatArray
 from epsmesh.run.samples import dataset_of, in_plane, plane_axes
 from epsmesh.run.solved import Solved
+from epsmesh.solve.compiled import cellwise_space
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.points.reduce import CHANGES, change_of
 from epsmesh.solve.points.state import Values
+from epsmesh.study.capabilities.refusals import refused
 from epsmesh.study.case import Case
 from epsmesh.units import parse_quantity
 
@@ -86,6 +89,25 @@ class CaseSolution:
         """Names of the regions, by their numbers in ``regions``."""
         return self.case.region_names
 
+    @cached_property
+    def influence(self) -> Any:
+        """What of F depends on the tissue at a place, ∂ln F/∂ln E per volume (1/m³): constant on each cell.
+
+        E is Young's modulus there. The integral over the whole body is 1: on what was modelled, 1 over ``images``.
+
+        Raises:
+            ValueError: if the influence of this scene is not computed; the message says why.
+        """
+        found = self.solved.state.influence
+        if found is None:
+            why = refused("influence", self.case) or "the change of the solution with the depth was not found"
+            raise ValueError(f"the influence is unknown: {why}")
+        function = fem.Function(cellwise_space(self.mesh, ()))
+        function.x.array[compat.cell_dofs(function.function_space)[: len(found), 0]] = found
+        function.x.scatter_forward()
+        function.name = "influence"
+        return function
+
     @property
     def force(self) -> float:
         """The force (N) of the dataset: the reaction along the tool's axis, positive against its advance."""
@@ -104,7 +126,7 @@ class CaseSolution:
         ``displacement``, ``strain``, ``stress``, ``principal_stress``, ``von_mises``, ``contact_pressure`` and
         ``region`` have units and long names. Points outside the body have NaN, and region -1. Where elements of one
         degree more are known, ``displacement_error``, ``principal_stress_error`` and ``von_mises_error`` are 95 % error
-        bars: of each component or principal value.
+        bars: of each component or principal value. ``influence`` is that of the cell, with a bar in the same way.
 
         Raises:
             ValueError: if these are not points.
@@ -152,8 +174,10 @@ class CaseSolution:
         return self._dataset(places, coordinates, v.shape)
 
     def _dataset(self, points: FloatArray, coordinates: dict[str, Any], shape: tuple[int, ...]) -> "xr.Dataset":
-        values = self.solved.state.at(points)
-        return dataset_of(values, self._bars(points, values), points, coordinates, shape, self.region_names)
+        values, state = self.solved.state.at(points), self.solved.state
+        influence = None if state.influence is None else state.of_cells_at(points, state.influence)
+        bars = self._bars(points, values)
+        return dataset_of(values, influence, bars, points, coordinates, shape, self.region_names)
 
     def _bars(self, points: FloatArray, values: Values) -> dict[str, FloatArray]:
         """Return the error bars at points, by variable; none without the fields of one degree more. Collective."""
@@ -161,12 +185,18 @@ class CaseSolution:
         if finer is None or clear is None:
             return {}
         above = finer.at(points)
+        bars = {} if finer.influence is None else {"influence": self._bar_of_influence(points)}
         known = np.where(self.solved.state.of_cells_at(points, clear.astype(float)) == 1.0, CHANGES, np.nan)
-        return {
+        return bars | {
             "displacement": CHANGES * change_of("displacement", values, above),
             "principal_stress": known * change_of("max_principal", values, above),
             "von_mises": known * change_of("von_mises", values, above),
         }
+
+    def _bar_of_influence(self, points: FloatArray) -> FloatArray:
+        state, finer = self.solved.state, self.solved.finer
+        assert finer is not None and state.influence is not None and finer.influence is not None
+        return state.of_cells_at(points, CHANGES * np.abs(finer.influence - state.influence))
 
     def _corners(self) -> FloatArray:
         """Return the corners (8, 3) of the box of the whole mesh; collective."""

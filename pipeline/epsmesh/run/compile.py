@@ -40,6 +40,7 @@ class _Body:
     of_contact: bool
     of_steps: bool
     of_slit: bool
+    of_influence: bool
 
     def compile(self) -> None:
         straight = self.degree == 1
@@ -114,6 +115,7 @@ def _forms(solve: Solve) -> _Forms:
             of_contact=way.is_found,
             of_steps=way.in_time,
             of_slit=way.motion is Motion.SLIT,
+            of_influence=case.solve.influence,
         )
     half_plane = body.half_plane()
     curved = bool(half_plane and half_plane.is_curved)

@@ -1,4 +1,7 @@
-"""The numbers that ``[[output]]`` asks for. Their error bars are the changes by elements of one degree more."""
+"""The numbers of fields that a study asks for: ``[[output]]``, and where the force is decided.
+
+Their error bars are the changes by elements of one degree more.
+"""
 
 import hashlib
 import importlib.util
@@ -16,6 +19,7 @@ from epsmesh.arrays import BoolArray
 from epsmesh.plan.steps import Solve
 from epsmesh.run.case_solution import CaseSolution
 from epsmesh.run.compile import prepare
+from epsmesh.run.influence import influence_of
 from epsmesh.run.memory import FreeMemory
 from epsmesh.run.problem import conditions_of, lacks_memory, law_of, memory_of, problem_of, solve_problem
 from epsmesh.run.record import Record
@@ -35,20 +39,35 @@ POINTWISE = {"at": 1.0, "max": 0.5, "mean": 0.1, "quantile": 0.3}
 _HIGHEST = 2
 
 
-def outputs_of(
+def with_fields(
     solve: Solve, problem: QuasiStaticProblem, spaces: Spaces, record: Record, *, has_bar: bool
-) -> tuple[dict[str, float], str]:
-    """Return outputs of the last solution of a ``problem``, with their bars, by name, and notes; collective."""
-    case, meshed, body = solve.case, solve.meshed_case, spaces.body
+) -> tuple[Record, str]:
+    """Return the record with what its case asks of the fields of the last solution, and notes; collective."""
+    if not (solve.case.outputs or solve.case.solve.influence):
+        return record, ""
     state = problem.state()
     finer, why = (problem.finer_state, "") if has_bar else (None, "not requested")
     if has_bar and finer is None:
         finer, why = _solved_again(solve, spaces)
+    notes = [f"no error bars on outputs: {why}"] if why else []
+    if solve.case.solve.influence and state.influence is None:
+        notes.append("no influence: the change of the solution with the depth was not found")
+    elif solve.case.solve.influence:
+        record = replace(record, influence=dict(influence_of(solve, state, finer)))
+    if solve.case.outputs:
+        found, more = _outputs_of(solve, state, finer, record)
+        record, notes = replace(record, largest=record.largest | found), [*notes, *more]
+    return record, "; ".join(notes)
+
+
+def _outputs_of(solve: Solve, state: State, finer: State | None, record: Record) -> tuple[dict[str, float], list[str]]:
+    """Return the outputs, with their bars, by name, and notes; collective."""
+    case, meshed, body = solve.case, solve.meshed_case, state.body
     law = law_of(case, in_body=True)
     compile_law(body.comm, state)
     clear = clear_cells(body, conditions_of(case).front, wholly=True)
     found: dict[str, float] = {}
-    notes = [f"no error bars on outputs: {why}"] if why else []
+    notes: list[str] = []
     undo = put_back(case, meshed, body, [each for each in (state, finer) if each is not None])
     try:
         states = [each and replace(each, law=law) for each in (state, finer)]
@@ -63,7 +82,7 @@ def outputs_of(
             notes += _notes(output, number)
     finally:
         undo()
-    return found, "; ".join(notes)
+    return found, notes
 
 
 def _of_fields(output: Output, case: Case, state: State | None, finer: State | None, clear: BoolArray) -> Number:

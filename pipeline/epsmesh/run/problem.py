@@ -250,18 +250,20 @@ def solve_problem(
     meshed: Case | None = None,
     keep: bool = False,
     goal: float | None = None,
+    influence: bool = False,
 ) -> Solution:
     """Solve a case; a small system is solved directly if iterations do not converge. Collective.
 
-    ``meshed`` is the case of the mesh, if it differs: see ``movement_of``. ``keep``: see :class:`Request`. ``goal`` is
-    the accuracy for which time steps are chosen.
+    ``meshed`` is the case of the mesh, if it differs: see ``movement_of``. ``keep`` and ``influence``, which the
+    case may ask for, too: see :class:`Request`. ``goal`` is the accuracy for which time steps are chosen.
 
     Raises:
         SolveError: if this fails, too, or if the solution is impossible.
     """
     law, movement = law_of(case), movement_of(case, meshed)
     asked = Request(law, movement, case.solve.method, case.solve.energy_tolerance, estimate, course_of(case, goal))
-    asked = replace(asked, keep=keep or bool(case.outputs))
+    influence = influence or case.solve.influence
+    asked = replace(asked, keep=keep or influence or bool(case.outputs), influence=influence)
     try:
         solution = problem.answer(asked)
     except (ContactError, LargeError):

@@ -59,6 +59,8 @@ class Record:
     - ``load_force`` (N), with the error bar ``load_force_error`` (N), and ``load_force_vector`` (N): what loads add to
       the force if the probe is held. ``load_energy`` (J): their strain energy. ``sag`` (m): their displacement of a
       probe that is free along its axis.
+    - ``influence``: shares of the force by region, and distances (m) within which shares are decided, with error bars,
+      by their names in the dataset; empty unless the study asks for them.
     - ``course``: what a case in time steps does over time: see ``COURSE``; empty for any other case.
     - ``surface_deviation`` (m): distance of the mesh from the surface in the body's file.
     - ``kind``, ``planned_cells``, ``poisson``: inputs of the cost model (:mod:`epsmesh.plan.cost`).
@@ -101,6 +103,7 @@ class Record:
     load_energy: float = nan
     sag: float = nan
     balance: float = nan
+    influence: dict[str, tuple[float, ...]] = field(default_factory=dict)
     course: dict[str, tuple[float, ...]] = field(default_factory=dict)
     surface_deviation: float = nan
     dofs: int = 0

@@ -25,7 +25,7 @@ from epsmesh.run.measure import BARS, TIMES, record_of
 from epsmesh.run.memory import FreeMemory, PeakMemory, give_back
 from epsmesh.run.mesh_cache import MeshCache
 from epsmesh.run.meshing import mesh_case, on_first_rank
-from epsmesh.run.outputs import outputs_of
+from epsmesh.run.outputs import with_fields
 from epsmesh.run.problem import (
     check_memory,
     lacks_memory,
@@ -218,10 +218,8 @@ class StepRunner:
         has_bar = has_bar and not missing
         solution = solve_problem(solve.case, problem, estimate=has_bar, meshed=solve.meshed_case)
         record = record_of(solve, solution, meshed.times.mesh)
-        if solve.case.outputs:
-            found, notes = outputs_of(solve, problem, meshed.spaces, record, has_bar=has_bar)
-            record = replace(record, largest=record.largest | found)
-            missing = "; ".join(filter(None, (missing, notes)))
+        record, notes = with_fields(solve, problem, meshed.spaces, record, has_bar=has_bar)
+        missing = "; ".join(filter(None, (missing, notes)))
         stamped = self._stamp(record, meshed.memory)
         return replace(stamped, message=missing, surface_deviation=meshed.spaces.body.deviation)
 

@@ -19,6 +19,7 @@ _AXES = ("x", "y", "z")
 
 def dataset_of(
     values: Values,
+    influence: FloatArray | None,
     bars: dict[str, FloatArray],
     points: FloatArray,
     coordinates: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]],
@@ -27,8 +28,8 @@ def dataset_of(
 ) -> "xr.Dataset":
     """Return a dataset of ``values`` at ``points`` (n, 3), n the product of a ``shape`` of dimensions.
 
-    ``bars`` are 95 % error bars by variable, in its unit. ``coordinates`` are those of the dimensions, in their order:
-    dimensions, values and attributes.
+    ``influence`` (n) is in 1/m³, None if it is unknown. ``bars`` are 95 % error bars by variable, in its unit.
+    ``coordinates`` are those of the dimensions, in their order: dimensions, values and attributes.
     """
     import xarray as xr  # noqa: PLC0415 (slow to import)
 
@@ -43,6 +44,9 @@ def dataset_of(
         "von_mises": (von_mises(values.stress), (), "Pa", f"von Mises stress of the {stress}"),
         "contact_pressure": (values.contact, (), "Pa", "pressure normal to the tool's footprint, NaN elsewhere"),
     }
+    if influence is not None:
+        meaning = "influence on the force, ∂ln F/∂ln E per volume, mean of the cell"
+        variables["influence"] = (influence, (), "m-3", meaning)
     for name, found in bars.items():
         variables[f"{name}_error"] = (found, (), variables[name][2], f"error bar (95 %) on {name}, by the mesh")
     data: dict[str, Any] = {

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ from epsmesh.solve.cell_values import clear_cells
 from epsmesh.solve.compiled import compiling
 from epsmesh.solve.points.state import State, compile_stress
 from epsmesh.solve.spaces import Spaces
+from epsmesh.study.capabilities.refusals import refused
 from epsmesh.study.case import Case
 from epsmesh.study.sweep import Study
 
@@ -83,14 +85,15 @@ def solve_fields(
     comm: MPI.Comm,
     *,
     bar: bool = True,
+    influence: bool = False,
     cache: MeshCache | None = None,
     note: Note = lambda text: None,
 ) -> Solved:
     """Return the solution of a case; collective.
 
     With an accuracy, meshes are tried and judged as in a run: the fields are those of its mesh, with its force. With
-    ``bar`` the force has its error bar, if there is the memory for it. ``note`` receives, on every rank, what is being
-    worked on.
+    ``bar`` the force has its error bar, if there is the memory for it. ``influence``: with it, where the scene has one.
+    ``note`` receives, on every rank, what is being worked on.
 
     Raises:
         CaseFailure: if the memory is too small.
@@ -99,13 +102,14 @@ def solve_fields(
     """
     return_large_arrays()
     run, solve = solve, replace(solve, axisymmetric=False)
+    attempt = partial(_attempt, comm=comm, bar=bar, influence=influence, cache=cache, note=note)
     with one_thread():
         attempts = Attempts()
-        best = latest = _attempt(solve, comm, bar, cache, note)
+        best = latest = attempt(solve)
         while (judged := attempts.judge(solve, latest.record)) is None:
             (solve,) = attempts.take_again()
             try:
-                latest = _attempt(solve, comm, bar, cache, note)
+                latest = attempt(solve)
             except (CaseFailure, MeshError, SolveError):
                 break  # no finer mesh: a run concludes with the best force so far, too
             if latest.record.force_error < best.record.force_error:
@@ -123,7 +127,9 @@ def _with_force_of_meridian(run: Solve, solved: Solved, comm: MPI.Comm) -> Solve
     return replace(solved, record=comm.bcast(record), on_meridian=True)
 
 
-def _attempt(solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, note: Note) -> Solved:
+def _attempt(
+    solve: Solve, *, comm: MPI.Comm, bar: bool, influence: bool, cache: MeshCache | None, note: Note
+) -> Solved:
     """Solve on one mesh; return the record that a run would have of it, and the fields; collective."""
     case, meshed = solve.case, solve.meshed_case
     arrays = modelled_arrays(solve, comm, cache, note)
@@ -138,7 +144,8 @@ def _attempt(solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, n
         # Of a history, fields are those of the elastic body.
         still = replace(case, probe=case.probe.model_copy(update={"history": None}), outputs=())
         has_bar = room or solve.goal is not None
-        solution = solve_problem(still, problem, estimate=has_bar, meshed=meshed, keep=True)
+        influence = influence and not refused("influence", still)
+        solution = solve_problem(still, problem, estimate=has_bar, meshed=meshed, keep=True, influence=influence)
         state, finer = problem.state(), problem.finer_state
     compile_law(comm, state)
     clear = clear_cells(mesh, conditions_of(case).front, wholly=True)

@@ -71,10 +71,11 @@ class ElasticForms:
     def _coefficient(self) -> Any:
         if self._regions is None:
             return fem.Constant(self._space.mesh, 1.0)
-        return fem.Function(self._cellwise)
+        return fem.Function(self.cellwise)
 
     @cached_property
-    def _cellwise(self) -> Any:
+    def cellwise(self) -> Any:
+        """The space of numbers that are constant on each cell."""
         return cellwise_space(self._space.mesh, ())
 
     def put(self, coefficient: Any, values: tuple[float, ...]) -> None:
@@ -228,6 +229,27 @@ class HyperelasticForms:
             for row in range(len(self._fields))
         )
 
+    @cached_property
+    def work_rates(self) -> Any:
+        """Integral over each cell of the rate, along the ``directions``, of E ∂ψ/∂E: all moduli are proportional to E.
+
+        In mixed elements E ∂ψ/∂E has p²/(2λ₁) in place of p D − p²/(2λ₁).
+        """
+        gradient, (along, *rest) = ufl.Identity(3) + ufl.grad(self._displacement), self.directions
+        cell, found = ufl.TestFunction(self._elastic.cellwise), []
+        for law, measure in self._measures.items():
+            rate = LAWS[law].density(gradient, self._coefficients).derivative(self._displacement, along).value
+            if self._pressure is not None:
+                pressure, compliance = self._pressure
+                rate += compliance * pressure * rest[0]
+            found.append(rate * cell * measure)
+        return form(sum(found))
+
+    @cached_property
+    def volumes(self) -> Any:
+        """Volumes of the cells."""
+        return form(ufl.TestFunction(self._elastic.cellwise) * dx(self._space))
+
     def set_directions(self) -> None:
         """Copy the fields to the ``directions``."""
         for direction, field in zip(self.directions, self._fields, strict=True):
@@ -244,11 +266,12 @@ def compile_forms(
     is_nonlinear: bool = False,
     of_contact: bool = False,
     of_steps: bool = False,
+    of_influence: bool = False,
 ) -> None:
     """Compile the forms for elements of ``degree``, for all lower degrees, and for the next one (error bar).
 
     ``is_nonlinear``: with those of Newton's method, ``of_contact`` at the next degree, too; ``of_steps``: with those of
-    time steps.
+    time steps, ``of_influence``: with those of the influence.
     """
     regions = np.zeros(1, dtype=np.int32) if of_regions else None
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
@@ -259,6 +282,10 @@ def compile_forms(
         if element == "mixed" and level > 1:  # the search for contact begins at the lowest degree
             mixed = MixedForms(elastic.displacement, scalar_space(mesh, level - 1))
             _ = mixed.mass, mixed.coupling, mixed.dilation, mixed.pull
+        if of_influence and level >= degree:
+            pressure = (mixed.pressure, elastic.by_region((1.0,))) if mixed is not None else None
+            large = HyperelasticForms(space, elastic, laws, pressure)
+            _ = large.work_rates, large.volumes
         if is_nonlinear and level >= degree:
             pressure = (mixed.pressure, elastic.by_region((1.0,))) if mixed is not None else None
             large = HyperelasticForms(space, elastic, laws, pressure)

@@ -147,6 +147,14 @@ class LoadSteps(Solver):
         work = global_sum(space.comm, np.array([residual[held] @ column.prescribed[held]]))
         return Products(space, [moved], [residual], work[None], work, on_terms[None])
 
+    def show_rate(self, columns: Sequence[Column], movement: Movement) -> None:
+        """Copy the linearised change per metre of the tool's advance to the forms' fields."""
+        with self._body.state() as state, self._body.state() as unit, self._body.state() as rate:
+            self._at(columns[0], state)
+            self._put_unit(columns[0], unit)
+            move(self._body, state, unit, rate)
+            self._body.show(rate)
+
     def load_response(self, response: Response) -> LoadResponse | None:
         """Return the effect of loads on the whole body, None without loads; ``response`` is that to the motion."""
         held, mirrored = self._load_path.held, self.elements.body.mirrored

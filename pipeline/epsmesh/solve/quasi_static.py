@@ -11,12 +11,14 @@ The tool is a constraint: its motion is prescribed (:mod:`epsmesh.solve.prescrib
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 from petsc4py import PETSc
 
 from epsmesh.arrays import FloatArray
+from epsmesh.solve import SolveError
 from epsmesh.solve.cell_values import CellValues, plain_share
 from epsmesh.solve.conditions import Conditions, Front
 from epsmesh.solve.contact.search import ContactSearch
@@ -24,10 +26,11 @@ from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.crack import Advance
 from epsmesh.solve.elements import elements_of
-from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
+from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate, show_unit
 from epsmesh.solve.elements.displacement import DisplacementElements
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.estimate import error_bar, stiffness_bars
+from epsmesh.solve.influence import influence_of
 from epsmesh.solve.linear_solver import LinearSolver
 from epsmesh.solve.movement import Motion, Movement
 from epsmesh.solve.physics import MaterialLaw
@@ -90,6 +93,7 @@ class QuasiStaticProblem(Problem):
         displacement = self.elements.displacements.forms.displacement
         self._values = CellValues(self._body, displacement, is_mixed=element == "mixed")
         self._law: MaterialLaw | None = None  # of the last solution
+        self._influence: FloatArray | None = None
         # The fields of the last solution in elements of one degree more, if they were requested and are known.
         self.finer_state: State | None = None
 
@@ -118,7 +122,7 @@ class QuasiStaticProblem(Problem):
             SolveError: if the elements do not support the law, the solver does not converge, or the solution fails a
                 check; a ContactError, if contact is not found.
         """
-        self._law, self.finer_state = asked.law, None
+        self._law, self.finer_state, self._influence = asked.law, None, None
         law = asked.law
         with recorded() as times, ExitStack() as stack:
             found = self.constraint.solve(asked, stack)
@@ -140,10 +144,24 @@ class QuasiStaticProblem(Problem):
             )
             if asked.estimate:
                 solution = self._estimated(solution, found, asked)
+            if asked.influence:
+                self._influence = self._influence_of(found, law)
             if asked.course is not None:
                 solution = self._followed(solution, found, asked, stack)
             self.elements.show(found.columns)
         return solution
+
+    @stage("error bar")
+    def _influence_of(self, found: Equilibrium, law: MaterialLaw) -> FloatArray | None:
+        """Return the influence (1/m³) on owned cells, None where terms act at rest, or the rate fails; collective."""
+        if self.elements.displacements.is_loaded:
+            return None
+        columns, force = found.columns, found.response.force[2]
+        show, amounts = partial(found.solver.show_rate, columns, found.movement), [each.amount for each in columns]
+        try:
+            return influence_of(self.elements, law, columns, amounts, show, force)
+        except SolveError:
+            return None
 
     def _followed(self, solution: Solution, found: Equilibrium, asked: Request, stack: ExitStack) -> Solution:
         """Return the ``solution`` with the history of the course; collective.
@@ -171,8 +189,13 @@ class QuasiStaticProblem(Problem):
                 columns, movement, stack, keep=asked.keep or self._conditions.front is not None
             )
             if asked.keep and finer.columns:
-                finer.elements.show(finer.columns, [column.amount for column in columns])
+                amounts = [column.amount for column in columns]
+                finer.elements.show(finer.columns, amounts)
                 self.finer_state = finer.elements.state(law)
+                if asked.influence:
+                    show = partial(show_unit, finer.elements, finer.columns, movement)
+                    above = influence_of(finer.elements, law, finer.columns, amounts, show)
+                    self.finer_state = replace(self.finer_state, influence=above)
             form = _form(solution.response, solution.load_response)
             if finer.decrements is None:
                 products = finer.elements.products(law, finer.columns, checked=False)
@@ -246,7 +269,7 @@ class QuasiStaticProblem(Problem):
     def state(self) -> State:
         """Return a copy of the last solution's fields, which outlives the problem; collective."""
         assert self._law is not None
-        return self.elements.state(self._law)
+        return replace(self.elements.state(self._law), influence=self._influence)
 
     def largest(self, law: MaterialLaw, displacement: PETSc.Vec) -> dict[str, Any]:
         """Return the cell maxima of ``displacement`` by name; collective."""

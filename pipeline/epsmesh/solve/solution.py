@@ -201,7 +201,7 @@ class Request:
 
     ``method`` is "auto", "direct" or "iterative"; ``tolerance`` is the relative energy norm of the solver's error.
     ``estimate`` requests error bars, ``keep`` the fields of one degree more that give them, where there are such. With
-    a ``course`` the movement is also followed over time.
+    a ``course`` the movement is also followed over time. ``influence`` requests where the force is decided.
     """
 
     law: MaterialLaw
@@ -211,6 +211,7 @@ class Request:
     estimate: bool = False
     course: Course | None = None
     keep: bool = False
+    influence: bool = False
 
 
 class Problem(ABC):

@@ -242,6 +242,16 @@ class Solving(Section):
         Words("Runs of each case of a timing study. The dataset has the median of their times.", "3"),
     ] = 3
 
+    influence: Annotated[
+        bool,
+        Words(
+            "Where F is decided: `force_share`, by layer and region, and `influence_radius`, the distance from the "
+            "touch within which a share of F is decided. The scene is solved in three dimensions.",
+            "true",
+            default="false",
+        ),
+    ] = False
+
     def wants_exact(self, mesh: Mesh) -> bool:
         """Return whether F_exact is computed beside a ``mesh``; with an accuracy, only if the study says so."""
         return self.exact and (mesh.accuracy is None or "exact" in self.model_fields_set)

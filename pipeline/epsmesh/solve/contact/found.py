@@ -35,6 +35,8 @@ from epsmesh.solve.response import Response, reaction
 _SAME = 1e-9
 # Contact is solved again for the bar where fully active facets cover less than this share of its area.
 _COVERED = 0.3
+# Energy norm of the error of the rate by the depth, relative to that of the solution.
+_RATE = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +164,17 @@ class LinearContact:
             if self.loaded is None:
                 self.sweep.keep_bar(depth, *known, movement.far)
         return estimate_of(self._plug, self.surface, depth, known, known[1])
+
+    def show_rate(self, columns: Sequence[Column], movement: Movement) -> None:
+        """Copy the change per metre of the tool's advance, with the same nodes in contact, to the forms' fields."""
+        elements, depth, smooth = self.sweep.elements, self.obstacle.depth, self.smooth
+        elements.start_at(self.unknowns)
+        elements.hold(smooth.active)
+        elements.improve(self.obstacle.bounds - depth, _RATE, smooth.state.energy)
+        for field, before in zip(elements.fields, self.unknowns, strict=True):
+            field.array[:] = (field.array - before) / depth
+        elements.show()
+        elements.start_at(self.unknowns)
 
     def _estimated(self) -> tuple[float, float]:
         """Return the share of the energy that one degree more removes, and the relative bar."""

@@ -55,6 +55,8 @@ from epsmesh.stages import stage
 _SMALL = 1e-4
 # Residual and gaps of one degree more, for the error bar.
 _FOUND_AGAIN = 1e-3
+# Share of the depth to both sides of it over which the rate by the depth is taken.
+_NEARBY = 1e-3
 
 
 class LargeContact:
@@ -259,6 +261,18 @@ class LargeContactSolution:
         # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
         of_area = nan if here.is_ended else bar + abs(finer.surface_contact.whole_area / here.whole_area - 1)
         return estimate_of(finer.body.elements, here, self.depth, (decrement, bar), of_area)
+
+    def show_rate(self, columns: Sequence[Column], movement: Movement) -> None:
+        """Copy the change per metre of the tool's advance, with the same nodes in contact, to the forms' fields."""
+        body, state, active, found = self.body, self.body.state, self.touched.active, list[FloatArray]()
+        for share in (1 + _NEARBY, 1 - _NEARBY):
+            body.state = state
+            tool = placed_tool(body, self.placed, share * self.depth)
+            solve_contact(body, replace(tool, complete=lambda _: active), active)
+            found.append(body.state)
+        body.state = (found[0] - found[1]) / (2 * _NEARBY * self.depth)
+        body.show()
+        body.state = state
 
     @stage("contact sets")
     def _found_again(self, loads: Loads | None, stack: ExitStack) -> "LargeContactSolution":

@@ -83,6 +83,13 @@ class HierarchicalEstimator(Protocol):
         ``keep`` requests the solutions of that degree, too.
         """
 
+    def show_rate(self, columns: Sequence[Column], movement: Movement) -> None:
+        """Copy the change of the solution per metre of the tool's advance to the forms' fields; collective.
+
+        Raises:
+            SolveError: if a linear solver fails.
+        """
+
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
@@ -140,6 +147,16 @@ class Solver(ABC):
         self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool
     ) -> HierarchicalEstimate:
         """Return the hierarchical estimate: see :class:`HierarchicalEstimator`."""
+
+    def show_rate(self, columns: Sequence[Column], movement: Movement) -> None:
+        """Copy the solution per metre of the tool's advance along its axis, −z, to the forms' fields."""
+        show_unit(self.elements, columns, movement)
+
+
+def show_unit(elements: ElementFields, columns: Sequence[Column], movement: Movement) -> None:
+    """Copy the solution of linear tissue per metre of the tool's advance along its axis, −z, to the forms' fields."""
+    number = next(n for n, motion in enumerate(movement.motions) if motion.direction[2])
+    elements.show([columns[number]], [-movement.motions[number].direction[2]])
 
 
 class Linearised(ABC):

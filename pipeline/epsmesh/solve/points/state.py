@@ -54,13 +54,15 @@ class State:
 
     ``displacement`` (m) and ``pressure`` (Pa, positive in tension) are dolfinx functions; the pressure is that of mixed
     elements, λ₁ times the change of volume, and None in displacement elements. The body may be the half or quarter that
-    planes of symmetry leave.
+    planes of symmetry leave. ``influence`` (1/m³), on owned cells, is known if it was requested: see
+    :mod:`epsmesh.solve.influence`.
     """
 
     body: BodyMesh
     displacement: Any
     pressure: Any | None
     law: MaterialLaw
+    influence: FloatArray | None = None
 
     @property
     def degree(self) -> int:

@@ -135,6 +135,11 @@ def _wants_exact(scene: Scene) -> bool:
     return solve is not None and bool(solve.wants_exact(scene.mesh))
 
 
+def _wants_influence(scene: Scene) -> bool:
+    solve = getattr(scene, "solve", None)
+    return solve is not None and bool(solve.influence)
+
+
 def needs_time_steps(scene: Scene) -> bool:
     """Return whether the force over time is no elastic force times a function of time."""
     if scene.probe.history is None:
@@ -227,6 +232,7 @@ FEATURES: dict[str, Feature] = {
     **{name: Feature(f"load.{name}", partial(_has_term, name=name), write=lambda _: None) for name in TERMS},
     # Of a case: the sections of a scene have none.
     "outputs": Feature("output", lambda s: bool(getattr(s, "outputs", ()))),
+    "influence": Feature("solve.influence", _wants_influence, write=bool),
     "F_exact": Feature("solve.exact", _wants_exact, ("mesh",)),
 }
 

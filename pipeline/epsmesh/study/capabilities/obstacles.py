@@ -16,6 +16,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "loads": "loads are computed in three dimensions",
         "terms": "terms are computed in three dimensions",
         "outputs": "outputs are numbers of a solution in three dimensions",
+        "influence": "the influence is that of a solution in three dimensions",
     },
     # Taken if no case of the study is in the way: what is compared is computed alike.
     "meridian, in a comparison": {
@@ -34,6 +35,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "terms": "the problem is solved as at large displacements",
         "time steps": "a history in time steps is no static solution",
         "outputs": "outputs need the solution of each case",
+        "influence": "the influence needs the solution of each case",
     },
     "scaling": {
         "needle that cuts": "its crack depends on the toughness over the modulus",
@@ -47,6 +49,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "loads": "loads break the symmetry",
         "terms": "a term may break the symmetry",
         "outputs": "outputs are at the same place of the body, not of its image",
+        "influence": "the shares are those of named regions, not of their images",
     },
     "equivalent places": {
         "fibres": "the direction of the fibres is fixed in the body",
@@ -74,6 +77,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "loads": "loads have results besides F",
         "terms": "terms act on the whole body",
         "outputs": "outputs need the solution of each place",
+        "influence": "the influence needs the solution of each place",
     },
     "F_exact": {
         "time steps": "F_exact is static, and these forces are no multiples of static ones",

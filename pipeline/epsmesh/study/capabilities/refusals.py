@@ -167,6 +167,14 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("insertion", "inclusion", "needs a body of layers: cuts through inclusions are not computed"),
     Refusal("insertion", "region", "needs a body of layers: cuts through regions are not computed"),
     Refusal("insertion", "loads", f"cuts in tissue under loads are not computed: {_NO_LOADS}"),
+    # Where F is decided: its derivatives by the modulus at a place.
+    Refusal("influence", "friction", "with friction, F is no derivative of an energy: omit it, or friction"),
+    Refusal("influence", "loads", f"the loads decide a part of F, and where its depth begins: {_NO_LOADS}, or omit it"),
+    Refusal("influence", "half ball", 'tissue beyond the cut decides a part of F: omit it, or use outside = "coarse"'),
+    Refusal("influence", "slit", "the force of a blade in a slit has a part at the slit's front: omit it"),
+    Refusal("influence", "insertion", "along an insertion, F has parts of fracture and friction: omit it"),
+    Refusal("influence", "history", "is not computed over time: omit [probe.history], or influence"),
+    Refusal("influence", "given force", "is computed at given depths: give a depth, or omit it"),
     # Loads.
     Refusal(
         "truncated body",
@@ -226,7 +234,13 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("half ball", "large displacements", f'must be "coarse", "linear", "free" or "fixed" {_OF_LAW}'),
 )
 
-_PARTS = ("body", "material", "probe", "mesh", "load")
+_PARTS = ("body", "material", "probe", "mesh", "load", "solve")
+
+
+def refused(name: str, scene: Scene) -> str:
+    """Return why a scene must not have a feature, which is the first of its pairs, as well; "" if it may."""
+    pairs = (refusal for refusal in REFUSALS if refusal.first == name)
+    return next((refusal.reason for refusal in pairs if FEATURES[refusal.second].holds(scene)), "")
 
 
 def check_features(

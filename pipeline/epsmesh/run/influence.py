@@ -1,0 +1,111 @@
+"""What of the force regions decide, and within which distance of the touch: sums of the influence over cells.
+
+Error bars are the changes by elements of one degree more, as those of outputs.
+"""
+
+from collections.abc import Iterator, Mapping
+
+import basix
+import numpy as np
+from mpi4py import MPI
+
+from epsmesh import compat
+from epsmesh.arrays import FloatArray, IntArray
+from epsmesh.mesh.distribute import BodyMesh
+from epsmesh.plan.steps import Solve
+from epsmesh.solve.compiled import global_sum
+from epsmesh.solve.points.locate import table_of
+from epsmesh.solve.points.reduce import CHANGES
+from epsmesh.solve.points.state import State
+from epsmesh.study.influence import DECIDED
+
+# Points of a cell at which its influence is summed by distance; cells that are summed together.
+_QUADRATURE, _CHUNK = 6, 20_000
+# Distances at which sums are read, from the least on, in units of the largest; they are interpolated between.
+_LEAST, _DISTANCES = 1e-4, 2_000
+# Least change of a region's share, in units of what changes anywhere in it; and of a distance, of the largest such one.
+_POINTWISE, _ELSEWHERE = 0.1, 0.3
+# A sum of the influence that lacks no more than this is the whole force.
+_ROUNDING = 1e-6
+
+
+def influence_of(solve: Solve, state: State, finer: State | None) -> Mapping[str, tuple[float, ...]]:
+    """Return share of F by region, and distance (m) by share of F, with error bars, by their names; collective.
+
+    The mesh is that of the solver, turned so that the probe presses along −z.
+    """
+    assert state.influence is not None
+    case, body, comm = solve.case, state.body, state.body.comm
+    count, numbers = len(case.tissues), np.zeros(body.owned_cells, int)
+    if body.regions is not None:  # beyond ε, the linear part of each region has a number of its own
+        numbers = body.regions[: body.owned_cells] % count
+    centre = np.array(solve.meshed_case.frame.upright.point)
+    above = None if finer is None else finer.influence
+    reach = comm.allreduce(_farthest(body, centre), op=MPI.MAX)
+    edges = np.concatenate([[0.0], reach * np.geomspace(_LEAST, 1.0, _DISTANCES)])
+    size = len(edges) - 1
+
+    def by_distance(distances: FloatArray, works: FloatArray) -> FloatArray:
+        places = np.searchsorted(edges, distances.ravel(), side="right").clip(1, size) - 1
+        return np.asarray(np.bincount(places, works.ravel(), minlength=size), dtype=float)
+
+    # Sums by region: here, in one degree more, and of changes. By distance: here, each cell at one, one degree more.
+    regions, within = np.zeros((3, count)), np.zeros((3, size))
+    for cells, distances, volumes in _points(state, centre):
+        here = state.influence[cells, None] * volumes
+        finest = here if above is None else above[cells, None] * volumes
+        by_cell = here.sum(axis=1), finest.sum(axis=1), np.abs(finest - here).sum(axis=1)
+        regions += [np.bincount(numbers[cells], one, minlength=count) for one in by_cell]
+        middles = distances.mean(axis=1)
+        within += [by_distance(distances, here), by_distance(middles, by_cell[0]), by_distance(distances, finest)]
+    regions, within = (2.0 ** len(body.mirrored) * global_sum(comm, sums) for sums in (regions, within))
+    radii = np.array([_radii(np.cumsum(one), edges[1:]) for one in within])
+    bars = np.full(count, np.nan), np.full(len(DECIDED), np.nan)
+    if above is not None:
+        bars = _bar_of_shares(*regions), _bar_of_radii(*radii)
+    found = {"force_share": regions[0], "influence_radius": radii[0]}
+    found |= {f"{name}_error": bar for name, bar in zip(found, bars, strict=True)}
+    return {name: tuple(map(float, values)) for name, values in found.items()}
+
+
+def _farthest(body: BodyMesh, centre: FloatArray) -> float:
+    return float(np.linalg.norm(np.asarray(body.mesh.geometry.x) - centre, axis=1).max(initial=0.0))
+
+
+def _bar_of_shares(here: FloatArray, above: FloatArray, changed: FloatArray) -> FloatArray:
+    return CHANGES * np.maximum(np.abs(here - above), _POINTWISE * changed)
+
+
+def _bar_of_radii(here: FloatArray, by_cell: FloatArray, above: FloatArray) -> FloatArray:
+    """Return the bar of distances; the size of cells adds to it: ``by_cell``, where each cell is at one distance."""
+    by, size = np.abs(above / here - 1), np.abs(by_cell - here)
+    return CHANGES * here * np.maximum(by, _ELSEWHERE * np.nanmax(by, initial=0.0)) + size
+
+
+def _points(state: State, centre: FloatArray) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
+    """Yield owned cells (n), the distances (m) of points in them from the ``centre``, and their volumes (n, q), m³."""
+    at, weights = map(np.asarray, basix.make_quadrature(basix.CellType.tetrahedron, _QUADRATURE))
+    functions, mesh = table_of(state.locator.order, at)[0], state.body.mesh
+    nodes, x = compat.geometry_dofs(mesh), np.asarray(mesh.geometry.x)
+    for start in range(0, state.body.owned_cells, _CHUNK):
+        cells = np.arange(start, min(start + _CHUNK, state.body.owned_cells))
+        places = np.einsum("qk,ckx->cqx", functions, x[nodes[cells]])
+        yield cells, np.linalg.norm(places - centre, axis=2), state.volumes(cells, at) * weights
+
+
+def _radii(within: FloatArray, radii: FloatArray) -> FloatArray:
+    """Return the distances (m) within which each of ``DECIDED`` is decided, and beyond which no less is; NaN if none.
+
+    ``within`` are the shares of F within ``radii`` (m).
+    """
+    found = np.full(len(DECIDED), np.nan)
+    for number, share in enumerate(DECIDED):
+        if within[-1] < share - _ROUNDING:
+            continue
+        less = np.flatnonzero(within[:-1] < share)
+        last = less[-1] if len(less) else -1
+        low = (0.0, 0.0) if last < 0 else (within[last], radii[last])
+        high = within[last + 1], radii[last + 1]
+        part = (share - low[0]) / (high[0] - low[0])
+        found[number] = low[1] + min(part, 1.0) * (high[1] - low[1])
+    return found

@@ -1,0 +1,138 @@
+"""Where F is decided, in records, datasets and solutions; reductions give the same, or are not taken."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+import xarray as xr
+from dolfinx import fem
+from mpi4py import MPI
+
+import epsmesh
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.run.execute import compute
+from epsmesh.study.influence import DECIDED
+from epsmesh.study.read import parse
+from tests.cases import raw, refusal
+
+WORLD = MPI.COMM_WORLD
+SKIN = {"name": "skin", "thickness": "3 mm", "young": "30 kPa", "poisson": 0.3}
+LUMP = {"name": "lump", "at": ["0 mm", "0 mm", "-8 mm"], "radius": "3 mm", "young": "50 kPa", "poisson": 0.3}
+REGIONS = {"layer": [SKIN], "inclusion": [LUMP]}
+BALL = {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "contact": "unilateral"}
+FINER = {"fine": "3 mm", "coarse": "6 mm", "rim": "0.6 mm"}
+ASKED = {"influence": True}
+
+
+def dataset(comm: MPI.Comm = MPI.COMM_SELF, without: tuple[str, ...] = (), **changes: Any) -> xr.Dataset:
+    """Return the dataset of the base study with changes, which asks for the influence."""
+    plan = make_plan(parse(raw(**{"solve": ASKED} | changes)), without=without)
+    return build(plan, compute(plan, comm))
+
+
+def same(one: xr.Dataset, other: xr.Dataset, rel: float = 1e-6) -> None:
+    for name in ("force_share", "influence_radius"):
+        assert one[name].values == pytest.approx(other[name].values, rel=rel, nan_ok=True), name
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"probe": BALL, "mesh": {"rim": "0.5 mm"}}, {"material": {"law": "neo-hookean"}}],
+    ids=["bonded", "contact found", "large displacements"],
+)
+def test_bars_hold_the_shares_of_a_finer_mesh(changes):
+    body, other = {"body": REGIONS}, changes | {"mesh": FINER | ({"rim": "0.3 mm"} if "probe" in changes else {})}
+    coarse, fine = dataset(**body, **changes), dataset(**body, **other)
+    assert coarse["region"].values.tolist() == ["tissue", "skin", "lump"]
+    assert coarse["decided"].values.tolist() == [*DECIDED]
+    assert float(coarse["force_share"].sum()) == pytest.approx(1.0, abs=1e-6)
+    for name in ("force_share", "influence_radius"):
+        off = np.abs(coarse[name] - fine[name])
+        assert (off <= coarse[f"{name}_error"] + fine[f"{name}_error"]).all(), name
+        assert (coarse[f"{name}_error"] > 0).all(), name
+        assert (coarse[f"{name}_error"] < 0.2 * coarse[name]).all(), name
+    assert (np.diff(coarse["influence_radius"]) > 0).all()
+
+
+def test_a_column_in_compression_is_decided_in_proportion_to_its_volume():
+    """A disc as wide as a cylinder of ν = 0: the strain is uniform, and the ball that has a share is known."""
+    half = 6e-3
+    found = dataset(
+        body={"shape": "cylinder", "radius": "6 mm", "height": "12 mm", "fixed": "bottom", "size": None},
+        material={"poisson": 0.0},
+        probe={"radius": "5.999 mm", "depth": "0.1 mm"},
+        mesh={"rim": "1 mm", "fine": "1.5 mm"},
+    )
+    within = 2 * np.pi / 3 * half**3 / (np.pi * half**2 * 2 * half)  # the half ball of the radius
+    radius = np.interp(within, found["decided"], found["influence_radius"])
+    assert radius == pytest.approx(half, rel=0.02)
+
+
+def test_parts_of_the_body_ranks_and_scales_give_the_same():
+    quarter = dataset(body=REGIONS)
+    same(quarter, dataset(WORLD, body=REGIONS), 1e-5)
+    same(quarter, dataset(body=REGIONS, mesh={"model": "3d"}), 0.03)
+    scaled = dataset(body=REGIONS, probe={"depth": ["0.2 mm", "0.4 mm"]})
+    assert set(scaled["origin"].values) > {"scaled"}
+    for number in range(2):
+        same(quarter, scaled.isel(depth=number))
+
+
+def test_what_needs_fields_is_solved_in_three_dimensions():
+    swept = {"material": {"poisson": [0.2 + 0.01 * number for number in range(12)]}}
+    round_body = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm", "fixed": "bottom", "size": None}
+    for changes in (swept, {"body": round_body, "plan": {"without": []}}):
+        (asked, plain) = (make_plan(parse(raw(**changes, solve=solve))) for solve in (ASKED, {}))
+        assert not any(solve.reduced or solve.axisymmetric for solve in asked.solves)
+        assert any(solve.reduced or solve.axisymmetric for solve in plain.solves)
+        assert not set(asked.keys) & set(plain.keys)
+
+
+def test_depths_of_a_contact_have_shares_of_their_own():
+    changes = {"body": {"layer": [SKIN]}, "mesh": {"rim": "0.5 mm"}}
+    depths = ["0.2 mm", "0.3 mm", "0.4 mm", "0.5 mm"]
+    together = dataset(**changes, probe=BALL | {"depth": depths})
+    same(together.isel(depth=3), dataset(**changes, probe=BALL), 1e-5)
+    assert (np.diff(together["force_share"].sel(region="tissue")) > 0).all()
+
+
+@pytest.mark.parametrize("contact", [{}, {"probe": BALL, "mesh": {"rim": "0.5 mm"}}], ids=["bonded", "found"])
+def test_a_solution_has_the_influence_as_a_function_and_at_points(contact):
+    solution = epsmesh.read(raw(body=REGIONS, **contact)).solve(comm=WORLD)
+    influence, degree = solution.influence, {"quadrature_degree": 6}
+    measure = ufl.Measure("dx", solution.mesh, subdomain_data=solution.regions, metadata=degree)
+    found = dataset(body=REGIONS, **contact)
+    for number, name in enumerate(solution.region_names):
+        own = fem.assemble_scalar(fem.form(influence * measure(number)))
+        share = solution.images * WORLD.allreduce(own, op=MPI.SUM)
+        assert share == pytest.approx(float(found["force_share"].sel(region=name)), abs=1e-4)
+    values = solution.at([["1 mm", "1 mm", "-1 mm"], ["-1 mm", "1 mm", "-1 mm"], ["90 mm", "0 mm", "0 mm"]])
+    here, image, outside = values["influence"].values
+    assert here == image > 0
+    assert np.isnan(outside)
+    assert values["influence"].attrs["units"] == "m-3"
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"probe": BALL | {"friction": 0.3}}, "no derivative of an energy"),
+        ({"load": {"traction": [{"on": "free", "pressure": "0.2 kPa"}]}}, "the loads decide"),
+        ({"mesh": {"epsilon": "8 mm", "outside": "halfspace"}}, "beyond the cut"),
+        ({"probe": {"history": {"ramp": "1 s", "hold": "5 s"}}}, "over time"),
+        ({"probe": {"force": "5 mN", "depth": None}}, "give a depth"),
+    ],
+)
+def test_what_has_no_influence_is_refused_with_its_reason(changes, said):
+    message = refusal(raw(**changes, solve=ASKED))
+    assert "solve.influence" in message
+    assert said in message
+
+
+def test_a_solution_without_influence_says_why():
+    solution = epsmesh.read(raw(probe=BALL | {"friction": 0.3}, mesh={"rim": "0.5 mm"})).solve(comm=MPI.COMM_SELF)
+    with pytest.raises(ValueError, match="no derivative of an energy"):
+        _ = solution.influence
+    assert "influence" not in solution.at([["1 mm", "1 mm", "-1 mm"]])
