@@ -137,6 +137,10 @@ MISTAKES = {
         {"mesh": NO_SIZES | {"accuracy": "1 %", "epsilon": ["9 mm", "full"]}},
         ["mesh.epsilon", "has no effect with `accuracy`", 'outside = "free"'],
     ),
+    "a body that is cut nowhere": (
+        {"mesh": NO_SIZES | {"accuracy": "1 %", "outside": "free"}},
+        ["mesh.outside", "needs epsilon, at which the body is cut", "or omit outside"],
+    ),
     "text for a truth": ({"solve": {"exact": "yes"}}, ['solve.exact = "yes"', "true or false"]),
     "text for a list": ({"plan": {"without": "symmetry"}}, ["plan.without", 'must be a list, such as ["symmetry"]']),
     "cap of two coordinates": (
@@ -452,6 +456,15 @@ def test_several_materials_beside_layers_are_told_to_be_a_sweep():
 
 
 BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"]}
+
+
+def _cut(epsilon):
+    return study(mesh=NO_SIZES | {"accuracy": "1 %", "outside": "free", "epsilon": epsilon}).warnings
+
+
+def test_an_accuracy_of_columns_alone_is_warned_of():
+    assert any('"free": cuts the body at epsilon in every case' in one for one in _cut("9 mm"))
+    assert not any("cuts the body" in one for one in _cut(["9 mm", "full"]))
 
 
 @pytest.mark.parametrize("degrees", [0, 2, 10, 17])

@@ -260,7 +260,7 @@ def _show(study: "Study", found: dict[str, Any], forecasts: "list[Forecast]", *,
             ground += f"; work of a kind without any gets {slower:.2g} times its usual time, as other work took"
         print(
             f"    ({ground}; a step's time is typically right within a factor of {found['factor']:.1f}, "
-            "on an idle machine)"
+            "on an idle machine; start-up and figures take a few seconds more)"
         )
         _list_steps(found["steps"], None if verbose else _MOST_STEPS)
     if rest := found["besides"]:

@@ -3,6 +3,7 @@
 import difflib
 import errno
 import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -93,6 +94,8 @@ def read_all(files: list[Path], *, have_cases: bool = True) -> "list[Study]":
         try:
             studies.append(read_study(file))
             if have_cases and studies[-1].lacking:
+                serves = f"{studies[-1].does} {shlex.quote(str(file))}"
+                faults.append(of_file(file, f"is a study for `{serves}`; for this command it lacks what follows"))
                 raise StudyError(str(file), studies[-1].lacking)
         except StudyError as wrong:
             faults += of_study(wrong, meant(file))

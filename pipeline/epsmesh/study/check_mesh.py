@@ -48,11 +48,22 @@ def check_linear(body: Body, material: Material, mesh: Mesh, problems: Problems)
 
 
 def check_chosen(meshes: Sequence[Mesh], problems: Problems) -> None:
-    """Report an ε without effect: with `accuracy`, and the same body on both sides of ε, all sizes are chosen."""
+    """Report an ε or an `outside` without effect: with `accuracy` all sizes are chosen, and no ε is that of full order.
+
+    Warn of cut-out columns alone: the accuracy is that of their force, not of the body's.
+    """
     chosen = [mesh for mesh in meshes if mesh.accuracy is not None]
     for mesh in chosen:
-        if mesh.outside == "linear" and "epsilon" not in mesh.model_fields_set:
-            problems.error("mesh.outside", mesh.outside, "needs epsilon, beyond which the body is linear")
+        if mesh.outside != "coarse" and "epsilon" not in mesh.model_fields_set:
+            what = "beyond which the body is linear" if mesh.outside == "linear" else "at which the body is cut"
+            problems.error("mesh.outside", mesh.outside, f'needs epsilon, {what}: write epsilon = "10 mm", or omit outside')
+    if chosen and all(isfinite(mesh.epsilon) and not mesh.keeps_all for mesh in meshes):
+        problems.warn(
+            "mesh.outside",
+            chosen[0].outside,
+            "cuts the body at epsilon in every case, and `accuracy` is that of the force of this column, not of the "
+            'body: for F of the body omit outside and epsilon; to compare, add "full" to epsilon',
+        )
     if len(chosen) < len(meshes) or any(mesh.outside != "coarse" for mesh in chosen):
         return
     for mesh in chosen:

@@ -33,6 +33,11 @@ def to_toml(study: Mapping[str, Any], file: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def to_line(key: str, value: Any) -> str:
+    """Return a key and its value, which TOML can write, as one line: tables in line."""
+    return f"{_key(key)} = {_value(value, key, Problems())}"
+
+
 def _table(table: Mapping[Any, Any], heading: str, where: str, problems: Problems) -> Iterator[str]:
     """Yield the lines of a table: its values, then the tables in it; ``heading`` is as TOML writes it.
 

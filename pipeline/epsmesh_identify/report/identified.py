@@ -14,6 +14,7 @@ from epsmesh.report.words import percent
 from epsmesh.states import FAILED
 from epsmesh.study.identified import FITS, is_of_test
 from epsmesh.study.text import toml_of
+from epsmesh.study.toml import to_line
 
 # What a study may leave undeclared, by the words of its key `may_hide`.
 _UNDECLARED = {"layer": "layer", "base": "base", "strain": "stiffening"}
@@ -203,10 +204,12 @@ def engineering(value: float, unit: str, digits: int = 3) -> str:
 def material(dataset: xr.Dataset) -> str:
     """Return what was found of the tissue as lines of a study file; "" if there is no one material.
 
-    Lines of layers and inclusions belong into their tables, which are named above them.
+    ``[material]`` has what the study knew, too. Lines of layers and inclusions belong into their tables, which are
+    named above them.
     """
     if "file" in dataset.dims or dataset.attrs["verdict"] != FITS:
         return ""
+    known = toml_of(str(dataset.attrs.get("study", "")), "").get("material", {})
     lines: dict[str, list[str]] = {"[material]": []}
     terms: dict[str, list[str]] = {}
     for name in wanted(dataset):
@@ -224,9 +227,12 @@ def material(dataset: xr.Dataset) -> str:
         lines.setdefault(heading, []).append(f"{key} = {text}  # {comment}")
     if terms:
         own = ", ".join(f"{{ {', '.join(terms[key])} }}" for key in sorted(terms))
-        has_material = "material" in toml_of(str(dataset.attrs.get("study", "")), "")
-        heading = "[material]" if has_material or lines["[material]"] else "# in the table of each layer:"
+        heading = "[material]" if known or lines["[material]"] else "# in the table of each layer:"
         lines.setdefault(heading, []).append(f"relaxation = [{own}]")
+    if lines["[material]"]:
+        sought = {*map(str, dataset["unknown"].values), *(["relaxation"] if terms else [])}
+        others = {key: value for key, value in known.items() if key not in sought}
+        lines["[material]"] += [f"{to_line(key, value)}  # as known before" for key, value in others.items()]
     return "\n".join("\n".join((heading, *rows)) for heading, rows in lines.items() if rows)
 
 

@@ -63,7 +63,7 @@ def _of_one(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
         unseen = "not in the curves" if name in wanted(dataset) else "as known before"
         bars = [bar(dataset, name), bar(dataset, name, hidden=True)] if seen else [unseen, ""]
         rows.append([title(name), value, *bars])
-    return ["", "value", "if the body is as declared", if_undeclared(dataset) or "the same"], rows
+    return ["", "value", "as declared", "undeclared" if if_undeclared(dataset) else "the same"], rows
 
 
 def _of_files(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:

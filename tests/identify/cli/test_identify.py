@@ -165,6 +165,7 @@ def test_the_report_is_a_page_with_the_answer(folder, epsmesh, found):
 def test_what_curves_and_ranges_give_is_needed_for_cases(folder, epsmesh, command):
     result = epsmesh(command[0], folder / "punch.toml", *command[1:], "--output", folder / "results")
     assert result.exit_code == 2
+    assert f"is a study for `epsmesh identify {folder / 'punch.toml'}`" in result.stderr
     for key in ("[mesh]", "probe.depth", "[material]"):
         assert f"{key}: " in result.stderr
     with pytest.raises(StudyError, match="is required for the study's cases"):

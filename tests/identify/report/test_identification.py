@@ -1,5 +1,7 @@
 """An identification in words, as a figure and as a page."""
 
+import tomllib
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -114,3 +116,22 @@ def test_curves_of_any_length_and_number_are_shown():
                        one.noise) for n, one in enumerate(curves * 5)]  # fmt: skip
     drawn = figure(dataset_of(estimate(curves=tuple(short)), {}), "")
     assert "The first 3 of 5 curves are shown." in drawn.get_label()
+
+
+def test_a_material_to_paste_has_what_the_study_knew_of_it():
+    known = '[material]\nlaw = "holzapfel"\nyoung = "1 kPa"\nfibres = {direction = [1, 0, 0], k1 = 0.5}\n'
+    text = material(identification().assign_attrs(study=known))
+    assert text.count("young") == 1
+    assert 'law = "holzapfel"  # as known before' in text
+    found = tomllib.loads(text)["material"]
+    assert found["fibres"] == {"direction": [1, 0, 0], "k1": 0.5}
+    assert "poisson" in found
+
+
+def test_a_depth_that_is_nearly_a_millimetre_has_the_unit_of_its_axis():
+    dataset = identification()
+    drawn = figure(dataset.assign(depth=dataset["depth"] * (0.9999e-3 / float(dataset["depth"].max()))), "")
+    lower = drawn.axes[1]
+    shown = max(float(line.get_xdata().max()) for line in lower.lines[:1])
+    assert lower.get_xlabel() == "depth of the tool, µm"
+    assert shown == pytest.approx(999.9)

@@ -69,12 +69,13 @@ def _draw_curve(upper: Axes, lower: Axes, one: xr.Dataset, *, is_first: bool, fi
     known = known[:: max(1, len(known) // _MOST_POINTS)]
     one = one.isel(sample=known)
     over_time = _holds(one)
-    along, of_along = _scaled(one["time" if over_time else "depth"].values, "s" if over_time else "m")
-    largest, of_force = _scaled(one["force"].values, "N")
-    factor = float(largest[-1] / one["force"].values[-1]) if one["force"].values[-1] else 1.0
-    fit, band, residual = (factor * one[key].values for key in ("fit", "band", "residual"))
+    along = one["time" if over_time else "depth"].values
+    to_unit, of_along = _unit(along, "s" if over_time else "m")
+    along = to_unit * along
+    factor, of_force = _unit(one["force"].values, "N")
+    force, fit, band, residual = (factor * one[key].values for key in ("force", "fit", "band", "residual"))
     order = np.argsort(along)
-    upper.plot(along, largest, ".", color=_MEASURED, markersize=3, label="measured")
+    upper.plot(along, force, ".", color=_MEASURED, markersize=3, label="measured")
     upper.plot(along[order], fit[order], color=_FIT, label="fit")
     if fits:
         ends = (along[order], (fit - band)[order], (fit + band)[order])
@@ -102,7 +103,7 @@ def _draw_profile(ax: Axes, dataset: xr.Dataset, unknown: str, *, is_first: bool
     one, unit = dataset.sel(unknown=unknown), str(dataset["unit"].sel(unknown=unknown).values)
     estimate, low, high = (float(one[name]) for name in ("estimate", "low", "high"))
     values, fall = _profile(one)
-    factor = _factor(np.array([low, high]), unit)
+    factor, word = _unit(np.array([low, high]), unit)
     for end, colour in (("_hidden", _HIDDEN), ("", _MEASURED)):
         ends = [factor * float(one[f"{side}{end}"]) for side in ("low", "high")]
         if np.isfinite(ends).all():
@@ -112,7 +113,6 @@ def _draw_profile(ax: Axes, dataset: xr.Dataset, unknown: str, *, is_first: bool
     ax.axvline(factor * estimate, color=_FIT)
     ax.set_xlim(factor * (estimate - _NEAR * (estimate - low)), factor * (estimate + _NEAR * (high - estimate)))
     ax.set_ylim(0, _HIGHEST)
-    word = _scaled(np.array([low, high]), unit)[1]
     ax.set_xlabel(f"{title(unknown)}{f', {word}' if word else ''}")
     ax.set_title(_bars(dataset, unknown))
     ax.locator_params(axis="x", nbins=4)
@@ -135,9 +135,10 @@ def _profile(one: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 def _bars(dataset: xr.Dataset, unknown: str) -> str:
     """Write both error bars, one below the other."""
     if not bool(dataset["seen"].sel(unknown=unknown)):
-        return "not in the curves"
+        return f"{title(unknown)}: not in the curves"
     first, second = bar(dataset, unknown), bar(dataset, unknown, hidden=True)
-    return f"{first}\nundeclared: {second}" if second and second != first else first
+    known = f"{title(unknown)}: {first}"
+    return f"{known}\nundeclared: {second}" if second and second != first else known
 
 
 def _caption(dataset: xr.Dataset, lines: Sequence[str], count: int, has_profiles: bool) -> str:
@@ -165,8 +166,8 @@ def _of_files(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
     for ax, unknown in zip(axes, shown, strict=True):
         one = dataset.sel(unknown=unknown).isel(file=order)
         good = fits[order]
-        values, unit = _scaled(one["estimate"].values, str(one["unit"].values))
-        factor = _factor(one["estimate"].values, str(one["unit"].values))
+        factor, unit = _unit(one["estimate"].values, str(one["unit"].values))
+        values = factor * one["estimate"].values
         for end, colour in (("_hidden", _HIDDEN), ("", _MEASURED)):
             low, high = (factor * one[f"{side}{end}"].values for side in ("low", "high"))
             ax.vlines(place[good], low[good], high[good], color=colour, linewidth=thick * (0.6 if end else 1.0))
@@ -182,18 +183,10 @@ def _of_files(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
     return figure
 
 
-def _factor(values: np.ndarray, unit: str) -> float:
-    """Return the factor from SI to the unit with a prefix that suits the largest value."""
+def _unit(values: np.ndarray, unit: str) -> tuple[float, str]:
+    """Return the factor from SI to the unit with a prefix that suits the largest of the values, and its name."""
     if unit in ("", "1"):
-        return 1.0
+        return 1.0, ""
     largest = float(np.nanmax(np.abs(values)))
-    word = engineering(largest, unit, 12).split(" ")[0]
-    return float(word) / largest if largest else 1.0
-
-
-def _scaled(values: np.ndarray, unit: str) -> tuple[np.ndarray, str]:
-    """Return values in that unit, and its name."""
-    if unit in ("", "1"):
-        return values, ""
-    word = engineering(float(np.nanmax(np.abs(values))), unit).split(" ")[1]
-    return _factor(values, unit) * values, word
+    number, word = engineering(largest, unit, 12).split(" ")
+    return float(number) / largest if largest else 1.0, word
