@@ -56,7 +56,9 @@ def check_chosen(meshes: Sequence[Mesh], problems: Problems) -> None:
     for mesh in chosen:
         if mesh.outside != "coarse" and "epsilon" not in mesh.model_fields_set:
             what = "beyond which the body is linear" if mesh.outside == "linear" else "at which the body is cut"
-            problems.error("mesh.outside", mesh.outside, f'needs epsilon, {what}: write epsilon = "10 mm", or omit outside')
+            problems.error(
+                "mesh.outside", mesh.outside, f'needs epsilon, {what}: write epsilon = "10 mm", or omit outside'
+            )
     if chosen and all(isfinite(mesh.epsilon) and not mesh.keeps_all for mesh in meshes):
         problems.warn(
             "mesh.outside",
