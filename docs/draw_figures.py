@@ -100,6 +100,7 @@ FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
     "needle_path": ("needle-path", of_kind("insertion")),
     "deep": ("deep", deep),
     "large_depth": ("large_depth", of_kind("force")),
+    "influence": ("influence", of_kind("influence")),
 }
 
 

@@ -12,6 +12,7 @@ from mpi4py import MPI
 import epsmesh
 from epsmesh.plan.plan import make_plan
 from epsmesh.report.dataset import build
+from epsmesh.report.figures import choose, figure
 from epsmesh.run.execute import compute
 from epsmesh.study.influence import DECIDED
 from epsmesh.study.read import parse
@@ -33,7 +34,7 @@ def dataset(comm: MPI.Comm = MPI.COMM_SELF, without: tuple[str, ...] = (), **cha
 
 
 def same(one: xr.Dataset, other: xr.Dataset, rel: float = 1e-6) -> None:
-    for name in ("force_share", "influence_radius"):
+    for name in ("force_share", "poisson_effect", "influence_radius"):
         assert one[name].values == pytest.approx(other[name].values, rel=rel, nan_ok=True), name
 
 
@@ -48,11 +49,13 @@ def test_bars_hold_the_shares_of_a_finer_mesh(changes):
     assert coarse["region"].values.tolist() == ["tissue", "skin", "lump"]
     assert coarse["decided"].values.tolist() == [*DECIDED]
     assert float(coarse["force_share"].sum()) == pytest.approx(1.0, abs=1e-6)
-    for name in ("force_share", "influence_radius"):
+    for name in ("force_share", "poisson_effect", "influence_radius"):
         off = np.abs(coarse[name] - fine[name])
         assert (off <= coarse[f"{name}_error"] + fine[f"{name}_error"]).all(), name
         assert (coarse[f"{name}_error"] > 0).all(), name
-        assert (coarse[f"{name}_error"] < 0.2 * coarse[name]).all(), name
+        # The effects of ν have either sign, and may cancel within a region.
+        size = abs(coarse[name]).max() if name == "poisson_effect" else coarse[name]
+        assert (coarse[f"{name}_error"] < 0.2 * size).all(), name
     assert (np.diff(coarse["influence_radius"]) > 0).all()
 
 
@@ -113,6 +116,18 @@ def test_a_solution_has_the_influence_as_a_function_and_at_points(contact):
     assert here == image > 0
     assert np.isnan(outside)
     assert values["influence"].attrs["units"] == "m-3"
+
+
+def test_the_figure_has_the_curves_of_the_dataset_beside_epsilon():
+    found = dataset(body=REGIONS, mesh={"epsilon": ["8 mm", "full"]})
+    assert "influence" in choose(found)
+    (axes,) = figure(found, "influence").axes
+    curves = {line.get_label(): line for line in axes.lines}
+    assert curves["ε"].get_xdata() == pytest.approx([8.0, 8.0])
+    drawn = [bars.lines[0] for bars in axes.containers]
+    for line, one in zip(drawn, found["influence_radius"].transpose("epsilon", "decided").values, strict=True):
+        assert line.get_xdata() == pytest.approx(1e3 * one)
+        assert line.get_ydata() == pytest.approx(100 * np.array(DECIDED))
 
 
 @pytest.mark.parametrize(

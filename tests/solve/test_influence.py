@@ -15,7 +15,7 @@ from epsmesh.run.meshing import mesh_case
 from epsmesh.run.problem import law_of, movement_of, problem_of
 from epsmesh.solve.compiled import cellwise_space, form, global_sum
 from epsmesh.solve.measures import dx
-from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.physics import MaterialLaw, Parameters
 from epsmesh.solve.points.state import State
 from epsmesh.solve.solution import Request
 from epsmesh.solve.spaces import Spaces
@@ -24,6 +24,8 @@ from tests.cases import study
 WORLD = MPI.COMM_WORLD
 # Of the modulus of a region, to both sides; the difference quotient of a force has the square of it as its error.
 STEP = 0.01
+# Of Poisson's ratio, downwards.
+OF_POISSON = 0.001
 BALL = {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "contact": "unilateral"}
 BLADE = {"shape": "blade", "length": "8 mm", "width": "2 mm", "depth": "0.2 mm", "slice": "0.3 mm"}
 ELLIPSOID = {"shape": "ellipsoid", "axes": ["24 mm", "22 mm", "20 mm"], "fixed": {"below": "-8 mm"}, "size": None}
@@ -91,15 +93,26 @@ class Scene:
             found = problem.answer(Request(law, movement_of(self.case), tolerance=1e-8, influence=influence))
             return found.reaction[2], problem.state()
 
-    def shares(self, state: State) -> FloatArray:
-        """Return the integrals of the influence over the regions of the whole body."""
+    def shares(self, state: State, by: str = "young") -> FloatArray:
+        """Return the integrals of the influence of a modulus over the regions of the whole body."""
         assert state.influence is not None
         owned, count = self.mesh.owned_cells, len(self.law.parameters)
         cell = ufl.TestFunction(cellwise_space(self.mesh.mesh, ()))
         volumes = fem.assemble_vector(form(cell * dx(state.displacement.function_space))).array[:owned]
         numbers = np.zeros(owned, int) if self.mesh.regions is None else self.mesh.regions[:owned]
-        own = np.bincount(numbers, state.influence * volumes, minlength=count)
+        own = np.bincount(numbers, getattr(state.influence, by) * volumes, minlength=count)
         return 2.0 ** len(self.mesh.mirrored) * global_sum(self.comm, own)
+
+
+def with_poisson(law: MaterialLaw, region: int, change: float) -> MaterialLaw:
+    """Return a law with another Poisson's ratio of one region; what is in units of E stays so."""
+    parameters = list(law.parameters)
+    one = parameters[region]
+    young, poisson = 2 * one.lame_mu * (1 + one.poisson), one.poisson + change
+    stiff = (1 + poisson) / (1 + one.poisson)
+    further = {name: value * stiff if name == "k1" else value for name, value in one.further}
+    parameters[region] = Parameters.of_moduli(young, poisson, one.law, further)
+    return MaterialLaw(tuple(parameters), law.unit)
 
 
 def stiffer(law: MaterialLaw, region: int, factor: float) -> MaterialLaw:
@@ -121,6 +134,10 @@ def test_shares_are_derivatives_of_the_force_by_the_moduli(name):
     for region, share in enumerate(shares):
         more, less = (scene.force(stiffer(scene.law, region, 1 + sign * STEP))[0] for sign in (1, -1))
         assert share == pytest.approx((more - less) / (2 * STEP * force), abs=4e-5)
+    for region, effect in enumerate(scene.shares(state, "poisson")):
+        here, *below = (scene.force(with_poisson(scene.law, region, -n * OF_POISSON))[0] for n in range(3))
+        slope = (3 * here - 4 * below[0] + below[1]) / (2 * OF_POISSON * force)
+        assert effect == pytest.approx(slope, rel=2e-3, abs=2e-4)
 
 
 def test_the_force_does_not_depend_on_whether_the_influence_is_asked_for():

@@ -52,7 +52,7 @@ def report(
         list[str] | None,
         typer.Option(
             help="With --figures: kind of figure; may be repeated: insertion, history, ratio, error, force, map, "
-            "compliance. Default: all that suit the study.",
+            "compliance, influence. Default: all that suit the study.",
             show_default=False,
         ),
     ] = None,

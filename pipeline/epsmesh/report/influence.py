@@ -13,7 +13,7 @@ from epsmesh.study.influence import DECIDED
 from epsmesh.study.sweep import Study
 
 # What is given, each with its dimension.
-_GIVEN = {"force_share": "region", "influence_radius": "decided"}
+_GIVEN = {"force_share": "region", "poisson_effect": "region", "influence_radius": "decided"}
 
 
 def add_influence(

@@ -103,7 +103,7 @@ class CaseSolution:
             why = refused("influence", self.case) or "the change of the solution with the depth was not found"
             raise ValueError(f"the influence is unknown: {why}")
         function = fem.Function(cellwise_space(self.mesh, ()))
-        function.x.array[compat.cell_dofs(function.function_space)[: len(found), 0]] = found
+        function.x.array[compat.cell_dofs(function.function_space)[: len(found.young), 0]] = found.young
         function.x.scatter_forward()
         function.name = "influence"
         return function
@@ -175,7 +175,7 @@ class CaseSolution:
 
     def _dataset(self, points: FloatArray, coordinates: dict[str, Any], shape: tuple[int, ...]) -> "xr.Dataset":
         values, state = self.solved.state.at(points), self.solved.state
-        influence = None if state.influence is None else state.of_cells_at(points, state.influence)
+        influence = None if state.influence is None else state.of_cells_at(points, state.influence.young)
         bars = self._bars(points, values)
         return dataset_of(values, influence, bars, points, coordinates, shape, self.region_names)
 
@@ -196,7 +196,7 @@ class CaseSolution:
     def _bar_of_influence(self, points: FloatArray) -> FloatArray:
         state, finer = self.solved.state, self.solved.finer
         assert finer is not None and state.influence is not None and finer.influence is not None
-        return state.of_cells_at(points, CHANGES * np.abs(finer.influence - state.influence))
+        return state.of_cells_at(points, CHANGES * np.abs(finer.influence.young - state.influence.young))
 
     def _corners(self) -> FloatArray:
         """Return the corners (8, 3) of the box of the whole mesh; collective."""

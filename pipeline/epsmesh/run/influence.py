@@ -40,7 +40,7 @@ def influence_of(solve: Solve, state: State, finer: State | None) -> Mapping[str
     if body.regions is not None:  # beyond ε, the linear part of each region has a number of its own
         numbers = body.regions[: body.owned_cells] % count
     centre = np.array(solve.meshed_case.frame.upright.point)
-    above = None if finer is None else finer.influence
+    above = (finer and finer.influence) or state.influence
     reach = comm.allreduce(_farthest(body, centre), op=MPI.MAX)
     edges = np.concatenate([[0.0], reach * np.geomspace(_LEAST, 1.0, _DISTANCES)])
     size = len(edges) - 1
@@ -49,30 +49,36 @@ def influence_of(solve: Solve, state: State, finer: State | None) -> Mapping[str
         places = np.searchsorted(edges, distances.ravel(), side="right").clip(1, size) - 1
         return np.asarray(np.bincount(places, works.ravel(), minlength=size), dtype=float)
 
-    # Sums by region: here, in one degree more, and of changes. By distance: here, each cell at one, one degree more.
-    regions, within = np.zeros((3, count)), np.zeros((3, size))
+    # Sums by region, of E and of ν: here, in one degree more, and of changes.
+    regions, within = np.zeros((2, 3, count)), np.zeros((3, size))
     for cells, distances, volumes in _points(state, centre):
-        here = state.influence[cells, None] * volumes
-        finest = here if above is None else above[cells, None] * volumes
-        by_cell = here.sum(axis=1), finest.sum(axis=1), np.abs(finest - here).sum(axis=1)
-        regions += [np.bincount(numbers[cells], one, minlength=count) for one in by_cell]
+        for number, name in enumerate(("young", "poisson")):
+            own, other = (getattr(one, name)[cells] * volumes.sum(axis=1) for one in (state.influence, above))
+            parts = own, other, np.abs(other - own)
+            regions[number] += [np.bincount(numbers[cells], one, minlength=count) for one in parts]
+        here, finest = (one.young[cells, None] * volumes for one in (state.influence, above))
         middles = distances.mean(axis=1)
-        within += [by_distance(distances, here), by_distance(middles, by_cell[0]), by_distance(distances, finest)]
+        # By distance: here, with each cell at one distance, and in one degree more.
+        whole = here.sum(axis=1)
+        within += [by_distance(distances, here), by_distance(middles, whole), by_distance(distances, finest)]
     regions, within = (2.0 ** len(body.mirrored) * global_sum(comm, sums) for sums in (regions, within))
     radii = np.array([_radii(np.cumsum(one), edges[1:]) for one in within])
-    bars = np.full(count, np.nan), np.full(len(DECIDED), np.nan)
-    if above is not None:
-        bars = _bar_of_shares(*regions), _bar_of_radii(*radii)
-    found = {"force_share": regions[0], "influence_radius": radii[0]}
-    found |= {f"{name}_error": bar for name, bar in zip(found, bars, strict=True)}
-    return {name: tuple(map(float, values)) for name, values in found.items()}
+    found = {
+        "force_share": (regions[0, 0], _bar_of_sums(*regions[0])),
+        "poisson_effect": (regions[1, 0], _bar_of_sums(*regions[1])),
+        "influence_radius": (radii[0], _bar_of_radii(*radii)),
+    }
+    is_known = above is not state.influence
+    values = {name: value for name, (value, _) in found.items()}
+    values |= {f"{name}_error": bar if is_known else np.full_like(bar, np.nan) for name, (_, bar) in found.items()}
+    return {name: tuple(map(float, numbers)) for name, numbers in values.items()}
 
 
 def _farthest(body: BodyMesh, centre: FloatArray) -> float:
     return float(np.linalg.norm(np.asarray(body.mesh.geometry.x) - centre, axis=1).max(initial=0.0))
 
 
-def _bar_of_shares(here: FloatArray, above: FloatArray, changed: FloatArray) -> FloatArray:
+def _bar_of_sums(here: FloatArray, above: FloatArray, changed: FloatArray) -> FloatArray:
     return CHANGES * np.maximum(np.abs(here - above), _POINTWISE * changed)
 
 

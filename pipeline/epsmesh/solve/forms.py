@@ -14,7 +14,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from epsmesh import compat
-from epsmesh.arrays import BoolArray, Int32Array
+from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.mesh.curve import EDGES
 from epsmesh.mesh.distribute import distribute
 from epsmesh.mesh.generate import MeshArrays
@@ -229,11 +229,20 @@ class HyperelasticForms:
             for row in range(len(self._fields))
         )
 
+    def set_moduli(self, lame_lambda: FloatArray, lame_mu: FloatArray, compliance: FloatArray, **others: float) -> None:
+        """Set the moduli by region for ``work_rates``, and ``others``, those of the laws that have them, everywhere."""
+        values = {"lame_lambda": lame_lambda, "lame_mu": lame_mu}
+        values |= {name: np.full(len(lame_mu), value) for name, value in others.items() if name in self._coefficients}
+        for name, by_region in values.items():
+            self._elastic.put(self._coefficients[name], tuple(by_region.tolist()))
+        if self._pressure is not None:
+            self._elastic.put(self._pressure[1], tuple(compliance.tolist()))
+
     @cached_property
     def work_rates(self) -> Any:
-        """Integral over each cell of the rate, along the ``directions``, of E ∂ψ/∂E: all moduli are proportional to E.
+        """Integral over each cell of the rate, along the ``directions``, of ψ, in which c p²/2 is the pressure's part.
 
-        In mixed elements E ∂ψ/∂E has p²/(2λ₁) in place of p D − p²/(2λ₁).
+        ψ is linear in λ, μ and the compliance c: with their derivatives, it is a derivative of the energy.
         """
         gradient, (along, *rest) = ufl.Identity(3) + ufl.grad(self._displacement), self.directions
         cell, found = ufl.TestFunction(self._elastic.cellwise), []

@@ -34,7 +34,7 @@ from epsmesh.solve.influence import influence_of
 from epsmesh.solve.linear_solver import LinearSolver
 from epsmesh.solve.movement import Motion, Movement
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.solve.points.state import State
+from epsmesh.solve.points.state import Influence, State
 from epsmesh.solve.prescribed import PrescribedMotion, respond
 from epsmesh.solve.response import LoadResponse, Response, shares
 from epsmesh.solve.solution import Problem, Request, Solution
@@ -93,7 +93,7 @@ class QuasiStaticProblem(Problem):
         displacement = self.elements.displacements.forms.displacement
         self._values = CellValues(self._body, displacement, is_mixed=element == "mixed")
         self._law: MaterialLaw | None = None  # of the last solution
-        self._influence: FloatArray | None = None
+        self._influence: Influence | None = None
         # The fields of the last solution in elements of one degree more, if they were requested and are known.
         self.finer_state: State | None = None
 
@@ -152,8 +152,8 @@ class QuasiStaticProblem(Problem):
         return solution
 
     @stage("error bar")
-    def _influence_of(self, found: Equilibrium, law: MaterialLaw) -> FloatArray | None:
-        """Return the influence (1/m³) on owned cells, None where terms act at rest, or the rate fails; collective."""
+    def _influence_of(self, found: Equilibrium, law: MaterialLaw) -> Influence | None:
+        """Return the influence on owned cells, None where terms act at rest, or the rate fails; collective."""
         if self.elements.displacements.is_loaded:
             return None
         columns, force = found.columns, found.response.force[2]

@@ -18,4 +18,4 @@ REDUCTIONS = (
 )
 
 # Each is drawn by the module of its name in pipeline/epsmesh/report/figures.
-FIGURES = ("insertion", "history", "ratio", "error", "force", "map", "compliance")
+FIGURES = ("insertion", "history", "ratio", "error", "force", "map", "compliance", "influence")

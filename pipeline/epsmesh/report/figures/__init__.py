@@ -15,6 +15,7 @@ from epsmesh.report.figures.compliance import compliance, shows_tools
 from epsmesh.report.figures.error import error, error_facets
 from epsmesh.report.figures.facets import Facets, is_meshed, rest, swept
 from epsmesh.report.figures.force import force, history, nothing
+from epsmesh.report.figures.influence import influence
 from epsmesh.report.figures.insertion import insertion
 from epsmesh.report.figures.map import force_map
 from epsmesh.report.figures.ratio import ratio, ratio_facets
@@ -37,6 +38,7 @@ _DRAWN: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
     "force": force,
     "map": force_map,
     "compliance": compliance,
+    "influence": influence,
     "nothing": nothing,
 }
 # What can be drawn on request.
@@ -48,6 +50,7 @@ _NEEDS = {
     "ratio": "several ε, and the full order among them",
     "error": "swept meshes, and F_exact or F_max",
     "compliance": "several tools and ε, the full order among them, in scenes whose compliances add",
+    "influence": "where F is decided ([solve] influence)",
     "map": "a raster of places ([probe.path])",
     "force": "a case that has a force",
     "nothing": "that no case has a force",
@@ -73,6 +76,7 @@ def choose(dataset: xr.Dataset) -> list[str]:
         "map": all(dataset.sizes.get(name, 0) > 1 for name in ("x", "y")),
     }
     kinds = [*(kind for kind, is_suited in suits.items() if is_suited), *([] if is_path else ["force"])]
+    kinds += ["influence"] if _known(dataset, "influence_radius") else []
     kinds += ["compliance"] if "ratio" in kinds and shows_tools(dataset) else []
     study = study_of(dataset)
     asked = study.drawing.kind if study else "auto"

@@ -49,20 +49,27 @@ class Values:
 
 
 @dataclass(frozen=True, eq=False)
+class Influence:
+    """What F depends on, on the owned cells, per volume (1/m³): ∂ln F/∂ln E by ``young``, ∂ln F/∂ν by ``poisson``."""
+
+    young: FloatArray
+    poisson: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class State:
     """The fields of one solution on a ``body``, distributed over the ranks.
 
     ``displacement`` (m) and ``pressure`` (Pa, positive in tension) are dolfinx functions; the pressure is that of mixed
     elements, λ₁ times the change of volume, and None in displacement elements. The body may be the half or quarter that
-    planes of symmetry leave. ``influence`` (1/m³), on owned cells, is known if it was requested: see
-    :mod:`epsmesh.solve.influence`.
+    planes of symmetry leave. ``influence`` is known if it was requested: see :mod:`epsmesh.solve.influence`.
     """
 
     body: BodyMesh
     displacement: Any
     pressure: Any | None
     law: MaterialLaw
-    influence: FloatArray | None = None
+    influence: Influence | None = None
 
     @property
     def degree(self) -> int:
