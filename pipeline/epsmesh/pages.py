@@ -1,6 +1,7 @@
 """Pages of HTML that hold all they need: their data stay text, and one script is all that may run."""
 
 import json
+import re
 import zlib
 from base64 import b64encode
 from collections.abc import Mapping
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 
 def render_page(template: Path, script: str, base: Path | None = None, **content: Any) -> str:
@@ -26,7 +27,13 @@ def render_page(template: Path, script: str, base: Path | None = None, **content
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["marked"] = marked
     return environment.get_template(template.name).render(script=script, script_hash=hash_of(script), **content)
+
+
+def marked(text: str) -> Markup:
+    """Return a message for a page: what it has between backticks, a key or a command, as code."""
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def hash_of(script: str) -> str:

@@ -17,7 +17,7 @@ from epsmesh.plan.plan import make_plan
 from epsmesh.report.read import read_file
 from epsmesh.shapes.probes.blade import Blade
 from epsmesh.study.toml import to_toml
-from epsmesh.view.film import frames_of
+from epsmesh.view.frames import frames_of
 
 STUDY = {
     "title": "A blade through a pad",

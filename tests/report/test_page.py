@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from epsmesh.pages import json_in_page
+from epsmesh.pages import json_in_page, marked
 from epsmesh.report import page
 from epsmesh.report.dataset import write
 from epsmesh.report.figures import choose, draw
@@ -113,6 +113,13 @@ def test_json_in_a_page_has_no_sign_that_html_knows():
     text = json_in_page(told)
     assert not set("<>&\u2028\u2029") & set(text)
     assert json.loads(text) == told
+
+
+def test_keys_and_commands_in_messages_are_code_and_all_else_is_text():
+    assert marked("give `rim` & <b>") == "give <code>rim</code> &amp; &lt;b&gt;"
+    assert marked("`<b>`") == "<code>&lt;b&gt;</code>"
+    data = small(warnings="use `epsmesh guide`")
+    assert "<li>use <code>epsmesh guide</code></li>" in render(data, "small")
 
 
 def test_page_needs_nothing_else(nasty):

@@ -1,8 +1,10 @@
 """Values of a dataset in words."""
 
+from math import nan
+
 import pytest
 
-from epsmesh.report.words import without_shared
+from epsmesh.report.words import span, without_shared
 
 
 @pytest.mark.parametrize(
@@ -20,3 +22,21 @@ from epsmesh.report.words import without_shared
 )
 def test_words_that_all_names_share_are_left_out(names, short):
     assert without_shared(names) == short
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ((25.02e-3, 31e-3), "25.02 to 31.00 mN"),
+        ((20.261e-3, 20.261e-3), "20.26 mN"),
+        ((1.0, 1.0 + 1e-6), "1000 mN"),
+        ((0.5e-3, 0.51e-3), "0.50 to 0.51 mN"),
+        ((-10e-3, 20e-3), "-10 to 20 mN"),
+        ((0.3e-3, 120e-3), "0.3 to 120 mN"),
+        ((1.0, 123.4), "1000 to 123400 mN"),
+        ((nan, 0.0, 0.1), "0 to 100 mN"),
+        ((0.0,), "0 mN"),
+    ],
+)
+def test_both_ends_of_a_range_have_as_many_decimals(values, words):
+    assert span("force", values) == words

@@ -44,7 +44,7 @@ MISTAKES = {
         {"mesh": {"element": "mixed"}, "material": {"poisson": 0.2}}, ["mesh.element", "above 0.25"],
     ),
     "accuracy without unit": ({"mesh": {"accuracy": 0.01}}, ["mesh.accuracy = 0.01", "1 %"]),
-    "accuracy out of reach": ({"mesh": {"accuracy": "0.001 %"}}, ["mesh.accuracy", "at least 0.0001"]),
+    "accuracy out of reach": ({"mesh": {"accuracy": "0.001 %"}}, ["mesh.accuracy", "at least 0.01 %"]),
     "sizes missing": (
         {"mesh": {"fine": None, "epsilon": None}}, ["mesh.fine", "mesh.epsilon", "give the sizes, or `accuracy`"],
     ),

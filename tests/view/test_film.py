@@ -8,9 +8,9 @@ from PIL import Image
 
 from epsmesh.report.dataset import build
 from epsmesh.study.read import read_mapping
-from epsmesh.view.blade_pictures import BladePictures
-from epsmesh.view.film import Frame, frames_of, write_film
-from epsmesh.view.needle_pictures import NeedlePictures
+from epsmesh.view.film import write_film
+from epsmesh.view.frames import Frame, frames_of
+from epsmesh.view.pictures import Pictures, half_of_crack, reach_of, section_across
 from epsmesh.view.section import Section
 from tests.insertion import test_needle as needles
 from tests.insertion.scenes import BLADE, SCENE, solved
@@ -24,14 +24,14 @@ def test_a_needle_is_pressed_drawn_in_its_crack_and_pulled_out(tmp_path):
     case = next(study.cases())
     needle = study.tool(case)
     pressed = {1e-3: Section(np.zeros((1, 3, 2)), np.zeros((1, 3, 2)), np.zeros((1, 3)))}
-    half = NeedlePictures.half_length(path, needle)
-    assert NeedlePictures.reach(path) == 1  # though the crack is below a tip that is pulled out
+    half = half_of_crack(path, needle)
+    assert reach_of(path) == 1  # though the crack is below a tip that is pulled out
     assert half == pytest.approx(needles.TORN / (2 * needle.toughness), rel=1e-3)
-    across = NeedlePictures.across(case, needle, 4 * needle.limit)
+    across = section_across(case, needle, 4 * needle.limit)
     assert np.abs(across.at(1.0)[..., 1]).max() > 2 * needle.limit
     seen = np.hypot(*np.moveaxis(across.at(1.0), -1, 0))
     assert seen.min() == pytest.approx(needle.limit, rel=1e-2)
-    file = write_film(path, NeedlePictures(path, needle, pressed, across, half), tmp_path / "path.gif", "")
+    file = write_film(Pictures(path, needle, pressed, across=across, half=half), tmp_path / "path.gif", "")
     with Image.open(file) as film:
         assert film.n_frames == len(list(frames_of(path)))
         film.seek(film.n_frames - 1)
@@ -51,8 +51,8 @@ def test_a_ring_crack_is_drawn_as_far_as_its_front_and_round_across(tmp_path):
     }.items():
         known[name] = ("depth", values)
     path = xr.Dataset(known)
-    assert (NeedlePictures.reach(path), NeedlePictures.half_length(path, needle)) == pytest.approx((2, radius))
-    across = NeedlePictures.across(case, needle, radius, is_ring=True)
+    assert (reach_of(path), half_of_crack(path, needle)) == pytest.approx((2, radius))
+    across = section_across(case, needle, radius, is_ring=True)
     before, after = (np.hypot(*np.moveaxis(across.at(share), -1, 0)) for share in (0.0, 1.0))
     assert (before.min(), after.min()) == pytest.approx((radius, needle.limit), rel=1e-3)
     grown = after**2 - before**2
@@ -61,7 +61,7 @@ def test_a_ring_crack_is_drawn_as_far_as_its_front_and_round_across(tmp_path):
     pressed = {1e-3: Section(np.zeros((1, 3, 2)), np.zeros((1, 3, 2)), np.zeros((1, 3)))}
     figure = Figure()
     panels = ax, _ = figure.subplots(1, 2)
-    NeedlePictures(path, needle, pressed, across, radius).draw(panels, Frame(6e-3, "cutting", 1.0, 12e-3))
+    Pictures(path, needle, pressed, across=across, half=radius).draw(panels, Frame(6e-3, "cutting", 1.0, 12e-3))
     assert min(min(line.get_ydata()) for line in ax.lines) == pytest.approx(-12) and ax.get_ylim()[0] < -12
 
 
@@ -78,5 +78,5 @@ def test_the_intact_body_of_a_path_that_ended_early_is_drawn_at_the_share_of_the
     assert np.isnan(path["puncture_depth"])
     section = Seen(np.zeros((1, 3, 2)), np.zeros((1, 3, 2)), np.zeros((1, 3)))
     blade = study.tool(next(study.cases()))
-    write_film(path, BladePictures(path, blade, {0.0: section}), tmp_path / "path.gif", "")
+    write_film(Pictures(path, blade, {blade.depth: section}), tmp_path / "path.gif", "")
     assert seen[1:4] == pytest.approx([1 / 12, 2 / 12, 3 / 12])

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from epsmesh.study.case import Case
     from epsmesh.study.sweep import Study
     from epsmesh.view.fields import Fields
-    from epsmesh.view.film import Pictures
 
 _HOWTO = "docs/guide/insertion.md"
 
@@ -44,51 +43,25 @@ def film(study: "Study", chosen: "Case", output: Path, solved: "Callable[[Case, 
 
     comm = world()
     load_solvers()
-    from epsmesh.view.film import write_film
-
-    with abort_on_exception(comm, typer.Exit), ended_soon():
-        if isinstance(tool, Needle):
-            pictures = _of_needle(study, chosen, tool, path, comm)
-        else:
-            pictures = _of_blade(cast("Blade", tool), study, stages, path, lambda case: solved(case, comm))
-        if comm.rank == 0:
-            write_film(path, pictures, file, study.title)
-            size = f"{file.stat().st_size / 1e6:.1f} MB"
-            say({"files": [str(file)]}, f"wrote {file} ({size})")
-
-
-def _of_blade(
-    blade: "Blade", study: "Study", stages: "list[Case]", path: "xr.Dataset", solved: "Callable[[Case], Fields | None]"
-) -> "Pictures":
-    """Return the pictures of a blade, on the first rank those of the fields that are ``solved``; collective."""
-    from epsmesh.view.blade_pictures import BladePictures
-    from epsmesh.view.section import Section, section_of
-
-    sections = dict[float, Section]()
-    pierced, deepest = float(path["puncture_depth"].min()), float(path["depth"][-1])
-    # A blade that is pulled out passes all slits. Without a puncture there are none.
-    first = 0.0 if "stroke" in path.dims and pierced > 0 else pierced
-    for depth, case in zip((0.0, *study.step_depths), stages, strict=True):
-        if depth and not first <= depth <= deepest:
-            continue
-        fields = solved(case)
-        if fields is not None:
-            sections[depth] = section_of(fields)
-    return BladePictures(path, blade, sections)
-
-
-def _of_needle(study: "Study", case: "Case", needle: Needle, path: "xr.Dataset", comm: "MPI.Comm") -> "Pictures":
-    """Return the pictures of a needle, solved on the first rank; exit if they cannot be; collective."""
     from epsmesh.mesh.generate import MeshError
     from epsmesh.run.meshing import on_first_rank
     from epsmesh.run.problem import CaseFailure
-    from epsmesh.view.needle_pictures import NeedlePictures
+    from epsmesh.view.film import write_film
+    from epsmesh.view.pictures import Pictures
 
-    try:
-        found = on_first_rank(comm, lambda: NeedlePictures.of(case, needle, path))
-    except (CaseFailure, MeshError) as wrong:
-        fail(of_file(study.file, f"the film: {wrong}", _HOWTO))
-    return cast("Pictures", found)
+    with abort_on_exception(comm, typer.Exit), ended_soon():
+        try:
+            if isinstance(tool, Needle):
+                pictures = on_first_rank(comm, lambda: Pictures.of_needle(path, tool, chosen))
+            else:
+                states = zip((0.0, *study.step_depths), stages, strict=True)
+                pictures = Pictures.of_blade(path, cast("Blade", tool), states, lambda case: solved(case, comm))
+        except (CaseFailure, MeshError) as wrong:
+            fail(of_file(study.file, f"the film: {wrong}", _HOWTO))
+        if pictures is not None and comm.rank == 0:
+            write_film(pictures, file, study.title)
+            size = f"{file.stat().st_size / 1e6:.1f} MB"
+            say({"files": [str(file)]}, f"wrote {file} ({size})")
 
 
 def _stages(study: "Study", chosen: "Case") -> "tuple[list[Case], int]":

@@ -1,7 +1,6 @@
 """What came out of a study, in a sentence or two of its kind: what comes first in its report."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -10,6 +9,7 @@ from epsmesh.quantities import write
 from epsmesh.report.insertion import answer
 from epsmesh.report.table import study_of
 from epsmesh.report.values import answer_of, at_peak, has_path, relative
+from epsmesh.report.words import span
 
 # Share of the largest depth by which the last one may be smaller of a tool that is held.
 _HELD = 1e-9
@@ -32,7 +32,7 @@ def _of_forces(dataset: xr.Dataset) -> str:
     """Return the force, or its range over the cases; of a given force, the depth."""
     name, size = answer_of(dataset), dataset["force"].size
     known, bar = int(np.isfinite(dataset["force"]).sum()), _largest_bar(dataset, name)
-    what, values = "F" if name == "force" else "The depth at the given force", _range(name, dataset[name])
+    what, values = "F" if name == "force" else "The depth at the given force", span(name, dataset[name])
     if size == 1:
         return f"{what} = {values}{bar and f' ± {bar}'}{_depth(dataset)}."
     if known == 1:
@@ -46,11 +46,11 @@ def _of_histories(dataset: xr.Dataset) -> str:
     peak, last = at_peak(dataset), _last(dataset["force"])
     depth, bar = abs(dataset["tool_depth"]), _largest_bar(peak, "force")
     is_held = bool((_last(depth) > (1 - _HELD) * depth.max("time")).all())
-    force, ends = _range("force", peak["force"]), "relaxes to" if is_held else "ends at"
+    force, ends = span("force", peak["force"]), "relaxes to" if is_held else "ends at"
     if last.size == 1:
         own = dataset["force"].squeeze().dropna("time")
         first, end = (write("time", float(time)) for time in (own["time"][int(abs(own).argmax())], own["time"][-1]))
-        return f"F = {force}{bar and f' ± {bar}'} at its peak, at {first}; it {ends} {_range('force', last)} at {end}."
+        return f"F = {force}{bar and f' ± {bar}'} at its peak, at {first}; it {ends} {span('force', last)} at {end}."
     least, most = (f"{100 * end(last / peak['force']):.3g}" for end in (np.nanmin, np.nanmax))
     shares = least if least == most else f"{least} to {most}"
     return f"F is {force} at its peak and {ends} {shares} % of that{bar and f'; the largest error bar is {bar}'}."
@@ -68,7 +68,7 @@ def _of_paths(dataset: xr.Dataset) -> list[str]:
     if size == 1:
         return [f"{line[0].upper()}{line[1:]}." for line in [*answer(dataset), *_largest(dataset)]]
     pierced = np.isfinite(dataset["puncture_depth"].values).reshape(size, -1).any(axis=1).sum()
-    depth, force = (_range(name, dataset[f"puncture_{name}"]) for name in ("depth", "force")) if pierced else ("", "")
+    depth, force = (span(name, dataset[f"puncture_{name}"]) for name in ("depth", "force")) if pierced else ("", "")
     where = f" at a depth of {depth}, with F = {force}" if pierced else ""
     found = f"{pierced} of {size} tools pierce the tissue{where}."
     return [found, f"At the depths of the paths: {_of_forces(at_peak(dataset))}"]
@@ -78,7 +78,7 @@ def _largest(dataset: xr.Dataset) -> Iterator[str]:
     """Yield the largest force of one path, and its depth."""
     peak = at_peak(dataset)
     if np.isfinite(peak["force"].item()):
-        force, depth = (_range(name, peak[name]) for name in ("force", "depth"))
+        force, depth = (span(name, peak[name]) for name in ("force", "depth"))
         yield f"at the depths of the path, F is at most {force}, at {depth}"
 
 
@@ -97,17 +97,10 @@ def _depth(dataset: xr.Dataset) -> str:
     study = study_of(dataset)
     if study is None or answer_of(dataset) == "depth":
         return ""
-    return f" at a depth of {_range('depth', next(iter(study.cases())).probe.depth)}"
+    return f" at a depth of {span('depth', next(iter(study.cases())).probe.depth)}"
 
 
 def _largest_bar(dataset: xr.Dataset, name: str) -> str:
     """Write the largest relative error bar, "" if there is none."""
     bars = relative(dataset, f"{name}_error").values
     return f"{100 * np.nanmax(bars):.2g} %" if np.isfinite(bars).any() else ""
-
-
-def _range(name: str, values: Any) -> str:
-    """Write the least and the largest value of a quantity, once if they are the same."""
-    least, most = (write(name, float(f"{float(end(values)):.4g}")) for end in (np.nanmin, np.nanmax))
-    (low, _, one), (_, _, other) = least.partition(" "), most.partition(" ")
-    return least if least == most else f"{low if one == other else least} to {most}"

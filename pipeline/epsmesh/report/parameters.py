@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from epsmesh.shapes.probe import Probe
 from epsmesh.study.case import Case
-from epsmesh.study.swept import unit_of
+from epsmesh.study.problems import unit_of
 
 # Values by key, as mesh.fine or body.layer[1].young. A key that a shape does not have is not there.
 Parameters = dict[str, Any]

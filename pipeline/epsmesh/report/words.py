@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from itertools import takewhile
-from math import isfinite
+from math import floor, isfinite, log10
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ import xarray as xr
 from epsmesh import quantities
 
 _NOUGHT = 1e-9  # what rounding leaves of no error
+_SPAN, _APART = 4, 0.01  # digits of the larger end of a range, and a share of it below which the other has its own
 _NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 # Of sizes and semi-axes, the last word of their dimensions' names.
 _SIZES = ("size", "axes")
@@ -43,6 +44,23 @@ def percent(share: float) -> str:
     if abs(share) < _NOUGHT:
         return "0 %"
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
+
+
+def span(name: str, values: Any, unit: str | None = None) -> str:
+    """Write the least and the largest value of a quantity with as many decimals: ``25.02 to 31.00 mN``.
+
+    Once if they are the same, and without decimals that both lack; of values that are far apart, each with its own.
+    """
+    factor, word = quantities.readable(name, unit)
+    low, high = factor * float(np.nanmin(values)), factor * float(np.nanmax(values))
+    largest = max(abs(low), abs(high))
+    decimals = max(0, _SPAN - 1 - floor(log10(largest))) if largest else 0
+    ends = [f"{end:.{decimals}f}" for end in (low, high)]
+    while "." in ends[0] and all(end.endswith(("0", ".")) for end in ends):
+        ends = [end[:-1] for end in ends]
+    if min(abs(low), abs(high)) < _APART * largest:
+        ends = [f"{float(f'{end:.{_SPAN}g}'):.6g}" for end in (low, high)]
+    return f"{' to '.join(dict.fromkeys(ends))} {word}".rstrip()
 
 
 def choices(coordinates: Mapping[Any, xr.DataArray], selection: Mapping[str, Any]) -> str:

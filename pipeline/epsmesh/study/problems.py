@@ -210,6 +210,16 @@ def table_model(model: type[BaseModel], key: str) -> type[BaseModel] | None:
     return kind if is_table else None
 
 
+def unit_of(model: type[BaseModel], key: str) -> str:
+    """Return the SI unit of a key: of a number, an optional one, or those of a list; "" if it has none."""
+    info = model.model_fields[key]
+    parts = getattr(info.annotation, "__args__", ())
+    extras = [info.json_schema_extra] + [
+        getattr(m, "json_schema_extra", None) for part in parts for m in getattr(part, "__metadata__", ())
+    ]
+    return next((str(extra["unit"]) for extra in extras if isinstance(extra, dict) and "unit" in extra), "")
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return ``did you mean …`` with the nearest known name, or the list of all of them."""
     known = list(known)
@@ -243,7 +253,11 @@ def allowed(item: Any, model: type[BaseModel]) -> str:
             return f"must be {context['expected']}"
         case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
             bounds = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at most"}
-            return "must be " + " and ".join(f"{bounds[k]} {v:g}" for k, v in context.items() if k in bounds)
+            unit = unit_of(model, str(item["loc"][0])) if item["loc"] and item["loc"][0] in model.model_fields else ""
+            found = {
+                bounds[k]: f"{100 * v:g} %" if unit == "1" else f"{v:g}" for k, v in context.items() if k in bounds
+            }
+            return "must be " + " and ".join(f"{word} {value}" for word, value in found.items())
         case "quantity":
             return f"must be {context['allowed']}"
         case "missing" | "too_short" | "too_long" | "tuple_type":

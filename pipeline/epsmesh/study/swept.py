@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from epsmesh.shapes.section import Section
 from epsmesh.study.axis import Axis
-from epsmesh.study.problems import Problems, nested_model, table_model
+from epsmesh.study.problems import Problems, nested_model, table_model, unit_of
 
 # Place of a value within a section: keys, and numbers in arrays of tables, from 0.
 Place = tuple[str | int, ...]
@@ -85,16 +85,6 @@ def _at(section: Any, place: list[str | int]) -> Any:
     for step in place:
         section = section[step] if isinstance(step, int) else getattr(section, step)
     return section
-
-
-def unit_of(model: type[BaseModel], key: str) -> str:
-    """Return the SI unit of a key: of a number, an optional one, or those of a list; "" if it has none."""
-    info = model.model_fields[key]
-    parts = getattr(info.annotation, "__args__", ())
-    extras = [info.json_schema_extra] + [
-        getattr(m, "json_schema_extra", None) for part in parts for m in getattr(part, "__metadata__", ())
-    ]
-    return next((str(extra["unit"]) for extra in extras if isinstance(extra, dict) and "unit" in extra), "")
 
 
 def written(place: Place) -> str:

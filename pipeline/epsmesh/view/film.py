@@ -1,9 +1,7 @@
 """A film of an insertion: its pictures over depth, true to scale, beside F."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
 
 import matplotlib as mpl
 import numpy as np
@@ -16,11 +14,11 @@ from PIL import Image
 
 from epsmesh.arrays import IntArray
 from epsmesh.files import atomic
-from epsmesh.insertion.steps import PHASES
 from epsmesh.report.figures.insertion import with_puncture
 from epsmesh.report.figures.style import COLOURS, DEFAULTS, GRID, LINE, PAPER
-from epsmesh.report.values import punctures
+from epsmesh.view.frames import frames_of
 from epsmesh.view.palette import TOOL
+from epsmesh.view.pictures import Pictures
 from epsmesh.view.section import SCALE
 
 _MM = 1e3
@@ -34,56 +32,9 @@ _KEPT, _EVERY = (PAPER, LINE, COLOURS[4], TOOL, *mpl.colormaps[SCALE](np.linspac
 _FORCE = 3.6
 
 
-@dataclass(frozen=True)
-class Frame:
-    """One picture: the tip's ``depth`` (m), the phase, the force (N), and the front of the slit (m), NaN without."""
-
-    depth: float
-    phase: str
-    force: float
-    crack: float
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether the body has no slit."""
-        return bool(np.isnan(self.crack))
-
-
-class Pictures(Protocol):
-    """What is drawn of a path beside its force: in panels of so many inches each."""
-
-    widths: tuple[float, ...]
-
-    def draw(self, panels: Sequence[Axes], frame: Frame) -> None:
-        """Draw a frame into cleared panels."""
-        ...
-
-
-def frames_of(path: xr.Dataset) -> Iterator[Frame]:
-    """Yield the frames of the path of one case, in the order of the motion, with both sides of the puncture."""
-    strokes = [path.isel(stroke=number) for number in range(2)] if "stroke" in path.dims else [path]
-    pierced = punctures(path)
-    for number, stroke in enumerate(strokes):
-        known = stroke.isel(depth=np.flatnonzero(np.isfinite(stroke["force"].values)))
-        phases = [PHASES[int(phase)] for phase in known["phase"]]
-        found = [_frame(known.isel(depth=place), phase) for place, phase in enumerate(phases)]
-        if number == 0:
-            for place in range(pierced.sizes["puncture"]):
-                one = pierced.isel(puncture=place)
-                depth, (peak, fall) = float(one["puncture_depth"]), one["force_at_puncture"].values
-                fronts = one["crack_depth_at_puncture"].values
-                found.append(Frame(depth, "indentation", float(peak), float(fronts[0]) or np.nan))
-                found.append(Frame(depth, "puncture", float(fall), float(fronts[1])))
-            found.sort(key=lambda one: (one.depth, one.phase != "indentation", one.phase != "puncture"))
-        yield from found if number == 0 else found[::-1]
-
-
-def _frame(step: xr.Dataset, phase: str) -> Frame:
-    return Frame(float(step["depth"]), phase, float(step["force"]), float(step["crack_depth"]) or np.nan)
-
-
-def write_film(path: xr.Dataset, pictures: Pictures, file: Path, title: str) -> Path:
+def write_film(pictures: Pictures, file: Path, title: str) -> Path:
     """Write the film of the path of one case as a GIF, and return the file."""
+    path = pictures.path
     frames, seen = list(frames_of(path)), list[IntArray]()
     with mpl.rc_context(DEFAULTS | {"font.size": 8}), atomic(file) as temporary:
         widths = (*pictures.widths, _FORCE)

@@ -113,7 +113,7 @@ def case_table(dataset: xr.Dataset) -> Table:
     study = study_of(dataset)
     stages = prod(len(axis) for axis in (study.axes if study else ()) if axis.is_stage)  # the last axis of a plan
     numbers = Column(
-        "case", "case", [stages * (n + 1) - 1 for n in range(size)], "the number by which `epsmesh plan` knows it"
+        "case", "case", [stages * (n + 1) - 1 for n in range(size)], "the number by which epsmesh plan knows it"
     )
     axes = [_axis(dataset, dim, position, dims) for position, dim in enumerate(dims)]
     quantities = [

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from epsmesh.quantities import write
 from epsmesh.report.times import doubts
 from epsmesh.report.values import by_case, relative
-from epsmesh.report.words import choices
+from epsmesh.report.words import choices, span
 from epsmesh.states import FAILED, NO_CONTACT, OK, PARTIAL, PENDING, SKIPPED
 
 # Of git, with a sign for changes that were not committed.
@@ -47,10 +46,8 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
     """Return the headlines of a study: name and value."""
     counts = {word: int((dataset["status"] == state).sum()) for state, word in _STATES.items()}
     found = [("cases", f"{dataset['status'].size}"), *((word, f"{count}") for word, count in counts.items() if count)]
-    force = dataset["force"].values * 1e3
-    if np.isfinite(force).any():
-        low, high = np.nanmin(force), np.nanmax(force)
-        found.append(("force", f"{low:.3g} mN" if high - low < 5e-4 * high else f"{low:.3g} to {high:.3g} mN"))
+    if dataset["force"].notnull().any():
+        found.append(("force", span("force", dataset["force"])))
     for values, text, unit in (
         (100 * relative(dataset, "force_error").values, "largest error bar", " %"),
         (dataset["balance"].values, "worst imbalance", ""),
@@ -59,8 +56,7 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
         if np.isfinite(values).any() and not (unit == " ×" and np.nanmax(values) == 1):
             found.append((text, f"{np.nanmax(values):.2g}{unit}"))
     if "depth_error" in dataset and dataset["depth"].notnull().any():
-        least, most = (write("depth", float(f"{f(dataset['depth']):.4g}")) for f in (np.nanmin, np.nanmax))
-        found.insert(1, ("depth", least if least == most else f"{least} to {most}"))
+        found.insert(1, ("depth", span("depth", dataset["depth"])))
     if any(name == "largest speed-up" for name, _ in found):
         found += [("speed-ups", text) for text in doubts(dataset)]
     if taken := _taken(dataset):

@@ -1,5 +1,6 @@
 """Figures of an identification: curves with their fit, residuals, and how well each unknown is known."""
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -23,7 +24,9 @@ _LINES = 300  # points of lines beside one another that fill a figure
 _HELD = 0.02  # share of the depth within which a tool is held
 _NORMAL = 3.84  # fall of the likelihood at the ends of a 95 % interval
 _HIGHEST = 6.0
-_NEAR = 1.3  # error bars, on both sides of the estimate, that a profile shows
+# Error bars, on both sides of the estimate, that a profile shows, and so many at most of the outer one.
+_NEAR, _FAR = 1.3, 3.0
+_LETTERS = 46  # of a line below all profiles
 
 
 def identification(dataset: xr.Dataset, name: str, *, answered: bool = True) -> Figure:
@@ -57,7 +60,7 @@ def _of_curves(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
     if shown:
         row = grid[1].subgridspec(1, len(shown))
         for number, unknown in enumerate(shown):
-            _draw_profile(figure.add_subplot(row[number]), dataset, unknown, is_first=number == 0)
+            _draw_profile(figure.add_subplot(row[number]), dataset, unknown, len(shown), is_first=number == 0)
     finish(figure, name, _caption(dataset, lines, count, bool(shown)), legend=False)
     figure.axes[0].legend(loc="best", frameon=False)
     return figure
@@ -98,8 +101,11 @@ def _holds(one: xr.Dataset) -> bool:
     return bool(np.ptp(at_end) > np.ptp(time) / 4)
 
 
-def _draw_profile(ax: Axes, dataset: xr.Dataset, unknown: str, *, is_first: bool) -> None:
-    """Draw how much worse the fit is at other values of an unknown, with both error bars as far as they are near."""
+def _draw_profile(ax: Axes, dataset: xr.Dataset, unknown: str, shown: int, *, is_first: bool) -> None:
+    """Draw how much worse the fit is at other values of an unknown, with both error bars.
+
+    An outer bar that goes further than the axis ends in an arrow.
+    """
     one, unit = dataset.sel(unknown=unknown), str(dataset["unit"].sel(unknown=unknown).values)
     estimate, low, high = (float(one[name]) for name in ("estimate", "low", "high"))
     values, fall = _profile(one)
@@ -111,10 +117,16 @@ def _draw_profile(ax: Axes, dataset: xr.Dataset, unknown: str, *, is_first: bool
     ax.plot(factor * values, fall, color=LINE)
     ax.axhline(_NORMAL, color=QUIET, linestyle=":")
     ax.axvline(factor * estimate, color=_FIT)
-    ax.set_xlim(factor * (estimate - _NEAR * (estimate - low)), factor * (estimate + _NEAR * (high - estimate)))
     ax.set_ylim(0, _HIGHEST)
-    ax.set_xlabel(f"{title(unknown)}{f', {word}' if word else ''}")
-    ax.set_title(_bars(dataset, unknown))
+    for side, end in (("low", low), ("high", high)):
+        outer = (float(one[f"{side}_hidden"]) - estimate) / (end - estimate)
+        most = min(max(_NEAR, _NEAR * outer if np.isfinite(outer) else 0.0), _FAR)
+        edge = factor * (estimate + most * (end - estimate))
+        ax.set_xlim(**{"left" if side == "low" else "right": edge})
+        if outer > most:
+            ax.plot(edge, _HIGHEST / 2, "<" if side == "low" else ">", color=_HIDDEN, clip_on=False)
+    bars = [textwrap.fill(line, _LETTERS // shown) for line in _bars(dataset, unknown)]
+    ax.set_xlabel("\n".join([f"{title(unknown)}{f', {word}' if word else ''}", *bars]))
     ax.locator_params(axis="x", nbins=4)
     if is_first:
         ax.set_ylabel("misfit, −2 ln L/L_max")
@@ -132,13 +144,12 @@ def _profile(one: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return estimate + np.where(shares < 0, estimate - low, high - estimate) * shares, _NORMAL * shares**2
 
 
-def _bars(dataset: xr.Dataset, unknown: str) -> str:
-    """Write both error bars, one below the other."""
+def _bars(dataset: xr.Dataset, unknown: str) -> list[str]:
+    """Write both error bars, a line each."""
     if not bool(dataset["seen"].sel(unknown=unknown)):
-        return f"{title(unknown)}: not in the curves"
+        return ["not in the curves"]
     first, second = bar(dataset, unknown), bar(dataset, unknown, hidden=True)
-    known = f"{title(unknown)}: {first}"
-    return f"{known}\nundeclared: {second}" if second and second != first else known
+    return [first, f"undeclared: {second}"] if second and second != first else [first]
 
 
 def _caption(dataset: xr.Dataset, lines: Sequence[str], count: int, has_profiles: bool) -> str:
@@ -149,7 +160,7 @@ def _caption(dataset: xr.Dataset, lines: Sequence[str], count: int, has_profiles
     if has_profiles:
         hidden = if_undeclared(dataset)
         bars = "inner band: its 95 % error bar if the body is as declared"
-        bars += f"; outer band: {hidden}" if hidden else ""
+        bars += f"; outer band, with an arrow where it goes further: {hidden}" if hidden else ""
         parts.append(f"Below: how much worse the best fit is at other values of an unknown ({bars}).")
     return " ".join(parts)
 

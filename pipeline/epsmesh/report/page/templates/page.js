@@ -4,6 +4,7 @@ const { columns, order, rows: step } = JSON.parse(document.getElementById("data"
 const byName = new Map(columns.map((column) => [column.name, column]));
 const form = document.getElementById("filters");
 const escaped = (text) => text.replace(/[&<>"'$]/g, (sign) => `&#${sign.charCodeAt(0)};`);
+const marked = (text) => escaped(text).replace(/`([^`]+)`/g, "<code>$1</code>");
 
 function textOf(column, row) {
   const value = column.values[row];
@@ -35,7 +36,7 @@ const table = new DataTable("#table", {
     className: `${column.words ? "word" : "number"} ${column.name}`,
     data: ({ row }, kind) => {
       if (kind === "sort" || kind === "type") return keyOf(column, row);
-      return kind === "display" ? escaped(textOf(column, row)) : textOf(column, row);
+      return kind === "display" ? marked(textOf(column, row)) : textOf(column, row);
     },
   })),
   createdRow: (line, { row }) => line.classList.add(textOf(byName.get("status"), row)),
