@@ -47,7 +47,7 @@ def test_every_command_loads(installed, command):
 
 
 def test_rooms_and_errors_of_the_package_are_importable(installed):
-    said = installed("-c", "import epsmesh.report.table, epsmesh.realtime as r; print(epsmesh.StudyError.__name__, r)")
+    said = installed("-c", "import epsmesh.report.study, epsmesh.realtime as r; print(epsmesh.StudyError.__name__, r)")
     assert said.stdout.startswith("StudyError <module 'epsmesh_realtime'"), said.stderr
 
 

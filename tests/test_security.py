@@ -15,7 +15,7 @@ from epsmesh.files import cache_folder
 from epsmesh.plan.plan import make_plan
 from epsmesh.report.page import render
 from epsmesh.report.read import read
-from epsmesh.report.table import DatasetError, study_of
+from epsmesh.report.study import DatasetError, study_of
 from epsmesh.run.reading import known_of
 from epsmesh.run.store import Store, StoreError
 from epsmesh.shapes.files.image import read_image

@@ -17,7 +17,7 @@ import psutil
 
 from benchmarks.faults.victim import WIDTH
 from epsmesh.report.read import read_file
-from epsmesh.report.table import DatasetError
+from epsmesh.report.study import DatasetError
 from epsmesh.run.reading import read_rows
 from epsmesh.run.store import Store, StoreError
 

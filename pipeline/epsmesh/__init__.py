@@ -18,7 +18,7 @@ __all__ = ["DatasetError", "Problem", "SolveError", "StoreError", "StudyError", 
 
 # Where what is imported late is.
 _LATE = {
-    "DatasetError": "epsmesh.report.table",
+    "DatasetError": "epsmesh.report.study",
     "Problem": "epsmesh.script",
     "SolveError": "epsmesh.solve",
     "StoreError": "epsmesh.run.store",

@@ -31,6 +31,14 @@ def render_page(template: Path, script: str, base: Path | None = None, **content
     return environment.get_template(template.name).render(script=script, script_hash=hash_of(script), **content)
 
 
+def render_text(template: Path, **content: Any) -> str:
+    """Return plain text from its ``template``, without the last line's end."""
+    environment = Environment(
+        loader=FileSystemLoader(template.parent), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template(template.name).render(**content).rstrip("\n")
+
+
 def marked(text: str) -> Markup:
     """Return a message for a page: what it has between backticks, a key or a command, as code."""
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))

@@ -7,7 +7,6 @@ import pytest
 
 from epsmesh.report.dataset import write
 from epsmesh.report.guide import USUAL_ACCURACY, guide, guide_if_any
-from epsmesh.report.guide_text import settings, text
 from epsmesh.run.record import Record
 from epsmesh.run.store import Store
 from epsmesh.shapes.probes.blade import Blade
@@ -149,8 +148,8 @@ def test_pruning_says_first_what_would_go(epsmesh, tmp_path):
 def test_report_and_guide_agree_on_every_number():
     data = dataset()
     found, section = guide(data, USUAL_ACCURACY), guide_if_any(data)
-    assert section.settings.equals(settings(found))
-    words = text(found, verbose=True)
+    assert section.settings.equals(found.settings)
+    words = found.text(verbose=True)
     details = [told for _, told in section.details]
     assert all(line in words for line in (section.sentence, *details, *section.others))
     # What takes longest in one scene is not what it usually takes: neither stands for the other.

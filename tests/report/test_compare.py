@@ -7,7 +7,7 @@ import pytest
 from epsmesh.report.compare import compare
 from epsmesh.report.dataset import build, write
 from epsmesh.report.parameters import units_of
-from epsmesh.report.table import DatasetError
+from epsmesh.report.study import DatasetError
 from epsmesh.study.read import read_mapping
 from tests.commands import epsmesh
 from tests.insertion import test_needle as needles

@@ -7,7 +7,7 @@ import xarray as xr
 
 from epsmesh.report.dataset import write
 from epsmesh.report.read import read_file
-from epsmesh.report.table import DatasetError
+from epsmesh.report.study import DatasetError
 from tests.report.synthetic import FIGURE, dataset
 
 

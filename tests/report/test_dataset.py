@@ -10,7 +10,7 @@ import epsmesh.report.accessor  # noqa: F401
 from epsmesh.plan.plan import make_plan
 from epsmesh.report.dataset import build, write
 from epsmesh.report.read import read
-from epsmesh.report.table import study_of
+from epsmesh.report.study import study_of
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import read_study
 from tests.cases import raw

@@ -1,5 +1,6 @@
 """The guide: worst cases over scenes, nothing claimed of cases that were not computed, and the law of correction."""
 
+import itertools
 import json
 from math import inf, isnan, nan
 
@@ -7,11 +8,11 @@ import numpy as np
 import pytest
 
 from epsmesh.cli.console import plain
-from epsmesh.report.correction import fit, r_without
 from epsmesh.report.guide import guide, quantity
-from epsmesh.report.guide_text import settings
-from epsmesh.report.table import DatasetError, arrange
+from epsmesh.report.laws import correction, r_without
+from epsmesh.report.study import DatasetError
 from epsmesh.report.values import relative
+from epsmesh.report.verdicts import arrange
 from tests.report.chosen import BAR, EXACT_BAR, TEXT, dataset
 from tests.report.synthetic import FIGURE
 from tests.report.synthetic import dataset as synthetic
@@ -127,7 +128,7 @@ def test_correction_against_brute_force(seed):
     size = int(random.integers(2, 12))
     values = np.round(random.uniform(0.1, 3, size), int(random.integers(1, 8)))  # some stand more than once
     labels, factor = random.integers(0, 4, size), random.uniform(0.5, 1.5)
-    law = fit(values, 0 * values, {"p": labels})
+    law = correction(values, 0 * values, {"p": labels})
     assert law.residual <= np.abs(values / (factor * law.r) - 1).max() + 1e-12
     for i, r in enumerate(r_without(values, labels)):
         others = values[labels != labels[i]]
@@ -139,7 +140,7 @@ def test_correction_against_brute_force(seed):
 
 
 def test_one_scene_has_no_law():
-    law = fit(np.array([0.9]), np.array([0.01]), {})
+    law = correction(np.array([0.9]), np.array([0.01]), {})
     assert law.r == pytest.approx(0.9)
     assert isnan(law.left_out)
     assert isnan(law.error)
@@ -164,7 +165,7 @@ def test_settings_that_lack_a_case_are_not_judged(state):
     assert not found.uncovered
     assert "Incomplete: 1 mesh setting without a result for every scene" in str(found)
     text = found.text(verbose=True)
-    assert "incomplete: 2 of 4 scenes have no result" in settings(found).to_string()
+    assert "incomplete: 2 of 4 scenes have no result" in found.settings.to_string()
     assert {"failed": "2 failed: so it went", "skipped": "2 skipped", "pending": "2 not yet run"}[state] in text
 
 
@@ -224,7 +225,7 @@ def test_full_order_counts_once_and_without_it_ratios_are_to_the_exact_force():
     found = guide(dataset(TEXT.replace(', "full"', "")), "5%")
     assert not found.has_full
     assert found.verdicts[0].spread.most == pytest.approx(1.02)
-    assert settings(found)["F/F_exact"][0] == "1.020 … 1.020"
+    assert found.settings["F/F_exact"][0] == "1.020 … 1.020"
 
 
 @pytest.mark.parametrize(
@@ -291,11 +292,11 @@ def test_json_and_rows_hold_the_same(tmp_path):
 def test_table_of_a_dataset_is_its_own_numbers():
     data = synthetic(**FIGURE | {"solve": {"exact": True}}).assign(force_exact=lambda d: 0.03 + 0 * d["force"])
     data["force_exact_error"] = 0 * data["force"]
-    table = arrange(data)
-    assert table.ratio.shape == (3 * 7 - 2, 8)
-    for row, labels in enumerate(table.settings):
-        for column, scene in enumerate(table.scenes):
-            assert table.force[row, column] == float(data["force"].sel(labels | scene))
+    cells = arrange(data)
+    assert len(cells.frame) == (3 * 7 - 2) * 8
+    forces = iter(cells.frame["force"])
+    for labels, scene in itertools.product(cells.settings, cells.scenes):
+        assert next(forces) == float(data["force"].sel(labels | scene))
 
 
 @pytest.mark.parametrize("value", ["five", "0 %", "100%", "3 mm", -1.0, "", "nan"])

@@ -11,7 +11,7 @@ from epsmesh.report.figures import choose, figure
 from epsmesh.report.guide import guide
 from epsmesh.report.laws import LAWS, Forces, judge
 from epsmesh.report.sinking import why_not
-from epsmesh.report.table import DatasetError
+from epsmesh.report.study import DatasetError
 from epsmesh.study.read import parse
 from tests.cases import raw
 from tests.report.chosen import dataset

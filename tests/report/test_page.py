@@ -21,7 +21,7 @@ from epsmesh.report.page import render, write_page
 from epsmesh.report.page.cases import case_table
 from epsmesh.report.page.facts import reproduce
 from epsmesh.report.read import read_file
-from epsmesh.report.table import case_at, study_of
+from epsmesh.report.study import case_at, study_of
 from tests.cases import BLADE, raw
 from tests.commands import epsmesh
 from tests.report import chosen

@@ -10,7 +10,7 @@ import epsmesh.report.accessor  # noqa: F401
 from epsmesh.report.figures import choose, figure
 from epsmesh.report.guide import guide_if_any
 from epsmesh.report.headline import headline
-from epsmesh.report.table import DatasetError, study_of
+from epsmesh.report.study import DatasetError, study_of
 from tests.cases import raw
 from tests.report.synthetic import dataset
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from epsmesh.plan.key import case_key, mesh_key
-from epsmesh.report.table import study_of
+from epsmesh.report.study import study_of
 from epsmesh.shapes.bodies.surface import FromSurface
 from epsmesh.shapes.frame import PlaceError
 from epsmesh.shapes.skin import Skin

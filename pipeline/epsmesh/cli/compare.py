@@ -24,7 +24,7 @@ def compare(a: Dataset, b: Dataset, output: ResultFolder = DEFAULT_OUTPUT, as_js
     from epsmesh.report.compare import compare as hold
     from epsmesh.report.compare_text import text, to_dict
     from epsmesh.report.read import dataset_path, read
-    from epsmesh.report.table import DatasetError
+    from epsmesh.report.study import DatasetError
     from epsmesh.report.times import doubts
 
     paths, datasets, faults = [], [], []

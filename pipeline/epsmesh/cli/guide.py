@@ -39,7 +39,7 @@ def guide(
     """
     from epsmesh.report.guide import guide as make_guide
     from epsmesh.report.guide import quantity
-    from epsmesh.report.table import DatasetError
+    from epsmesh.report.study import DatasetError
 
     for name, value, unit in (("--accuracy", accuracy, ""), ("--budget", budget, "s")):
         try:

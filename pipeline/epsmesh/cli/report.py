@@ -129,7 +129,7 @@ def _draw(path: Path, dataset: "xr.Dataset", kind: list[str] | None, *, rest: bo
 def _scene_of(path: Path, dataset: "xr.Dataset", text: str) -> str:
     """Return the page of a case of ``dataset``, as its mesh; exit if there is none."""
     from epsmesh.cli.view import fields_of
-    from epsmesh.report.table import DatasetError, study_of
+    from epsmesh.report.study import DatasetError, study_of
     from epsmesh.view.page import render
     from epsmesh.workflow import abort_on_exception, world
 
@@ -152,7 +152,7 @@ def _scene_of(path: Path, dataset: "xr.Dataset", text: str) -> str:
 def _scene_at_hand(dataset: "xr.Dataset") -> str:
     """Return the page of the case that limits the answer, as its mesh; "" where it is not to be had in seconds."""
     from epsmesh.plan.estimate import cells
-    from epsmesh.report.table import DatasetError, study_of
+    from epsmesh.report.study import DatasetError, study_of
 
     study = study_of(dataset)
     if study is None or faults_of_machine():
@@ -195,7 +195,7 @@ def _of_answer(dataset: "xr.Dataset", study: "Study") -> "Case":
         DatasetError: if there is no answer.
     """
     from epsmesh.report.guide import USUAL_ACCURACY, guide
-    from epsmesh.report.table import DatasetError, case_at
+    from epsmesh.report.study import DatasetError, case_at
 
     if study.shape == ():
         return next(iter(study.cases()))

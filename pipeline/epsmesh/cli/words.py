@@ -129,7 +129,7 @@ def read_dataset(file: Path, output: Path, *, any_kind: bool = False) -> "tuple[
     It is that of a study's cases, or with ``any_kind`` one of another kind.
     """
     from epsmesh.report.read import dataset_path, read, read_any
-    from epsmesh.report.table import DatasetError
+    from epsmesh.report.study import DatasetError
 
     with refusing(DatasetError, file=file):
         return dataset_path(file, output), (read_any if any_kind else read)(file, output, warning)

@@ -17,7 +17,7 @@ import xarray as xr
 from epsmesh.printable import counted
 from epsmesh.quantities import quantity_of, write
 from epsmesh.report.parameters import Parameters, differing, parameters_of, units_of, varied
-from epsmesh.report.table import DatasetError, study_of
+from epsmesh.report.study import DatasetError, study_of
 from epsmesh.report.values import at_peak
 from epsmesh.states import OK, PENDING, SKIPPED
 

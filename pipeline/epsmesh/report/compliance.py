@@ -19,7 +19,7 @@ import xarray as xr
 
 from epsmesh.quantities import attributes
 from epsmesh.report.sinking import LOADS, PLACES, Sinking
-from epsmesh.report.table import DatasetError, case_at, study_of
+from epsmesh.report.study import DatasetError, case_at, study_of
 from epsmesh.report.values import at_full_order, elastic, relative
 
 Against = Literal["exact", "full"]

@@ -7,7 +7,7 @@ import xarray as xr
 
 from epsmesh.quantities import write
 from epsmesh.report.insertion import answer
-from epsmesh.report.table import study_of
+from epsmesh.report.study import study_of
 from epsmesh.report.values import answer_of, at_peak, has_path, relative
 from epsmesh.report.words import span
 

@@ -7,9 +7,11 @@
 
 Constants are fitted by least squares of the relative error of F_exact, to the scenes that are alike in all but one
 parameter of the study (the tool, the thickness, ν, …), leaving out those with one value of it, which are then judged.
+A :class:`Correction` is one r for all scenes, that whose largest residual |F / (r F_exact) - 1| is smallest
+(Chebyshev's choice): the middle between the smallest and the largest F/F_exact.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, nan
 
@@ -17,6 +19,8 @@ import numpy as np
 
 from epsmesh.report.compliance import beyond
 
+# Of each scene parameter, the position of each scene's value.
+Codes = Mapping[str, np.ndarray]
 LAWS = ("ratio", "compliance", "second order")
 FORMULAS = {
     "ratio": "F_exact ≈ F / r",
@@ -27,6 +31,60 @@ FORMULAS = {
 _WORTH = 0.8
 # Of a determinant, over that of columns at right angles: below it the tools left do not tell two constants apart.
 _SINGULAR = 1e-6
+
+
+@dataclass(frozen=True)
+class Correction:
+    """r of a mesh setting and its relative residuals, the largest over the scenes.
+
+    ``residual`` is that of the scenes that r was taken from; ``left_out`` that of each scene by the r of all the
+    others, which tells little where scenes have twins (F/F_exact is the same for every Young's modulus); ``unseen``
+    that of the scenes with one value of a scene parameter (one ν, one probe, …) by the r of those without it, the worst
+    over parameters and values; ``error`` adds the error bars to the worst of these. NaN where there is nothing left to
+    take r from.
+    """
+
+    r: float = nan
+    mean: float = nan
+    residual: float = nan
+    left_out: float = nan
+    unseen: float = nan
+    error: float = nan
+
+
+def correction(ratio: np.ndarray, bar: np.ndarray, codes: Codes) -> Correction:
+    """Return the correction of one setting from F/F_exact of its scenes, and what error bars add to each.
+
+    ``codes`` has, for each scene parameter, the position of each scene's value.
+    """
+    if not ratio.size:
+        return Correction()
+    r = float(ratio.min() + ratio.max()) / 2
+    alone = r_without(ratio, np.arange(ratio.size))
+    parameters = [r_without(ratio, labels) for labels in codes.values() if len(np.unique(labels)) > 1]
+    return Correction(
+        r,
+        float(ratio.mean()),
+        _worst(np.abs(ratio / r - 1)),
+        _worst(np.abs(ratio / alone - 1)),
+        max((_worst(np.abs(ratio / others - 1)) for others in parameters), default=nan),
+        max(_worst(np.abs(ratio / others - 1) + bar / others) for others in [alone, *parameters]),
+    )
+
+
+def r_without(ratio: np.ndarray, labels: np.ndarray) -> np.ndarray:
+    """Return, for each scene, r of the scenes with other labels than its own; NaN if there are none."""
+    names, group = np.unique(labels, return_inverse=True)
+    if len(names) < 2:
+        return np.full(ratio.shape, nan)
+    total = np.zeros(len(names))
+    for extreme, end in ((np.minimum, inf), (np.maximum, -inf)):
+        own = np.full(len(names), end)
+        extreme.at(own, group, ratio)
+        # The extreme of the others is the extreme of all, but for the group that has it: there it is the runner-up.
+        first = int(own.argmin() if end > 0 else own.argmax())
+        total += np.where(np.arange(len(names)) == first, extreme.reduce(np.delete(own, first)), own[first])
+    return np.asarray(total[group] / 2)
 
 
 @dataclass(frozen=True)
@@ -81,28 +139,30 @@ class Laws:
         return next((law for law in known if _WORTH * law.error <= least), None)
 
 
-def judge(forces: Forces, axes: Mapping[str, np.ndarray], tools: tuple[str, ...], loads: tuple[str, ...]) -> Laws:
+def judge(forces: Forces, codes: Codes, tools: Sequence[str], loads: Sequence[str]) -> Laws:
     """Judge all laws.
 
-    ``axes`` holds, for each scene parameter, the position of each scene's value; ``tools`` names those that make a tool
+    ``codes`` has, for each scene parameter, the position of each scene's value; ``tools`` names those that make a tool
     what it is, ``loads`` those that only move it.
     """
     if not forces.ratio.size:
         return Laws()
-    site = _groups([axes[name] for name in axes if name not in (*tools, *loads)], forces.ratio.size)
-    tool = _groups([axes[name] for name in tools], forces.ratio.size)
-    alone = {name: _groups([axes[n] for n in axes if n != name], forces.ratio.size) for name in axes}
+    count = forces.ratio.size
+    site = groups([labels for name, labels in codes.items() if name not in (*tools, *loads)], count)
+    tool = groups([codes[name] for name in tools], count)
+    alone = {name: groups_without(codes, name, count) for name in codes}
     found = []
     for name in LAWS:
-        fitted = _fit(_model(name, forces), site, np.arange(forces.ratio.size), out=False)
+        model = _model(name, forces)
+        constant = _fit(model, site, np.arange(count), out=False)[:, 0]
+        constant = 1 / constant if name == "ratio" else constant
         carried = tuple(
-            (axis, _worst(np.abs(_predict(name, forces, _fit(_model(name, forces), alone[axis], axes[axis]))[0] - 1)))
-            for axis in axes
+            (axis, _worst(np.abs(_predict(name, forces, _fit(model, group, codes[axis]))[0] - 1)))
+            for axis, group in alone.items()
         )
-        predicted, bar = _predict(name, forces, _fit(_model(name, forces), site, tool))
+        predicted, bar = _predict(name, forces, _fit(model, site, tool))
         off = np.abs(predicted - 1)
-        constant = 1 / fitted[:, 0] if name == "ratio" else fitted[:, 0]
-        found.append(Law(name, _least(constant), _worst(constant), carried, _worst(off), _worst(off + bar)))
+        found.append(Law(name, float(constant.min()), _worst(constant), carried, _worst(off), _worst(off + bar)))
     return Laws(_worst(forces.force_bar + forces.exact_bar), tuple(found))
 
 
@@ -139,7 +199,7 @@ def _fit(model: tuple[np.ndarray, np.ndarray], group: np.ndarray, label: np.ndar
     count = columns.shape[1]
     size = np.nanmax(np.abs(columns), axis=0)
     scaled = columns / size
-    cell = _groups([group, label], len(target))
+    cell = groups([group, label], len(target))
     gram, moment = scaled[:, :, None] * scaled[:, None, :], scaled * target[:, None]
     one = np.zeros(len(target))
     one[np.unique(cell, return_index=True)[1]] = 1.0
@@ -161,17 +221,18 @@ def _sum(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     return np.asarray(sums[group])
 
 
-def _groups(labels: list[np.ndarray], count: int) -> np.ndarray:
+def groups(labels: Sequence[np.ndarray], count: int) -> np.ndarray:
     """Return the number of the group of each scene: one for each combination of labels."""
     if not labels:
         return np.zeros(count, dtype=int)
     return np.unique(np.stack(labels, axis=1), axis=0, return_inverse=True)[1].ravel()
 
 
+def groups_without(codes: Codes, name: str, count: int) -> np.ndarray:
+    """Return the number of the group of each scene: of those that are alike in all but one parameter."""
+    return groups([labels for other, labels in codes.items() if other != name], count)
+
+
 def _worst(values: np.ndarray) -> float:
     """Return the largest, NaN if one of them is not known."""
     return float(values.max()) if values.size else nan
-
-
-def _least(values: np.ndarray) -> float:
-    return float(values.min()) if values.size else nan

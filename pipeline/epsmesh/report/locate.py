@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from epsmesh.report.table import DatasetError
+from epsmesh.report.study import DatasetError
 from epsmesh.report.values import at_peak, by_case, relative
 
 if TYPE_CHECKING:

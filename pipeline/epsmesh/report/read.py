@@ -12,7 +12,7 @@ import xarray as xr
 
 from epsmesh.extensions import kind, kind_of
 from epsmesh.printable import printable, printable_lines
-from epsmesh.report.table import DatasetError, warnings_of
+from epsmesh.report.study import DatasetError, warnings_of
 from epsmesh.report.values import with_words
 from epsmesh.study.identified import FROM
 from epsmesh.study.problems import StudyError

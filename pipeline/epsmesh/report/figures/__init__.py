@@ -20,7 +20,7 @@ from epsmesh.report.figures.insertion import insertion
 from epsmesh.report.figures.map import force_map
 from epsmesh.report.figures.ratio import ratio, ratio_facets
 from epsmesh.report.figures.style import STYLE, add_note, save
-from epsmesh.report.table import study_of, warnings_of
+from epsmesh.report.study import study_of, warnings_of
 from epsmesh.report.values import at_peak, has_path, of_path
 from epsmesh.report.words import is_numeric, without_shared
 from epsmesh.states import FAILED, NO_CONTACT, PARTIAL, PENDING, SKIPPED

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 from epsmesh.arrays import FloatArray
 from epsmesh.report.figures.facets import arrange
 from epsmesh.report.figures.style import CLAIM, FAILED, LINE, finish, look, new_figure
-from epsmesh.report.table import study_of
+from epsmesh.report.study import study_of
 from epsmesh.report.words import choices, heading, scale
 from epsmesh.shapes.facetted import Facetted
 from epsmesh.shapes.triangles import closed_edges, doubled_normals

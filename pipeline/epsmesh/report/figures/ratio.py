@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from epsmesh.report.figures.curves import BARS, Panel, draw, grid, positions, share
 from epsmesh.report.figures.facets import Facets, arrange
 from epsmesh.report.figures.style import CLAIM, LINE, finish, log_scale, look
-from epsmesh.report.table import study_of
+from epsmesh.report.study import study_of
 from epsmesh.report.times import doubtful, spreads
 from epsmesh.study.sweep import Study
 

@@ -25,7 +25,7 @@ from epsmesh.report.page.facts import (
     without_exact,
 )
 from epsmesh.report.page.inline import in_page
-from epsmesh.report.table import warnings_of
+from epsmesh.report.study import warnings_of
 from epsmesh.report.uncertainty import unknowns
 from epsmesh.report.values import at_peak
 from epsmesh.states import FAILURES, SKIPPED

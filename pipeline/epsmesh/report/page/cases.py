@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from epsmesh.pages import json_in_page
 from epsmesh.quantities import LARGEST, QUANTITIES
-from epsmesh.report.table import study_of
+from epsmesh.report.study import study_of
 from epsmesh.report.values import by_case, relative
 from epsmesh.report.words import is_numeric, lengths, number, scale, symbol
 from epsmesh.states import WORST_FIRST
