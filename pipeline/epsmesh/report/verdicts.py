@@ -217,10 +217,10 @@ class Verdict:
         known = {name: values[adds] for name, values in self._known.items()}
         if not np.isfinite(known[of]).all():
             return Laws()
-        scale, *powers = sinking[["scale", "exponent", "square"]].to_numpy()[adds].T
-        bars = ((0.0 if of == "share" else 1.0) * known[name] for name in ("force_bar", "exact_bar"))
+        scale, exponent, square = sinking[["scale", "exponent", "square"]].to_numpy()[adds].T
+        bar, exact_bar = ((0.0 if of == "share" else 1.0) * known[name] for name in ("force_bar", "exact_bar"))
         codes = {name: values[adds] for name, values in self._codes.items()}
-        forces = Forces(known[of], *bars, scale / known["force"], *powers)
+        forces = Forces(known[of], bar, exact_bar, scale / known["force"], exponent, square)
         return laws.judge(forces, codes, self._all.tools, self._all.loads)
 
 

@@ -118,10 +118,10 @@ def _draw_profile(ax: Axes, dataset: xr.Dataset, unknown: str, shown: int, *, is
     ax.axhline(_NORMAL, color=QUIET, linestyle=":")
     ax.axvline(factor * estimate, color=_FIT)
     ax.set_ylim(0, _HIGHEST)
-    for side, end in (("low", low), ("high", high)):
-        outer = (float(one[f"{side}_hidden"]) - estimate) / (end - estimate)
+    for side, bound in (("low", low), ("high", high)):
+        outer = (float(one[f"{side}_hidden"]) - estimate) / (bound - estimate)
         most = min(max(_NEAR, _NEAR * outer if np.isfinite(outer) else 0.0), _FAR)
-        edge = factor * (estimate + most * (end - estimate))
+        edge = factor * (estimate + most * (bound - estimate))
         ax.set_xlim(**{"left" if side == "low" else "right": edge})
         if outer > most:
             ax.plot(edge, _HIGHEST / 2, "<" if side == "low" else ">", color=_HIDDEN, clip_on=False)
