@@ -14,6 +14,7 @@ from epsmesh.run.loads import loads_of
 from epsmesh.run.meshing import mesh_case
 from epsmesh.run.problem import law_of, movement_of, tool_of
 from epsmesh.scene.model import FIXED, FREE, PROBE
+from epsmesh.solve import SolveError
 from epsmesh.solve.conditions import Conditions
 from epsmesh.solve.dead_loads import sag
 from epsmesh.solve.elements import elements_of
@@ -176,6 +177,18 @@ def test_bars_cover_a_finer_mesh():
 def test_symmetric_halves_are_the_whole():
     term = springs(1e5)
     assert force(term, **LARGE) == pytest.approx(force(term, **LARGE, mesh={"model": "3d"}), rel=1e-8)
+
+
+@pytest.mark.parametrize("model", ["auto", "3d"])
+def test_planes_of_symmetry_hold_no_body(model):
+    """On rollers the whole body is free to move along its face, and so is a quarter of it."""
+
+    def energy(at: Place) -> Any:
+        return at.constant(1e5) / 2 * ufl.dot(at.u, at.normal) ** 2 * at.ds
+
+    rollers = EnergyTerm(energy, ("springs", "rollers"), lambda _, normals: normals[:, 2] < -0.9)
+    with pytest.raises(SolveError, match=r"let it (move along|turn about z).*fix a face"):
+        solve(rollers, **BALL, mesh={"model": model})
 
 
 @pytest.mark.mpi

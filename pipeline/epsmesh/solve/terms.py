@@ -187,26 +187,32 @@ class DeadLoads:
 
 
 def check_hold(space: Any) -> None:
-    """Check that terms of an elastic space without support leave no rigid motion free; collective.
+    """Check that terms of an elastic space without support leave no rigid motion of the whole body free; collective.
 
-    Motions that planes of symmetry exclude are not considered.
+    Planes of symmetry hold no body: a motion that they exclude is free all the same. Between motions of which one is
+    its own image in a plane, and the other its opposite, the forces on the whole body do no work.
 
     Raises:
         SolveError: if they leave one.
     """
     if not space.terms or space.comm.allreduce(len(space.fixed_owned)):
         return
-    places = space.places.reshape(-1, 3)
+    places, planes = space.places.reshape(-1, 3), list(space.body.mirrored)
     *centre, count = global_sum(space.comm, np.array([*places.sum(axis=0), len(places)]))
-    away = places - np.array(centre) / count
+    middle = np.array(centre) / count
+    middle[planes] = 0.0
+    away = places - middle
     away /= np.sqrt(global_sum(space.comm, np.array([(away**2).sum()]))[0] / count)
-    axes, mirrored = np.eye(3), set(space.body.mirrored)
-    motions = {f"move along {'xyz'[n]}": np.tile(axes[n], (len(places), 1)) for n in range(3) if n not in mirrored}
-    motions |= {f"turn about {'xyz'[n]}": np.cross(axes[n], away) for n in range(3) if mirrored <= {n}}
+    moves = {f"move along {'xyz'[n]}": np.tile(axis, (len(places), 1)) for n, axis in enumerate(np.eye(3))}
+    turns = {f"turn about {'xyz'[n]}": np.cross(axis, away) for n, axis in enumerate(np.eye(3))}
+    motions = moves | turns
     modes = np.array([motion.ravel() for motion in motions.values()])
+    is_own = np.arange(3)[:, None] != np.array(planes, dtype=int)  # a move along a plane is its own image there
+    images = np.vstack([is_own, ~is_own])
     with space.at_rest():
         forces = sum((np.array([product(term, mode) for mode in modes]) for term in space.terms), np.zeros(modes.shape))
     stiffness = global_sum(space.comm, (modes @ forces.T).ravel()).reshape(len(modes), -1)
+    stiffness *= (images[:, None] == images).all(axis=2)
     values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
     if not values[0] > _FREE * abs(values[-1]):
         free = [*motions][int(np.abs(vectors[:, 0]).argmax())]
