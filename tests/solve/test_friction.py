@@ -10,10 +10,11 @@ from mpi4py import MPI
 from epsmesh.run.meshing import mesh_case
 from epsmesh.run.problem import law_of, movement_of, tool_of
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
+from epsmesh.solve.contact.surface import Candidates, facet_nodes
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.problems import StudyError
-from tests.cases import solve, study
+from tests.cases import NO_SIZES, solve, study
 from tests.verification import known
 
 BODY = {"shape": "cylinder", "radius": "60 mm", "height": "60 mm"}
@@ -225,6 +226,37 @@ def test_a_ball_beside_a_corner_has_forces_across_its_axis_and_next_to_no_torque
     across, along, _ = found.force_vector
     assert across > 2 * along > 0
     assert abs(found.torque) < 0.01 * found.friction_force * found.contact_radius
+
+
+@pytest.mark.parametrize(("poisson", "rim"), [(0.4, "0.9 mm"), (0.45, "1.5 mm")])
+def test_below_a_sharp_disc_to_which_tissue_sticks_friction_is_that_of_the_meridian(poisson, rim):
+    """The traction is singular at its edge, where nodal forces alternate: their sizes add up to more."""
+    scene = {
+        "body": {"shape": "cylinder", "radius": "10 mm", "height": "8 mm"},
+        "material": {"poisson": poisson},
+        "probe": DISC | {"radius": "3 mm", "friction": "stick"},
+    }
+    (coarse,) = solve(**scene, mesh=MESH | {"fine": "3.6 mm", "coarse": "6 mm", "rim": rim}).values()
+    (exact,) = solve(**scene, mesh=NO_SIZES | {"accuracy": "2 %"}, plan={"without": []}).values()
+    assert exact.origin == "axisymmetric"
+    error = abs(coarse.friction_force - exact.friction_force)
+    assert error < 0.3 * exact.friction_force
+    assert error < coarse.friction_force_error + exact.friction_force_error
+
+
+def test_the_size_of_a_traction_is_its_integral():
+    """An even one exactly, whatever the shares of nodes; nodal forces that alternate within facets cancel."""
+    corners = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [2.0, 2.0, 0.0]])
+    for degree in (2, 3):
+        shape = facet_nodes(degree)
+        nodes = np.concatenate([shape.corners @ corners[[0, 1, 2]], shape.corners @ corners[[1, 3, 2]]])
+        points, facets = np.unique(nodes.round(9), axis=0, return_inverse=True)
+        facets, none = facets.reshape(2, -1), np.zeros(2, dtype=np.int64)
+        both = Candidates(np.arange(len(points)), points, facets, shape, points[:, 0] < 0, none, none.astype(np.int32))
+        even = both.weights[:, None] * np.array([0.6, 0.8, 0.0])
+        assert both.size_of(even) == pytest.approx(4.0)
+        assert both.size_of(even - 2 * even * (points[:, :1] > 1)) < 4.0
+    assert both.size_of(np.zeros_like(even)) == 0.0
 
 
 def test_friction_that_slides_is_the_law_times_the_force():

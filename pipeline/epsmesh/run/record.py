@@ -51,9 +51,9 @@ class Record:
       a record is "partial".
     - ``stiffness``: of all six rigid motions, with the error bars ``stiffness_error``; empty without `motion = "all"`.
     - ``contact_area`` (m²), ``contact_radius`` (m): of unilateral contact, with relative error bars;
-      ``slip_area`` (m²): the part that slides, of contact with friction. ``friction_force`` (N): the sum of the
-      sizes of its tangential forces; ``torque`` (N m): that of the tissue on the probe about its advance. Their error
-      bars are in the same units, NaN if unknown.
+      ``slip_area`` (m²): the part that slides, of contact with friction. ``friction_force`` (N): the
+      integral of the size of its tangential traction; ``torque`` (N m): that of the tissue on the probe about its
+      advance. Their error bars are in the same units, NaN if unknown.
     - ``largest``: the largest values of cells away from the probe's edge, by their names in the dataset.
     - ``energy_release`` (J/m²): the mean along a slit's front, with its relative 95 % error bar.
     - ``load_force`` (N), with the error bar ``load_force_error`` (N), and ``load_force_vector`` (N): what loads add to

@@ -6,17 +6,18 @@ from math import nan, pi
 
 # Bars with friction, in units of the change from half as many load steps, to which the area that slides adds a part of
 # the facets in which sliding begins or ends, and the tangential force the relative bars on the axial one and on the
-# contact area. Measured: benchmarks/results/friction.md.
-_OF_STEPS, _OF_UNSURE, _OF_FORCE, _OF_AREA = 1.5, 0.6, 2.0, 3.0
+# contact area, and a part of what nodal forces have beyond it. Measured: benchmarks/results/friction.md.
+_OF_STEPS, _OF_UNSURE, _OF_FORCE, _OF_AREA, _OF_UNEVEN = 1.5, 0.6, 2.0, 3.0, 0.35
 
 
 @dataclass(frozen=True)
 class ContactResult:
     """Unilateral contact: its area (m²), with a relative 95 % bar if requested.
 
-    ``slip_area`` (m²) is the part of it that slides along the tool, ``friction_force`` (N) the sum of the sizes of the
-    tangential forces, and ``torque`` (N m) that of the tissue on the tool about its advance: NaN without friction. Each
-    has a 95 % bar in its own unit, NaN if unknown; ``rubbing`` is what those of the first two follow from.
+    ``slip_area`` (m²) is the part of it that slides along the tool, ``friction_force`` (N) the integral of the size of
+    the tangential traction, and ``torque`` (N m) that of the tissue on the tool about its advance: NaN without
+    friction. Each has a 95 % bar in its own unit, NaN if unknown; ``rubbing`` is what those of the first two follow
+    from.
     ``friction_bar`` is the relative bar on what friction adds to the force. ``sag`` (m) is the displacement of the
     first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere the
     tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's bar by the
@@ -58,10 +59,11 @@ class ContactResult:
 
 @dataclass(frozen=True)
 class Rubbing:
-    """Friction at nodes: the ``share`` of the contact that slides, and the sum of the tangential ``force`` (N).
+    """Friction at nodes: the ``share`` of the contact that slides, and the tangential ``force`` (N).
 
     The changes of both are those from half as many load steps; ``unsure`` (m²) is the area of the facets in which
-    sliding begins or ends, zero if tissue sticks by definition.
+    sliding begins or ends, zero if tissue sticks by definition. ``uneven`` (N) is what the sizes of nodal forces have
+    beyond the integral of the traction's: they alternate where it is singular.
     """
 
     share: float
@@ -69,11 +71,12 @@ class Rubbing:
     change_of_share: float
     change_of_force: float
     unsure: float
+    uneven: float
 
     def times(self, images: float) -> "Rubbing":
         """Return that of the whole body, of which the modelled part has so many ``images``."""
-        force, change, unsure = images * self.force, images * self.change_of_force, images * self.unsure
-        return replace(self, force=force, change_of_force=change, unsure=unsure)
+        whole = {name: images * getattr(self, name) for name in ("force", "change_of_force", "unsure", "uneven")}
+        return replace(self, **whole)
 
     def bars(self, area: float, relative: float, area_bar: float) -> tuple[float, float]:
         """Return the 95 % bars on the area that slides (m²) and on the force (N); benchmarks/results/friction.md.
@@ -81,4 +84,5 @@ class Rubbing:
         ``area`` (m²) is that of the contact, ``area_bar`` its relative bar, and ``relative`` that of the axial force.
         """
         of_slip = (_OF_STEPS * self.change_of_share + area_bar * self.share) * area + _OF_UNSURE * self.unsure
-        return of_slip, _OF_STEPS * self.change_of_force + (_OF_FORCE * relative + _OF_AREA * area_bar) * self.force
+        of_force = _OF_STEPS * self.change_of_force + (_OF_FORCE * relative + _OF_AREA * area_bar) * self.force
+        return of_slip, of_force + _OF_UNEVEN * self.uneven

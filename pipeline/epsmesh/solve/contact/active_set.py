@@ -93,5 +93,5 @@ def find_set(
             raise ContactError(f"the contact area does not settle: {error}") from error
         forces = tissue.forces()
         gap = tool.distance(tissue.positions()).gap
-        touched = ContactSolution(forces[:, 0] != 0.0, forces, gap, 0, -forces[:, 0])
+        touched = ContactSolution(forces[:, 0] != 0.0, forces, gap, 0, np.full_like(forces, -1.0))
     return SettledContact(touched, elements.state())

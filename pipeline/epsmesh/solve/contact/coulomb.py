@@ -103,8 +103,8 @@ class Touching(Protocol):
         """How they slide."""
 
     @property
-    def tangential(self) -> FloatArray:
-        """Sizes of the tangential forces (n), N, with the sign of the normal reaction."""
+    def friction(self) -> FloatArray:
+        """The tangential forces (n, d), N."""
 
 
 def rubbing_of(candidates: Candidates, coefficient: float, fine: Touching, coarse: Touching) -> Rubbing:
@@ -112,15 +112,17 @@ def rubbing_of(candidates: Candidates, coefficient: float, fine: Touching, coars
 
     At an infinite ``coefficient`` tissue slides nowhere, by definition.
     """
-    force, change = float(fine.tangential.sum()), abs(float(fine.tangential.sum() - coarse.tangential.sum()))
+    force, before = (candidates.size_of(each.friction) for each in (fine, coarse))
+    change = abs(force - before)
+    uneven = float(np.linalg.norm(fine.friction, axis=1).sum()) - force
     if coefficient == inf:
-        return Rubbing(0.0, force, 0.0, change, 0.0)
+        return Rubbing(0.0, force, 0.0, change, 0.0, uneven)
     assert fine.slide is not None
     assert coarse.slide is not None
     share = fine.slide.share(candidates.weights, fine.active)
     other = coarse.slide.share(candidates.weights, coarse.active)
     unsure = fine.slide.unsure(candidates.facets, candidates.areas, fine.active)
-    return Rubbing(share, force, abs(share - other), change, unsure)
+    return Rubbing(share, force, abs(share - other), change, unsure, uneven)
 
 
 @dataclass(frozen=True, eq=False)

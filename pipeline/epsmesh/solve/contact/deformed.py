@@ -102,21 +102,25 @@ class PlacedTool:
 class ContactSolution:
     """Contact at equilibrium: the ``active`` nodes (n), forces of the tool on the nodes (n, d), N, and gaps (n), m.
 
-    ``pressed`` (n) are the normal parts of the forces (N). ``slide`` is the state of friction, None without.
+    ``normal`` (n, d) are the tool's unit normals at the nodes. ``slide`` is the state of friction, None without.
     """
 
     active: BoolArray
     forces: FloatArray
     gap: FloatArray
     iterations: int
-    pressed: FloatArray
+    normal: FloatArray
     slide: Slide | None = None
 
     @property
-    def tangential(self) -> FloatArray:
-        """Sizes (n) of the tangential forces (N), with the sign of the normal part."""
-        squares = (self.forces**2).sum(axis=1) - self.pressed**2
-        return np.asarray(np.sign(self.pressed) * np.sqrt(np.maximum(squares, 0.0)))
+    def pressed(self) -> FloatArray:
+        """The normal parts (n) of the forces (N)."""
+        return np.asarray(np.einsum("ni,ni->n", self.forces, self.normal))
+
+    @property
+    def friction(self) -> FloatArray:
+        """The tangential parts (n, d) of the forces (N)."""
+        return np.asarray(self.forces - self.pressed[:, None] * self.normal)
 
 
 class NoTouchError(LargeError):
@@ -335,7 +339,7 @@ class _InContact(Newton[ContactSolution]):
         if friction is not None and not friction.is_sound(active):
             raise LargeError("the states of nodes with friction repeat")
         exerted, slide = np.where(active[:, None], forces, 0.0), None if friction is None else friction.slide
-        return ContactSolution(active, exerted, self._place.gap, iteration, self._pressed, slide)
+        return ContactSolution(active, exerted, self._place.gap, iteration, self._there.normal, slide)
 
     def _check_patience(self, iteration: int) -> None:
         if not self._is_patient and iteration >= _SOON and not self._is_closed:

@@ -122,5 +122,5 @@ def _of_all(candidates: Candidates, nodes: IntArray, touched: ContactSolution) -
 
     assert touched.slide is not None
     slide = Slide(spread(touched.slide.sliding), spread(touched.slide.trial))
-    arrays = {name: spread(getattr(touched, name)) for name in ("active", "forces", "gap", "pressed")}
+    arrays = {name: spread(getattr(touched, name)) for name in ("active", "forces", "gap", "normal")}
     return replace(touched, **arrays, slide=slide)

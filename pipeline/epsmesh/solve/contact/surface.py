@@ -189,6 +189,17 @@ class Candidates:
         # Shares of degree 4 are negative in the middle of edges.
         return np.asarray(np.sqrt(np.maximum(np.bincount(self.facets.ravel(), shares, len(self)), 0.0) / count))
 
+    def size_of(self, forces: FloatArray) -> float:
+        """Return the integral (N) of the size of the traction with nodal ``forces`` (n, d).
+
+        Facets share their nodes' forces by area. Nodal forces alternate beside an edge where the traction is singular:
+        their own sizes add up to as much as three times the integral.
+        """
+        nodes, count = self.facets.ravel(), self.facets.shape[1]
+        around = np.bincount(nodes, np.repeat(self.areas, count), len(self))
+        shares = self.areas[:, None] / around[self.facets]
+        return float(np.linalg.norm(np.einsum("mk,mkd->md", shares, forces[self.facets]), axis=1).sum())
+
     def from_regions(self, values: Sequence[float]) -> FloatArray:
         """Return ``values`` by region as values of the nodes (n), from the tissue below their facets."""
         found = np.empty(len(self))

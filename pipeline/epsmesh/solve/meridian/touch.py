@@ -279,7 +279,7 @@ class MeridianTouch:
     @property
     def friction(self) -> float:
         """The sum of the sizes of the tangential forces."""
-        return 2 * pi * float(np.abs(self._contact.tangential).sum())
+        return 2 * pi * float(np.linalg.norm(self._contact.friction, axis=1).sum())
 
     def check(self) -> None:
         """Check balance and work, and that contact ends on the surface.
