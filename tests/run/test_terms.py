@@ -1,6 +1,7 @@
 """The term that CONTRIBUTING shows, as one file: its keys, its pairs, its records and its forces."""
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -32,8 +33,8 @@ def study(tool, **more):
     return {"body": box, "material": material, "probe": tools[tool], "mesh": mesh, "load": springs} | more
 
 
-def floating(tool, stiffness, kind="spring"):
-    load = {kind: [{"on": "bottom", "stiffness": stiffness}]}
+def floating(tool, stiffness, kind="spring", on="bottom"):
+    load = {kind: [{"on": on, "stiffness": stiffness}]}
     return epsmesh.read(study(tool, body=box | {"fixed": "none"}, load=load), "floating").run(output=sys.argv[2])
 
 
@@ -48,12 +49,15 @@ for tool in tools:
     lies = epsmesh.read(study(tool, body=box | {"fixed": "bottom"}, load={}), "lies").run(output=sys.argv[2])
     found[f"{tool} instead"] = [float(floating(tool, "1 MPa/mm").force), float(lies.force)]
 found["soft"] = float(floating("bonded", "1 Pa/mm").force)
+cap = {"around": ["0 mm", "0 mm", "-20 mm"], "radius": "7 mm"}
+found["cap"] = float(floating("bonded", "1 Pa/mm", on=cap).force)
 found["rolls"] = str(floating("bonded", "1 kPa/mm", "roller").message.values)
 for name, changes in {
     "floats": {"body": box | {"fixed": "none"}, "load": {}},
     "slit": {"probe": {"shape": "blade", "length": "10 mm", "width": "1 mm", "depth": "0.1 mm", "incision": "4 mm"}},
     "history": {"probe": tools["bonded"] | {"history": {"ramp": "1 s", "hold": "1 s"}}},
     "face": {"load": {"spring": [{"on": "floor", "stiffness": "10 kPa/mm"}]}},
+    "off": {"load": {"spring": [{"on": cap | {"around": ["0 mm", "0 mm", "9 mm"]}, "stiffness": "10 kPa/mm"}]}},
 }.items():
     try:
         epsmesh.read(study("bonded", **changes), name)
@@ -126,6 +130,13 @@ def test_springs_replace_a_support(found):
         stiff, fixed = found[f"{contact} instead"]
         assert stiff == pytest.approx(fixed, rel=3e-4)
     assert found["soft"] == pytest.approx(1e3 * 0.04**2 * 0.2e-3, rel=0.03)
+
+
+def test_springs_act_on_a_cap_as_tractions_do(found):
+    """Its edge crosses facets of its own size: the soft body moves like a rigid one, whose force is k A d."""
+    assert found["cap"] == pytest.approx(1e3 * math.pi * 0.007**2 * 0.2e-3, rel=0.02)
+    assert "load.spring[1].on" in found["off"]
+    assert "off the surface of the body" in found["off"]
 
 
 def test_what_nothing_holds_is_refused(found):

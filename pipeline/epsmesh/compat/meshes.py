@@ -136,6 +136,7 @@ def cell_tags(mesh: Any, values: np.ndarray) -> Any:
     )
 
 
-def facet_tags(mesh: Any, facets: np.ndarray) -> Any:
-    """Return tags of value 1 of local ``facets``, ascending."""
-    return dolfinx.mesh.meshtags(mesh, mesh.topology.dim - 1, facets, np.ones(len(facets), dtype=np.int32))
+def facet_tags(mesh: Any, facets: np.ndarray, values: np.ndarray) -> Any:
+    """Return tags with ``values`` of local ``facets``."""
+    order = np.argsort(facets)
+    return dolfinx.mesh.meshtags(mesh, mesh.topology.dim - 1, facets[order], values[order].astype(np.int32))

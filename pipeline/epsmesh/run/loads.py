@@ -6,12 +6,13 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.frame import Frame, Vector
+from epsmesh.shapes.part import FREE, Cap
 from epsmesh.shapes.surface import Surface
 from epsmesh.shapes.term import BodyTerm
 from epsmesh.solve.movement import Loads, SurfaceLoad
 from epsmesh.solve.terms import AddedTerm, EnergyTerm
 from epsmesh.study.case import Case
-from epsmesh.study.loads import FREE, Cap, Traction
+from epsmesh.study.loads import Traction
 
 _Test = Callable[[FloatArray, FloatArray], BoolArray]
 # A facet belongs to a cap if the cosine between its normal and that at the cap's centre exceeds this.
@@ -33,34 +34,35 @@ def loads_of(case: Case) -> Loads | None:
 
 def terms_of(case: Case) -> tuple[AddedTerm, ...]:
     """Return the terms of the energy that [load] adds."""
-    outer, cavities = case.body.surfaces(), {name: (wall,) for name, wall in case.body.cavities.items()}
     turn = case.frame.turn
 
     def of(term: BodyTerm) -> AddedTerm:
-        on = None if term.on == FREE else _on_face(outer | cavities, (term.on,), case.frame)
         key = term, None if turn is None else turn.tobytes()  # spaces are those of one mesh, hence of one body
-        return EnergyTerm(term.energy, key, on, turn)
+        return EnergyTerm(term.energy, key, *_part(case, term.on), turn)
 
     return tuple(map(of, case.load.terms))
 
 
 def _surface_load(case: Case, traction: Traction) -> SurfaceLoad:
-    turn, on = case.frame.turn, traction.on
-    vector, pressure = _turned(turn, traction.traction or (0.0, 0.0, 0.0)), traction.pressure or 0.0
-    outer, cavities = case.body.surfaces(), {name: (wall,) for name, wall in case.body.cavities.items()}
+    vector, pressure = _turned(case.frame.turn, traction.traction or (0.0, 0.0, 0.0)), traction.pressure or 0.0
+    on_facets, within = _part(case, traction.on)
+    return SurfaceLoad(on_facets, vector, pressure, within)
+
+
+def _part(case: Case, on: str | Cap) -> tuple[_Test, tuple[Vector, float] | None]:
+    """Return a test of the facets of a part of the boundary, and the ball that bounds it, None for no bound."""
+    turn, outer = case.frame.turn, case.body.surfaces()
+    cavities = {name: (wall,) for name, wall in case.body.cavities.items()}
     is_outside = _on_face(outer | cavities, (*outer,), case.frame) if cavities else _everywhere
     if isinstance(on, Cap):
         place = case.body.frame(on.around)
         outward = np.array(_turned(turn, place.outward))
-        within = _turned(turn, place.point), on.radius
 
         def in_cap(corners: FloatArray, normals: FloatArray) -> BoolArray:
             return np.asarray(normals @ outward > _SAME_WAY) & is_outside(corners, normals)
 
-        return SurfaceLoad(in_cap, vector, pressure, within)
-    if on == FREE:
-        return SurfaceLoad(is_outside, vector, pressure)
-    return SurfaceLoad(_on_face(outer | cavities, (on,), case.frame), vector, pressure)
+        return in_cap, (_turned(turn, place.point), on.radius)
+    return (is_outside if on == FREE else _on_face(outer | cavities, (on,), case.frame)), None
 
 
 def _everywhere(corners: FloatArray, _: FloatArray) -> BoolArray:

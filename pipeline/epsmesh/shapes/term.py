@@ -8,6 +8,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Protocol
 
+from epsmesh.shapes.part import FREE, Part
 from epsmesh.shapes.section import OptionalName, Section, Words
 
 
@@ -52,12 +53,14 @@ class BodyTerm(Section):
         ),
     ] = ""
     on: Annotated[
-        str,
+        Part,
         Words(
-            'Part of the boundary: a face of the body ("top", "sides", "bottom"), or "free", all but the support.',
+            'Part of the boundary: a face of the body ("top", "sides", "bottom"; not of a CAD file), a hollow region '
+            'by its name, a cap around a point of the surface, or "free", all of the boundary without support and '
+            "hollow regions.",
             '"bottom"',
         ),
-    ] = "free"
+    ] = FREE
 
     # What it is, for the author of a study.
     ABOUT: ClassVar[str] = ""
@@ -71,7 +74,7 @@ class BodyTerm(Section):
         """Return the energy (J) as a form of UFL."""
 
     def is_mirrored(self, normal: tuple[float, float, float]) -> bool:
-        """Tell whether it is its own image in the plane through the origin with that unit normal, as the body is.
+        """Tell whether it is its own image in the plane through the origin with that unit normal, as body and part are.
 
         Only a term that says so is solved on a half or a quarter of the body.
         """

@@ -7,7 +7,7 @@ from math import nan, pi
 # Bars with friction, in units of the change from half as many load steps, to which the area that slides adds a part of
 # the facets in which sliding begins or ends, and the tangential force the relative bars on the axial one and on the
 # contact area, and a part of what nodal forces have beyond it. Measured: benchmarks/results/friction.md.
-_OF_STEPS, _OF_UNSURE, _OF_FORCE, _OF_AREA, _OF_UNEVEN = 1.5, 0.6, 2.0, 3.0, 0.35
+_OF_STEPS, _OF_UNSURE, _OF_FORCE, _OF_AREA, _OF_UNEVEN = 1.5, 0.6, 2.0, 3.0, 0.3
 
 
 @dataclass(frozen=True)

@@ -101,7 +101,7 @@ def _add_traction(load: SurfaceLoad, body: BodyMesh, space: Any, dofs: Int32Arra
     sums = np.zeros(5)
     free = boundary_of(body, (FREE,))
     cells, sides, geometry, corners, normals = free.cells, free.sides, free.geometry, free.corners, free.normals
-    halvings = _halvings(load, corners)
+    halvings = halvings_at_end(load.within, corners)
     carries = load.on_facets(corners, normals) & (halvings >= 0)
     degree = compat.degree(space) + (0 if geometry.shape[1] == 4 else _CURVED)
     for side in range(4):
@@ -166,12 +166,12 @@ def boundary_of(body: BodyMesh, groups: Sequence[str]) -> Boundary:
     return Boundary(facets, cells, sides, geometry, corners, normals)
 
 
-def _halvings(load: SurfaceLoad, corners: FloatArray) -> Int32Array:
-    """Return how often to halve each facet's sides for the quadrature, -1 for facets outside the load's ball."""
+def halvings_at_end(within: tuple[Sequence[float], float] | None, corners: FloatArray) -> Int32Array:
+    """Return how often to halve each facet's sides for the quadrature, -1 for facets outside the ball ``within``."""
     halvings = np.zeros(len(corners), dtype=np.int32)
-    if load.within is None:
+    if within is None:
         return halvings
-    centre, radius = np.array(load.within[0]), load.within[1]
+    centre, radius = np.array(within[0]), within[1]
     middle = corners.mean(axis=1)
     # Radius of a facet around its centre, with a margin for curved facets.
     size = 1.2 * np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)

@@ -22,15 +22,19 @@ from epsmesh.scene.model import FREE, PROBE
 from epsmesh.solve import SolveError
 from epsmesh.solve.compiled import MORE, assemble, general_form, global_sum, vector
 from epsmesh.solve.kernels.product import SparsePart
-from epsmesh.solve.loads import boundary_of
+from epsmesh.solve.loads import boundary_of, halvings_at_end
 from epsmesh.solve.measures import dx, has_curved_cells
 
 # Stiffness of a rigid motion that is free, in units of the largest: rounding.
 _FREE = 1e-9
 # Quadrature degrees that the map of a curved facet adds.
 _CURVED = 3
+# Marks of facets, and the quadrature degree of those that the edge of a cap crosses.
+_WHOLE, _CROSSED, _OF_CROSSED = 1, 2, 20
 # Tells which facets a term acts on, from their corners (n, 3, 3) and outward unit normals (n, 3), in m.
 OnFacets = Callable[[FloatArray, FloatArray], BoolArray]
+# Centre (m) and radius (m).
+Ball = tuple[Sequence[float], float]
 
 
 class Term(Protocol):
@@ -63,12 +67,14 @@ class AddedTerm(Protocol):
 class Place:
     """What the energy of a term is written in: the displacement ``u`` (m) on the mesh of a ``body``.
 
-    The term acts ``on`` facets of the boundary, None for all of it. ``turn`` rotates the body to the mesh.
+    The term acts ``on`` facets of the boundary, None for all of it, ``within`` a ball by its centre (m) and radius (m),
+    None for no bound. ``turn`` rotates the body to the mesh.
     """
 
     body: BodyMesh
     u: Any
     on: OnFacets | None = None
+    within: Ball | None = None
     turn: FloatArray | None = None
     ufl = ufl
 
@@ -95,12 +101,22 @@ class Place:
     @property
     def ds(self) -> Any:
         """The measure of the undeformed boundary (m²) on which the term acts, the support excepted."""
-        mesh, boundary = self.body.mesh, boundary_of(self.body, (FREE, PROBE))
+        boundary = boundary_of(self.body, (FREE, PROBE))
         every = np.ones(len(boundary.facets), dtype=bool)
         chosen = every if self.on is None else self.on(boundary.corners, boundary.normals)
-        degree = 2 * compat.degree(self.u.function_space) + MORE + (_CURVED if has_curved_cells(mesh) else 0)
-        tags = compat.facet_tags(mesh, np.sort(boundary.facets[chosen]))
-        return ufl.Measure("ds", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": degree})(1)
+        halvings = halvings_at_end(self.within, boundary.corners)
+        degree = 2 * compat.degree(self.u.function_space) + MORE + (_CURVED if has_curved_cells(self.body.mesh) else 0)
+        chosen &= halvings >= 0
+        values = np.where(halvings == 0, _WHOLE, _CROSSED)[chosen]
+        tags = compat.facet_tags(self.body.mesh, boundary.facets[chosen], values)
+        measure = ufl.Measure("ds", domain=self.body.mesh, subdomain_data=tags)
+        whole = measure(_WHOLE, metadata={"quadrature_degree": degree})
+        if self.within is None:
+            return whole
+        centre, radius = self.within
+        away = self.x - self.constant(centre)
+        crossed = measure(_CROSSED, metadata={"quadrature_degree": _OF_CROSSED})
+        return Clipped(whole, crossed, ufl.le(ufl.inner(away, away), self.constant(radius**2)))
 
     def constant(self, value: float | Sequence[float]) -> Any:
         """Return a number, or a vector, of which other values need no new compilation."""
@@ -113,20 +129,34 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Clipped:
+    """A measure of facets that are ``whole``, and of those ``crossed`` by an edge the part that is ``inside``."""
+
+    whole: Any
+    crossed: Any
+    inside: Any
+
+    def __rmul__(self, integrand: Any) -> Any:
+        return integrand * self.whole + ufl.conditional(self.inside, 1.0, 0.0) * integrand * self.crossed
+
+
+@dataclass(frozen=True)
 class EnergyTerm:
     """A term by its ``energy`` (J), a form of UFL at a :class:`Place`; its derivatives follow.
 
-    It acts ``on_facets`` of the boundary, None for all. Terms of equal ``key`` are equal: their spaces are shared.
+    It acts ``on_facets`` of the boundary, None for all, ``within`` a ball, None for no bound. Terms of equal ``key`` are
+    equal: their spaces are shared.
     """
 
     energy: Callable[[Any], Any] = field(compare=False)
     key: Hashable = field(default_factory=object)
     on_facets: OnFacets | None = field(default=None, compare=False)
+    within: Ball | None = field(default=None, compare=False)
     turn: FloatArray | None = field(default=None, compare=False)
 
     def on(self, body: BodyMesh, displacement: Any) -> Term:
         """Return the term on the space of the function ``displacement``; collective."""
-        return _OfForm(self.energy(Place(body, displacement, self.on_facets, self.turn)), displacement)
+        return _OfForm(self.energy(Place(body, displacement, self.on_facets, self.within, self.turn)), displacement)
 
 
 class _OfForm:

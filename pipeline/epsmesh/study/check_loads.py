@@ -8,12 +8,13 @@ from typing import cast
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.frame import PlaceError
 from epsmesh.shapes.from_file import FromFile
+from epsmesh.shapes.part import FREE, Cap
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section, in_mm
 from epsmesh.shapes.support import NONE, Faces, NamedFace
 from epsmesh.study.axis import Axis
-from epsmesh.study.loads import FREE, Cap, Load, Traction
+from epsmesh.study.loads import Load, Traction
 from epsmesh.study.problems import Problems, nearest
 from epsmesh.study.regions import tissues_of
 from epsmesh.study.schema import Material

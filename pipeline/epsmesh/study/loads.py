@@ -2,46 +2,19 @@
 
 from collections.abc import Mapping
 from math import hypot
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
-from pydantic_core import PydanticCustomError
+from pydantic import Field, create_model
 
 from epsmesh.shapes.frame import Vector
+from epsmesh.shapes.part import Part, is_part_mirrored
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import OptionalName, Section, Words
 from epsmesh.shapes.term import BodyTerm
-from epsmesh.units import Acceleration, Coordinate, Length, Stress
+from epsmesh.units import Acceleration, Stress
 
-# All of the boundary without support and probe.
-FREE = "free"
-# A component of a unit vector, or a coordinate in units of a cap's radius, that is smaller is none.
+# A component of a unit vector that is smaller is none.
 _NONE = 1e-12
-_COORDINATES = 3
-
-
-class Cap(BaseModel):
-    """A cap: the part of the boundary within a ball whose normal is on the same side as at the centre."""
-
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
-    around: tuple[Coordinate, Coordinate, Coordinate]
-    radius: Length
-
-
-def _on(value: Any) -> Any:
-    if isinstance(value, dict):
-        around = value.get("around")
-        if set(value) != {"around", "radius"} or not isinstance(around, tuple) or len(around) != _COORDINATES:
-            raise PydanticCustomError(
-                "not_supported",
-                'a cap has the keys around and radius: {around = ["10 mm", "0 mm", "0 mm"], radius = "4 mm"}',
-            )
-        return Cap(**value)
-    if not isinstance(value, str):
-        raise PydanticCustomError(
-            "not_supported", 'must be a face by name, "free", or {around = ["10 mm", "0 mm", "0 mm"], radius = "4 mm"}'
-        )
-    return value
 
 
 class Traction(Section):
@@ -57,8 +30,7 @@ class Traction(Section):
         ),
     ] = ""
     on: Annotated[
-        str | Cap,
-        BeforeValidator(_on),
+        Part,
         Words(
             'Part of the boundary: a face of the body ("top", "sides", "bottom"; not of a CAD file), a hollow '
             "region by its name, "
@@ -120,20 +92,16 @@ class _Load(Section):
         return any(self.gravity) or any(traction.acts for traction in self.traction)
 
     def is_mirrored(self, normal: Vector) -> bool:
-        """Tell whether it is its own image in the plane through the origin with that unit normal, as the body is.
-
-        This is so for a named face, and for a cap whose centre is in the plane. Pairs of caps are not considered.
-        """
+        """Tell whether it is its own image in the plane through the origin with that unit normal, as the body is."""
         if abs(_along(self.gravity, normal)) > _NONE * hypot(*self.gravity):
             return False
         for traction in (traction for traction in self.traction if traction.acts):
             vector = traction.traction or (0.0, 0.0, 0.0)
             if abs(_along(vector, normal)) > _NONE * hypot(*vector):
                 return False
-            cap = traction.on
-            if isinstance(cap, Cap) and abs(_along(cap.around, normal)) > _NONE * cap.radius:
+            if not is_part_mirrored(traction.on, normal):
                 return False
-        return all(term.is_mirrored(normal) for term in self.terms)
+        return all(term.is_mirrored(normal) and is_part_mirrored(term.on, normal) for term in self.terms)
 
 
 if TYPE_CHECKING:

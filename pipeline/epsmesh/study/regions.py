@@ -15,6 +15,7 @@ from epsmesh.shapes.closed import Closed
 from epsmesh.shapes.complex import OUTSIDE, TISSUE
 from epsmesh.shapes.facetted import Facetted
 from epsmesh.shapes.files.loaded import Label
+from epsmesh.shapes.part import FREE
 from epsmesh.shapes.regions import Embedded, Inclusion
 from epsmesh.shapes.section import Section, in_mm
 from epsmesh.shapes.segment import Segment, shell_of
@@ -22,7 +23,6 @@ from epsmesh.shapes.shell import Shell
 from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.axis import Axis
 from epsmesh.study.howto import page_of
-from epsmesh.study.loads import FREE
 from epsmesh.study.problems import Problems
 from epsmesh.study.schema import Material, material_of
 
