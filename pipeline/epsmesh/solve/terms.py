@@ -144,8 +144,8 @@ class Clipped:
 class EnergyTerm:
     """A term by its ``energy`` (J), a form of UFL at a :class:`Place`; its derivatives follow.
 
-    It acts ``on_facets`` of the boundary, None for all, ``within`` a ball, None for no bound. Terms of equal ``key`` are
-    equal: their spaces are shared.
+    It acts ``on_facets`` of the boundary, None for all, ``within`` a ball, None for no bound. Terms of equal ``key``
+    are equal: their spaces are shared.
     """
 
     energy: Callable[[Any], Any] = field(compare=False)
