@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from epsmesh.report.figures.curves import BARS, grid
 from epsmesh.report.figures.facets import arrange
 from epsmesh.report.figures.style import LINE, finish, look
-from epsmesh.report.table import study_of
+from epsmesh.report.study import study_of
 from epsmesh.report.words import choices, heading, scale
 
 _SAID = 0.9  # the share of F whose distance is told in words
