@@ -16,6 +16,12 @@ unset PYTHONPATH PYTHONHOME VIRTUAL_ENV
 export PIP_USER=0 PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1 OMP_NUM_THREADS=1
 export EPSMESH_CACHE="$work/cache" XDG_STATE_HOME="$work/state"
 
+# Building leaves files beside the sources. First, because a set-up of the checkout may run beside this.
+mkdir "$work/source"
+tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --exclude=./build --exclude='*.egg-info' \
+    --exclude='*.so' --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
+    tar -xf - -C "$work/source"
+
 # ---- Python --------------------------------------------------------------------------------------------
 fits() { # a shim of pyenv is on PATH, and need not be a Python
     timeout 30 "$1" -c 'import ensurepip, sys, venv; sys.exit(sys.version_info < (3, 12))' >/dev/null 2>&1 </dev/null
@@ -37,11 +43,6 @@ say "$("$python" --version), $python"
 venv=$work/venv/bin
 timeout 120 "$venv/python" -m pip download --quiet --no-deps --dest "$work/reached" "typer>=0.12" >"$work/log" 2>&1 ||
     skip "no package index is within reach"
-# Building leaves files beside the sources.
-mkdir "$work/source"
-tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --exclude=./build --exclude='*.egg-info' \
-    --exclude='*.so' --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
-    tar -xf - -C "$work/source"
 "$venv/python" -m pip wheel --quiet --no-deps --wheel-dir "$work/wheels" "$work/source" >"$work/log" 2>&1 ||
     { tail -n 30 "$work/log" >&2; fail "cannot be built"; }
 wheel=$(compgen -G "$work/wheels/epsmesh-*.whl")
