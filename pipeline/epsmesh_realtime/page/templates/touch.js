@@ -8,8 +8,6 @@ const DEGREE = Math.PI / 180;
 // The arrow of the largest force so far is this share of the body's size; arrows are this thick.
 const ARROW = 0.35;
 const THICK = 0.008;
-// The error bar that fills its gauge.
-const DOUBT = 0.05;
 // What is so far from the face, in units of the body's size, is another side of the body.
 const BESIDE = 0.05;
 // Points along the border of the region, so far above the face, in units of the body's size.
@@ -264,7 +262,6 @@ class Page {
     const whisker = document.querySelector("#gauge .whisker");
     const full = this.largest * 1.1 || 1;
     bar.style.width = isIn ? `${(100 * normal) / full}%` : "0";
-    document.querySelector("#doubt .bar").style.width = isIn ? `${Math.min(100, (100 * share) / DOUBT)}%` : "0";
     whisker.hidden = !isIn;
     if (isIn) {
       whisker.style.left = `${(100 * normal * (1 - share)) / full}%`;
