@@ -67,7 +67,7 @@ _FOUND_LIMITS = {
     ("mixed", 3): (0.2, 0.6),
 }
 _FOUND_BALL = {("displacement", 2): (0.45, 0.29), ("mixed", 2): (0.56, 0.32)}
-_FOUND_COARSE = {2: (0.4, 0.8), 3: (0.0, 1.0)}
+_FOUND_COARSE = {2: (0.27, 0.85), 3: (0.0, 1.0)}
 _FOUND_ENDED, _FOUND_ELSEWHERE = (0.43, 0.4), 1.25
 # The same where contact is solved again: in units of the change in one degree more, and of the area's bar.
 _FOUND_AGAIN, _FOUND_AT_EDGE = 2.0, 0.1
