@@ -67,7 +67,7 @@ def _patch(degree: int, *, mixed: bool) -> float:
     forms.displacement.interpolate(lambda x: gradient @ x)
     parts = [forms.action]
     if mixed:
-        coupled = MixedForms(forms.displacement, scalar_space(body.mesh, degree - 1))
+        coupled = MixedForms(forms, scalar_space(body.mesh, degree - 1))
         coupled.pressure.x.array[:] = np.trace(gradient)
         parts.append(coupled.pull)
     vectors = [fem.assemble_vector(part) for part in parts]
@@ -111,7 +111,7 @@ def _manufactured(degree: int, cubes: int, *, poisson: float, mixed: bool) -> fl
     blocks = [[_sparse(forms.stiffness)]]
     rhs = np.array(fem.assemble_vector(load).array)
     if mixed:
-        coupling = _sparse(MixedForms(forms.displacement, scalar_space(mesh, degree - 1)).coupling)
+        coupling = _sparse(MixedForms(forms, scalar_space(mesh, degree - 1)).coupling)
         blocks = [[blocks[0][0], coupling.T], [coupling, None]]
         rhs = np.concatenate([rhs, np.zeros(coupling.shape[0])])
     matrix = sp.bmat(blocks, format="csc")

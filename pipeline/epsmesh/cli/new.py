@@ -182,7 +182,7 @@ def _files_in(value: Any, key: str = "") -> Iterator[str]:
 
 def _with_others(name: str, source: Path) -> list[str]:
     """Return a name of a file, or those of the files of a pattern, with the modules that a file of Python imports."""
-    from epsmesh.study.sources import with_imported
+    from epsmesh.sources import with_imported
 
     path = source / name
     try:

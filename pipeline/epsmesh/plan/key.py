@@ -198,7 +198,8 @@ def _material_text(material: Material, *, scaled: bool) -> str:
 def _tissue_content(tissue: Tissue) -> dict[str, Any]:
     """Return what the law of a tissue reads, with defaults; densities are written with the loads."""
     law = {"law": tissue.law} if tissue.is_large else {}
-    return {"young": tissue.young, "poisson": tissue.poisson, **law, **tissue.further}
+    field = {} if tissue.varying is None else {"field": tissue.varying.identity}
+    return {"young": tissue.young, "poisson": tissue.poisson, **law, **tissue.further, **field}
 
 
 def _time_text(case: Case) -> str:

@@ -36,6 +36,7 @@ class _Body:
     element: str
     laws: tuple[str, ...]
     of_regions: bool
+    varies: bool
     is_nonlinear: bool
     of_contact: bool
     of_steps: bool
@@ -111,6 +112,7 @@ def _forms(solve: Solve) -> _Forms:
             way.element,
             way.laws,
             of_regions=bool(body.regions) or case.is_linear_beyond,
+            varies=case.varies,
             is_nonlinear=way.is_nonlinear,
             of_contact=way.is_found,
             of_steps=way.in_time,

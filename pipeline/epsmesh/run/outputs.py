@@ -3,14 +3,9 @@
 Their error bars are the changes by elements of one degree more.
 """
 
-import hashlib
-import importlib.util
-import sys
-from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite, nan
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +14,7 @@ from epsmesh.arrays import BoolArray
 from epsmesh.plan.steps import Solve
 from epsmesh.run.case_solution import CaseSolution
 from epsmesh.run.compile import prepare
+from epsmesh.run.functions import loaded
 from epsmesh.run.influence import influence_of
 from epsmesh.run.memory import FreeMemory
 from epsmesh.run.problem import conditions_of, lacks_memory, law_of, memory_of, problem_of, solve_problem
@@ -123,46 +119,7 @@ def function_of(output: Output) -> Callable[[CaseSolution], Any]:
     Raises:
         Exception: what the file raises; AttributeError, if it has no such function.
     """
-    file, name = output.path
-    function: Callable[[CaseSolution], Any] = getattr(_module(file.resolve(), output.sources), name)
-
-    def called(solution: CaseSolution) -> Any:
-        with _beside(file.resolve().parent):
-            return function(solution)
-
-    return called
-
-
-def _module(path: Path, sources: Sequence[Path]) -> Any:
-    # By content, too: the files may have changed since this process last executed them.
-    content = hashlib.sha256(b"\0".join(source.read_bytes() for source in sources)).hexdigest()[:16]
-    key = f"_epsmesh_output_{path.stem}_{content}_{abs(hash(path))}"
-    if key not in sys.modules:
-        specification = importlib.util.spec_from_file_location(key, path)
-        assert specification is not None and specification.loader is not None
-        module = sys.modules[key] = importlib.util.module_from_spec(specification)
-        with _beside(path.parent, {source.resolve() for source in sources}):
-            try:
-                specification.loader.exec_module(module)
-            except BaseException:
-                del sys.modules[key]
-                raise
-    return sys.modules[key]
-
-
-@contextmanager
-def _beside(folder: Path, changed: Collection[Path] = ()) -> Iterator[None]:
-    """Import modules of a ``folder`` first, as a script there does, and afresh those that may have changed."""
-    loaded = {name: getattr(module, "__file__", None) for name, module in [*sys.modules.items()] if changed}
-    for name in (name for name, file in loaded.items() if file and Path(file).resolve() in changed):
-        if not name.startswith("_epsmesh_output_"):
-            del sys.modules[name]
-    importlib.invalidate_caches()
-    sys.path.insert(0, str(folder))
-    try:
-        yield
-    finally:
-        sys.path.remove(str(folder))
+    return loaded(str(output.function))
 
 
 def _bar(output: Output, number: Number) -> float:

@@ -12,6 +12,7 @@ from epsmesh.plan import estimate
 from epsmesh.plan.symmetry import mirror_planes, movement_planes
 from epsmesh.plan.thin import cause
 from epsmesh.run.far_field import far_field_of, far_field_seconds
+from epsmesh.run.fields import variation_of
 from epsmesh.run.loads import loads_of, terms_of
 from epsmesh.run.room import MEMORY_SHARE
 from epsmesh.shapes.contact import first_touch
@@ -102,7 +103,9 @@ def conditions_of(case: Case) -> Conditions:
     """Return the boundary conditions by the probe of ``case``."""
     front, tip = _fronts_of(case)
     bonded, is_found = case.way.constraint is Constraint.BONDED, case.way.is_found
-    return Conditions(bonded=bonded, unilateral=is_found, front=front, tip=tip, terms=terms_of(case))
+    return Conditions(
+        bonded=bonded, unilateral=is_found, front=front, tip=tip, terms=terms_of(case), variation=variation_of(case)
+    )
 
 
 def tool_of(case: Case) -> Tool:

@@ -4,11 +4,12 @@ from math import hypot, inf
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BaseModel, Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
 from epsmesh.shapes.frame import Vector
 from epsmesh.shapes.section import OptionalName, Section, Words
+from epsmesh.shapes.varying import Varying
 from epsmesh.units import Density, Pressure, Time
 from epsmesh.viscoelastic import Terms
 
@@ -139,10 +140,22 @@ def name_in_term(own: str, number: int, key: str) -> str:
     return f"{own}_{key}" if own else f"{key}_{number + 1}"
 
 
-class Tissue(Section):
-    """Elasticity: small-strain moduli, and a law."""
+class _Young(BaseModel):
+    """A modulus that is a table; errors then have the place of the table."""
 
-    young: Annotated[Pressure, Words("Young's modulus at small strain.", '"10 kPa"', is_used=True)]
+    young: Varying
+
+
+class Tissue(Section):
+    """Elasticity: small-strain moduli, and a law.
+
+    Of a modulus that varies, ``young`` is what ``varying``, the field, is relative to.
+    """
+
+    young: Annotated[
+        Pressure,
+        Words("Young's modulus at small strain, or its field.", '"10 kPa"', is_used=True, takes="pressure > 0 | table"),
+    ]
     poisson: Annotated[
         float, Field(ge=0, le=0.5), Words("Poisson's ratio at small strain. 0.5 is incompressible.", "0.45")
     ]
@@ -214,6 +227,27 @@ class Tissue(Section):
         ),
     ] = ()
 
+    _varying: Varying | None = PrivateAttr(None)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _read_young(cls, raw: Any, handler: ModelWrapValidatorHandler["Tissue"]) -> "Tissue":
+        """Read a table of a field in place of the modulus."""
+        if not (isinstance(raw, dict) and isinstance(raw.get("young"), dict)):
+            return handler(raw)
+        varying = _Young.model_validate({"young": raw["young"]}).young
+        return handler(raw | {"young": f"{varying.young!r} Pa"}).with_field(varying)
+
+    def with_field(self: _Tissue, varying: Varying | None) -> _Tissue:
+        """Return this tissue, whose modulus is that of a field."""
+        self._varying = varying
+        return self
+
+    @property
+    def varying(self) -> Varying | None:
+        """The field of its modulus; None if that is constant."""
+        return self._varying
+
     @property
     def prony(self) -> Terms:
         """Shares and times (s) of the relaxation, the shortest time first."""
@@ -251,6 +285,8 @@ class Tissue(Section):
 
     def is_mirrored(self, normal: Vector) -> bool:
         """Return whether it is its own image in a plane with that unit normal."""
+        if self.varying is not None and not self.varying.is_mirrored(normal):
+            return False
         return not self.has_fibres or self.fibres is None or self.fibres.is_mirrored(normal)
 
     @property

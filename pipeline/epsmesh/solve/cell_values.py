@@ -70,9 +70,12 @@ CELL_MAXIMA: dict[str, Callable[[Cells], FloatArray]] = {"max_strain": _max_stra
 class CellValues:
     """Values on the cells of a mesh for the current ``displacement`` of a space."""
 
-    def __init__(self, body: BodyMesh, displacement: Any, *, is_mixed: bool = False):
-        """Compile the forms; ``is_mixed`` if the elements have a pressure, too; collective."""
-        self._body, self._is_mixed = body, is_mixed
+    def __init__(self, body: BodyMesh, displacement: Any, *, is_mixed: bool = False, factors: FloatArray | None = None):
+        """Compile the forms; collective.
+
+        ``is_mixed`` if the elements have a pressure, too; ``factors`` are those of the energy of local cells.
+        """
+        self._body, self._is_mixed, self._factors = body, is_mixed, factors
         space = displacement.function_space
         tensors = cellwise_space(space.mesh, (3, 3))
         test, ones = ufl.TestFunction(tensors), ufl.as_tensor(np.ones((3, 3)).tolist())
@@ -88,11 +91,13 @@ class CellValues:
             np.asarray(fem.assemble_vector(part).array).reshape(-1, 3, 3)[:owned]
             for part in (self._integral, self._volume)
         )
-        regions = self._body.regions
+        lame = [of_regions(values, self._body.regions, owned) for values in (law.lame_lambda, law.lame_mu)]
+        if self._factors is not None:
+            lame = [values * self._factors[:owned] for values in lame]
         return Cells(
             gradient=integral / volume,
-            lame_lambda=of_regions(law.lame_lambda, regions, owned),
-            lame_mu=of_regions(law.lame_mu, regions, owned),
+            lame_lambda=lame[0],
+            lame_mu=lame[1],
             is_linear=law.is_linear,
             is_mixed=self._is_mixed,
         )

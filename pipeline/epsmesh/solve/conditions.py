@@ -9,6 +9,7 @@ from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.movement import Vector
 from epsmesh.solve.terms import AddedTerm
+from epsmesh.solve.variation import Variation
 
 # The virtual extension v is 1 up to the first of these shares of its radius, and 0 from the second on.
 _INNER, _OUTER = 0.4, 1.0
@@ -53,7 +54,7 @@ class Conditions:
     With ``unilateral`` contact the footprint prescribes nothing: the active set does. The support is fixed. On planes
     of symmetry that bound the mesh the normal displacement is zero. A probe in a slit with that ``front`` touches both
     faces of the slit. Without bond it prescribes their opening only, and its driving force acts at its ``tip``.
-    ``terms`` act on the body besides its law.
+    ``terms`` act on the body besides its law, whose stiffness has a ``variation``, if it varies within regions.
     """
 
     bonded: bool = True
@@ -61,11 +62,12 @@ class Conditions:
     front: Front | None = None
     tip: Front | None = None
     terms: tuple[AddedTerm, ...] = ()
+    variation: Variation | None = None
 
     @property
     def without_footprint(self) -> "Conditions":
         """The same without a tool."""
-        return Conditions(bonded=False, unilateral=True, terms=self.terms)
+        return Conditions(bonded=False, unilateral=True, terms=self.terms, variation=self.variation)
 
     @property
     def components(self) -> tuple[int, ...]:

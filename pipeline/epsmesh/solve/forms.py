@@ -37,11 +37,23 @@ class ElasticForms:
 
     ``coefficients`` are the law's parameters by name: constants, or, on a mesh of several ``regions`` (of the local
     cells, ghosts included), functions that are constant on each cell. ``displacement`` is the u of ``action``, K u.
-    With a ``cell_kernel``, that kernel integrates K on straight cells.
+    With a ``cell_kernel``, that kernel integrates K on straight cells. ``factors`` are those of the energy of each
+    local cell; ``factor`` is the function that has them, or 1.
     """
 
-    def __init__(self, space: Any, regions: Int32Array | None = None, cell_kernel: CellKernel | None = None):
-        self._space, self._regions, self._cell_kernel = space, regions, cell_kernel
+    def __init__(
+        self,
+        space: Any,
+        regions: Int32Array | None = None,
+        cell_kernel: CellKernel | None = None,
+        factors: FloatArray | None = None,
+    ):
+        self._space, self._regions = space, regions
+        self._cell_kernel = cell_kernel if factors is None else None
+        self.factor: Any = 1
+        if factors is not None:
+            self.factor = fem.Function(self._cellwise)
+            self.factor.x.array[compat.cell_dofs(self._cellwise).reshape(-1)] = factors
         self.displacement = fem.Function(space)
         self.coefficients = {name: self._coefficient() for name in COEFFICIENTS}
 
@@ -112,17 +124,18 @@ class ElasticForms:
     def _form(self, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
         v, of = ufl.TestFunction(self._space), self.coefficients
         work = of["lame_lambda"] * ufl.div(u) * ufl.div(v) + 2 * of["lame_mu"] * ufl.inner(strain(u), strain(v))
-        return form(work * measure, kernels)
+        return form(self.factor * work * measure, kernels)
 
 
 class MixedForms:
     """Coupling of displacement and pressure in mixed elements: B(q, u) = ∫ q div u and M(p, q) = ∫ p q.
 
-    ``dilation`` is for the ``displacement`` that was passed, ``pull`` for the function ``pressure``.
+    ``dilation`` is for the displacement of the ``elastic`` forms, ``pull`` for the function ``pressure``. The factor of
+    these forms is that of every integral: pressures are in units of it.
     """
 
-    def __init__(self, displacement: Any, pressures: Any):
-        self._displacement, self._pressures = displacement, pressures
+    def __init__(self, elastic: ElasticForms, pressures: Any):
+        self._displacement, self._factor, self._pressures = elastic.displacement, elastic.factor, pressures
         self.pressure = fem.Function(pressures)
 
     @cached_property
@@ -148,7 +161,7 @@ class MixedForms:
         return self._form(self.pressure * ufl.div(ufl.TestFunction(self._displacement.function_space)))
 
     def _form(self, integrand: Any) -> Any:
-        return form(integrand * dx(self._displacement.function_space))
+        return form(self._factor * integrand * dx(self._displacement.function_space))
 
 
 class HyperelasticForms:
@@ -183,7 +196,7 @@ class HyperelasticForms:
             energy = LAWS[law].density(gradient, self._coefficients, self._pressure)
             for column, direction in directions:
                 energy = energy.derivative(self._fields[column], direction, of_shape=column == 0)
-            value = energy.value if self._factor is None else self._factor * energy.value
+            value = self._elastic.factor * (energy.value if self._factor is None else self._factor * energy.value)
             found.append(value * measure)
         return sum(found)
 
@@ -272,6 +285,7 @@ def compile_forms(
     *,
     straight: bool = False,
     of_regions: bool = False,
+    varies: bool = False,
     is_nonlinear: bool = False,
     of_contact: bool = False,
     of_steps: bool = False,
@@ -280,16 +294,17 @@ def compile_forms(
     """Compile the forms for elements of ``degree``, for all lower degrees, and for the next one (error bar).
 
     ``is_nonlinear``: with those of Newton's method, ``of_contact`` at the next degree, too; ``of_steps``: with those of
-    time steps, ``of_influence``: with those of the influence.
+    time steps, ``of_influence``: with those of the influence; ``varies``: with a factor of each cell.
     """
     regions = np.zeros(1, dtype=np.int32) if of_regions else None
+    factors = np.ones(1) if varies else None
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
     for level in range(1, degree + 2):
         space = vector_space(mesh, level)
-        elastic, mixed = ElasticForms(space, regions), None
+        elastic, mixed = ElasticForms(space, regions, factors=factors), None
         _ = elastic.stiffness, elastic.action
         if element == "mixed" and level > 1:  # the search for contact begins at the lowest degree
-            mixed = MixedForms(elastic.displacement, scalar_space(mesh, level - 1))
+            mixed = MixedForms(elastic, scalar_space(mesh, level - 1))
             _ = mixed.mass, mixed.coupling, mixed.dilation, mixed.pull
         if of_influence and level >= degree:
             pressure = (mixed.pressure, elastic.by_region((1.0,))) if mixed is not None else None

@@ -90,8 +90,10 @@ class QuasiStaticProblem(Problem):
         if tool is not None:
             self.constraint = ContactSearch(spaces, self.elements, tool, reuse=reuse, condense=condense)
         self._body, self._conditions = spaces.body, conditions
-        displacement = self.elements.displacements.forms.displacement
-        self._values = CellValues(self._body, displacement, is_mixed=element == "mixed")
+        space = self.elements.displacements
+        self._values = CellValues(
+            self._body, space.forms.displacement, is_mixed=element == "mixed", factors=space.factors
+        )
         self._law: MaterialLaw | None = None  # of the last solution
         self._influence: Influence | None = None
         # The fields of the last solution in elements of one degree more, if they were requested and are known.

@@ -43,7 +43,8 @@ class ElasticSpace:
 
     ``prescribed`` are local dofs (unrolled, owned and ghosts). Arrays named ``…_owned`` index owned dofs;
     ``probe_owned`` and ``fixed_owned`` index owned blocks of three dofs. ``owned`` and ``size`` count the dofs of this
-    rank, and of all ranks. ``terms`` are those of the conditions. ``space`` and ``dirichlet`` are dolfinx objects.
+    rank, and of all ranks. ``terms`` are those of the conditions. ``factors`` are those of the energy of local cells, or
+    None. ``space`` and ``dirichlet`` are dolfinx objects.
     """
 
     @stage("spaces, forms")
@@ -54,6 +55,7 @@ class ElasticSpace:
             SolveError: if footprint and support share a point.
         """
         self.body, self.comm, self.degree, self.conditions = body, body.comm, degree, conditions
+        self.factors = factors_of(body, conditions)
         self._maps = maps
         self.space = space = vector_space(body.mesh, degree)
         index_map = space.dofmap.index_map
@@ -72,7 +74,7 @@ class ElasticSpace:
         self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * fixed + c for c in range(3))]))
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
         self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
-        self.forms = ElasticForms(space, body.regions, cell_kernel)
+        self.forms = ElasticForms(space, body.regions, cell_kernel, self.factors)
         self.terms: list[Term] = [term.on(body, self.forms.displacement) for term in conditions.terms]
 
     @property
@@ -115,11 +117,11 @@ class ElasticSpace:
     def cells(self) -> CellStiffness:
         """The cells in the layout of products, made at first use; for degree 2 or more; collective."""
         curved = curved_cells(self.body.mesh)
-        return CellStiffness(self.space, curved, self.prescribed, self.body.regions, self._maps)
+        return CellStiffness(self.space, curved, self.prescribed, self.body.regions, self._maps, self.factors)
 
     @cached_property
     def _straight(self) -> StraightStiffness:
-        return StraightStiffness(self.space, curved_cells(self.body.mesh), self.body.regions)
+        return StraightStiffness(self.space, curved_cells(self.body.mesh), self.body.regions, self.factors)
 
     @stage("assembly")
     def _product(self, law: MaterialLaw, terms: list[PETSc.Mat]) -> PETSc.Mat:
@@ -252,7 +254,8 @@ class Spaces:
         self._maps = self._new_maps()
 
     def _new_maps(self) -> StraightMaps:
-        return StraightMaps(self.body.mesh, curved_cells(self.body.mesh))
+        factors = None if self._conditions is None else factors_of(self.body, self._conditions)
+        return StraightMaps(self.body.mesh, curved_cells(self.body.mesh), factors)
 
     def __enter__(self) -> "Spaces":
         return self
@@ -267,8 +270,8 @@ class Spaces:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
         if conditions != self._conditions:
-            self.close()
             self._conditions = conditions
+            self.close()
         if degree not in self._made:
             self._made[degree] = ElasticSpace(self.body, degree, conditions, self._maps)
         return self._made[degree]
@@ -278,6 +281,15 @@ class Spaces:
         self._maps = self._new_maps()
         while self._made:
             self._made.popitem()
+
+
+def factors_of(body: BodyMesh, conditions: Conditions) -> FloatArray | None:
+    """Return the factor of the energy of each local cell, None if the stiffness does not vary; collective.
+
+    Raises:
+        SolveError: if a field has no value somewhere.
+    """
+    return None if conditions.variation is None else conditions.variation.factors(body)
 
 
 def whole_points(space: Any, body: BodyMesh) -> int:

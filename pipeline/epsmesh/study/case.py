@@ -145,6 +145,12 @@ class Case:
         return self.material, *self.body.regions
 
     @property
+    @of_scene
+    def varies(self) -> bool:
+        """Whether the stiffness varies within a region."""
+        return any(tissue.varying is not None for tissue in self.tissues)
+
+    @property
     def region_names(self) -> tuple[str, ...]:
         """Names of the regions of the mesh, in the order of their numbers: those of tissues, then of linear parts."""
         names = self.body.region_names
@@ -202,8 +208,8 @@ class Case:
     @property
     @of_scene
     def is_even(self) -> bool:
-        """Whether a body of one material is pressed straight down on a plane face."""
-        return not self.body.pieces and self.probe.slit is None and is_level(self.body, self.frame)
+        """Whether a body of one constant material is pressed straight down on a plane face."""
+        return not self.varies and not self.body.pieces and self.probe.slit is None and is_level(self.body, self.frame)
 
     @property
     @of_scene

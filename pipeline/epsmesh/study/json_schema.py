@@ -19,10 +19,11 @@ from pydantic.json_schema import models_json_schema
 from epsmesh import extensions
 from epsmesh.shapes.history import History, Sine
 from epsmesh.shapes.section import Section, words_of
+from epsmesh.shapes.varying import Varying
 from epsmesh.study.identified import WORDS as IDENTIFIED
 from epsmesh.study.named import EXAMPLES, SCHEMA
 from epsmesh.study.ranges import KEYS
-from epsmesh.study.schema import FURTHER, NESTED, SECTIONS, SINGLE, TABLES, further
+from epsmesh.study.schema import FURTHER, NESTED, PLAIN_TOO, SECTIONS, SINGLE, TABLES, further
 
 Schema = dict[str, Any]
 
@@ -75,7 +76,8 @@ def study_schema() -> Schema:
         for owner, (key, model) in product(sections[section], inner.items()):
             if key not in owner.model_fields and any(key in other.model_fields for other in sections[section]):
                 continue  # a table of other shapes
-            definitions[owner.__name__]["properties"][key] = {"$ref": f"#/$defs/{model.__name__}"}
+            if key not in PLAIN_TOO:
+                definitions[owner.__name__]["properties"][key] = {"$ref": f"#/$defs/{model.__name__}"}
     swept: dict[str, type[BaseModel]] = {
         model.__name__: model for model in chain[type[BaseModel]](_swept(), (History, Sine))
     }
@@ -84,7 +86,10 @@ def study_schema() -> Schema:
         definition.pop("description", None)  # a docstring, which is not for authors of studies
         properties = definition.get("properties", {})
         for key, value in properties.items():
-            properties[key] = _described(_in_file(value, name in swept, key), words.get(name), key)
+            in_file = _in_file(value, name in swept, key)
+            if key in PLAIN_TOO:
+                in_file = {"anyOf": [in_file, {"$ref": f"#/$defs/{Varying.__name__}"}]}
+            properties[key] = _described(in_file, words.get(name), key)
     for section, schema_of_others in ((name, other) for one in added for name, other in one.others.items()):
         (model,) = sections[section]
         definitions[model.__name__]["additionalProperties"] = schema_of_others

@@ -16,7 +16,7 @@ from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Words, words_of
 from epsmesh.study.identified import WORDS as IDENTIFIED
 from epsmesh.study.json_schema import takes_of
-from epsmesh.study.schema import FURTHER, NESTED, SECTIONS, further, tables_of
+from epsmesh.study.schema import FURTHER, NESTED, PLAIN_TOO, SECTIONS, further, tables_of
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,8 @@ _TEXTS = {
     "the values of a named term can be swept.",
     "material.fibres": "Fibres of Holzapfel's law; those of a layer are [body.layer.fibres]. Optional; every value can "
     "be swept.",
+    "material.young": "A modulus that varies from place to place; those of a layer are [body.layer.young]. It takes the "
+    "place of the value of `young`. Optional; `scale` can be swept.",
     "probe": "The tool, called probe in study files and datasets, and its motion.",
     "probe.path": "Several points of contact, instead of `at`. Give one of `line`, `circle`, `raster` and "
     "`points`. Optional.",
@@ -83,7 +85,7 @@ def keys_of(section: str) -> tuple[Key, ...]:
     models = shapes_of(section)
     found: dict[str, dict[str, list[str]]] = {}
     # A section's name labels it; a piece's is a key like others.
-    hidden = {*_inner(section), *(() if section in _labelled() else ("name",))}
+    hidden = {*(key for key in _inner(section) if key not in PLAIN_TOO), *(() if section in _labelled() else ("name",))}
     for shape, model in models.items():
         for name in model.model_fields:
             if name not in hidden:

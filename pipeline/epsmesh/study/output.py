@@ -12,10 +12,10 @@ from epsmesh.quantities import RESERVED
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.section import Section, Words
+from epsmesh.sources import function_in, problem_of, with_imported
 from epsmesh.study.axis import Axis
 from epsmesh.study.insertion_stages import has_insertion
 from epsmesh.study.problems import Problems, nearest, tuples
-from epsmesh.study.sources import with_imported
 from epsmesh.units import Coordinate, parse_quantity
 
 # What an output is of, with its unit and its meaning.
@@ -124,8 +124,7 @@ class Output(Section):
     @property
     def path(self) -> tuple[Path, str]:
         """The file of the function, and its name there."""
-        file, _, name = (self.function or "").rpartition(":")
-        return Path(file), name
+        return function_in(self.function or "")
 
     @property
     def sources(self) -> tuple[Path, ...]:
@@ -172,19 +171,10 @@ def read_outputs(raw: Any, folder: Path, problems: Problems) -> tuple[Output, ..
             problems.from_pydantic(where, error, Output, table)
             continue
         if one.function is not None:
-            file, name = one.path
-            path = folder / file
-            if not path.resolve().is_relative_to(folder.resolve()):
-                allowed = "must be a file in the folder of the study, or below it: a run executes it"
-                problems.error(f"{where}.function", one.function, allowed)
+            if wrong := problem_of(one.function, folder):
+                problems.error(f"{where}.function", one.function, wrong)
                 continue
-            if file.suffix != ".py" or not name.isidentifier():
-                problems.error(f"{where}.function", one.function, 'must be "FILE.py:NAME"')
-                continue
-            if not path.is_file():
-                problems.error(f"{where}.function", one.function, f"there is no file {path}")
-                continue
-            one = one.model_copy(update={"function": f"{path}:{name}"})
+            one = one.model_copy(update={"function": str(folder / one.function)})
         found.append(one)
     for name, count in Counter(one.name for one in found).items():
         if count > 1:

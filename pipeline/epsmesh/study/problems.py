@@ -13,6 +13,8 @@ from pydantic import BaseModel, ValidationError
 
 from epsmesh.printable import printable
 from epsmesh.shapes.section import Section, words_of
+from epsmesh.shapes.tissue import Tissue
+from epsmesh.shapes.varying import Varying
 from epsmesh.study.howto import page_of
 from epsmesh.study.meant import OTHER_VALUES, other_name
 
@@ -204,6 +206,8 @@ def nested_model(model: type[BaseModel], key: str) -> type[BaseModel] | None:
 
 def table_model(model: type[BaseModel], key: str) -> type[BaseModel] | None:
     """Return the model of an optional table under ``key``, None if there is none."""
+    if key == "young" and issubclass(model, Tissue):  # a table may take the place of its value
+        return Varying
     annotation: Any = model.model_fields[key].annotation if key in model.model_fields else None
     kind, *others = getattr(annotation, "__args__", None) or (None,)
     is_table = others == [type(None)] and isinstance(kind, type) and issubclass(kind, BaseModel)

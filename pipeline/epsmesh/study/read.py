@@ -10,7 +10,9 @@ from typing import Any
 
 from epsmesh.class_maps import CLASS_MAPS
 from epsmesh.extensions import Filled, Reading
+from epsmesh.shapes.body import PIECES
 from epsmesh.shapes.section import Section
+from epsmesh.sources import problem_of
 from epsmesh.study.axis import Axis
 from epsmesh.study.check import check_sense, check_steps
 from epsmesh.study.check_loads import check_loads
@@ -78,6 +80,7 @@ def parse(raw: Mapping[str, Any], *, file: str = "study", text: str = "", filled
     for one in further_ones:
         filled = one.fill(filled)
     problems.warnings += filled.doubts
+    _check_functions(dict(filled.whole), Path(file).parent, problems)
     given, whole = filled.given, _beside(dict(filled.whole), Path(file).parent)
     _check_top(whole, problems)
     axes: list[Axis] = []
@@ -175,21 +178,49 @@ def _names_of(raw: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
 
 def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Return the study with paths of bodies' files that begin with the ``folder`` of the study."""
+    """Return the study with paths of the files of bodies and materials that begin with the ``folder`` of the study."""
 
     def found(value: Any) -> Any:
         if isinstance(value, list):
             return [found(v) for v in value]
         return str(folder / value) if isinstance(value, str) and value and value not in CLASS_MAPS else value
 
-    def table(body: Any) -> Any:
-        if not isinstance(body, dict):
-            return body
-        regions = {"region": [table(one) for one in body["region"]]} if isinstance(body.get("region"), list) else {}
-        return body | regions | {key: found(body[key]) for key in ("file", "names") if key in body}
+    def table(one: Any) -> Any:
+        """Return a body, one of its pieces, or a material."""
+        if isinstance(one, list):
+            return [table(part) for part in one]
+        if not isinstance(one, dict):
+            return one
+        pieces = {key: table(one[key]) for key in PIECES if isinstance(one.get(key), list)}
+        field = one.get("young")
+        young = {"young": field | of_files(field, "file", "function")} if isinstance(field, dict) else {}
+        return one | pieces | young | of_files(one, "file", "names")
 
-    bodies = raw.get("body")
-    return raw | {"body": [table(b) for b in bodies] if isinstance(bodies, list) else table(bodies)} if bodies else raw
+    def of_files(one: dict[str, Any], *keys: str) -> dict[str, Any]:
+        return {key: found(one[key]) for key in keys if key in one}
+
+    return raw | {name: table(raw[name]) for name in ("body", "material") if raw.get(name)}
+
+
+def _check_functions(raw: dict[str, Any], folder: Path, problems: Problems) -> None:
+    """Report functions of moduli that a run must not execute, or cannot."""
+
+    def check(one: Any, where: str) -> None:
+        if isinstance(one, list):
+            for number, part in enumerate(one, start=1):
+                check(part, f"{where}[{number}]")
+        if not isinstance(one, dict):
+            return
+        for key in PIECES:
+            check(one.get(key), f"{where}.{key}")
+        young = one.get("young")
+        given = young.get("function") if isinstance(young, dict) else None
+        for function in given if isinstance(given, list) else [given]:
+            if isinstance(function, str) and (wrong := problem_of(function, folder)):
+                problems.error(f"{where}.young.function", function, wrong)
+
+    for name in ("body", "material"):
+        check(raw.get(name), name)
 
 
 def _check_top(raw: dict[str, Any], problems: Problems) -> None:

@@ -19,6 +19,7 @@ from epsmesh.shapes.registry import BODIES, PROBES, TERMS
 from epsmesh.shapes.section import Section, Words
 from epsmesh.shapes.segment import Segment
 from epsmesh.shapes.tissue import LAWS, Fibres, Relaxation, Term, Tissue
+from epsmesh.shapes.varying import Varying
 from epsmesh.study.loads import Load, Traction
 from epsmesh.study.output import Output
 from epsmesh.study.path import Path
@@ -31,7 +32,15 @@ from epsmesh.units import Length, Pressure, Share, parse_quantity
 class Material(Tissue):
     """Elasticity: linear, or a law of large displacements."""
 
-    young: Annotated[Pressure, Words("Young's modulus. F is proportional to it.", '"10 kPa"', is_used=True)]
+    young: Annotated[
+        Pressure,
+        Words(
+            "Young's modulus, or its field: a table, [material.young]. F is proportional to it.",
+            '"10 kPa"',
+            is_used=True,
+            takes="pressure > 0 | table",
+        ),
+    ]
     poisson: Annotated[
         float,
         Field(ge=0, le=0.5),
@@ -67,7 +76,7 @@ def main_material(body: Body, material: Material) -> Material:
 def material_of(tissue: Tissue) -> Material:
     """Return the material of a layer or an inclusion."""
     own = {key: getattr(tissue, key) for key in ("young", "poisson", "density", "relaxation", *tissue.given)}
-    return Material.model_construct(**own, law=tissue.law or "linear")
+    return Material.model_construct(**own, law=tissue.law or "linear").with_field(tissue.varying)
 
 
 # ---- mesh and solver --------------------------------------------------------------------------------
@@ -332,8 +341,10 @@ SINGLE = ("solve", "plan", "figure")
 # Tables within a section.
 TABLES: dict[str, dict[str, type[BaseModel]]] = {
     "probe": {"path": Path, "history": History, "insertion": Insertion},
-    "material": {"fibres": Fibres},
+    "material": {"fibres": Fibres, "young": Varying},
 }
+# Keys that may be a table or a plain value.
+PLAIN_TOO = ("young",)
 
 
 def further() -> dict[str, type[Section]]:

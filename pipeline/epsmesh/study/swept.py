@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from epsmesh.shapes.section import Section
+from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.axis import Axis
 from epsmesh.study.problems import Problems, nested_model, table_model, unit_of
 
@@ -83,6 +84,9 @@ def _labelled(table: dict[str, Any]) -> str:
 def _at(section: Any, place: list[str | int]) -> Any:
     """Return the value at a place within a section."""
     for step in place:
+        if step == "young" and isinstance(section, Tissue):  # of the table that takes its place
+            section = section.varying
+            continue
         section = section[step] if isinstance(step, int) else getattr(section, step)
     return section
 

@@ -1,7 +1,8 @@
-"""Reader of label maps, NIfTI, NRRD and DICOM: an integer for each voxel, positions, and names."""
+"""Reader of label maps, NIfTI, NRRD and DICOM: an integer for each voxel, positions, and names; and of other values."""
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from epsmesh.shapes.files.label_names import names_of_extensions, read_names
 from epsmesh.shapes.files.nrrd_labels import data_file, read_nrrd
 from epsmesh.shapes.triangles import SurfaceError
 
-__all__ = ["ENDINGS", "LARGEST_IMAGE", "LabelMap", "files_of", "is_image", "of_label", "read_labels"]
+__all__ = ["ENDINGS", "LARGEST_IMAGE", "LabelMap", "files_of", "is_image", "of_label", "read_labels", "read_values"]
 
 _NIFTI = (".nii", ".nii.gz", ".mgz", ".mgh", ".hdr", ".img")  # and what nibabel reads beside it
 _NRRD, _DICOM = (".nrrd", ".nhdr"), (".dcm",)
@@ -62,7 +63,29 @@ def read_labels(path: Path, unit: float | None, names: str = "") -> LabelMap:
     if not is_image(path):
         why = why_not_read(path) or f"its name ends in `{path.suffix}`"
         raise SurfaceError(f"{why}; allowed label maps are {', '.join(ENDINGS)}")
-    kind, read = _reader(path)
+    found = _read(path, *_reader(path), unit)
+    return replace(found, names=read_names(names)) if names else found
+
+
+def read_values(path: Path, unit: float | None) -> LabelMap:
+    """Return the values of voxels in a file, as floats; ``unit`` (m) applies if the header names none.
+
+    Raises:
+        SurfaceError: if it is no image of numbers, or does not give the size of its voxels.
+    """
+    if not path.name.lower().endswith((*_NIFTI, *_NRRD)):
+        raise SurfaceError(f"its name ends in `{path.suffix}`: allowed are {', '.join((*_NIFTI, *_NRRD))}")
+    kind, read = ("NIfTI", _nifti) if path.name.lower().endswith(_NIFTI) else ("NRRD", read_nrrd)
+    return _read(path, kind, partial(read, values_of=_numbers), unit)
+
+
+def _numbers(values: Any) -> Any:
+    if values.dtype.kind not in "uif":
+        raise SurfaceError("contains colours or complex numbers, not one number for each voxel")
+    return values.astype(np.float64)
+
+
+def _read(path: Path, kind: str, read: Callable[[Path, float | None], LabelMap], unit: float | None) -> LabelMap:
     try:
         found = read(path, unit)
     except (SurfaceError, MemoryError, ModuleNotFoundError):
@@ -74,7 +97,7 @@ def read_labels(path: Path, unit: float | None, names: str = "") -> LabelMap:
         ) from error
     if not _has_volume(found.affine):
         raise SurfaceError("its header gives voxels without volume: export it again with spacing and directions")
-    return replace(found, names=read_names(names)) if names else found
+    return found
 
 
 def _reader(path: Path) -> tuple[str, Callable[[Path, float | None], LabelMap]]:
@@ -84,7 +107,7 @@ def _reader(path: Path) -> tuple[str, Callable[[Path, float | None], LabelMap]]:
     return ("NIfTI", _nifti) if name.endswith(_NIFTI) else ("NRRD", read_nrrd)
 
 
-def _nifti(path: Path, unit: float | None) -> LabelMap:
+def _nifti(path: Path, unit: float | None, values_of: Callable[[Any], Any] = whole) -> LabelMap:
     import nibabel  # noqa: PLC0415 (0.25 s to import; only for studies with images)
 
     image: Any = nibabel.load(path)
@@ -101,7 +124,7 @@ def _nifti(path: Path, unit: float | None) -> LabelMap:
     affine = position[:3] * size
     extensions = getattr(image.header, "extensions", ())
     names = names_of_extensions(extension.get_content() for extension in extensions)
-    return LabelMap(whole(np.asanyarray(image.dataobj).reshape(image.shape[:3])), affine, notices, names)
+    return LabelMap(values_of(np.asanyarray(image.dataobj).reshape(image.shape[:3])), affine, notices, names)
 
 
 def _position(image: Any) -> tuple[FloatArray, tuple[str, ...]]:

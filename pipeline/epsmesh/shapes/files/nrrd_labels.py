@@ -3,6 +3,7 @@
 import bz2
 import gzip
 import zlib
+from collections.abc import Callable
 from contextlib import suppress
 from math import prod
 from pathlib import Path
@@ -40,9 +41,10 @@ def data_file(path: Path) -> Path | None:
     return None if data is None else path.parent / str(data)
 
 
-def read_nrrd(path: Path, unit: float | None) -> LabelMap:
+def read_nrrd(path: Path, unit: float | None, values_of: Callable[[Any], Any] = whole) -> LabelMap:
     """Return the label map in a NRRD file; ``unit`` (m) applies if the header names none.
 
+    ``values_of`` checks the values: by default, that they are labels.
     Layers of 3D Slicer, an axis before the three of space, become one map: segments then have the labels 1, 2, ….
     """
     import nrrd  # noqa: PLC0415
@@ -58,7 +60,7 @@ def read_nrrd(path: Path, unit: float | None) -> LabelMap:
     affine, notices = _affine(header, unit)
     values, _ = nrrd.read(str(path))
     if not is_layered:
-        return LabelMap(whole(values), affine, notices, {label: name for _, label, name in segments})
+        return LabelMap(values_of(values), affine, notices, {label: name for _, label, name in segments})
     if any(layer >= sizes[0] for layer, _, _ in segments):
         raise SurfaceError(f"its segments name more layers than the {sizes[0]} that it has: export it again")
     names = {number: name for number, (_, _, name) in enumerate(segments, start=1)}

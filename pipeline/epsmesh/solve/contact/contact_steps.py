@@ -25,7 +25,7 @@ from epsmesh.solve.contact.friction_step import FrictionStep, meeting_places
 from epsmesh.solve.contact.surface import Candidates, Neighbours
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.path import Path, PathPoint, follow
-from epsmesh.solve.physics import MaterialLaw, of_regions
+from epsmesh.solve.physics import MaterialLaw
 
 # Larger steps than this share, without friction, are given up soon.
 _LARGE = 1 / 8
@@ -76,7 +76,7 @@ class Friction:
     def on(cls, candidates: Candidates, law: MaterialLaw, coefficient: float, depth: float) -> "Friction":
         """Return the friction of a tool that advances along −z to a ``depth`` (m) on ``candidates`` of a body."""
         width = float(np.median(candidates.widths[candidates.widths > 0]))
-        modulus = float(np.mean(of_regions(law.plane_moduli, candidates.regions, len(candidates.facets))))
+        modulus = float(np.mean(candidates.of_facets(law.plane_moduli)))
         penalty = np.full(len(candidates), modulus * width)
         return cls(coefficient, np.array([0.0, 0.0, -1.0]), penalty, candidates.neighbours, depth)
 

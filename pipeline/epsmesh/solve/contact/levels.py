@@ -36,7 +36,8 @@ class Surface:
     def of(self, degree: int) -> Candidates:
         """Return the candidates of a ``degree``; collective."""
         if degree not in self._found:
-            self._found[degree] = find_candidates(self.spaces.body, self.space(degree).space)
+            space = self.space(degree)
+            self._found[degree] = find_candidates(self.spaces.body, space.space, space.factors)
         return self._found[degree]
 
     def space(self, degree: int) -> ElasticSpace:
@@ -182,7 +183,7 @@ class HeldOperator:
             space=space.space,
             matrix=matrix,
             prescribed=np.union1d(space.prescribed, dofs),
-            jumps=not is_uniform,
+            jumps=not is_uniform or space.factors is not None,
             held=dofs if self._is_masked else None,
         )
 

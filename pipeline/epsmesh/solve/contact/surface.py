@@ -150,7 +150,8 @@ class Candidates:
     ``numbers`` (n) are the nodes' global numbers (blocks) in the space, ``points`` (n, 3) are in m. ``facets`` (m, k)
     index the nodes, in the order of ``shape``; candidates of all degrees on a mesh have the same facets. ``is_edge``
     (n) marks nodes on the boundary of the candidates, planes of symmetry aside. ``regions`` (m) are those of the tissue
-    below the facets. Only ``local_facets`` (m) differ by rank: the facets' numbers there, −1 for facets of others.
+    below the facets, ``factors`` (m) those of its energy. Only ``local_facets`` (m) differ by rank: the facets' numbers
+    there, −1 for facets of others.
     """
 
     numbers: IntArray
@@ -159,6 +160,7 @@ class Candidates:
     shape: FacetNodes
     is_edge: BoolArray
     regions: IntArray
+    factors: FloatArray
     local_facets: Int32Array
 
     def __len__(self) -> int:
@@ -201,10 +203,14 @@ class Candidates:
         return float(np.linalg.norm(np.einsum("mk,mkd->md", shares, forces[self.facets]), axis=1).sum())
 
     def from_regions(self, values: Sequence[float]) -> FloatArray:
-        """Return ``values`` by region as values of the nodes (n), from the tissue below their facets."""
+        """Return moduli, ``values`` by region, as values of the nodes (n), from the tissue below their facets."""
         found = np.empty(len(self))
-        found[self.facets] = of_regions(values, self.regions, len(self.facets))[:, None]
+        found[self.facets] = self.of_facets(values)[:, None]
         return found
+
+    def of_facets(self, values: Sequence[float]) -> FloatArray:
+        """Return moduli, ``values`` by region, as values of the facets (m), from the tissue below."""
+        return self.factors * of_regions(values, self.regions, len(self.facets))
 
     def bordering(self, active: BoolArray) -> BoolArray:
         """Return a mask (n) of nodes that share a facet with both active and inactive nodes; corners do not count."""
@@ -249,8 +255,8 @@ class Candidates:
         return found
 
 
-def find_candidates(body: BodyMesh, space: Any) -> Candidates:
-    """Return the nodes of ``space`` on the footprint of ``body``; collective."""
+def find_candidates(body: BodyMesh, space: Any, factors: FloatArray | None = None) -> Candidates:
+    """Return the nodes of ``space`` on the footprint of ``body``; ``factors`` are those of local cells; collective."""
     topology, tdim = body.mesh.topology, body.mesh.topology.dim
     facets = body.facets[PROBE]
     topology.create_connectivity(tdim, tdim - 1)
@@ -263,18 +269,27 @@ def find_candidates(body: BodyMesh, space: Any) -> Candidates:
     dofs = np.take_along_axis(compat.cell_dofs(space)[cell], shape.places[side], axis=1)
     x = np.asarray(space.tabulate_dof_coordinates())[dofs]
     regions = np.zeros(len(cell), dtype=np.int64) if body.regions is None else body.regions[cell]
-    of_all = (np.concatenate(body.comm.allgather(part)) for part in (_global(space, dofs), x, regions))
-    numbers, points, regions = of_all
+    own = np.ones(len(cell)) if factors is None else factors[cell]
+    of_all = (np.concatenate(body.comm.allgather(part)) for part in (_global(space, dofs), x, regions, own))
+    numbers, points, regions, own = of_all
     local = np.full(len(numbers), -1, dtype=np.int32)
     first = body.mesh.comm.scan(len(facets)) - len(facets)
     local[first : first + len(facets)] = facets
-    return _assembled(body, numbers, points, shape, regions, local)
+    return _assembled(body, numbers, points, shape, (regions, own), local)
 
 
 def _assembled(
-    body: BodyMesh, of_facets: IntArray, x: FloatArray, shape: FacetNodes, regions: IntArray, local: Int32Array
+    body: BodyMesh,
+    of_facets: IntArray,
+    x: FloatArray,
+    shape: FacetNodes,
+    below: tuple[IntArray, FloatArray],
+    local: Int32Array,
 ) -> Candidates:
-    """Number the nodes of the facets of all ranks, in an order independent of the number of ranks."""
+    """Number the nodes of the facets of all ranks, in an order independent of the number of ranks.
+
+    ``below`` are regions and factors of the tissue below the facets.
+    """
     _, first = np.unique(of_facets, return_index=True)
     points = x.reshape(-1, 3)[first]
     order = np.lexsort(points.T)
@@ -282,7 +297,7 @@ def _assembled(
     rank = np.argsort(numbers)
     facets = rank[np.searchsorted(numbers[rank], of_facets)]
     is_edge = _edge(body, points, facets, shape)
-    return Candidates(numbers, points, facets, shape, is_edge, regions, local)
+    return Candidates(numbers, points, facets, shape, is_edge, *below, local)
 
 
 def _edge(body: BodyMesh, points: FloatArray, facets: IntArray, shape: FacetNodes) -> BoolArray:

@@ -318,7 +318,7 @@ class Elements(ElementFields, ABC):
         """Return a copy of the forms' fields, with the ``law`` of their solution."""
         pressure = self._pressure(law)
         p = None if pressure is None else _copied(pressure[0], self.unit(law))
-        return State(self.body, _copied(self.displacements.forms.displacement), p, law)
+        return State(self.body, _copied(self.displacements.forms.displacement), p, law, self.displacements.factors)
 
     def _pressure(self, law: MaterialLaw) -> tuple[Any, Any] | None:
         """Return the pressure of the forms and its compliance, or None."""
@@ -335,4 +335,4 @@ def _copied(function: Any, factor: float = 1.0) -> Any:
 def level_of(space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool = False) -> Level:
     """Return a multigrid level, or that of a direct solve; the ``stack`` frees its operator; collective."""
     matrix = stack.enter_context(space.lend(law, entries=direct))
-    return Level(space.space, matrix, space.prescribed, not law.is_uniform)
+    return Level(space.space, matrix, space.prescribed, not law.is_uniform or space.factors is not None)

@@ -38,7 +38,7 @@ class Pressures:
         self._displacements = displacements
         self.space, self._region = region_wise_space(body, displacements.degree - 1)
         self._has_regions = body.regions is not None
-        self.forms = MixedForms(displacements.forms.displacement, self.space)
+        self.forms = MixedForms(displacements.forms, self.space)
         index_map = self.space.dofmap.index_map
         self.owned, self.dofs = index_map.size_local, index_map.size_global
         self.whole_dofs = whole_points(self.space, body)

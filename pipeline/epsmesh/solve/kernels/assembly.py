@@ -23,16 +23,23 @@ class StraightStiffness:
     """Straight cells of a space of displacements, and the sparsity pattern of all cells.
 
     ``curved`` is a mask of the local cells that others assemble, or None; ``regions`` are the numbers of the cells'
-    regions.
+    regions, ``factors`` those of the energy of local cells.
     """
 
-    def __init__(self, space: Any, curved: BoolArray | None, regions: Int32Array | None = None):
+    def __init__(
+        self,
+        space: Any,
+        curved: BoolArray | None,
+        regions: Int32Array | None = None,
+        factors: FloatArray | None = None,
+    ):
         """Find the pattern; collective."""
         index_map = space.dofmap.index_map
         self._points = index_map.size_local + index_map.num_ghosts
         self._dofs = owned_cells(space)
         self._which = straight_cells(curved, len(self._dofs))
         self._regions = np.zeros(len(self._dofs), dtype=np.int32) if regions is None else regions
+        self._factors = factors
         self._corners, self._tensors = corners(space.mesh), _reference_tensors(compat.degree(space))
         offsets, columns, self._places = _pattern(self._dofs, self._points)
         self._entries, self._rows = len(columns), SharedRows(space.mesh.comm, index_map, offsets, columns)
@@ -44,11 +51,9 @@ class StraightStiffness:
         """
         free = np.ones(3 * self._points)
         free[prescribed] = 0.0
-        regions = np.zeros_like(self._regions) if law.is_uniform else self._regions
         blocks = np.zeros((self._entries, 9))
         cells = len(self._which), self._which, self._dofs.shape[1], self._corners, self._dofs, self._places
-        lame = (np.array(values, dtype=float) for values in (law.lame_lambda, law.lame_mu))
-        call("add_stiffness", *cells, self._tensors, free, regions, *lame, blocks)
+        call("add_stiffness", *cells, self._tensors, free, *self._moduli(law), blocks)
         rows = self._rows
         blocks = rows.summed(blocks)
         row = np.repeat(np.arange(rows.owned, dtype=np.int32), np.diff(rows.offsets))
@@ -63,6 +68,16 @@ class StraightStiffness:
         matrix.setBlockSizes(3, 3)  # this halves BoomerAMG's iterations
         matrix.setLGMap(rows.numbering, rows.numbering)
         return matrix
+
+    def _moduli(self, law: MaterialLaw) -> tuple[Int32Array, FloatArray, FloatArray]:
+        """Return the number of each cell among different materials, and λ and μ (Pa) of these."""
+        regions = np.zeros_like(self._regions) if law.is_uniform else self._regions
+        lame_lambda, lame_mu = (np.array(values, dtype=float) for values in (law.lame_lambda, law.lame_mu))
+        if self._factors is None:
+            return regions, lame_lambda, lame_mu
+        count = len(self._dofs)
+        factors, own = self._factors[:count], regions[:count]
+        return np.arange(count, dtype=np.int32), factors * lame_lambda[own], factors * lame_mu[own]
 
     @property
     def nbytes(self) -> int:

@@ -34,9 +34,7 @@ class Lanes:
 
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Return ``values`` (cells, n) of these cells as (batches, n, lanes)."""
-        filled = np.zeros((self.batches * LANES, values.shape[1]), dtype=values.dtype)
-        filled[: len(values)] = values
-        return np.ascontiguousarray(filled.reshape(self.batches, LANES, -1).transpose(0, 2, 1))
+        return filled(values)
 
     def lame(self, law: MaterialLaw, regions: Int32Array | None) -> FloatArray:
         """Return λ and μ (Pa), (batches, 2, lanes); ``regions`` are the regions' numbers of all cells of the rank."""
@@ -45,14 +43,23 @@ class Lanes:
         return self.spread(np.column_stack(lame))
 
 
+def filled(values: np.ndarray) -> np.ndarray:
+    """Return ``values`` (cells, n) as (batches, n, lanes); padding is zero."""
+    batches = -(-len(values) // LANES)
+    found = np.zeros((batches * LANES, values.shape[1]), dtype=values.dtype)
+    found[: len(values)] = values
+    return np.ascontiguousarray(found.reshape(batches, LANES, values.shape[1]).transpose(0, 2, 1))
+
+
 class StraightMaps:
     """The maps of the straight cells of a mesh, the same for spaces of all degrees.
 
-    ``curved`` is a mask of local cells, or None if none is curved.
+    ``curved`` is a mask of local cells, or None if none is curved. ``factors`` are those of the energy of local cells:
+    they count as volume.
     """
 
-    def __init__(self, mesh: Any, curved: BoolArray | None):
-        self._mesh, self._curved = mesh, curved
+    def __init__(self, mesh: Any, curved: BoolArray | None, factors: FloatArray | None = None):
+        self._mesh, self._curved, self._factors = mesh, curved, factors
 
     @cached_property
     def both(self) -> dict[str, np.ndarray]:
@@ -61,6 +68,8 @@ class StraightMaps:
         which = straight_cells(self._curved, topology.index_map(topology.dim).size_local)
         maps = np.zeros((-(-len(which) // LANES), 9, LANES))
         call("map_cells", len(which), which, corners(self._mesh), maps)
+        if self._factors is not None:
+            maps *= filled(np.sqrt(self._factors[which])[:, None])
         return _in_both(maps)
 
 
@@ -71,8 +80,11 @@ class CurvedCells:
     3) exist in both precisions, ``roots`` (batches, quadrature, lanes) in double only: see ``curved.c``.
     """
 
-    def __init__(self, space: Any, which: Int32Array, dofs: Int32Array):
-        """``which`` are the numbers of the curved cells, ``dofs`` (cells, points) the points of all local cells."""
+    def __init__(self, space: Any, which: Int32Array, dofs: Int32Array, factors: FloatArray | None = None):
+        """``which`` are the numbers of the curved cells, ``dofs`` (cells, points) the points of all local cells.
+
+        ``factors``: see :class:`StraightMaps`.
+        """
         self.lanes, degree = Lanes(which, dofs), compat.degree(space)
         self.quadrature = quadrature_degree(degree)
         weights, _, of_geometry = reference(2, self.quadrature)
@@ -81,6 +93,10 @@ class CurvedCells:
         maps = np.zeros((self.lanes.batches, len(weights), 9, LANES))
         sizes = len(which), nodes.shape[1], len(weights)
         call("map_curved", *sizes, nodes, by_points(of_geometry), weights, maps, self.roots)
+        if factors is not None:
+            root = filled(np.sqrt(factors[which])[:, None])
+            self.roots *= root
+            maps *= root[:, None]
         self.maps = _in_both(maps)
         self.signs = _in_both(np.sign(weights))  # some weights are negative
         self.gradients = _in_both(by_points(reference(degree, self.quadrature)[2]))

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from epsmesh import compat
 from epsmesh.arrays import FloatArray, Int32Array
-from epsmesh.solve.kernels.cells import Ghosts, corners, owned_cells, reference, roots
+from epsmesh.solve.kernels.cells import Ghosts, owned_cells, reference
 from epsmesh.solve.kernels.native import call
 from epsmesh.solve.kernels.product import CellStiffness, bernstein
 
@@ -29,7 +29,7 @@ class CellPressures:
         self.comm, self.cells, self.degree = cells.comm, cells, compat.degree(pressures)
         self._prescribed = cells.prescribed
         self._dofs = cells.lanes.spread(dofs[cells.lanes.which])
-        self._roots = cells.lanes.spread(roots(corners(pressures.mesh)[cells.lanes.which])[:, None])
+        self._roots = cells.roots
         weights, values, _ = reference(self.degree, 2 * self.degree)
         self._mass = np.ascontiguousarray(np.einsum("q,qi,qj->ij", weights, values, values))
         # The displacements' mass has a factor p²; a single gradient needs one p.

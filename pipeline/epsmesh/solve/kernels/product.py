@@ -8,7 +8,7 @@ import itertools
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from math import factorial, prod
 from typing import Any, NamedTuple, Protocol
 
@@ -24,8 +24,10 @@ from epsmesh.solve.kernels.cells import (
     Ghosts,
     Lanes,
     StraightMaps,
+    corners,
     owned_cells,
     reference,
+    roots,
     straight_cells,
 )
 from epsmesh.solve.kernels.native import Single, call, precision
@@ -109,7 +111,7 @@ class CellStiffness:
 
     ``curved`` is a mask of local cells, or None if none is curved. ``prescribed`` are the local dofs (unrolled) without
     rows and columns in the operator. ``regions`` are the numbers of the cells' regions. ``straight`` are the maps that
-    spaces of one mesh share.
+    spaces of one mesh share. ``factors`` are those of the energy of local cells: they count as volume.
     """
 
     def __init__(
@@ -119,15 +121,24 @@ class CellStiffness:
         prescribed: Int32Array,
         regions: Int32Array | None = None,
         straight: StraightMaps | None = None,
+        factors: FloatArray | None = None,
     ):
         """Lay out the cells; collective."""
+        self._mesh, self._factors = space.mesh, factors
         self.comm, self.degree, self.ghosts = space.mesh.comm, compat.degree(space), Ghosts(space)
         self.prescribed = prescribed[prescribed < 3 * self.ghosts.owned]
         dofs, self.regions = owned_cells(space), regions
         self.lanes = Lanes(straight_cells(curved, len(dofs)), dofs)
-        self.maps = (straight or StraightMaps(space.mesh, curved)).both
+        self.maps = (straight or StraightMaps(space.mesh, curved, factors)).both
         bent = np.empty(0) if curved is None else np.flatnonzero(curved[: len(dofs)])
-        self.curved = CurvedCells(space, bent.astype(np.int32), dofs) if len(bent) else None
+        self.curved = CurvedCells(space, bent.astype(np.int32), dofs, factors) if len(bent) else None
+
+    @cached_property
+    def roots(self) -> FloatArray:
+        """The roots that the maps of straight cells have as a factor, (batches, 1, lanes)."""
+        which = self.lanes.which
+        found = roots(corners(self._mesh)[which])
+        return self.lanes.spread((found if self._factors is None else found * np.sqrt(self._factors[which]))[:, None])
 
     def operator(self, law: MaterialLaw, further: Sequence[SparsePart] = ()) -> "CellOperator":
         """Return the stiffness of a material, with ``further`` parts."""

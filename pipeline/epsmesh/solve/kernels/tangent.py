@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from epsmesh import compat
 from epsmesh.arrays import FloatArray, Int32Array
-from epsmesh.solve.kernels.cells import LANES, Lanes, by_points, corners, reference, roots
+from epsmesh.solve.kernels.cells import LANES, Lanes, by_points, reference
 from epsmesh.solve.kernels.native import Single, call, precision
 from epsmesh.solve.kernels.pressure import CellPressures, matrix_of
 from epsmesh.solve.kernels.product import CellStiffness
@@ -74,9 +74,8 @@ class TangentCells:
         )
         weights, _, gradients = reference(compat.degree(space), quadrature)
         table = by_points(gradients)
-        of_maps = cells.lanes.spread(roots(corners(space.mesh)[cells.lanes.which])[:, None])
         both: dict[str, np.ndarray] = {"float64": table, "float32": table.astype(np.float32)}
-        self._parts = [_Part(cells.lanes, cells.maps, 0, of_maps, weights, both, quadrature)]
+        self._parts = [_Part(cells.lanes, cells.maps, 0, cells.roots, weights, both, quadrature)]
         if (curved := cells.curved) is not None:
             tables = curved.roots, curved.signs["float64"], curved.gradients, curved.quadrature
             self._parts.append(_Part(curved.lanes, curved.maps, _STEP, *tables))
@@ -106,7 +105,7 @@ class TangentCells:
         return found
 
     def weights(self) -> list[FloatArray]:
-        """Return the volumes (m³) of the quadrature points, (batches, quadrature, lanes) by part; 0 of padding."""
+        """Return the volumes (m³) of the quadrature points, times the factors of the cells, (batches, quadrature, lanes) by part; 0 of padding."""
         return [part.factors[:, None] * part.roots**2 for part in self._parts]
 
     def by_region(self, values: Sequence[float]) -> list[FloatArray]:

@@ -63,6 +63,8 @@ class State:
     ``displacement`` (m) and ``pressure`` (Pa, positive in tension) are dolfinx functions; the pressure is that of mixed
     elements, λ₁ times the change of volume, and None in displacement elements. The body may be the half or quarter that
     planes of symmetry leave. ``influence`` is known if it was requested: see :mod:`epsmesh.solve.influence`.
+    ``factors`` are those of the energy of local cells, None where they are 1: stresses, and the pressure, are to be
+    multiplied by them.
     """
 
     body: BodyMesh
@@ -70,6 +72,7 @@ class State:
     pressure: Any | None
     law: MaterialLaw
     influence: Influence | None = None
+    factors: FloatArray | None = None
 
     @property
     def degree(self) -> int:
@@ -160,6 +163,8 @@ class State:
         values = values[compat.cell_dofs(self.displacement.function_space)[cells]]
         gradient = np.einsum("rnk,nki,nrj->nij", table[1:], values, inverse)
         stress = self._stress(cells, at, gradient)
+        if self.factors is not None:
+            stress *= self.factors[cells][:, None, None]
         found[here, :3] = np.einsum("nk,nki->ni", table[0], values)
         found[here, 3:12], found[here, 12:21] = gradient.reshape(-1, 9), stress.reshape(-1, 9)
         facet = self._on_footprint(cells, at)

@@ -108,6 +108,10 @@ def _is_large(scene: Scene) -> bool:
     return scene.body.main(scene.material).is_large
 
 
+def _varies(scene: Scene) -> bool:
+    return any(tissue.varying is not None for tissue in (scene.body.main(scene.material), *scene.body.regions))
+
+
 def _coefficient(friction: float) -> float | str:
     return STICK if friction == inf else friction
 
@@ -172,6 +176,7 @@ FEATURES: dict[str, Feature] = {
         "probe.history", lambda s: needs_time_steps(s) and _is_in_space(s), ("body", "material", "mesh", "load")
     ),
     "fibres": Feature("material.law", lambda s: any(t.has_fibres for t in (s.material, *s.body.regions)), ("body",)),
+    "varying stiffness": Feature("material.young", _varies, ("body",), lambda _: None),
     # Of regions, those of layers that fill the body included, the study's check of laws reports it.
     "ν < 0.2": Feature(
         "material.poisson",

@@ -13,6 +13,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "linear outside": "the boundary of the linear part is a sphere, and no line of the mesh of the meridian",
         "six motions": "most of the six motions are not axisymmetric",
         "half ball": "a half ball is coupled to its far field in three dimensions",
+        "varying stiffness": "a field of the modulus is computed in three dimensions",
         "loads": "loads are computed in three dimensions",
         "terms": "terms are computed in three dimensions",
         "outputs": "outputs are numbers of a solution in three dimensions",
@@ -27,6 +28,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "layers": "a body of several materials has more than one parameter",
         "inclusion": "a body of several materials has more than one parameter",
         "region": "a body of several materials has more than one parameter",
+        "varying stiffness": "a field of the modulus is another material in each cell",
         "unilateral contact": "the contact area changes with Poisson's ratio",
         "half ball": "the far field changes with Poisson's ratio",
         "large displacements": "the problem is nonlinear",
@@ -45,6 +47,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     },
     "mirrored": {
         "fibres": "the direction of the fibres differs in a mirror image",
+        "varying stiffness": "the field of the modulus differs in a mirror image",
         "six motions": "the 6 × 6 stiffness differs in a mirror image",
         "loads": "loads break the symmetry",
         "terms": "a term may break the symmetry",
@@ -53,6 +56,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     },
     "equivalent places": {
         "fibres": "the direction of the fibres is fixed in the body",
+        "varying stiffness": "the field of the modulus is fixed in the body",
         "inclusion": "the distance to the inclusion differs",
         "region": "the distance to the region differs",
         "loads": "loads act on the whole body",
@@ -87,6 +91,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     },
     "SOFA scene": {
         "large displacements": "material.law: a scene of SOFA is for linear tissue",
+        "varying stiffness": "material.young: a scene of SOFA has one modulus for each region",
         "relaxation": "material.relaxation: a scene of SOFA is static",
         "loads": "[load]: a scene of SOFA has the tool's force alone",
         "terms": "[load]: a scene of SOFA has the tool's force alone",
@@ -102,6 +107,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "loads": "[load]: gravity, tractions and pressure in hollow regions have no real-time model",
         "terms": "[load]: springs and other terms have no real-time model",
         "fibres": "material.law: fibres have a direction, and the half-space of a real-time model has none",
+        "varying stiffness": "material.young: the half-space of a real-time model has one modulus. Give a value",
         "time steps": "material.relaxation: all tissue of a real-time model relaxes alike. Omit the relaxation of "
         "layers and inclusions",
         "slit": f"probe.incision: {_PRESSED_ONLY}",

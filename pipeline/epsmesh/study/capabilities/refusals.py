@@ -55,6 +55,7 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("half ball", "layers", _ONE_MATERIAL),
     Refusal("half ball", "inclusion", _ONE_MATERIAL),
     Refusal("half ball", "region", _ONE_MATERIAL),
+    Refusal("half ball", "varying stiffness", _ONE_MATERIAL),
     Refusal("half ball", "slice", _PRESSES),
     Refusal("half ball", "slit", _PRESSES),
     Refusal("half ball", "six motions", _PRESSES),
@@ -132,6 +133,11 @@ REFUSALS: tuple[Refusal, ...] = (
         "accuracy",
         "needs given element sizes: with `accuracy`, each depth has a mesh of its own. Omit one of the two",
     ),
+    Refusal(
+        "slit",
+        "varying stiffness",
+        "the energy that the slit's front releases is computed for a constant modulus: give layers or inclusions",
+    ),
     # A given force, whose depth is found.
     Refusal("given force", "loads", f"loads press on the tool at depth 0 already: {_NO_LOADS}, or give a depth"),
     Refusal("given force", "history", "a history has depths of its own: omit [probe.history], or give a depth"),
@@ -166,6 +172,7 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("inserted needle", "no round scene", "needs a cylinder, and the needle on its axis"),
     Refusal("insertion", "inclusion", "needs a body of layers: cuts through inclusions are not computed"),
     Refusal("insertion", "region", "needs a body of layers: cuts through regions are not computed"),
+    Refusal("insertion", "varying stiffness", "cuts are computed in tissue of a constant modulus: give layers"),
     Refusal("insertion", "loads", f"cuts in tissue under loads are not computed: {_NO_LOADS}"),
     # Where F is decided: its derivatives by the modulus at a place.
     Refusal("influence", "friction", "with friction, F is no derivative of an energy: omit it, or friction"),

@@ -1,8 +1,33 @@
 """Files of Python beside a study: the one of a function, and the modules that it imports."""
 
 import ast
+import hashlib
 from functools import lru_cache
 from pathlib import Path
+
+
+def function_in(function: str) -> tuple[Path, str]:
+    """Return the file of a function, FILE.py:NAME, and its name there."""
+    file, _, name = function.rpartition(":")
+    return Path(file), name
+
+
+def content_of(function: str) -> tuple[str, ...]:
+    """Return the identity of a function, FILE.py:NAME: the content of its file, its name, the content of imports."""
+    file, name = function_in(function)
+    first, *others = (hashlib.sha256(source.read_bytes()).hexdigest() for source in with_imported(file))
+    return first, name, *others
+
+
+def problem_of(function: str, folder: Path) -> str:
+    """Return what is wrong with a function, FILE.py:NAME in a ``folder``; "" if nothing is."""
+    file, name = function_in(function)
+    path = folder / file
+    if not path.resolve().is_relative_to(folder.resolve()):
+        return "must be a file in the folder of the study, or below it: a run executes it"
+    if file.suffix != ".py" or not name.isidentifier():
+        return 'must be "FILE.py:NAME"'
+    return "" if path.is_file() else f"there is no file {path}"
 
 
 def with_imported(file: Path) -> tuple[Path, ...]:

@@ -1,0 +1,70 @@
+"""Fields of the modulus of a case, on its mesh."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from epsmesh.arrays import FloatArray
+from epsmesh.run.functions import loaded
+from epsmesh.shapes.varying import Varying
+from epsmesh.solve import SolveError
+from epsmesh.solve.variation import Variation
+from epsmesh.study.case import Case
+
+
+@dataclass(frozen=True)
+class TissueField:
+    """The field of a tissue, relative to its modulus; its ``key`` in the study is for messages."""
+
+    varying: Varying
+    key: str
+
+    def __hash__(self) -> int:
+        """Return the hash of the content: the same field in another study is the same."""
+        return hash(self.varying.identity)
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether the other one has the same content."""
+        return isinstance(other, TissueField) and self.varying.identity == other.varying.identity
+
+    @property
+    def detail(self) -> float:
+        """The size (m) of voxels; infinite without an image."""
+        return self.varying.detail
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the relative values at ``points`` (n, 3), m; NaN where there is none."""
+        return self.varying.relative(self._moduli(points))
+
+    def refusal(self, point: FloatArray, value: float) -> str:
+        """Return the message about a relative ``value`` that is not positive at a ``point`` (3), m."""
+        return self.varying.refusal(self.key, point, value * self.varying.young / self.varying.scale)
+
+    def _moduli(self, points: FloatArray) -> FloatArray:
+        if self.varying.function is None:
+            return self.varying.at(points)
+        try:
+            found = np.array(loaded(self.varying.function)(points.copy()), dtype=np.float64)
+        except Exception as error:  # of the study's author
+            raise SolveError(
+                f"{self.key}: function {self.varying.function}: {type(error).__name__}: {error}"
+            ) from error
+        if found.shape != (len(points),):
+            raise SolveError(
+                f"{self.key}: function {self.varying.function} returned an array of shape {found.shape} for "
+                f"{len(points)} points: it must return a modulus in Pa for each"
+            )
+        return found
+
+
+def variation_of(case: Case) -> Variation | None:
+    """Return the fields of the regions of the mesh of ``case``; None if all moduli are constant."""
+    if not case.varies:
+        return None
+    keys = ("material", *(f"body.{place}" for place in case.body.places))
+    fields = tuple(
+        tissue.varying and TissueField(tissue.varying, f"{key}.young")
+        for tissue, key in zip(case.tissues, keys, strict=True)
+    )
+    turn = case.frame.turn
+    return Variation(fields, None if turn is None else tuple(map(tuple, turn.tolist())))
