@@ -292,6 +292,8 @@ FEATURES = (
     Feature("accuracy", "accuracy", _accuracy),
     Feature("model 3d", "model", _update("mesh", model="3d")),
     Feature("F_exact", "exact", _update("solve", exact=True)),
+    Feature("formula", "young", _update("material", young={"formula": "10 kPa*(1 + 0.3*z/(20 mm) + 0.1*x/(20 mm))"})),
+    Feature("stiffness map", "young", _update("material", young={"file": "map.nrrd", "unit": "kPa"})),
     Feature("swept E", "young", _update("material", young=["10 kPa", "20 kPa"])),
     Feature("output", "output", _output),
     Feature("influence", "influence", _update("solve", influence=True)),
@@ -336,6 +338,8 @@ def write_bodies(folder: Path) -> None:
     }
     header["space origin"] = np.array([-23.0, -23.0, -23.0])
     nrrd.write(str(folder / "box.nrrd"), label, header)
+    x, y, z = np.indices(label.shape)
+    nrrd.write(str(folder / "map.nrrd"), 10.0 + 2.0 * np.sin(x / 5) + 0.1 * y - 0.2 * z, header)
     label[:12, 12:] *= 2
     nrrd.write(str(folder / "labels.nrrd"), label, header)
     # In a process of its own: in this one the mesher may have begun.

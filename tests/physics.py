@@ -20,7 +20,10 @@ SOURCES = (
     *("shapes", "scene", "mesh", "solve", "insertion", "compat", "viscoelastic.py", "units.py"),
     *(f"study/{name}.py" for name in ("case", "closure", "loads", "output", "slit", "stages", "sweep")),
     *(f"plan/{name}.py" for name in ("far_fields", "ladders", "recipe", "reductions", "refinement", "symmetry")),
-    *(f"run/{name}.py" for name in ("attempts", "basis", "far_field", "loads", "measure", "meshing", "outputs")),
+    *(
+        f"run/{name}.py"
+        for name in ("attempts", "basis", "far_field", "fields", "loads", "measure", "meshing", "outputs")
+    ),
     *(f"run/{name}.py" for name in ("problem", "record", "runner", "samples", "solved")),
 )
 COMMAND = "python -m tests.physics"

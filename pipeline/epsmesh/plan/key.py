@@ -8,7 +8,7 @@ from math import inf
 from typing import Any
 
 from epsmesh.plan.refinement import refinements
-from epsmesh.plan.symmetry import mirror_planes, movement_planes
+from epsmesh.plan.symmetry import slides_across
 from epsmesh.shapes.body import PIECES, Body
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.registry import TERMS
@@ -262,10 +262,9 @@ def _written(mesh: Mesh, given_keys: frozenset[str], is_full: bool, half_width: 
 
 def _slides_across_a_mirror(case: Case) -> bool:
     """Return whether a blade moves across a plane of symmetry: that movement has no force along the axis."""
-    if case.probe.motion == "press":
-        return mirror_planes(case) != movement_planes(case)
-    pressed = replace(case, probe=case.probe.model_copy(update={"motion": "press"}))
-    return mirror_planes(case) != movement_planes(pressed)
+    if case.probe.motion != "press":
+        case = replace(case, probe=case.probe.model_copy(update={"motion": "press"}))
+    return slides_across(case)
 
 
 def _text(content: dict[str, Any]) -> str:

@@ -19,23 +19,24 @@ _FOLDS = 0.25  # depth over half width beyond which the meridian's elements fold
 
 
 def mirror_planes(case: Case) -> tuple[str, ...]:
-    """Return the planes of symmetry of geometry and fields of stiffness, of x = 0 ("x") and y = 0 ("y")."""
-    return _of_tissue(case, _geometry(case.body, case.probe))
+    """Return the planes of symmetry of the scene's geometry, of x = 0 ("x") and y = 0 ("y")."""
+    return _geometry(case.body, case.probe)
 
 
 def movement_planes(case: Case) -> tuple[str, ...]:
-    """Return the planes of symmetry of geometry, fields of stiffness, and movement."""
-    return _of_tissue(case, _movement(case.body, case.probe))
+    """Return the planes of symmetry of geometry and movement."""
+    return _movement(case.body, case.probe)
 
 
-def _of_tissue(case: Case, planes: tuple[str, ...]) -> tuple[str, ...]:
-    """Return those planes in which the stiffness is symmetric, if it varies."""
+def slides_across(case: Case) -> bool:
+    """Return whether the tool moves across a plane of symmetry: that movement has no force along the axis."""
+    lost = {*mirror_planes(case)} - {*movement_planes(case)}
     fields = [tissue.varying for tissue in case.tissues if tissue.varying is not None]
-    return tuple(plane for plane in planes if all(field.is_mirrored(PLANES[plane]) for field in fields))
+    return any(all(field.is_mirrored(PLANES[plane]) for field in fields) for plane in lost)
 
 
 def model_planes(case: Case) -> tuple[str, ...]:
-    """Return the planes of symmetry of geometry, movement, loads and fibres: half or a quarter of the body does."""
+    """Return the planes of symmetry of geometry, movement, loads and tissue: half or a quarter of the body does."""
     tests = [case.load.is_mirrored, *(tissue.is_mirrored for tissue in case.tissues)]
     return tuple(plane for plane in movement_planes(case) if all(test(PLANES[plane]) for test in tests))
 

@@ -46,9 +46,8 @@ class TissueField:
         try:
             found = np.array(loaded(self.varying.function)(points.copy()), dtype=np.float64)
         except Exception as error:  # of the study's author
-            raise SolveError(
-                f"{self.key}: function {self.varying.function}: {type(error).__name__}: {error}"
-            ) from error
+            what = f"{type(error).__name__}: {error}"
+            raise SolveError(f"{self.key}: function {self.varying.function}: {what}") from error
         if found.shape != (len(points),):
             raise SolveError(
                 f"{self.key}: function {self.varying.function} returned an array of shape {found.shape} for "
@@ -63,7 +62,7 @@ def variation_of(case: Case) -> Variation | None:
         return None
     keys = ("material", *(f"body.{place}" for place in case.body.places))
     fields = tuple(
-        tissue.varying and TissueField(tissue.varying, f"{key}.young")
+        None if tissue.varying is None else TissueField(tissue.varying, f"{key}.young")
         for tissue, key in zip(case.tissues, keys, strict=True)
     )
     turn = case.frame.turn

@@ -9,7 +9,7 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.mesh.of_case import meridian_of
 from epsmesh.plan import estimate
-from epsmesh.plan.symmetry import mirror_planes, movement_planes
+from epsmesh.plan.symmetry import slides_across
 from epsmesh.plan.thin import cause
 from epsmesh.run.far_field import far_field_of, far_field_seconds
 from epsmesh.run.fields import variation_of
@@ -194,7 +194,7 @@ def _motions_of(case: Case, meshed: Case) -> Movement:
     if motion is Motion.FAR:
         return Movement.along(travel).with_far(_moved(far_field_of(case), meshed.frame.point))
     # Across a plane of symmetry, sliding gives no axial force, and pressing gives no lateral force.
-    return Movement.along(travel, decoupled=mirror_planes(case) != movement_planes(case))
+    return Movement.along(travel, decoupled=slides_across(case))
 
 
 @lru_cache(_FAR_FIELDS)

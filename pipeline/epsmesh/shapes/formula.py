@@ -28,8 +28,8 @@ _OF_ONE_UNIT = ("abs", "min", "max")
 _OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)
 _QUANTITY = re.compile(r"(?<![\w.])(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)[ \t]*([^\W\d_]+|%|°)")
 _LONGEST, _DEEPEST = 500, 50
-_KINDS = {(0, 0): "a number", (1, 0): "a length", (0, 1): "a pressure"}
-_NUMBER, _PRESSURE = (0.0, 0.0), (0.0, 1.0)
+_NUMBER, _LENGTH, _PRESSURE = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
+_KINDS = {_NUMBER: "a number", _LENGTH: "a length", _PRESSURE: "a pressure"}
 
 
 class FormulaError(ValueError):
@@ -45,7 +45,7 @@ class _Value:
 
     @property
     def kind(self) -> str:
-        return _KINDS.get(self.unit, f"in m^{self.unit[0]:g} Pa^{self.unit[1]:g}")  # type: ignore[call-overload]
+        return _KINDS.get(self.unit, f"in m^{self.unit[0]:g} Pa^{self.unit[1]:g}")
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,9 @@ class Formula:
 
         if len(self.text) > _LONGEST:
             raise FormulaError(f"has {len(self.text)} characters: at most {_LONGEST}")
+        plain = _QUANTITY.sub(replaced, self.text.strip()).replace("^", "**")
         try:
-            tree = ast.parse(_QUANTITY.sub(replaced, self.text.strip()).replace("^", "**"), mode="eval").body
+            tree = ast.parse(plain, mode="eval").body
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise FormulaError('is no formula: write it as "8 kPa * (1 + 0.3*z/(20 mm))"') from None
         if _depth(tree) > _DEEPEST:
@@ -99,8 +100,8 @@ class Formula:
     def _evaluated(self, points: FloatArray) -> _Value:
         tree, quantities = self._parsed
         x, y, z = points.T
-        named = {name: _Value(values, (1.0, 0.0)) for name, values in zip("xyz", (x, y, z), strict=True)}
-        named["r"] = _Value(np.hypot(x, y), (1.0, 0.0))
+        named = {name: _Value(values, _LENGTH) for name, values in zip("xyz", (x, y, z), strict=True)}
+        named["r"] = _Value(np.hypot(x, y), _LENGTH)
         named |= {f"_{number}": value for number, value in enumerate(quantities)}
         with np.errstate(all="ignore"):  # what is no number is refused with its place
             return _value(tree, named)
@@ -108,7 +109,7 @@ class Formula:
 
 def _quantity(number: str, unit: str) -> _Value:
     """Return a number with its unit, of a length or a pressure, or a share."""
-    for kind, powers in (("m", (1.0, 0.0)), ("Pa", _PRESSURE), ("", _NUMBER)):
+    for kind, powers in (("m", _LENGTH), ("Pa", _PRESSURE), ("", _NUMBER)):
         try:
             return _Value(parse_quantity(f"{number} {unit}", kind), powers)
         except ValueError:

@@ -41,8 +41,8 @@ class Varying(Section):
     file: Annotated[
         str | None,
         Words(
-            "Image of the modulus (NIfTI, NRRD), in the frame of the body: its path from the folder of the study. It is "
-            "linear between the centres of voxels.",
+            "Image of the modulus (NIfTI, NRRD), in the frame of the body: its path from the folder of the study. "
+            "Values are linear between the centres of voxels.",
             '"stiffness.nii.gz"',
             default="none: a formula or a function",
         ),

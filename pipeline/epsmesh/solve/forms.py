@@ -52,8 +52,8 @@ class ElasticForms:
         self._cell_kernel = cell_kernel if factors is None else None
         self.factor: Any = 1
         if factors is not None:
-            self.factor = fem.Function(self._cellwise)
-            self.factor.x.array[compat.cell_dofs(self._cellwise).reshape(-1)] = factors
+            self.factor = fem.Function(self.cellwise)
+            self.factor.x.array[compat.cell_dofs(self.cellwise).reshape(-1)] = factors
         self.displacement = fem.Function(space)
         self.coefficients = {name: self._coefficient() for name in COEFFICIENTS}
 
@@ -264,7 +264,7 @@ class HyperelasticForms:
             if self._pressure is not None:
                 pressure, compliance = self._pressure
                 rate += compliance * pressure * rest[0]
-            found.append(rate * cell * measure)
+            found.append(self._elastic.factor * rate * cell * measure)
         return form(sum(found))
 
     @cached_property

@@ -43,8 +43,8 @@ class ElasticSpace:
 
     ``prescribed`` are local dofs (unrolled, owned and ghosts). Arrays named ``…_owned`` index owned dofs;
     ``probe_owned`` and ``fixed_owned`` index owned blocks of three dofs. ``owned`` and ``size`` count the dofs of this
-    rank, and of all ranks. ``terms`` are those of the conditions. ``factors`` are those of the energy of local cells, or
-    None. ``space`` and ``dirichlet`` are dolfinx objects.
+    rank, and of all ranks. ``terms`` are those of the conditions. ``factors`` are those of the energy of local cells,
+    or None. ``space`` and ``dirichlet`` are dolfinx objects.
     """
 
     @stage("spaces, forms")

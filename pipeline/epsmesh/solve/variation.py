@@ -18,8 +18,8 @@ from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.solve import SolveError
 
-# The mean over a cell is that of equal parts, each with four points: exact for polynomials of degree 2. Parts are halved
-# until the mean changes by less than this share of it, or so many times: 2,048 points a cell then.
+# The mean over a cell is that of equal parts, each with four points: exact for polynomials of degree 2. Parts are
+# halved until the mean changes by less than this share of it, or so many times: 2,048 points a cell then.
 _RESOLVED, _HALVINGS = 1e-3, 3
 # Barycentric coordinates of the four points: one has the first weight, the others the second.
 _NEAR, _APART = (5 + 3 * 5**0.5) / 20, (5 - 5**0.5) / 20
@@ -97,7 +97,10 @@ class Variation:
         points, weights = _places(nodes, level)
         if self.turn is not None:
             points = points @ np.array(self.turn)
-        values = field.at(points.reshape(-1, 3))
+        try:
+            values = field.at(points.reshape(-1, 3))
+        except SolveError as error:  # which other ranks may not have
+            return np.ones(len(nodes)), str(error)
         is_wrong = ~(values > 0) | ~np.isfinite(values)
         if is_wrong.any():
             first = int(is_wrong.argmax())

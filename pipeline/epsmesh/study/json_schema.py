@@ -47,7 +47,7 @@ _NAMES = {name for name, _ in _QUANTITIES.values()}
 # A range of values: see ranges.py. Its keys are no properties, or editors would complete them alone.
 _RANGE: Schema = {"propertyNames": {"enum": [*KEYS]}, "required": [*KEYS]}
 # Arrays of tables, and tables, within sections.
-_INNER = (*chain.from_iterable(NESTED.values()), *chain.from_iterable(TABLES.values()))
+_INNER = {*chain.from_iterable(NESTED.values()), *chain.from_iterable(TABLES.values())} - {*PLAIN_TOO}
 _PLAIN = {"boolean": "true | false", "integer": "whole number", "string": "text"}
 _SIGNS = {
     "gt": ">",

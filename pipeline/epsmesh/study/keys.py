@@ -49,8 +49,8 @@ _TEXTS = {
     "the values of a named term can be swept.",
     "material.fibres": "Fibres of Holzapfel's law; those of a layer are [body.layer.fibres]. Optional; every value can "
     "be swept.",
-    "material.young": "A modulus that varies from place to place; those of a layer are [body.layer.young]. It takes the "
-    "place of the value of `young`. Optional; `scale` can be swept.",
+    "material.young": "A modulus that varies from place to place; those of a layer are [body.layer.young]. It takes "
+    "the place of the value of `young`. Optional; every value can be swept.",
     "probe": "The tool, called probe in study files and datasets, and its motion.",
     "probe.path": "Several points of contact, instead of `at`. Give one of `line`, `circle`, `raster` and "
     "`points`. Optional.",

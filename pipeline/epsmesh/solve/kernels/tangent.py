@@ -105,7 +105,10 @@ class TangentCells:
         return found
 
     def weights(self) -> list[FloatArray]:
-        """Return the volumes (m³) of the quadrature points, times the factors of the cells, (batches, quadrature, lanes) by part; 0 of padding."""
+        """Return the volumes (m³) of the quadrature points, (batches, quadrature, lanes) by part; 0 of padding.
+
+        They are those of the maps: times the factors of the cells.
+        """
         return [part.factors[:, None] * part.roots**2 for part in self._parts]
 
     def by_region(self, values: Sequence[float]) -> list[FloatArray]:
