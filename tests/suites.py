@@ -43,6 +43,25 @@ NIGHTLY = (
     "tests/test_same.py::test_what_may_not_matter_does_not",
     "tests/fuzz/test_large.py",
     "tests/cluster",
+    # Further variants of ways through mesher and solver, whose every line other tests of the day run.
+    *(
+        f"tests/{test}"
+        for test in (
+            "insertion/test_command.py::test_two_layers_have_two_punctures_and_a_withdrawal_by_solves",
+            "mesh/test_meeting_regions.py::test_a_hollow_region_leaves_its_neighbours_alone",
+            "plan/test_reductions.py::test_all_at_once",
+            "run/test_pyramid.py::test_force_does_not_depend_on_the_direction_and_grows_with_the_square_of_the_depth",
+            "solve/test_axisymmetric.py::test_element_does_not_depend_on_youngs_modulus",
+            "solve/test_axisymmetric.py::test_more_support_is_stiffer",
+            "solve/test_axisymmetric_ellipsoid.py::test_arcs_are_followed_closely_enough",
+            "solve/test_friction.py::test_at_small_depth_the_law_does_not_matter",
+            "solve/test_friction.py::test_little_friction_settles_at_large_displacements",
+            "solve/test_laws.py::test_force_on_fibres",
+            "solve/test_meridian_friction.py::test_little_friction_is_none_and_much_sticks",
+            "solve/test_meridian_large_contact.py::test_the_work_of_the_force_is_the_energy",
+            "solve/test_sliding.py::test_drag_of_an_inclined_path_is_the_law_times_the_force",
+        )
+    ),
 )
 # Fixtures whose tests run by night: a real browser.
 NIGHTLY_FIXTURES = frozenset({"browser"})

@@ -14,6 +14,7 @@ from epsmesh.study.named import SCHEMA, SHORT, examples
 from epsmesh.study.read import parse, read_study
 from epsmesh.study.starter import starter
 from tests.commands import epsmesh
+from tests.sampling import sampled
 
 _SCHEMA = "#:schema ./study.schema.json\n"
 STUDIES = Path(__file__).parents[2] / "studies"
@@ -94,7 +95,7 @@ def test_short_examples_are_short_named_in_the_help_and_without_warnings(name):
     assert not study.warnings
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in STUDIES.glob("*.toml")))
+@sampled("name", sorted(path.stem for path in STUDIES.glob("*.toml")), by_day=8)
 def test_like_copies_the_studies_that_come_with_the_program(elsewhere, name):
     assert new("mine", "--like", name).exit_code == 0
     assert (elsewhere / "studies" / "mine.toml").read_text() == _SCHEMA + (STUDIES / f"{name}.toml").read_text()

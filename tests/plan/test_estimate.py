@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import product
 
 import pytest
 
@@ -15,6 +16,7 @@ from epsmesh.plan.steps import MeshStep, OperatorStep, mesh_steps
 from epsmesh.run.problem import memory_of
 from tests.cases import BLADE, solve, study
 from tests.folded import study_of
+from tests.sampling import sampled
 
 MESHES = {
     "coarse": {"fine": "5 mm", "rim": "1 mm"},
@@ -25,8 +27,7 @@ MESHES = {
 }
 
 
-@pytest.mark.parametrize("probe", ["disc", "blade"])
-@pytest.mark.parametrize("name", MESHES)
+@sampled("name, probe", product(MESHES, ("disc", "blade")), by_day=5)
 def test_cells(name, probe):
     changes = {"mesh": MESHES[name] | {"degree": 1, "model": "3d"}} | ({"probe": BLADE} if probe == "blade" else {})
     (record,) = solve(**changes).values()

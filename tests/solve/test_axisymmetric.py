@@ -63,7 +63,7 @@ def test_uniaxial_compression(bonded, column):
     assert solution.max_strain == pytest.approx(0.5, rel=1e-8)
 
 
-@pytest.mark.parametrize(("bonded", "factor"), [(True, 1.0), (False, 0.25)])
+@pytest.mark.parametrize(("bonded", "factor"), [pytest.param(True, 1.0, marks=pytest.mark.nightly), (False, 0.25)])
 def test_incompressible_thin_layer(bonded, factor):
     """An incompressible layer is squeezed out: F = 3π μ a⁴ d/(2 h³) between rough faces, a quarter with one smooth."""
     h, mu = 1e-3, 1 / 3
@@ -79,8 +79,9 @@ def test_clamped_thin_plate():
 
 
 @pytest.mark.parametrize(
-    ("meridian", "bonded"), [(Meridian(5, 3, 1), False), (Meridian(9, 2, 1, column=2), True)]
-)  # fmt: skip
+    ("meridian", "bonded"),
+    [(Meridian(5, 3, 1), False), pytest.param(Meridian(9, 2, 1, column=2), True, marks=pytest.mark.nightly)],
+)
 def test_incompressible_is_the_limit(meridian, bonded):
     limit = solve_axisymmetric(meridian, 0.5, bonded).reaction[2]
     gaps = [solve_axisymmetric(meridian, 0.5 - x, bonded).reaction[2] / limit - 1 for x in (1e-4, 1e-5)]
@@ -97,7 +98,7 @@ def test_displacement_and_mixed_elements_agree(monkeypatch):
     assert forces[0] == pytest.approx(forces[1], rel=1e-7)
 
 
-@pytest.mark.parametrize(("unit", "young"), [(1e-3, 1e12), (1 / 3, 1e-3)])
+@pytest.mark.parametrize(("unit", "young"), [(1e-3, 1e12), pytest.param(1 / 3, 1e-3, marks=pytest.mark.nightly)])
 def test_units_do_not_matter(unit, young):
     here, there = (
         solve_axisymmetric(Meridian(5 * u, 3 * u, 0.7 * u, -1.1 * u), 0.45, True, young=e, depth=0.1 * u)
