@@ -132,13 +132,15 @@ class RunnableStudy:
         comm: "MPI.Comm | None" = None,
         *,
         meshes: str | Path | None = None,
+        influence: bool = False,
         **more: float | int | str,
     ) -> "CaseSolution":
         """Solve one case on the ranks of ``comm`` (all there are) and return its fields; collective.
 
         The case is chosen by its labels, as in xarray's ``sel``: numbers in SI units, or text (``depth="2 mm"``). Mesh,
         elements, contact and accuracy are those of a run, and so is the force. Nothing is read from a store or written
-        to it; meshes are kept in ``meshes`` if that is given.
+        to it; meshes are kept in ``meshes`` if that is given. ``influence`` adds what of F depends on where, as the key
+        of ``[solve]`` does: for contact and laws of large displacements, by one more linear solve.
 
         Raises:
             ValueError: if not exactly one case has these labels, or the tool has no contact at its place.
@@ -164,7 +166,7 @@ class RunnableStudy:
                 study, case, unreached = at_its_depth(self.declared, case, comm)
                 if unreached:
                     raise CaseFailure(unreached)
-                solved = solve_fields(solve_alone(study, case), comm, influence=True, cache=cache)
+                solved = solve_fields(solve_alone(study, case), comm, influence=influence, cache=cache)
         except agreed as failure:
             raise RuntimeError(f"{case}: {failure}") from failure
         if solved.record.status in FAILURES:

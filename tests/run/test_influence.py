@@ -73,6 +73,7 @@ def test_a_column_in_compression_is_decided_in_proportion_to_its_volume():
     assert radius == pytest.approx(half, rel=0.02)
 
 
+@pytest.mark.mpi
 def test_parts_of_the_body_ranks_and_scales_give_the_same():
     quarter = dataset(body=REGIONS)
     same(quarter, dataset(WORLD, body=REGIONS), 1e-5)
@@ -91,6 +92,19 @@ def test_what_needs_fields_is_solved_in_three_dimensions():
         assert not any(solve.reduced or solve.axisymmetric for solve in asked.solves)
         assert any(solve.reduced or solve.axisymmetric for solve in plain.solves)
         assert not set(asked.keys) & set(plain.keys)
+    depths = BALL | {"depth": [f"{0.3 + 0.02 * n:.2f} mm" for n in range(12)], "mesh_depths": ["0.3 mm", "0.52 mm"]}
+    condensed = [
+        {one.name for one in make_plan(parse(raw(probe=depths, mesh={"rim": "0.5 mm"}, solve=solve))).skipped}
+        for solve in ({}, ASKED)
+    ]
+    assert ["condensed" in names for names in condensed] == [True, False]
+
+
+def test_a_stored_case_has_its_shares(tmp_path):
+    study = epsmesh.read(raw(body=REGIONS, solve=ASKED))
+    first, second = (study.run(output=tmp_path) for _ in range(2))
+    assert not study.plan(store=tmp_path / "cases.sqlite").solves
+    same(first, second, 1e-12)
 
 
 def test_depths_of_a_contact_have_shares_of_their_own():
@@ -101,9 +115,10 @@ def test_depths_of_a_contact_have_shares_of_their_own():
     assert (np.diff(together["force_share"].sel(region="tissue")) > 0).all()
 
 
+@pytest.mark.mpi
 @pytest.mark.parametrize("contact", [{}, {"probe": BALL, "mesh": {"rim": "0.5 mm"}}], ids=["bonded", "found"])
 def test_a_solution_has_the_influence_as_a_function_and_at_points(contact):
-    solution = epsmesh.read(raw(body=REGIONS, **contact)).solve(comm=WORLD)
+    solution = epsmesh.read(raw(body=REGIONS, **contact)).solve(comm=WORLD, influence=True)
     influence, degree = solution.influence, {"quadrature_degree": 6}
     measure = ufl.Measure("dx", solution.mesh, subdomain_data=solution.regions, metadata=degree)
     found = dataset(body=REGIONS, **contact)
@@ -147,7 +162,9 @@ def test_what_has_no_influence_is_refused_with_its_reason(changes, said):
 
 
 def test_a_solution_without_influence_says_why():
-    solution = epsmesh.read(raw(probe=BALL | {"friction": 0.3}, mesh={"rim": "0.5 mm"})).solve(comm=MPI.COMM_SELF)
-    with pytest.raises(ValueError, match="no derivative of an energy"):
-        _ = solution.influence
-    assert "influence" not in solution.at([["1 mm", "1 mm", "-1 mm"]])
+    rubbing = {"probe": BALL | {"friction": 0.3}, "mesh": {"rim": "0.5 mm"}}
+    for changes, asked, said in ((rubbing, True, "no derivative of an energy"), ({}, False, "ask for it")):
+        solution = epsmesh.read(raw(**changes)).solve(comm=MPI.COMM_SELF, influence=asked)
+        with pytest.raises(ValueError, match=said):
+            _ = solution.influence
+        assert "influence" not in solution.at([["1 mm", "1 mm", "-1 mm"]])

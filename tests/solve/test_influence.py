@@ -146,6 +146,7 @@ def test_the_force_does_not_depend_on_whether_the_influence_is_asked_for():
         assert scene.force(scene.law)[0] == scene.force(scene.law, influence=True)[0]
 
 
+@pytest.mark.mpi
 @pytest.mark.parametrize("name", ["mixed", "found, neo-Hookean"])
 def test_ranks_agree(name):
     alone, together = Scene(CASES[name], MPI.COMM_SELF), Scene(CASES[name], WORLD)

@@ -100,7 +100,7 @@ class CaseSolution:
         """
         found = self.solved.state.influence
         if found is None:
-            why = refused("influence", self.case) or "the change of the solution with the depth was not found"
+            why = refused("influence", self.case) or "ask for it: study.solve(…, influence=True)"
             raise ValueError(f"the influence is unknown: {why}")
         function = fem.Function(cellwise_space(self.mesh, ()))
         function.x.array[compat.cell_dofs(function.function_space)[: len(found.young), 0]] = found.young

@@ -23,8 +23,8 @@ from epsmesh.study.influence import DECIDED
 _QUADRATURE, _CHUNK = 6, 20_000
 # Distances at which sums are read, from the least on, in units of the largest; they are interpolated between.
 _LEAST, _DISTANCES = 1e-4, 2_000
-# Least change of a region's share, in units of what changes anywhere in it; and of a distance, of the largest such one.
-_POINTWISE, _ELSEWHERE = 0.1, 0.3
+# Least change of a region's share, in units of what changes anywhere in it.
+_POINTWISE = 0.1
 # A sum of the influence that lacks no more than this is the whole force.
 _ROUNDING = 1e-6
 
@@ -83,9 +83,13 @@ def _bar_of_sums(here: FloatArray, above: FloatArray, changed: FloatArray) -> Fl
 
 
 def _bar_of_radii(here: FloatArray, by_cell: FloatArray, above: FloatArray) -> FloatArray:
-    """Return the bar of distances; the size of cells adds to it: ``by_cell``, where each cell is at one distance."""
-    by, size = np.abs(above / here - 1), np.abs(by_cell - here)
-    return CHANGES * here * np.maximum(by, _ELSEWHERE * np.nanmax(by, initial=0.0)) + size
+    """Return the bar of distances; the size of cells adds to it: ``by_cell``, where each cell is at one distance.
+
+    A change may vanish by chance: the bar of each has what all change on average.
+    """
+    changes = [np.abs(other / here - 1) for other in (above, by_cell)]
+    of_degree, of_size = (np.maximum(change, np.sqrt(np.nanmean(change**2))) for change in changes)
+    return np.asarray(here * (CHANGES * of_degree + of_size))
 
 
 def _points(state: State, centre: FloatArray) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
