@@ -83,9 +83,16 @@ class Complex:
         """Whether several regions meet what is outside."""
         return len(np.unique(self.sides[self.sides[:, 1] == OUTSIDE, 0])) > 1
 
+    @cached_property
+    def _surfaces(self) -> dict[int, Triangles]:
+        """Surfaces of regions that were asked for: what is found of one, such as its thickness, is kept by it."""
+        return {}
+
     def surface(self, region: int) -> Triangles:
         """Return the surface of a region."""
-        return self._surface(self.boundary(region))
+        if region not in self._surfaces:
+            self._surfaces[region] = self._surface(self.boundary(region))
+        return self._surfaces[region]
 
     def _surface(self, facets: IntArray) -> Triangles:
         used, corners = np.unique(facets, return_inverse=True)
