@@ -124,13 +124,18 @@ def test_the_bar_has_a_load_path_of_its_own_where_the_next_degree_does_not_settl
 
 
 def test_depths_on_a_path_have_the_forces_and_bars_of_each_alone():
+    """The load path goes on from one depth to the next: from rest, a large one takes more steps."""
     depths = [f"{depth} mm" for depth in (0.5, 1.0, 1.5)]
     probe = SPHERE | {"depth": depths, "mesh_depths": ["0.5 mm", "1.5 mm"]}
     together = solve(material=TISSUE, probe=probe, mesh=COARSE).values()
+    iterations = []
     for depth, one in zip(depths, together, strict=True):
         (alone,) = solve(material=TISSUE, probe=probe | {"depth": depth}, mesh=COARSE).values()
         assert one.force == pytest.approx(alone.force, rel=1e-7)
         assert one.force_error == pytest.approx(alone.force_error, rel=1e-2)
+        iterations.append((one.iterations, alone.iterations))
+    assert iterations[0][0] == iterations[0][1]
+    assert iterations[-1][0] < iterations[-1][1]
 
 
 def test_frames_keep_planes_of_symmetry():

@@ -9,17 +9,22 @@ from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.deformed import PlacedTool, solve_contact
+from epsmesh.solve.newton import LargeError
 
 COUNT = 9
 
 
 @dataclass
 class Springs:
-    """Nodes that move along z only, on springs whose ``stiffness`` couples any two of them; loads push them up."""
+    """Nodes that move along z only, on springs whose ``stiffness`` couples any two of them; loads push them up.
+
+    ``left`` is a residual inside the body that no step reduces.
+    """
 
     stiffness: FloatArray
     loads: FloatArray
     state: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
+    left: float = 0.0
     is_sound, energy, slope = True, np.nan, None
 
     @property
@@ -33,7 +38,7 @@ class Springs:
         return np.column_stack([np.zeros(COUNT), self.stiffness @ self.state - self.loads])
 
     def unbalanced(self) -> float:
-        return 0.0
+        return self.left
 
     def linearise(self, constraint: Constraint) -> FloatArray:
         held = constraint.held[:, 1]
@@ -122,3 +127,15 @@ def test_a_rough_solution_is_close_and_takes_at_least_one_step():
     exact_steps, rough_steps = np.array(rough).T
     assert (rough_steps >= 1).all()
     assert rough_steps.sum() < exact_steps.sum()
+
+
+def test_a_residual_that_rounding_keeps_from_falling_is_enough():
+    """One step more shows that it does not fall; a larger one is no rounding."""
+    tool, all_nodes = ceiling(np.zeros(COUNT), np.zeros(COUNT, dtype=bool)), np.ones(COUNT, dtype=bool)
+    exact, rounded = (
+        solve_contact(Springs(np.eye(COUNT), np.ones(COUNT), left=left), tool, all_nodes) for left in (0.0, 1e-7)
+    )
+    assert rounded.iterations == exact.iterations + 1
+    assert rounded.forces == pytest.approx(exact.forces)
+    with pytest.raises(LargeError):
+        solve_contact(Springs(np.eye(COUNT), np.ones(COUNT), left=1e-4), tool, all_nodes)
