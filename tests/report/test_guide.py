@@ -188,6 +188,20 @@ def test_without_error_bars_nothing_is_judged():
         guide(dataset(status=lambda case: "failed"), "5%")
 
 
+def test_the_full_order_is_no_answer_where_f_is_compared_with_it():
+    free = TEXT.replace('["coarse", "free"]', '"free"')
+    found = guide(dataset(free, exact=lambda case: False), "5%")
+    assert found.sentence.startswith("No ε keeps F within 5 % of F_max in all 4 scenes")
+    assert found.sentence.endswith("Best: ε = 10 mm, within 6.9 %.")
+    assert dict(found.details)["Worst case"].endswith("at ν = 0.4, scalpel")
+
+
+def test_a_study_of_one_mesh_setting_is_told_its_bars_and_what_compares():
+    one = TEXT.replace('["4 mm", "6 mm", "10 mm", "full"]', '"full"').replace('["coarse", "free"]', '"coarse"')
+    with pytest.raises(DatasetError, match=r"compares no meshes\. F is .*the largest error bar is 0\.4 %\. To compare"):
+        guide(dataset(one, exact=lambda case: False), "5%")
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_whatever_fails_the_answer_holds_for_every_scene_that_it_claims(seed):
     random = np.random.default_rng(seed)

@@ -22,11 +22,12 @@ from epsmesh.pages import render_text
 from epsmesh.printable import counted
 from epsmesh.quantities import symbol, write
 from epsmesh.report.by_scene import OfOutside, Part, parts
+from epsmesh.report.headline import headline
 from epsmesh.report.laws import Law, Laws
 from epsmesh.report.study import DatasetError, Labels
 from epsmesh.report.times import doubts
 from epsmesh.report.uncertainty import unknowns
-from epsmesh.report.verdicts import EXACT, Cells, Verdict, arrange, by_outside, choose, keeps, most_accurate
+from epsmesh.report.verdicts import EXACT, Cells, Verdict, arrange, by_outside, choose, is_full, keeps, most_accurate
 from epsmesh.report.words import choices, percent
 from epsmesh.units import parse_quantity
 
@@ -120,6 +121,8 @@ class Guide:
         if chosen is None:
             return self._no_answer()
         is_for_accuracy = isfinite(self.accuracy)
+        if is_for_accuracy and self._is_itself(chosen):
+            return self._only_full()
         smallest = "the smallest ε" if "epsilon" in chosen.labels else "the cheapest setting"
         best = f"the most accurate setting within {time(self.budget)} a case"
         what = f"{smallest} that suffices" if is_for_accuracy else best
@@ -135,6 +138,7 @@ class Guide:
     def details(self) -> list[tuple[str, str]]:
         """The worst case of the chosen setting, its cost and its elements: names and words."""
         verdict = self.answer or self.best
+        verdict = self._best_cut if verdict and self._is_itself(verdict) else verdict
         if verdict is None:
             return []
         where = f", at {choices(self.coordinates, verdict.limit)}" if verdict.limit else ""
@@ -267,6 +271,23 @@ class Guide:
         tried = {v.labels["epsilon"] for v in self.verdicts if "epsilon" in v.labels}
         return " No smaller ε was tried." if len(tried) > 1 and chosen.labels["epsilon"] == min(tried) else ""
 
+    def _is_itself(self, verdict: Verdict) -> bool:
+        """Tell whether a setting is the one that F is compared with."""
+        return is_full(verdict) and self.reference != EXACT
+
+    @property
+    def _best_cut(self) -> Verdict | None:
+        """The most accurate setting with an ε."""
+        return most_accurate((v for v in self.verdicts if not is_full(v)), self.budget)
+
+    def _only_full(self) -> str:
+        """Say that no ε suffices beside the full order, and which is the best."""
+        what, best = "puncture and cutting" if self._is_of_paths else "F", self._best_cut
+        none = (
+            f"No ε keeps {what} within {percent(self.accuracy)} of {self._compared}{_all(self.scenes)}, {self._bars}."
+        )
+        return f"{none} Best: {self._named(best)}, within {percent(best.error)}." if best else none
+
     def _no_answer(self) -> str:
         limits, best = list[str](), self.best
         if isfinite(self.accuracy):
@@ -367,7 +388,11 @@ def guide(dataset: xr.Dataset, accuracy: str | float | None = None, budget: str 
         reasons = "; ".join(f"{count} {why}" for why, count in Counter(cells.frame["why"]).most_common())
         raise DatasetError(f"no case can be judged: {reasons}")
     if len(cells.settings) == 1 and cells.reference != EXACT:
-        raise DatasetError("the study has one mesh setting, and F_max is its own force: it compares no meshes")
+        raise DatasetError(
+            "the study has one mesh setting, and F_max is its own force: it compares no meshes. "
+            f"{' '.join(headline(dataset))} To compare, write `exact = true` in [solve] for F_exact, or sweep epsilon "
+            'with "full" in place of an accuracy'
+        )
     return Guide(dataset, cells, wanted, seconds)
 
 
@@ -453,7 +478,7 @@ def cost(verdict: Verdict) -> str:
 
 def time(seconds: float) -> str:
     """Write seconds, in ms where they are few."""
-    return f"{seconds:.3g} s" if seconds >= 1 else f"{1e3 * seconds:.3g} ms"
+    return f"{seconds:.3g} s" if seconds >= 0.9995 else f"{1e3 * seconds:.3g} ms"
 
 
 def _all(count: int) -> str:

@@ -70,7 +70,7 @@ def _of_paths(dataset: xr.Dataset) -> list[str]:
     pierced = np.isfinite(dataset["puncture_depth"].values).reshape(size, -1).any(axis=1).sum()
     depth, force = (span(name, dataset[f"puncture_{name}"]) for name in ("depth", "force")) if pierced else ("", "")
     where = f" at a depth of {depth}, with F = {force}" if pierced else ""
-    found = f"{pierced} of {size} tools pierce the tissue{where}."
+    found = f"The tissue is pierced in {pierced} of {size} cases{where}."
     return [found, f"At the depths of the paths: {_of_forces(at_peak(dataset))}"]
 
 

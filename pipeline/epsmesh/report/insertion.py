@@ -47,7 +47,8 @@ def _lines(dataset: xr.Dataset) -> Iterator[str]:
         yield f"cutting at {write('depth', float(last['depth']))}: F = {_force(last)} (in mN: {parts})"
     if back is not None and bool(np.isfinite(back["force"]).any()):
         pulled = back["force"].dropna("depth").values * 1e3
-        yield f"withdrawal: F from {pulled[-1]:.4g} to {pulled[0]:.4g} mN, at least {pulled.min():.4g} mN"
+        first, end, least = (f"{force:.4g} mN" for force in (pulled[-1], pulled[0], pulled.min()))
+        yield f"withdrawal: F begins at {first} and ends at {end}; its least value is {least}"
     worst = float(np.nanmax(np.abs(whole["energy_balance"].values)))
     yield f"work is stored energy + fracture + friction within {100 * worst:.2g} %"
 

@@ -93,9 +93,9 @@ def _flat(where: str, value: Any, unit: str = "") -> Iterator[tuple[str, Any, st
 
 
 def _plain(value: Any) -> Any:
-    """Return a value that can be compared: numbers to so many digits, lists as tuples."""
+    """Return a value that can be compared: numbers to so many digits, lists as tuples, None for none of them."""
     if isinstance(value, tuple | list):
-        return tuple(_plain(one) for one in value)
+        return tuple(_plain(one) for one in value) or None
     if isinstance(value, dict):
         return tuple((key, _plain(one)) for key, one in sorted(value.items()))
     if isinstance(value, float):

@@ -16,7 +16,7 @@ from epsmesh.report import laws
 from epsmesh.report.laws import Codes, Correction, Forces, Laws, groups_without
 from epsmesh.report.sinking import LOADS, PLACES, Sinking, tools
 from epsmesh.report.study import DatasetError, Labels, case_at, plain, study_of
-from epsmesh.report.values import elastic, relative
+from epsmesh.report.values import elastic, has_path, relative
 from epsmesh.states import OK, PENDING
 from epsmesh.study.sweep import Study
 
@@ -298,9 +298,10 @@ def _reference(dataset: xr.Dataset) -> str:
     for name, variable in _VARIABLES.items():
         if variable in dataset and bool(np.isfinite(dataset[variable]).any()):
             return name
+    exact = "" if has_path(dataset) else "`exact = true` in [solve], or with "
     raise DatasetError(
-        "the dataset holds no F_exact, against which a guide compares each mesh: "
-        'run its study with `exact = true` in [solve], or with "full" in epsilon, for F_max'
+        "the dataset holds no F_exact or F_max, against which a guide compares each mesh: "
+        f'run its study with {exact}"full" and another ε in epsilon'
     )
 
 

@@ -1,6 +1,6 @@
 """The table of cases: columns in the units people read, rows in the order in which a reader needs them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from typing import Any
 
@@ -9,7 +9,7 @@ import xarray as xr
 from markupsafe import Markup
 
 from epsmesh.pages import json_in_page
-from epsmesh.quantities import LARGEST, QUANTITIES
+from epsmesh.quantities import LARGEST, MESH_DIMENSIONS, QUANTITIES
 from epsmesh.report.study import study_of
 from epsmesh.report.values import by_case, relative
 from epsmesh.report.words import is_numeric, lengths, number, scale, symbol
@@ -131,6 +131,13 @@ def case_table(dataset: xr.Dataset) -> Table:
     )
     message = _texts("message", by_case(dataset, "message").values.ravel(), "why there is no force")
     known = [column for column in quantities if any(value is not None for value in column.values)]
+    # The depth of a sweep is a column of its own; of one mesh setting, F_max is each case's own force.
+    swept = "probe_depth" in dims or "depth" in dims
+    needless = {
+        *(["depth"] if swept else []),
+        *(("force_ratio", "speedup") if {*dims}.isdisjoint(MESH_DIMENSIONS) else ()),
+    }
+    known = [replace(one, is_first=False) if one.name in needless else one for one in known]
     words = [column for column in (origin, message) if any(column.words or ())]
     rank = {state: position for position, state in enumerate(WORST_FIRST)}
     order = sorted(range(size), key=lambda row: rank.get(states[row], 0))
