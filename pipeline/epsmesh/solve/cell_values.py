@@ -32,19 +32,22 @@ from epsmesh.stages import stage
 # A quarter point is at 0.25 of its edge, a mid node at 0.5, up to the bulge of a curved edge.
 _BETWEEN = 0.375
 _CORNERS = 4
+# λ/μ up to which volume counts in energies: beyond, that of degree p is of the elements more than of the tissue.
+_MOST_RATIO = 10.0
 # For each mesh, by the front of its slit: the cells that are clear of singular edges.
 _clear: WeakKeyDictionary[Any, dict[Front | None, BoolArray]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Owned cells of a solution: the mean ``gradient`` of the displacement (n, 3, 3), and λ and μ (n), in Pa.
+    """Owned cells of a solution: the mean ``gradient`` of the displacement (n, 3, 3), λ and μ (n), Pa; volumes (n), m³.
 
     λ is infinite in incompressible tissue. In mixed elements (``is_mixed``) the mean pressure is not λ tr ε, so the
     stress is unknown: return NaN there.
     """
 
     gradient: FloatArray
+    volumes: FloatArray
     lame_lambda: FloatArray
     lame_mu: FloatArray
     is_linear: bool
@@ -56,6 +59,14 @@ class Cells:
         if self.is_linear:
             return np.asarray(np.linalg.eigvalsh((self.gradient + self.gradient.swapaxes(1, 2)) / 2))
         return np.asarray(np.linalg.svd(np.eye(3) + self.gradient, compute_uv=False)[:, ::-1] - 1)
+
+    @property
+    def energies(self) -> FloatArray:
+        """About the strain energies (n), J, of shape above all; λ is at most 10 μ in them."""
+        strain = (self.gradient + self.gradient.swapaxes(1, 2)) / 2
+        dilation = np.trace(strain, axis1=1, axis2=2)
+        volumetric = np.minimum(self.lame_lambda, _MOST_RATIO * self.lame_mu) / 2 * dilation**2
+        return np.asarray(self.volumes * (volumetric + self.lame_mu * (strain**2).sum(axis=(1, 2))))
 
 
 def _max_strain(cells: Cells) -> FloatArray:
@@ -96,6 +107,7 @@ class CellValues:
             lame = [values * self._factors[:owned] for values in lame]
         return Cells(
             gradient=integral / volume,
+            volumes=volume[:, 0, 0],
             lame_lambda=lame[0],
             lame_mu=lame[1],
             is_linear=law.is_linear,

@@ -18,12 +18,21 @@ from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.mesh.curve import EDGES
 from epsmesh.mesh.distribute import distribute
 from epsmesh.mesh.generate import MeshArrays
-from epsmesh.solve.compiled import MORE, cellwise_space, form, scalar_space, vector_space
+from epsmesh.solve.compiled import (
+    MORE,
+    cellwise_space,
+    form,
+    quadrature_degree,
+    quadrature_space,
+    scalar_space,
+    vector_space,
+)
 from epsmesh.solve.laws import LAWS
 from epsmesh.solve.laws.law import Pressure
 from epsmesh.solve.measures import STRAIGHT, curved_cells, dx, measures_of
 from epsmesh.solve.physics import COEFFICIENTS, MaterialLaw, of_regions, strain
 from epsmesh.solve.point_law import PointLaw
+from epsmesh.solve.variation import Factors
 
 
 class CellKernel(Protocol):
@@ -37,8 +46,9 @@ class ElasticForms:
 
     ``coefficients`` are the law's parameters by name: constants, or, on a mesh of several ``regions`` (of the local
     cells, ghosts included), functions that are constant on each cell. ``displacement`` is the u of ``action``, K u.
-    With a ``cell_kernel``, that kernel integrates K on straight cells. ``factors`` are those of the energy of each
-    local cell; ``factor`` is the function that has them, or 1.
+    With a ``cell_kernel``, that kernel integrates K on straight cells. ``factors`` are those of the energy; ``factor``
+    is what has them in forms, or 1. It ``is_sampled`` at the quadrature points of curved cells, which all cells then
+    are: see :func:`is_sampled`.
     """
 
     def __init__(
@@ -46,14 +56,14 @@ class ElasticForms:
         space: Any,
         regions: Int32Array | None = None,
         cell_kernel: CellKernel | None = None,
-        factors: FloatArray | None = None,
+        factors: Factors | None = None,
     ):
         self._space, self._regions = space, regions
         self._cell_kernel = cell_kernel if factors is None else None
         self.factor: Any = 1
+        self.is_sampled = is_sampled(space, factors)
         if factors is not None:
-            self.factor = fem.Function(self.cellwise)
-            self.factor.x.array[compat.cell_dofs(self.cellwise).reshape(-1)] = factors
+            self.factor = self._function_of(factors)
         self.displacement = fem.Function(space)
         self.coefficients = {name: self._coefficient() for name in COEFFICIENTS}
 
@@ -85,6 +95,18 @@ class ElasticForms:
             return fem.Constant(self._space.mesh, 1.0)
         return fem.Function(self.cellwise)
 
+    def _function_of(self, factors: Factors) -> Any:
+        mesh, degree = self._space.mesh, quadrature_degree(compat.degree(self._space))
+        points = quadrature_space(mesh, degree, 1) if self.is_sampled else self.cellwise
+        found = fem.Function(points)
+        values = factors.at_points(degree) if self.is_sampled else factors.means
+        found.x.array[compat.cell_dofs(points).reshape(-1)] = values.reshape(-1)
+        return found[0] if self.is_sampled else found
+
+    def dx(self, *, curved_only: bool = False) -> Any:
+        """Return the measure of the forms."""
+        return dx(self._space, curved_only=curved_only, everywhere=self.is_sampled)
+
     @cached_property
     def cellwise(self) -> Any:
         """The space of numbers that are constant on each cell."""
@@ -102,17 +124,17 @@ class ElasticForms:
     @cached_property
     def stiffness(self) -> Any:
         """Stiffness K."""
-        return self._form(ufl.TrialFunction(self._space), dx(self._space), self._kernels())
+        return self._form(ufl.TrialFunction(self._space), self.dx(), self._kernels())
 
     @cached_property
     def curved_stiffness(self) -> Any:
         """The part of K from cells with curved edges: the same code, with only these cells marked."""
-        return self._form(ufl.TrialFunction(self._space), dx(self._space, curved_only=True))
+        return self._form(ufl.TrialFunction(self._space), self.dx(curved_only=True))
 
     @cached_property
     def action(self) -> Any:
         """Product K u."""
-        return self._form(self.displacement, dx(self._space))
+        return self._form(self.displacement, self.dx())
 
     def _kernels(self) -> dict[int, int]:
         """Return the hand-written kernel for straight cells: it takes a twelfth of the time of the generated one."""
@@ -135,7 +157,7 @@ class MixedForms:
     """
 
     def __init__(self, elastic: ElasticForms, pressures: Any):
-        self._displacement, self._factor, self._pressures = elastic.displacement, elastic.factor, pressures
+        self._displacement, self._pressures, self._elastic = elastic.displacement, pressures, elastic
         self.pressure = fem.Function(pressures)
 
     @cached_property
@@ -161,7 +183,7 @@ class MixedForms:
         return self._form(self.pressure * ufl.div(ufl.TestFunction(self._displacement.function_space)))
 
     def _form(self, integrand: Any) -> Any:
-        return form(self._factor * integrand * dx(self._displacement.function_space))
+        return form(self._elastic.factor * integrand * self._elastic.dx())
 
 
 class HyperelasticForms:
@@ -206,7 +228,7 @@ class HyperelasticForms:
 
     @cached_property
     def _measures(self) -> dict[str, Any]:
-        return measures_of(self._space, self._cells, more=MORE)
+        return measures_of(self._space, self._cells, more=MORE, everywhere=self._elastic.is_sampled)
 
     def _test(self, row: int) -> tuple[int, Any]:
         return row, ufl.TestFunction(self._fields[row].function_space)
@@ -278,6 +300,15 @@ class HyperelasticForms:
             direction.x.array[:] = field.x.array
 
 
+def is_sampled(space: Any, factors: Factors | None) -> bool:
+    """Return whether ``factors`` vary within the cells of a space whose strain does, too.
+
+    All cells are then integrated as curved ones, with the factors at their quadrature points.
+    """
+    has_points = compat.degree(space) > 1 and curved_cells(space.mesh) is not None
+    return factors is not None and factors.varies and has_points
+
+
 def compile_forms(
     degree: int,
     element: str = "displacement",
@@ -297,7 +328,7 @@ def compile_forms(
     time steps, ``of_influence``: with those of the influence; ``varies``: with a factor of each cell.
     """
     regions = np.zeros(1, dtype=np.int32) if of_regions else None
-    factors = np.ones(1) if varies else None
+    factors = Factors.of_one_cell() if varies else None
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
     for level in range(1, degree + 2):
         space = vector_space(mesh, level)

@@ -19,30 +19,34 @@ _FLAT = 1e-9
 _curved: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
 
 
-def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:
+def dx(space: Any, *, curved_only: bool = False, more: int = 0, everywhere: bool = False) -> Any:
     """Return the measure for forms of elasticity on ``space``, with quadrature degrees; of curved cells only, if so.
 
     On straight cells degree 2p - 2 is exact; ``more`` is added for integrands that are no such polynomials. Curved
-    cells have a higher degree of their own, since few cells of a mesh are curved.
+    cells have a higher degree of their own, since few cells of a mesh are curved; all cells if ``everywhere``.
     """
     degree, mesh = compat.degree(space), space.mesh
     exact, enough = ({"quadrature_degree": d} for d in (2 * degree - 2 + more, quadrature_degree(degree)))
     curved = curved_cells(mesh)
-    if curved is None:
-        return ufl.dx(metadata=exact)
+    if everywhere or curved is None:
+        return ufl.dx(metadata=enough if everywhere else exact)
     marks = np.where(curved, _CURVED, _NEITHER if curved_only else STRAIGHT)
     measure = ufl.Measure("dx", domain=mesh, subdomain_data=compat.cell_tags(mesh, marks))
     return measure(STRAIGHT, metadata=exact) + measure(_CURVED, metadata=enough)
 
 
-def measures_of(space: Any, cells: Mapping[str, BoolArray | None], *, more: int) -> dict[str, Any]:
+def measures_of(
+    space: Any, cells: Mapping[str, BoolArray | None], *, more: int, everywhere: bool = False
+) -> dict[str, Any]:
     """Return a measure for each law on its ``cells``, None for all of them: see :func:`dx`."""
     masks = [mask for mask in cells.values() if mask is not None]
     if not masks:
-        return {law: dx(space, more=more) for law in cells}
+        return {law: dx(space, more=more, everywhere=everywhere) for law in cells}
     degree, mesh, count = compat.degree(space), space.mesh, len(masks)
     exact, enough = ({"quadrature_degree": d} for d in (2 * degree - 2 + more, quadrature_degree(degree)))
     curved, marks = curved_cells(mesh), np.array(masks).argmax(axis=0) + 1
+    if everywhere:
+        curved, exact = None, enough
     if curved is not None:
         marks[curved] += count
     measure = ufl.Measure("dx", domain=mesh, subdomain_data=compat.cell_tags(mesh, marks))

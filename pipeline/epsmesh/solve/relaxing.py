@@ -134,13 +134,15 @@ class HistoryVariables:
 
     def _flat(self, parts: list[FloatArray]) -> FloatArray:
         """Return values by part, (batches, quadrature, 6, lanes), as (6, points)."""
-        return np.concatenate([np.moveaxis(part, 2, 0).reshape(part.shape[2], -1) for part in parts], axis=1)
+        return np.concatenate(
+            [np.moveaxis(part, 2, 0).reshape(part.shape[2], part[:, :, 0].size) for part in parts], axis=1
+        )
 
     def _parts(self, values: FloatArray) -> list[FloatArray]:
         """Return the inverse of :meth:`_flat`."""
         ends = np.cumsum([np.prod(shape) for shape in self._shapes])[:-1]
         return [
-            np.moveaxis(part.reshape(-1, *shape), 0, 2)
+            np.moveaxis(part.reshape(len(part), *shape), 0, 2)
             for part, shape in zip(np.split(values, ends, axis=1), self._shapes, strict=True)
         ]
 

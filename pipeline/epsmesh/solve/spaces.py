@@ -14,13 +14,13 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from epsmesh import compat
-from epsmesh.arrays import FloatArray, Int32Array
+from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.scene.model import FIXED, MIRROR, PROBE
 from epsmesh.solve import SolveError
 from epsmesh.solve.compiled import assemble, fill, vector_space
 from epsmesh.solve.conditions import Conditions, Front
-from epsmesh.solve.forms import ElasticForms
+from epsmesh.solve.forms import ElasticForms, is_sampled
 from epsmesh.solve.kernels.assembly import StraightStiffness, cell_kernel
 from epsmesh.solve.kernels.cells import StraightMaps
 from epsmesh.solve.kernels.product import DEGREES, CellStiffness, SparsePart
@@ -30,6 +30,7 @@ from epsmesh.solve.measures import curved_cells, has_curved_cells
 from epsmesh.solve.movement import Loads, Motion
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.terms import Term
+from epsmesh.solve.variation import Factors
 from epsmesh.stages import stage
 
 _ORIGIN = np.zeros((1, 3))
@@ -43,8 +44,8 @@ class ElasticSpace:
 
     ``prescribed`` are local dofs (unrolled, owned and ghosts). Arrays named ``…_owned`` index owned dofs;
     ``probe_owned`` and ``fixed_owned`` index owned blocks of three dofs. ``owned`` and ``size`` count the dofs of this
-    rank, and of all ranks. ``terms`` are those of the conditions. ``factors`` are those of the energy of local cells,
-    or None. ``space`` and ``dirichlet`` are dolfinx objects.
+    rank, and of all ranks. ``terms`` are those of the conditions, ``factors`` those of the energy, or None. ``space``
+    and ``dirichlet`` are dolfinx objects.
     """
 
     @stage("spaces, forms")
@@ -58,6 +59,7 @@ class ElasticSpace:
         self.factors = factors_of(body, conditions)
         self._maps = maps
         self.space = space = vector_space(body.mesh, degree)
+        self._curved = _curved(body, self.factors) if is_sampled(space, self.factors) else curved_cells(body.mesh)
         index_map = space.dofmap.index_map
         self.owned, self.size = 3 * index_map.size_local, 3 * index_map.size_global
         probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
@@ -81,6 +83,11 @@ class ElasticSpace:
     def whole_dofs(self) -> int:
         """Number of unknowns of the whole body, of which a half or a quarter may be modelled; collective."""
         return 3 * whole_points(self.space, self.body)
+
+    @property
+    def means(self) -> FloatArray | None:
+        """The mean factor of the energy of each local cell, or None."""
+        return None if self.factors is None else self.factors.means
 
     def held(self, motion: Motion) -> FloatArray:
         """Return the displacement (m) that a unit of ``motion`` prescribes, zero elsewhere; local, with ghosts."""
@@ -116,12 +123,11 @@ class ElasticSpace:
     @cached_property
     def cells(self) -> CellStiffness:
         """The cells in the layout of products, made at first use; for degree 2 or more; collective."""
-        curved = curved_cells(self.body.mesh)
-        return CellStiffness(self.space, curved, self.prescribed, self.body.regions, self._maps, self.factors)
+        return CellStiffness(self.space, self._curved, self.prescribed, self.body.regions, self._maps, self.factors)
 
     @cached_property
     def _straight(self) -> StraightStiffness:
-        return StraightStiffness(self.space, curved_cells(self.body.mesh), self.body.regions, self.factors)
+        return StraightStiffness(self.space, self._curved, self.body.regions, self.factors)
 
     @stage("assembly")
     def _product(self, law: MaterialLaw, terms: list[PETSc.Mat]) -> PETSc.Mat:
@@ -153,7 +159,7 @@ class ElasticSpace:
         matrix = self._straight.matrix(law, _NO_DOFS if whole else self.prescribed, diagonal)
         if self.comm.allreduce(self._straight.nbytes, op=MPI.MAX) > _KEPT_BYTES:
             del self._straight
-        if has_curved_cells(self.body.mesh):
+        if self.forms.is_sampled or has_curved_cells(self.body.mesh):
             compat.add_matrix(matrix, self.forms.curved_stiffness, dirichlet, diagonal)
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, True)
@@ -255,7 +261,7 @@ class Spaces:
 
     def _new_maps(self) -> StraightMaps:
         factors = None if self._conditions is None else factors_of(self.body, self._conditions)
-        return StraightMaps(self.body.mesh, curved_cells(self.body.mesh), factors)
+        return StraightMaps(self.body.mesh, _curved(self.body, factors), factors)
 
     def __enter__(self) -> "Spaces":
         return self
@@ -283,13 +289,19 @@ class Spaces:
             self._made.popitem()
 
 
-def factors_of(body: BodyMesh, conditions: Conditions) -> FloatArray | None:
-    """Return the factor of the energy of each local cell, None if the stiffness does not vary; collective.
+def factors_of(body: BodyMesh, conditions: Conditions) -> Factors | None:
+    """Return the factors of the energy, None if the stiffness does not vary; collective.
 
     Raises:
         SolveError: if a field has no value somewhere.
     """
     return None if conditions.variation is None else conditions.variation.factors(body)
+
+
+def _curved(body: BodyMesh, factors: Factors | None) -> BoolArray | None:
+    """Return a mask of the local cells that are integrated as curved ones, by spaces of degree 2 or more."""
+    curved = curved_cells(body.mesh)
+    return np.ones_like(curved) if factors is not None and factors.varies and curved is not None else curved
 
 
 def whole_points(space: Any, body: BodyMesh) -> int:

@@ -1,17 +1,20 @@
-"""Stiffness that varies within regions: the energy of each cell has a factor, the mean of a field over the cell.
+"""Stiffness that varies within regions: the energy at a place has a factor, the value of a field there.
 
-E(x) is a modulus times a field s(x), and every energy is proportional to the modulus: each cell's energy is s̄ times
-that of the law. Cells thereby count as if their volume were s̄ times as large, in every operator and form. In mixed
-elements the pressure is s̄ times that of the elements' dofs, which is λ₁ div u of the law without a field.
+E(x) is a modulus times a field s(x), and every energy is proportional to the modulus: the energy per volume is s(x)
+times that of the law. Volume thereby counts as if it were s times as large, in every operator and form, at their
+quadrature points. In mixed elements the pressure is s times that of the elements' dofs, which is λ₁ div u of the law
+without a field. Elements of degree 1, whose strain is constant, need the means of cells alone.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Protocol
 from weakref import WeakKeyDictionary
 
+import basix
 import numpy as np
+from mpi4py import MPI
 
 from epsmesh import compat
 from epsmesh.arrays import FloatArray, IntArray
@@ -23,11 +26,13 @@ from epsmesh.solve import SolveError
 _RESOLVED, _HALVINGS = 1e-3, 3
 # Barycentric coordinates of the four points: one has the first weight, the others the second.
 _NEAR, _APART = (5 + 3 * 5**0.5) / 20, (5 - 5**0.5) / 20
+# A deviation of values in a cell, relative to their mean, up to which they are constant; the least value in a cell.
+_CONSTANT, _LEAST = 1e-9, 0.05
 # Points that are evaluated at once.
 _CHUNK = 1_000_000
 _CORNERS = 4
 # For each mesh, the factors of variations.
-_known: WeakKeyDictionary[Any, dict["Variation", FloatArray]] = WeakKeyDictionary()
+_known: WeakKeyDictionary[Any, dict["Variation", "Factors"]] = WeakKeyDictionary()
 
 
 class Field(Protocol):
@@ -44,6 +49,42 @@ class Field(Protocol):
         """Return the message about a ``value`` that is not positive at a ``point`` (3), m."""
 
 
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """The factors of the energy of local cells, ghosts included.
+
+    ``means`` (cells) are their means. They vary within cells of any rank if ``varies``. Relative to the mean,
+    ``variances`` (cells) are those within cells, ``rests`` (cells) those of what elements do not resolve there: more
+    than quadratic functions, or in cells of many details, than linear ones.
+    """
+
+    means: FloatArray
+    varies: bool
+    variances: FloatArray
+    rests: FloatArray
+    _at: Callable[[int], FloatArray]
+    _known: dict[int, FloatArray] = field(default_factory=dict)
+
+    @staticmethod
+    def of_one_cell() -> "Factors":
+        """Return factors that vary within one cell, on which forms are compiled."""
+
+        def ones(degree: int) -> FloatArray:
+            return np.ones((1, len(basix.make_quadrature(basix.CellType.tetrahedron, degree)[1])))
+
+        return Factors(np.ones(1), True, np.zeros(1), np.zeros(1), ones)
+
+    def in_cells(self, degree: int) -> FloatArray:
+        """Return the factors at the quadrature points of a ``degree``; their means alone where they do not vary."""
+        return self.at_points(degree) if self.varies else self.means[:, None]
+
+    def at_points(self, degree: int) -> FloatArray:
+        """Return the factors at the quadrature points of a ``degree``, (cells, points); their mean is that of cells."""
+        if degree not in self._known:
+            self._known[degree] = self._at(degree)
+        return self._known[degree]
+
+
 @dataclass(frozen=True)
 class Variation:
     """The field of each region of a mesh by number, None where the stiffness is constant.
@@ -54,8 +95,8 @@ class Variation:
     fields: tuple[Field | None, ...]
     turn: tuple[tuple[float, ...], ...] | None = None
 
-    def factors(self, body: BodyMesh) -> FloatArray:
-        """Return the factor of the energy of each local cell, ghosts included; collective.
+    def factors(self, body: BodyMesh) -> Factors:
+        """Return the factors of the energy of cells; collective.
 
         Raises:
             SolveError: if a field has no positive value somewhere in its region.
@@ -65,47 +106,97 @@ class Variation:
             known[self] = self._factors(body)
         return known[self]
 
-    def _factors(self, body: BodyMesh) -> FloatArray:
-        nodes = compat.geometry_dofs(body.mesh)
-        found, refusal = np.ones(len(nodes)), ""
-        regions = np.zeros(len(nodes), int) if body.regions is None else body.regions % len(self.fields)
-        for number, field in enumerate(self.fields):
-            if field is not None:
-                cells = np.flatnonzero(regions == number)
-                found[cells], why = self._means(field, np.asarray(body.mesh.geometry.x)[nodes[cells]])
-                refusal = refusal or why
+    def _factors(self, body: BodyMesh) -> Factors:
+        count, refusal = len(compat.geometry_dofs(body.mesh)), ""
+        means, variances, rests = np.ones(count), np.zeros(count), np.zeros(count)
+        for values_of, cells, nodes in self._parts(body):
+            means[cells], variances[cells], rests[cells], why = self._sampled(values_of, nodes)
+            refusal = refusal or why
         if refusals := [why for why in body.comm.allgather(refusal) if why]:
             raise SolveError(refusals[0])
-        return found
+        varies = bool(body.comm.allreduce(float(variances.max(initial=0.0)), op=MPI.MAX) > _CONSTANT**2)
+        return Factors(means, varies, variances, rests, lambda degree: self._at_points(body, means, degree))
 
-    def _means(self, field: Field, nodes: FloatArray) -> tuple[FloatArray, str]:
-        """Return the means of a field over cells with these ``nodes`` (cells, n, 3), and why it has none, or ""."""
-        halvings = _halvings(nodes, field.detail)
-        found, refusal = np.ones(len(nodes)), ""
+    def _parts(self, body: BodyMesh) -> Iterator[tuple[Field, IntArray, FloatArray]]:
+        """Yield each field with its local cells and their nodes (cells, n, 3)."""
+        nodes = compat.geometry_dofs(body.mesh)
+        regions = np.zeros(len(nodes), int) if body.regions is None else body.regions % len(self.fields)
+        for number, one in enumerate(self.fields):
+            if one is not None:
+                cells = np.flatnonzero(regions == number)
+                yield one, cells, np.asarray(body.mesh.geometry.x)[nodes[cells]]
+
+    def _sampled(self, of: Field, nodes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, str]:
+        """Return means over cells with these ``nodes``, variances and rests (see :class:`Factors`), and a refusal."""
+        halvings, refusal = _halvings(nodes, of.detail), ""
+        is_fitted = halvings > 0
+        means, variances, rests = np.ones(len(nodes)), np.zeros(len(nodes)), np.zeros(len(nodes))
         for level in range(_HALVINGS + 1):
             for cells in _chunks(np.flatnonzero(halvings == level), level):
-                means, why = self._mean(field, nodes[cells], level)
+                values, weights, why = self._values(of, nodes[cells], _points(level))
                 refusal = refusal or why
-                is_rough = np.zeros(len(cells), bool)
+                found = (values * weights).sum(axis=1) / weights.sum(axis=1)
                 if level < _HALVINGS and not refusal:
-                    finer, _ = self._mean(field, nodes[cells], level + 1)
-                    is_rough, means = np.abs(finer - means) > _RESOLVED * finer, finer
-                found[cells], halvings[cells[is_rough]] = means, level + 1
-        return found, refusal
+                    coarse = found
+                    values, weights, _ = self._values(of, nodes[cells], _points(level + 1))
+                    found = (values * weights).sum(axis=1) / weights.sum(axis=1)
+                    halvings[cells[np.abs(coarse - found) > _RESOLVED * found]] = level + 1
+                finest = level + 1 if level < _HALVINGS and not refusal else level
+                means[cells], variances[cells] = found, values.var(axis=1) / found**2
+                linear = (values - values @ _projection(finest, 1)).var(axis=1)
+                quadratic = (values - values @ _projection(finest, 2)).var(axis=1)
+                rests[cells] = np.where(is_fitted[cells], linear, quadratic) / found**2
+        return means, variances, rests, refusal
 
-    def _mean(self, field: Field, nodes: FloatArray, level: int) -> tuple[FloatArray, str]:
-        points, weights = _places(nodes, level)
+    def _at_points(self, body: BodyMesh, means: FloatArray, degree: int) -> FloatArray:
+        """Return the factors at quadrature points: of the field, or of its linear fit in cells of many details."""
+        at = np.asarray(basix.make_quadrature(basix.CellType.tetrahedron, degree)[0])
+        found = np.repeat(means[:, None], len(at), axis=1)
+        for values_of, within, nodes in self._parts(body):
+            halvings = _halvings(nodes, values_of.detail)
+            for level in range(_HALVINGS + 1):
+                for cells in _chunks(np.flatnonzero(halvings == level), level):
+                    mean, points = means[within[cells], None], at if level == 0 else _points(level)
+                    values, weights, _ = self._values(values_of, nodes[cells], points)
+                    if level > 0:
+                        values = values @ np.linalg.pinv(_functions(points, 1)).T @ _functions(at, 1).T
+                        _, weights = _places(nodes[cells], at)
+                    values = np.maximum(np.where(np.isfinite(values), values, mean), _LEAST * mean)
+                    signed = weights * np.asarray(basix.make_quadrature(basix.CellType.tetrahedron, degree)[1])
+                    found[within[cells]] = (
+                        values * mean * signed.sum(axis=1, keepdims=True) / (values * signed).sum(axis=1, keepdims=True)
+                    )
+        return found
+
+    def _values(self, of: Field, nodes: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray, str]:
+        """Return values at reference points ``at`` (q, 3) of cells, |dx/dX| there, (cells, q), and a refusal."""
+        points, weights = _places(nodes, at)
         if self.turn is not None:
             points = points @ np.array(self.turn)
+        points = points.reshape(-1, 3)
         try:
-            values = field.at(points.reshape(-1, 3))
+            values = of.at(points)
         except SolveError as error:  # which other ranks may not have
-            return np.ones(len(nodes)), str(error)
-        is_wrong = ~(values > 0) | ~np.isfinite(values)
+            return np.ones_like(weights), weights, str(error)
+        is_wrong, why = ~(values > 0) | ~np.isfinite(values), ""
         if is_wrong.any():
             first = int(is_wrong.argmax())
-            return np.ones(len(nodes)), field.refusal(points.reshape(-1, 3)[first], float(values[first]))
-        return (values.reshape(weights.shape) * weights).sum(axis=1) / weights.sum(axis=1), ""
+            why = of.refusal(points[first], float(values[first]))
+            values = np.where(is_wrong, 1.0, values)
+        return values.reshape(weights.shape), weights, why
+
+
+@cache
+def _projection(level: int, degree: int) -> FloatArray:
+    functions = _functions(_points(level), degree)
+    return np.asarray(functions @ np.linalg.pinv(functions)).T
+
+
+def _functions(at: FloatArray, degree: int) -> FloatArray:
+    """Return the values (q, functions) of the polynomials of a degree, 1 or 2, at reference points."""
+    x, y, z = at.T
+    linear = [np.ones(len(at)), x, y, z]
+    return np.column_stack([*linear, x * x, y * y, z * z, x * y, y * z, z * x] if degree > 1 else linear)
 
 
 def _halvings(nodes: FloatArray, detail: float) -> IntArray:
@@ -122,10 +213,10 @@ def _chunks(cells: IntArray, level: int) -> Iterator[IntArray]:
     return (cells[start : start + size] for start in range(0, len(cells), size))
 
 
-def _places(nodes: FloatArray, level: int) -> tuple[FloatArray, FloatArray]:
-    """Return points (cells, q, 3) and their weights (cells, q) of cells with these ``nodes`` (cells, n, 3)."""
+def _places(nodes: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return places (cells, q, 3) of reference points ``at`` (q, 3) of cells with these ``nodes``, and |dx/dX|."""
     degree = 1 if nodes.shape[1] == _CORNERS else 2
-    table = compat.reference_element(degree).tabulate(1, _points(level))[:, :, :, 0]
+    table = compat.reference_element(degree).tabulate(1, at)[:, :, :, 0]
     points = np.einsum("qi,cir->cqr", table[0], nodes)
     jacobian = np.einsum("aqi,cir->cqra", table[1:4], nodes)
     return points, np.abs(np.linalg.det(jacobian))

@@ -37,7 +37,7 @@ class Surface:
         """Return the candidates of a ``degree``; collective."""
         if degree not in self._found:
             space = self.space(degree)
-            self._found[degree] = find_candidates(self.spaces.body, space.space, space.factors)
+            self._found[degree] = find_candidates(self.spaces.body, space.space, space.means)
         return self._found[degree]
 
     def space(self, degree: int) -> ElasticSpace:

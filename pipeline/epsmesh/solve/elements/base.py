@@ -319,7 +319,7 @@ class Elements(ElementFields, ABC):
         pressure = self._pressure(law)
         p = None if pressure is None else _copied(pressure[0], self.unit(law))
         return State(
-            self.body, _copied(self.displacements.forms.displacement), p, law, factors=self.displacements.factors
+            self.body, _copied(self.displacements.forms.displacement), p, law, factors=self.displacements.means
         )
 
     def _pressure(self, law: MaterialLaw) -> tuple[Any, Any] | None:

@@ -17,13 +17,14 @@ from epsmesh.solve.kernels.cells import corners, owned_cells, reference, straigh
 from epsmesh.solve.kernels.native import address, call, point_at
 from epsmesh.solve.kernels.shared_rows import SharedRows
 from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.variation import Factors
 
 
 class StraightStiffness:
     """Straight cells of a space of displacements, and the sparsity pattern of all cells.
 
     ``curved`` is a mask of the local cells that others assemble, or None; ``regions`` are the numbers of the cells'
-    regions, ``factors`` those of the energy of local cells.
+    regions, ``factors`` those of the energy.
     """
 
     def __init__(
@@ -31,7 +32,7 @@ class StraightStiffness:
         space: Any,
         curved: BoolArray | None,
         regions: Int32Array | None = None,
-        factors: FloatArray | None = None,
+        factors: Factors | None = None,
     ):
         """Find the pattern; collective."""
         index_map = space.dofmap.index_map
@@ -76,7 +77,7 @@ class StraightStiffness:
         if self._factors is None:
             return regions, lame_lambda, lame_mu
         count = len(self._dofs)
-        factors, own = self._factors[:count], regions[:count]
+        factors, own = self._factors.means[:count], regions[:count]
         return np.arange(count, dtype=np.int32), factors * lame_lambda[own], factors * lame_mu[own]
 
     @property

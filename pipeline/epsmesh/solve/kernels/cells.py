@@ -16,6 +16,7 @@ from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.solve.compiled import quadrature_degree
 from epsmesh.solve.kernels.native import call, precision
 from epsmesh.solve.physics import MaterialLaw, of_regions
+from epsmesh.solve.variation import Factors
 
 # Cells per batch, as in product.c.
 LANES = 16
@@ -54,11 +55,11 @@ def filled(values: np.ndarray) -> np.ndarray:
 class StraightMaps:
     """The maps of the straight cells of a mesh, the same for spaces of all degrees.
 
-    ``curved`` is a mask of local cells, or None if none is curved. ``factors`` are those of the energy of local cells:
-    they count as volume.
+    ``curved`` is a mask of local cells, or None if none is curved. ``factors`` are those of the energy: they count
+    as volume.
     """
 
-    def __init__(self, mesh: Any, curved: BoolArray | None, factors: FloatArray | None = None):
+    def __init__(self, mesh: Any, curved: BoolArray | None, factors: Factors | None = None):
         self._mesh, self._curved, self._factors = mesh, curved, factors
 
     @cached_property
@@ -69,7 +70,7 @@ class StraightMaps:
         maps = np.zeros((-(-len(which) // LANES), 9, LANES))
         call("map_cells", len(which), which, corners(self._mesh), maps)
         if self._factors is not None:
-            maps *= filled(np.sqrt(self._factors[which])[:, None])
+            maps *= filled(np.sqrt(self._factors.means[which])[:, None])
         return _in_both(maps)
 
 
@@ -80,7 +81,7 @@ class CurvedCells:
     3) exist in both precisions, ``roots`` (batches, quadrature, lanes) in double only: see ``curved.c``.
     """
 
-    def __init__(self, space: Any, which: Int32Array, dofs: Int32Array, factors: FloatArray | None = None):
+    def __init__(self, space: Any, which: Int32Array, dofs: Int32Array, factors: Factors | None = None):
         """``which`` are the numbers of the curved cells, ``dofs`` (cells, points) the points of all local cells.
 
         ``factors``: see :class:`StraightMaps`.
@@ -94,9 +95,9 @@ class CurvedCells:
         sizes = len(which), nodes.shape[1], len(weights)
         call("map_curved", *sizes, nodes, by_points(of_geometry), weights, maps, self.roots)
         if factors is not None:
-            root = filled(np.sqrt(factors[which])[:, None])
+            root = filled(np.sqrt(factors.in_cells(self.quadrature)[which]))
             self.roots *= root
-            maps *= root[:, None]
+            maps *= root[:, :, None]
         self.maps = _in_both(maps)
         self.signs = _in_both(np.sign(weights))  # some weights are negative
         self.gradients = _in_both(by_points(reference(degree, self.quadrature)[2]))

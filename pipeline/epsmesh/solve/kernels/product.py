@@ -32,6 +32,7 @@ from epsmesh.solve.kernels.cells import (
 )
 from epsmesh.solve.kernels.native import Single, call, precision
 from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.variation import Factors
 
 DEGREES = (2, 3, 4)
 # The map from values to coefficients is sparse up to rounding of this size.
@@ -121,7 +122,7 @@ class CellStiffness:
         prescribed: Int32Array,
         regions: Int32Array | None = None,
         straight: StraightMaps | None = None,
-        factors: FloatArray | None = None,
+        factors: Factors | None = None,
     ):
         """Lay out the cells; collective."""
         self._mesh, self._factors = space.mesh, factors
@@ -138,7 +139,9 @@ class CellStiffness:
         """The roots that the maps of straight cells have as a factor, (batches, 1, lanes)."""
         which = self.lanes.which
         found = roots(corners(self._mesh)[which])
-        return self.lanes.spread((found if self._factors is None else found * np.sqrt(self._factors[which]))[:, None])
+        return self.lanes.spread(
+            (found if self._factors is None else found * np.sqrt(self._factors.means[which]))[:, None]
+        )
 
     def operator(self, law: MaterialLaw, further: Sequence[SparsePart] = ()) -> "CellOperator":
         """Return the stiffness of a material, with ``further`` parts."""
