@@ -35,8 +35,8 @@ from epsmesh.solve.relaxing import HistoryVariables, Points
 from epsmesh.solve.response import whole_force
 from epsmesh.stages import stage
 
-# Fewest steps of the whole movement.
-_FEWEST = 3
+# Fewest steps of the whole movement, without friction and with it.
+_FEWEST, _FEWEST_WITH_FRICTION = 3, 8
 # How often all steps are halved for an accuracy.
 _MOST_REFINEMENTS = 3
 # Of the difference between steps and double steps, a third is the error of the steps; the bar is twice that.
@@ -198,7 +198,7 @@ def follow_course(begin: Callable[[], "TimeSteps"], course: Course) -> tuple[His
         iterations += steps.iterations
         if steps.rubs:
             half = begin()
-            half.fewest = _FEWEST / 2
+            half.fewest /= 2
             found = found.with_half_the_steps(half.follow(course.coarse()), sorted(course.halves()))
             iterations += half.iterations
         if found.bar <= course.accuracy or refinements == _MOST_REFINEMENTS:
@@ -232,7 +232,7 @@ class TimeSteps:
         self._relaxes = any(each.relaxation for each in law.parameters)
         self._variables = HistoryVariables(self._body.points, [each.relaxation for each in law.parameters])
         self._state, self._before = (stack.enter_context(self._body.state()) for _ in range(2))
-        self._at_start, self.fewest = 0.0, float(_FEWEST)
+        self._at_start, self.fewest = 0.0, float(_FEWEST_WITH_FRICTION if indentation.rubs else _FEWEST)
         if (start := indentation.start()) is not None:
             self._state.array[:] = self._before.array[:] = start
             self._variables.begin(*self._body.stresses(self._state))
