@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import epsmesh
-from epsmesh.plan.cost import CostModel, Observation, fit
+from epsmesh.plan.cost import CostModel, Observation, features, fit
 from epsmesh.plan.plan import declare, first_attempts
 from epsmesh.plan.steps import OperatorStep
 from epsmesh.run.record import Record
@@ -124,6 +124,21 @@ def test_friction_takes_longer_than_contact_without_it(body, law, least, most):
         return sum(CostModel().step(step).seconds for step in first_attempts(declare(scene)).meshes)
 
     assert least < seconds(0.3) / seconds(0.0) < most
+
+
+@pytest.mark.parametrize("law", ["linear", "neo-hookean"])
+def test_time_steps_are_counted_and_friction_makes_them_longer(law):
+    tissue = {"law": law, "relaxation": [{"share": 0.4, "time": "1 s"}]}
+
+    def seconds(steps, friction=0.3):
+        probe = {"shape": "sphere", "radius": "4 mm", "depth": "0.4 mm", "contact": "unilateral", "friction": friction}
+        probe["history"] = {"ramp": "1 s", "hold": "1 s", "steps": steps}
+        (solve,) = declare(study(material=tissue, probe=probe)).solves
+        return CostModel().seconds("solve", *features(solve))
+
+    assert 2 < seconds(40) / seconds(10) < 4
+    assert seconds(1) == seconds(3) < seconds(4)
+    assert law == "linear" or 2 < seconds(20) / seconds(20, 0.0) < 8
 
 
 def test_meshes_that_may_have_to_follow_are_counted():

@@ -7,7 +7,7 @@ exponent of the prior. Time grows slowly with few cells, and in proportion to n 
 ridge regression about the prior fits stored cases, so that few of them change it little, and many determine it.
 """
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import exp, log
@@ -18,7 +18,7 @@ from epsmesh.plan.steps import MeshStep, Solve
 from epsmesh.plan.symmetry import model_planes
 from epsmesh.shapes.body import Layered
 from epsmesh.study.case import Case
-from epsmesh.study.way import Constraint, Steps, Way
+from epsmesh.study.way import Constraint, Way
 
 # Parallel speed-up of one solve: n ranks are n^0.8 times faster.
 _PARALLEL = 0.8
@@ -38,19 +38,21 @@ _FOLDED, _OF_BALL = 5.0, 15.6
 # Factors on the time: mixed elements, search for the contact area, several materials, proof of an accuracy; meshes of
 # curved and folded bodies.
 _MIXED, _SEARCH, _LAYERED, _PROOF = 1.4, 2.7, 1.8, 1.6
-# A course of some 40 time steps, linear and with a law of large displacements: times the static solve.
-_COURSE, _COURSE_LARGE = 40.0, 10.0
+# A time step of linear tissue takes as long as the static solve, one of large displacements this part of it. The least
+# number of steps. What friction multiplies: time steps, with half of them again, and load steps of large displacements.
+_STEP_LARGE, _FEWEST_STEPS = 0.1, 6
+_RUBBING_STEP, _RUBBING_LARGE = 6.0, 1.5
 _MESHED = {"curved": 2.5, "folded": 18.0}
 _MERIDIAN, _MERIDIAN_BYTES = 0.27, 3.8e8
 # Its kinds, and their times in units of the first: trial radii of a contact; load steps on a few meshes, at large
-# displacements or with friction; some 40 time steps besides.
+# displacements or with friction; each time step besides.
 _KINDS_OF_MERIDIAN = {
-    "meridian": 1.0,
-    "meridian contact": 1.7,
-    "meridian large": 4.0,
-    "meridian friction": 8.5,
-    "meridian time steps": 45.0,
+    "": 1.0,
+    "contact": 1.7,
+    "large": 4.0,
+    "friction": 8.5,
 }
+_STEP_OF_MERIDIAN = 1.0
 # Words of a kind in three dimensions.
 _TOUCH = {Constraint.FOUND: ["found"], Constraint.FRICTION: ["found", "friction"]}
 # Friction on a linear body: a factorisation, a condensation to the surface, and load steps there.
@@ -175,17 +177,17 @@ def _memory(solve: Solve) -> float:
 def kind_of(solve: Solve) -> str:
     """Return the kind of a solve in the cost model.
 
-    It names element, degree, several movements, unilateral contact, friction, several materials, time steps, and a
-    curved or folded body.
+    It names element, degree, several movements, unilateral contact, friction, several materials, the number of time
+    steps, and a curved or folded body.
     """
     case, way = solve.case, solve.way
     if solve.axisymmetric:
-        return _of_meridian(way)
+        return " ".join([_of_meridian(way), *_steps(case)])
     words = [way.formulation, str(case.mesh.degree)]
     words += [str(case.movements)] if case.movements > 1 else []
     words += _TOUCH.get(way.constraint, [])
     words += ["regions"] if case.body.regions else []
-    words += ["steps"] if way.in_time else []
+    words += _steps(case)
     if not isinstance(case.body, Layered):
         folds = case.body.curvature > _FOLDED * _OF_BALL * case.body.volume ** (1 / 3)
         words += ["folded" if folds else "curved"]
@@ -193,14 +195,23 @@ def kind_of(solve: Solve) -> str:
 
 
 def _of_meridian(way: Way) -> str:
-    match way.steps, way.constraint:
-        case Steps.TIME, _:
-            return "meridian time steps"
-        case Steps.LOAD, Constraint.FRICTION:
-            return "meridian friction"
-        case Steps.LOAD, _:
-            return "meridian large"
+    if way.rubs:
+        return "meridian friction"
+    if way.is_nonlinear:
+        return "meridian large"
     return "meridian contact" if way.is_found else "meridian"
+
+
+def _steps(case: Case) -> list[str]:
+    """Return the word for the number of time steps; without them, none."""
+    if not case.way.in_time or (history := case.probe.history) is None:
+        return []
+    return [f"{max(len(history.times()) - 1, _FEWEST_STEPS)}-steps"]
+
+
+def _steps_of(words: Sequence[str]) -> int:
+    """Return the number of time steps that a kind's words tell, 0 without any."""
+    return next((int(word.removesuffix("-steps")) for word in words if word.endswith("-steps")), 0)
 
 
 def features(solve: Solve) -> tuple[str, float, float]:
@@ -272,22 +283,29 @@ def _poisson(case: Case) -> float:
 
 @lru_cache
 def _prior(stage: str, kind: str) -> _Numbers:
-    if kind.startswith("meridian"):
-        return log(_MERIDIAN * _KINDS_OF_MERIDIAN.get(kind, 1.0)), 0.0, 0.0
-    element, degree, *words = kind.split()
+    element, *words = kind.split()
+    steps: float = _steps_of(words)
+    if element == "meridian":
+        static = _KINDS_OF_MERIDIAN[next((word for word in words if not word.endswith("-steps")), "")]
+        return log(_MERIDIAN * (static + _STEP_OF_MERIDIAN * steps)), 0.0, 0.0
+    degree, *words = words
+    steps *= _RUBBING_STEP if "friction" in words else 1.0
     if stage == "mesh":
         seconds, power = _MESH
         return log(seconds * _MESHED.get(words[-1] if words else "", 1.0)), power, 0.0
     if element not in ("displacement", "mixed"):  # the names of laws: Newton's method
         seconds, power = _LARGE[stage]
-        seconds *= _COURSE_LARGE if stage == "solve" and "steps" in words else 1.0
+        if stage == "solve":
+            seconds *= (_RUBBING_LARGE if "friction" in words else 1.0) + _STEP_LARGE * steps
         is_mixed = element.endswith("-mixed")
         return log(seconds * (_MIXED_LARGE if is_mixed else 1.0)), power, 0.0 if is_mixed else _LOCKING
     rubs = stage == "solve" and "friction" in words
-    seconds, power = _FRICTION if rubs else (_SOLVE if stage == "solve" else _BAR)[int(degree)]
+    stepped = stage == "solve" and steps > 0
+    seconds, power = _FRICTION if rubs and not stepped else (_SOLVE if stage == "solve" else _BAR)[int(degree)]
     movements = next((int(word) for word in words if word.isdigit()), 1)
     seconds *= (1 + _MOVEMENT * (movements - 1)) * (_MIXED if element == "mixed" else 1.0)
     seconds *= _LAYERED if "regions" in words else 1.0
-    seconds *= _SEARCH if stage == "solve" and "found" in words and not rubs else 1.0
-    seconds *= _COURSE if stage == "solve" and "steps" in words else 1.0
+    seconds *= _SEARCH if stage == "solve" and "found" in words and (stepped or not rubs) else 1.0
+    if stepped:
+        seconds = seconds * steps + (_FRICTION[0] if rubs else 0.0)
     return log(seconds), power, 0.0 if element == "mixed" or rubs else _LOCKING
