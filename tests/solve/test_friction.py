@@ -251,8 +251,8 @@ def test_the_size_of_a_traction_is_its_integral():
         shape = facet_nodes(degree)
         nodes = np.concatenate([shape.corners @ corners[[0, 1, 2]], shape.corners @ corners[[1, 3, 2]]])
         points, facets = np.unique(nodes.round(9), axis=0, return_inverse=True)
-        facets, none = facets.reshape(2, -1), np.zeros(2, dtype=np.int64)
-        both = Candidates(np.arange(len(points)), points, facets, shape, points[:, 0] < 0, none, none.astype(np.int32))
+        facets, none = facets.reshape(2, -1), np.zeros(2, dtype=np.int32)
+        both = Candidates(np.arange(len(points)), points, facets, shape, points[:, 0] < 0, none, np.ones(2), none)
         even = both.weights[:, None] * np.array([0.6, 0.8, 0.0])
         assert both.size_of(even) == pytest.approx(4.0)
         assert both.size_of(even - 2 * even * (points[:, :1] > 1)) < 4.0
