@@ -27,8 +27,10 @@ LETTERS = """[...document.querySelectorAll('body *')].filter(e => e.getBoundingC
     const size = parseFloat(getComputedStyle(e).fontSize);
     return figure ? size * figure.getBoundingClientRect().width / figure.viewBox.baseVal.width : size;
   })"""
-# What does not fit a phone is scrolled in its own frame; the first figure fills the page beside what is said of it.
+# Columns of panels are one below the other on a phone; what does not fit all the same is scrolled in its own frame. The
+# first figure fills the page beside what is said of it.
 FRAMED = "[...document.querySelectorAll('figure > div')].every(e => getComputedStyle(e).overflowX === 'auto')"
+NARROW = "[...document.querySelectorAll('figure > div')].every(e => e.scrollWidth <= e.clientWidth)"
 FILLED = """[...document.querySelector('.first').children].reduce((sum, e) => sum + e.clientWidth, 0)
   / document.body.clientWidth"""
 
@@ -157,6 +159,7 @@ def test_fits_the_screen_with_enough_contrast(browser, path, width, dark):
     assert browser.ask("document.documentElement.scrollWidth") <= width
     assert min(browser.ask(LETTERS)) >= 11.9, "letters of figures and page are 9 pt or larger"
     assert browser.ask(FRAMED)
+    assert browser.ask(NARROW)
     assert width < 1200 or browser.ask(FILLED) > 0.85
     colours = "[...document.querySelectorAll(SELECTOR)].map(e => getComputedStyle(e).color)"
     ground = luminance(browser.ask("getComputedStyle(document.body).backgroundColor"))

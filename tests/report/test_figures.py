@@ -11,8 +11,8 @@ import xarray as xr
 from epsmesh.report.figures import KINDS, choose, draw, figure, lacks
 from epsmesh.report.figures.curves import positions
 from epsmesh.report.figures.facets import arrange, rest
-from epsmesh.report.figures.ratio import ratio_facets
 from epsmesh.report.figures.style import COLOURS
+from epsmesh.report.figures.sweep import ratio_facets
 from epsmesh.report.pareto import is_by_chance
 from epsmesh.report.words import choice, heading, points
 from epsmesh.study.problems import StudyError
@@ -203,9 +203,8 @@ def test_the_rest_holds_what_a_figure_leaves_out(tmp_path):
     dims = ("poisson", "probe", "degree", "outside")
     seen = set()
     facets = ratio_facets(data)
-    for _, _, panel in facets.panels:
-        for curve in facets.curves:
-            seen |= cells(data, dims, facets.at | panel | curve)
+    for row, column, curve in itertools.product(facets.rows, facets.columns, facets.curves):
+        seen |= cells(data, dims, facets.at | row | column | curve)
     every = set(itertools.product(*(data[dim].values for dim in dims)))
     assert seen < every
     found = list(rest(data, facets))

@@ -105,12 +105,12 @@ def symbol(coordinate: xr.DataArray) -> str:
     return quantities.symbol(str(coordinate.name))
 
 
-def heading(array: xr.DataArray) -> str:
-    """Return what an axis of a figure says: name and unit."""
+def heading(array: xr.DataArray, *, short: bool = False) -> str:
+    """Return what an axis of a figure says: name, or where room is ``short`` its symbol, and unit."""
     name = str(array.name)
     known = quantities.quantity_of(name)
     text = (known.axis if known else "") or str(array.attrs.get("long_name", name))
-    unit = scale(array)[1]
+    text, unit = symbol(array) if short else text, scale(array)[1]
     return f"{text}, {unit}" if unit else text
 
 

@@ -12,14 +12,12 @@ from matplotlib.figure import Figure
 from epsmesh.files import FIGURE_FORMATS
 from epsmesh.printable import counted
 from epsmesh.report.figures.compliance import compliance, shows_tools
-from epsmesh.report.figures.error import error, error_facets
 from epsmesh.report.figures.facets import Facets, is_meshed, rest, swept
-from epsmesh.report.figures.force import force, history, nothing
 from epsmesh.report.figures.influence import influence
 from epsmesh.report.figures.insertion import insertion
 from epsmesh.report.figures.map import force_map
-from epsmesh.report.figures.ratio import ratio, ratio_facets
 from epsmesh.report.figures.style import STYLE, add_note, save
+from epsmesh.report.figures.sweep import error, error_facets, force, history, nothing, ratio, ratio_facets
 from epsmesh.report.study import study_of, warnings_of
 from epsmesh.report.values import at_peak, has_path, of_path
 from epsmesh.report.words import is_numeric, without_shared

@@ -22,16 +22,16 @@ def compliance(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """E d / F of tools with a known footprint, for each ε; lines: full order's, raised by one c for all of a kind."""
     data, heading = _with_positions(dataset)
     facets = arrange(data, (_WHOLE,), tool_dimension(dataset), flat=("epsilon",), most=(1, 3, 3))
-    figure, panels = grid(data, facets, (_WHOLE,))
+    figure, panels = grid(data, [facets], (_WHOLE,))
     for panel in panels:
         _draw(panel.ax, panel.data)
         if panel.ax.get_xlabel():
             panel.ax.set_xlabel(heading)
-        if panel.column == 0:
-            panel.ax.set_ylabel("compliance E d / F, 1/mm")
-    share(panels, facets)
-    # All share it: not before all are drawn.
-    figure.axes[0].set_xlim(0, _ROOM * figure.axes[0].get_xlim()[1])
+        panel.ax.set_ylabel(f"{'' if panel.column else 'compliance '}E d / F, 1/mm")
+    share(panels)
+    end = _ROOM * max(panel.ax.get_xlim()[1] for panel in panels)
+    for panel in panels:
+        panel.ax.set_xlim(0, end)
     contacts = np.unique(data["touch"].values.astype(str))
     tells = "Each line is one ε. Parallel lines: an ε-mesh adds the same compliance to every tool. "
     tells += "E is that of [material], or of the top layer."

@@ -1,7 +1,8 @@
 """Curves of quantities against a swept dimension, in a grid of panels."""
 
+import itertools
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -16,80 +17,94 @@ from epsmesh.report.figures.style import FAILED, LEGEND, WIDTH, log_scale, look,
 from epsmesh.report.words import choices, heading, is_numeric, lengths, scale
 from epsmesh.states import FAILURES
 
-_HEIGHT = 2.0  # inches of a panel
+_HEIGHT = 2.1  # inches of a panel
 _BESIDE = 1.6  # inches: what a figure takes besides its panels, above and below them
 _LONG = 30.0  # values that span more than this have a logarithmic axis
 _LINEAR = {"depth"}  # F over it is read as a stiffness
-_WORD, _LINE, _TITLE = 14, 36, 34  # letters: of a word's line at an axis, of all words there, of a panel's title
+# Letters: of a word's line at an axis, of all words there, of a panel's title, and of a line beside an axis.
+_WORD, _LINE, _TITLE, _LABEL = 14, 32, 34, 26
 _MARKED = 40  # points of a curve up to which each has a marker
 BARS = {"capsize": 2, "elinewidth": 0.8}
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One panel: its axes, the part of the dataset that it shows, its quantity, its column."""
+    """One panel: its axes, the part of the dataset that it shows, its quantity, its column, and the facets of that."""
 
     ax: Axes
     data: xr.Dataset
     quantity: str
     column: int
+    facets: Facets
+
+    @property
+    def curves(self) -> Iterator[tuple[str, dict[str, str], xr.Dataset]]:
+        """Label, colour with marker, and data of each curve."""
+        for position, curve in enumerate(self.facets.curves):
+            yield choices(self.data, curve), look(position), self.data.sel(curve)
 
 
-def grid(dataset: xr.Dataset, facets: Facets, quantities: Sequence[str]) -> tuple[Figure, list[Panel]]:
-    """Return a figure with a row of panels for each row of facets and each quantity."""
-    rows, columns = len(facets.rows) * len(quantities), len(facets.columns)
-    figure = new_figure(WIDTH * max(columns, 2) / 3 + LEGEND, _HEIGHT * rows + _BESIDE)
-    axes = figure.subplots(rows, columns, squeeze=False, sharex=True)
+def grid(
+    dataset: xr.Dataset,
+    facets: Sequence[Facets],
+    quantities: Sequence[str],
+    panel: float = WIDTH / 3,
+    beside: float = LEGEND,
+) -> tuple[Figure, list[Panel]]:
+    """Return a figure with columns for those of all ``facets``, and a row for each of their rows and each quantity.
+
+    Each column is ``panel`` inches wide; a legend has so many ``beside``.
+    """
+    columns = [(one, column) for one in facets for column in one.columns]
+    rows = list(itertools.product(facets[0].rows, quantities))
+    figure = new_figure(panel * max(len(columns), 2 * WIDTH / 3 / panel) + beside, _HEIGHT * len(rows) + _BESIDE)
+    axes = figure.subplots(len(rows), len(columns), squeeze=False, sharex="col")
     panels = []
-    for i, j, selection in facets.panels:
-        for k, quantity in enumerate(quantities):
-            ax = axes[i * len(quantities) + k, j]
-            panels.append(Panel(ax, dataset.sel(facets.at | selection), quantity, j))
-            if k == 0:
-                ax.set_title(textwrap.fill(choices(dataset, selection), _TITLE))
-            if j == 0:
-                ax.set_ylabel(textwrap.fill(heading(dataset[quantity]), 26))
-    if facets.x:
-        for ax in axes[-1]:
-            ax.set_xlabel(heading(dataset[facets.x]))
+    for j, (one, column) in enumerate(columns):
+        for ax, (row, quantity) in zip(axes[:, j], rows, strict=True):
+            panels.append(Panel(ax, dataset.sel(one.at | row | column), quantity, j, one))
+            if quantity == quantities[0]:
+                ax.set_title(textwrap.fill(choices(dataset, row | column), _TITLE))
+            ax.set_ylabel(textwrap.fill(heading(dataset[quantity], short=j > 0), _LABEL))
+        if one.x:
+            axes[-1, j].set_xlabel(heading(dataset[one.x]))
     return figure, panels
 
 
-def share(panels: Sequence[Panel], facets: Facets) -> None:
+def share(panels: Sequence[Panel]) -> None:
     """Give panels of a quantity one scale: all or, where columns are kinds of outside, those of each column."""
-    by_column = any("outside" in column for column in facets.columns)
     first: dict[tuple[str, int], Axes] = {}
     for panel in panels:
-        key = panel.quantity, panel.column if by_column and panel.quantity != "speedup" else 0
+        by_column = "outside" in panel.facets.columns[0] and panel.quantity != "speedup"
+        key = panel.quantity, panel.column if by_column else 0
         if first.setdefault(key, panel.ax) is not panel.ax:
             panel.ax.sharey(first[key])
             panel.ax.autoscale_view()
 
 
-def draw(panel: Panel, facets: Facets) -> None:
+def draw(panel: Panel) -> None:
     """Draw the curves of a panel, with the error bars of its quantity, and crosses where cases failed."""
-    assert facets.x is not None
-    x = positions(panel.data[facets.x])
-    joins = is_numeric(panel.data[facets.x]) and len(x) > 1
+    assert panel.facets.x is not None
+    along = panel.data[panel.facets.x]
+    x, count = positions(along), len(panel.facets.curves)
+    joins = is_numeric(along) and len(x) > 1
     factor = scale(panel.data[panel.quantity])[0]
-    for position, curve in enumerate(facets.curves):
-        line = panel.data.sel(curve)
+    for position, (label, own, line) in enumerate(panel.curves):
         y = factor * line[panel.quantity].values.astype(float)
         if not np.isfinite(y).any():
             continue
-        style = look(position) | ({} if joins else {"linestyle": "none"})
+        style = own | ({} if joins else {"linestyle": "none"})
         style |= {"marker": "none"} if joins and len(x) > _MARKED and not _has_lone(y) else {}
-        label = choices(panel.data, curve) or None
-        beside = x if joins else x + 0.12 * (position - (len(facets.curves) - 1) / 2)
+        beside = x if joins else x + 0.12 * (position - (count - 1) / 2)
         if (error := f"{panel.quantity}_error") in line:
             bars = np.broadcast_to(np.nan_to_num(np.abs(factor * line[error].values)), y.shape)
-            panel.ax.errorbar(beside, y, bars, label=label, **BARS, **style)
+            panel.ax.errorbar(beside, y, bars, label=label or None, **BARS, **style)
         else:
-            panel.ax.plot(beside, y, label=label, **style)
+            panel.ax.plot(beside, y, label=label or None, **style)
         failed = np.isin(line["status"].values.astype(str), FAILURES)
         place = {"transform": panel.ax.get_xaxis_transform(), "zorder": 6}
         panel.ax.plot(x[failed], np.full(failed.sum(), 0.04), "x", color=FAILED, **place)
-    write_ticks(panel.ax, panel.data[facets.x])
+    write_ticks(panel.ax, along)
 
 
 def _has_lone(values: np.ndarray) -> bool:

@@ -40,13 +40,6 @@ class Facets:
     note: str = ""
     part: tuple[str, ...] = ()
 
-    @property
-    def panels(self) -> Iterator[tuple[int, int, Selection]]:
-        """Row, column and selection of each panel."""
-        for i, row in enumerate(self.rows):
-            for j, column in enumerate(self.columns):
-                yield i, j, row | column
-
 
 def arrange(
     dataset: xr.Dataset,

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from epsmesh.report.figures.curves import BARS, grid
 from epsmesh.report.figures.facets import arrange
-from epsmesh.report.figures.style import LINE, finish, look
+from epsmesh.report.figures.style import LINE, finish
 from epsmesh.report.study import study_of
-from epsmesh.report.words import choices, heading, scale
+from epsmesh.report.words import heading, scale
 
 _SAID = 0.9  # the share of F whose distance is told in words
 
@@ -20,22 +20,20 @@ def influence(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     name = "influence_radius"
     factor, unit = scale(dataset[name])
     facets = arrange(dataset, (name,), None)
-    figure, panels = grid(dataset, facets, (name,))
+    figure, panels = grid(dataset, [facets], (name,))
     radii = sorted({factor * epsilon for epsilon in _epsilons(dataset) if isfinite(epsilon)})
     for panel in panels:
-        ax, share = panel.ax, 100 * panel.data["decided"].values
-        for number, curve in enumerate(facets.curves):
-            line = panel.data.sel(curve)
+        share = 100 * panel.data["decided"].values
+        for label, style, line in panel.curves:
             radius, bar = (factor * line[one].values for one in (name, f"{name}_error"))
             known = np.isfinite(radius)
-            style = look(number) | {"label": choices(panel.data, curve) or "F"}
-            ax.errorbar(radius[known], share[known], xerr=np.nan_to_num(bar[known]), **BARS, **style)
+            bars = np.nan_to_num(bar[known])
+            panel.ax.errorbar(radius[known], share[known], xerr=bars, label=label or "F", **BARS, **style)
         for radius in radii:
-            ax.axvline(radius, color=LINE, linewidth=0.7, linestyle="--", label="ε")
-        ax.set(xlim=(0, None), ylim=(0, 102), ylabel="decided within r, % of F" if panel.column == 0 else "")
-    for ax in figure.axes:
-        if ax.get_subplotspec().is_last_row():
-            ax.set_xlabel(heading(dataset[name]))
+            panel.ax.axvline(radius, color=LINE, linewidth=0.7, linestyle="--", label="ε")
+        panel.ax.set(xlim=(0, None), ylim=(0, 102), ylabel=f"{'' if panel.column else 'decided within r, '}% of F")
+        if panel.ax.get_subplotspec().is_last_row():
+            panel.ax.set_xlabel(heading(dataset[name]))
     told = dataset[name].sel(decided=_SAID, method="nearest").values
     low, high = (factor * find(told, initial=start) for find, start in ((np.nanmin, np.inf), (np.nanmax, -np.inf)))
     within = f"{low:.3g} {unit}" if low > 0.99 * high else f"{low:.3g} to {high:.3g} {unit}"

@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 from epsmesh.insertion.steps import ENDED, INDENTATION, PHASES
 from epsmesh.report.figures.curves import BARS, grid, share
 from epsmesh.report.figures.facets import arrange, swept
-from epsmesh.report.figures.style import COLOURS, LINE, WIDTH, finish, look, new_figure
+from epsmesh.report.figures.style import COLOURS, LINE, WIDTH, finish, new_figure
 from epsmesh.report.values import punctures
-from epsmesh.report.words import choices
 
 _HEIGHT = 5.2  # inches
 _PARTS = ("force_cutting", "force_friction", "force_elastic")
@@ -67,22 +66,15 @@ def insertion(dataset: xr.Dataset, title: str, warning: str) -> Figure:
 def _several(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """Draw F over depth of several cases, with the puncture of each: curves, in columns."""
     facets = arrange(dataset, ["force", "puncture_depth"], "depth", most=_MOST, first=_CURVES)
-    figure, panels = grid(dataset, facets, ["force"])
+    figure, panels = grid(dataset, [facets], ["force"])
     for panel in panels:
-        for position, curve in enumerate(facets.curves):
-            one = panel.data.sel(curve)
-            style = look(position)
-            depth, force, bar = (with_puncture(one, name) for name in ("depth", "force", "force_error"))
-            color, label = style["color"], choices(dataset, curve) or "F"
-            panel.ax.fill_between(1e3 * depth, 1e3 * (force - bar), 1e3 * (force + bar), color=color, alpha=0.15)
-            panel.ax.plot(1e3 * depth, 1e3 * force, **(style | {"marker": "none"}), label=label)
-            pierced = punctures(one)
-            panel.ax.errorbar(
-                *(1e3 * pierced[f"puncture_{name}"].values for name in _BARRED),
-                **(style | {"linestyle": "none"}),
-                **BARS,
-            )
-    share(panels, facets)
+        for label, style, one in panel.curves:
+            depth, force, bar = (1e3 * with_puncture(one, name) for name in ("depth", "force", "force_error"))
+            panel.ax.fill_between(depth, force - bar, force + bar, color=style["color"], alpha=0.15)
+            panel.ax.plot(depth, force, label=label or "F", **style | {"marker": "none"})
+            at = (1e3 * punctures(one)[f"puncture_{name}"].values for name in _BARRED)
+            panel.ax.errorbar(*at, **style | {"linestyle": "none"}, **BARS)
+    share(panels)
     panels[0].ax.set_ylim(bottom=0)
     finish(figure, title, f"{_OF_SEVERAL} {facets.note}".strip(), warning)
     return figure

@@ -49,7 +49,7 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             _draw_outline(ax, outline)
             ax.set_title(titles[column] if row == 0 else "")
             ax.set_xlabel(heading(dataset["x"]) if row == 1 else "")
-            ax.set_ylabel(heading(dataset["y"]) if column == 0 else "")
+            ax.set_ylabel(heading(dataset["y"], short=column > 0))
         figure.colorbar(drawn, ax=axes[row].tolist(), label=label)
     tells = "The force at each place, seen from above, and below it its 95\N{NO-BREAK SPACE}% error bar."
     finish(figure, title, " ".join(filter(None, (tells, facets.note))), warning)

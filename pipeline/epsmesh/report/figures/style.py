@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from epsmesh.files import atomic
@@ -105,10 +106,10 @@ def write_legend(figure: Figure) -> None:
     )
 
 
-def write_above(ax: Axes, title: str, letters: int, columns: int) -> None:
-    """Name the curves of a panel above it."""
+def write_above(ax: Axes, title: str, letters: int, columns: int) -> Legend:
+    """Name the curves of a panel above it, and return the legend."""
     handles, texts = ax.get_legend_handles_labels()
-    ax.legend(
+    return ax.legend(
         handles,
         [textwrap.fill(text, letters) for text in texts],
         title=title,

@@ -1,7 +1,9 @@
 """A figure as SVG inside a page: colours that follow the page's theme, names that no other figure has."""
 
+import itertools
 import re
 from io import StringIO
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -23,27 +25,60 @@ _THEME = {colour: f"var(--curve-{i})" for i, colour in enumerate(COLOURS, start=
     PAPER: "var(--paper)",
 }
 # Inches: narrower figures are drawn so wide that they fill the page beside what is said of them.
-_LEAST = 8.0
+_LEAST = 7.8
+_POINTS, _PIXELS = 72, 4 / 3  # in an inch; of CSS in a point
+_MARGIN = 2.0  # points left of a column
 _COLOUR = re.compile("|".join(_THEME))
 
 
 def in_page(figure: Figure, name: str) -> dict[str, Any]:
-    """Return ``figure`` for a page: an ``<svg>`` element, its width (CSS pixels) and caption; ``name`` is its kind.
+    """Return ``figure`` for a page: ``<svg>`` elements, their width (CSS pixels) and caption; ``name`` is its kind.
 
-    It is never shown smaller than it is drawn: letters would be. ``name`` goes before every name in it.
+    There is one for each column of panels, and one for a legend beside them: side by side they are the figure, and on a
+    narrow screen they are one below the other. None is shown smaller than it is drawn: letters would be. ``name`` goes
+    before every name in it.
     """
     caption = figure.get_label()
     figure.supxlabel("")
     with mpl.rc_context(STYLE):
         figure.set_figwidth(max(figure.get_figwidth(), _LEAST))
+        figure.set_dpi(_POINTS)  # as in the file: places and cuts are then the same
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+        cuts, key = _cuts(figure)
         buffer = StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None})
-    text = buffer.getvalue()
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
-    text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{name}-", text)
-    head, rest = text.split(">", 1)
-    width = round(float(re.findall(r'width="([\d.]+)pt"', head)[0]) * 4 / 3)
-    head = re.sub(r' (width|height)="[^"]*"', "", head)
-    svg = f'{head} style="min-width: {width}px" aria-hidden="true">{_COLOUR.sub(lambda found: _THEME[found[0]], rest)}'
-    return {"kind": name, "caption": caption, "svg": Markup(svg.strip()), "width": width}
+    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", buffer.getvalue(), flags=re.DOTALL)
+    text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{name}-", text[text.index("<svg") :])
+    content = text[text.index(">") + 1 : text.rindex("</svg>")].strip()
+    content = f'<g id="{name}-whole">{_COLOUR.sub(lambda found: _THEME[found[0]], content)}</g>'
+    width, height = figure.bbox.size
+    parts = []
+    for left, right in itertools.pairwise([0.0, *cuts, width]):
+        is_key = bool(key) and right == width
+        pixels, high = (right - left) * _PIXELS, key if is_key else height
+        size = f"--width: {pixels:.1f}px; flex-grow: {pixels:.0f}"
+        box = f"{left:.2f} 0 {right - left:.2f} {high:.2f}"
+        of_key = ' class="key"' if is_key else ""
+        parts.append(f'<svg{of_key} viewBox="{box}" style="{size}" aria-hidden="true">{content}</svg>')
+        content = f'<use href="#{name}-whole"/>'
+    return {"kind": name, "caption": caption, "svg": Markup("".join(parts)), "width": round(width * _PIXELS)}
+
+
+def _cuts(figure: Figure) -> tuple[list[float], float]:
+    """Return where (pt) a figure may be cut: left of columns, and of a legend or of scales of colours beside them.
+
+    A legend ends so far (pt) below the top; 0 without one.
+    """
+    # Those of colours have no place among the others, and of some versions not even the question.
+    places = [ax.get_subplotspec() if hasattr(ax, "get_subplotspec") else None for ax in figure.axes]
+    if len({id(place.get_gridspec()) for place in places if place}) != 1:
+        return [], 0.0  # rows have columns of their own
+    drawn = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    lefts, key = dict[float, float](), 0.0
+    for ax, place in zip(figure.axes, places, strict=True):
+        found = {place.colspan.start if place else inf: (ax.yaxis if place else ax).get_tightbbox(drawn).x0}
+        if (legend := ax.get_legend()) and (box := legend.get_window_extent(drawn)).x0 > ax.bbox.x1:
+            found[inf], key = box.x0, figure.bbox.height - box.y0 + _MARGIN
+        lefts |= {number: min(left, lefts.get(number, left)) for number, left in found.items()}
+    return [left - _MARGIN for column, left in sorted(lefts.items()) if column], key
