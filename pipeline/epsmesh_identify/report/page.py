@@ -32,6 +32,7 @@ def render(dataset: xr.Dataset, name: str) -> str:
     return render_page(
         _TEMPLATES / "identification.html.j2",
         "",
+        PAGE_CSS.parent,
         title=dataset.attrs.get("title", name),
         name=name,
         style=joined(PAGE_CSS),

@@ -74,7 +74,7 @@ def _cuts(figure: Figure) -> tuple[list[float], float]:
     places = [ax.get_subplotspec() if hasattr(ax, "get_subplotspec") else None for ax in figure.axes]
     if len({id(place.get_gridspec()) for place in places if place}) != 1:
         return [], 0.0  # rows have columns of their own
-    drawn = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    drawn = figure.canvas.get_renderer()
     lefts, key = dict[float, float](), 0.0
     for ax, place in zip(figure.axes, places, strict=True):
         found = {place.colspan.start if place else inf: (ax.yaxis if place else ax).get_tightbbox(drawn).x0}
