@@ -149,7 +149,7 @@ def test_the_figure_has_the_curves_of_the_dataset_beside_epsilon():
     ("changes", "said"),
     [
         ({"probe": BALL | {"friction": 0.3}}, "no derivative of an energy"),
-        ({"load": {"traction": [{"on": "free", "pressure": "0.2 kPa"}]}}, "the loads decide"),
+        ({"probe": BALL, "load": {"traction": [{"on": "free", "pressure": "0.2 kPa"}]}}, "where the depth begins"),
         ({"mesh": {"epsilon": "8 mm", "outside": "halfspace"}}, "beyond the cut"),
         ({"probe": {"history": {"ramp": "1 s", "hold": "5 s"}}}, "over time"),
         ({"probe": {"force": "5 mN", "depth": None}}, "give a depth"),

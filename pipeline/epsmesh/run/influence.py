@@ -29,10 +29,13 @@ _POINTWISE = 0.1
 _ROUNDING = 1e-6
 
 
-def influence_of(solve: Solve, state: State, finer: State | None) -> Mapping[str, tuple[float, ...]]:
+def influence_of(
+    solve: Solve, state: State, finer: State | None, contact_error: float = 0.0
+) -> Mapping[str, tuple[float, ...]]:
     """Return share of F by region, and distance (m) by share of F, with error bars, by their names; collective.
 
-    The mesh is that of the solver, turned so that the probe presses along −z.
+    The mesh is that of the solver, turned so that the probe presses along −z. ``contact_error`` is the relative error
+    bar of the contact radius: two degrees may have the same nodes in contact, and F another share where it is wider.
     """
     assert state.influence is not None
     case, body, comm = solve.case, state.body, state.body.comm
@@ -63,8 +66,9 @@ def influence_of(solve: Solve, state: State, finer: State | None) -> Mapping[str
         within += [by_distance(distances, here), by_distance(middles, whole), by_distance(distances, finest)]
     regions, within = (2.0 ** len(body.mirrored) * global_sum(comm, sums) for sums in (regions, within))
     radii = np.array([_radii(np.cumsum(one), edges[1:]) for one in within])
+    share = regions[0, 0]
     found = {
-        "force_share": (regions[0, 0], _bar_of_sums(*regions[0])),
+        "force_share": (share, _bar_of_sums(*regions[0]) + contact_error * np.abs(share * (1 - share))),
         "poisson_effect": (regions[1, 0], _bar_of_sums(*regions[1])),
         "influence_radius": (radii[0], _bar_of_radii(*radii)),
     }

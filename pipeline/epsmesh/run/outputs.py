@@ -5,7 +5,7 @@ Their error bars are the changes by elements of one degree more.
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
@@ -49,7 +49,8 @@ def with_fields(
     if solve.case.solve.influence and state.influence is None:
         notes.append("no influence: the change of the solution with the depth was not found")
     elif solve.case.solve.influence:
-        record = replace(record, influence=dict(influence_of(solve, state, finer)))
+        of_contact = 0.0 if isnan(record.contact_radius_error) else record.contact_radius_error
+        record = replace(record, influence=dict(influence_of(solve, state, finer, of_contact)))
     if solve.case.outputs:
         found, more = _outputs_of(solve, state, finer, record)
         record, notes = replace(record, largest=record.largest | found), [*notes, *more]

@@ -11,7 +11,7 @@ The influence (1/m³) is ∂ln F/∂ln E per volume. Its integral over the body 
 decide the rest. Near a singular edge it grows without limit as elements shrink: it is given by its mean over each cell.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from dolfinx import fem
 from epsmesh.arrays import FloatArray
 from epsmesh.shapes.tissue import lame
 from epsmesh.solve.compiled import global_sum
-from epsmesh.solve.elements.base import Elements
+from epsmesh.solve.elements.base import Elements, Rate
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.physics import MaterialLaw, SplitLaw
 from epsmesh.solve.points.state import Influence
@@ -33,19 +33,20 @@ def influence_of(
     elements: Elements,
     law: MaterialLaw,
     columns: Sequence[Column],
-    amounts: Sequence[float],
-    show_rate: Callable[[], None],
+    rate: Rate,
     force: float | None = None,
 ) -> Influence:
     """Return the influence on the owned cells; collective.
 
-    ``show_rate`` copies the change of the solution per metre of the tool's advance to the forms' fields. ``force`` (N)
-    is that on the whole body, by default that of these fields.
+    ``force`` (N) is that on the whole body, by default that of the fields.
+
+    Raises:
+        SolveError: if the rate is not found.
     """
     forms, body = elements.large_forms(law), elements.body
-    show_rate()
+    rate.show()
     forms.set_directions()
-    elements.show(columns, list(amounts))
+    elements.show(columns, rate.amounts)
     elements.set_law(law)
     owned, works = body.owned_cells, list[FloatArray]()
     # E ∂ψ/∂E, and ∂ψ/∂ν: the compliance is proportional to 1/E. Fibres are stiff in proportion to E, whatever ν is.

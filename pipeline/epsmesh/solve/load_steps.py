@@ -17,7 +17,7 @@ from epsmesh.arrays import FloatArray
 from epsmesh.solve.cell_values import plain_share
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.dead_loads import HeldTool, hold_tool
-from epsmesh.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Products, Solver
+from epsmesh.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Products, Rate, Solver
 from epsmesh.solve.elements.fields import Column, Fields
 from epsmesh.solve.ended import ended
 from epsmesh.solve.estimate import is_plain
@@ -147,11 +147,14 @@ class LoadSteps(Solver):
         work = global_sum(space.comm, np.array([residual[held] @ column.prescribed[held]]))
         return Products(space, [moved], [residual], work[None], work, on_terms[None])
 
-    def show_rate(self, columns: Sequence[Column], movement: Movement) -> None:
-        """Copy the linearised change per metre of the tool's advance to the forms' fields."""
+    def rate(self, columns: Sequence[Column], movement: Movement) -> Rate:
+        """Return the linearised rate."""
+        return Rate([column.amount for column in columns], lambda: self._show_rate(columns[0]))
+
+    def _show_rate(self, column: Column) -> None:
         with self._body.state() as state, self._body.state() as unit, self._body.state() as rate:
-            self._at(columns[0], state)
-            self._put_unit(columns[0], unit)
+            self._at(column, state)
+            self._put_unit(column, unit)
             move(self._body, state, unit, rate)
             self._body.show(rate)
 

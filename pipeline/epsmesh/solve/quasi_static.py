@@ -11,7 +11,6 @@ The tool is a constraint: its motion is prescribed (:mod:`epsmesh.solve.prescrib
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -27,7 +26,7 @@ from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.crack import Advance
 from epsmesh.solve.elements import elements_of
-from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate, show_unit
+from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate, rate_of_linear
 from epsmesh.solve.elements.displacement import DisplacementElements
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.estimate import error_bar, stiffness_bars
@@ -159,10 +158,9 @@ class QuasiStaticProblem(Problem):
         """Return the influence on owned cells, None where terms act at rest, or the rate fails; collective."""
         if self.elements.displacements.is_loaded:
             return None
-        columns, force = found.columns, found.response.force[2]
-        show, amounts = partial(found.solver.show_rate, columns, found.movement), [each.amount for each in columns]
+        rate = found.solver.rate(found.columns, found.movement)
         try:
-            return influence_of(self.elements, law, columns, amounts, show, force)
+            return influence_of(self.elements, law, found.columns, rate, found.response.force[2])
         except SolveError:
             return None
 
@@ -196,8 +194,8 @@ class QuasiStaticProblem(Problem):
                 finer.elements.show(finer.columns, amounts)
                 self.finer_state = finer.elements.state(law)
                 if asked.influence:
-                    show = partial(show_unit, finer.elements, finer.columns, movement)
-                    above = influence_of(finer.elements, law, finer.columns, amounts, show)
+                    rate = rate_of_linear(finer.elements, finer.columns, movement)
+                    above = influence_of(finer.elements, law, finer.columns, rate)
                     self.finer_state = replace(self.finer_state, influence=above)
             form = _form(solution.response, solution.load_response)
             if finer.decrements is None:

@@ -25,7 +25,7 @@ from epsmesh.solve.contact.surface_contact import SurfaceContact
 from epsmesh.solve.contact.sweep import Sweep
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact_result import ContactResult
-from epsmesh.solve.elements.base import Elements, HierarchicalEstimate
+from epsmesh.solve.elements.base import Elements, HierarchicalEstimate, Rate
 from epsmesh.solve.elements.fields import Column, add_far
 from epsmesh.solve.estimate import error_bar, found_again_bar, found_bar
 from epsmesh.solve.movement import Movement
@@ -165,8 +165,11 @@ class LinearContact:
                 self.sweep.keep_bar(depth, *known, movement.far)
         return estimate_of(self._plug, self.surface, depth, known, known[1])
 
-    def show_rate(self, columns: Sequence[Column], movement: Movement) -> None:
-        """Copy the change per metre of the tool's advance, with the same nodes in contact, to the forms' fields."""
+    def rate(self, columns: Sequence[Column], movement: Movement) -> Rate:
+        """Return the rate with the same nodes in contact."""
+        return Rate([column.amount for column in columns], self._show_rate)
+
+    def _show_rate(self) -> None:
         elements, depth, smooth = self.sweep.elements, self.obstacle.depth, self.smooth
         elements.start_at(self.unknowns)
         elements.hold(smooth.active)

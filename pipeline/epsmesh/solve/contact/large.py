@@ -41,7 +41,7 @@ from epsmesh.solve.contact.surface_contact import SurfaceContact
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact_result import ContactResult
-from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate
+from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate, Rate
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.ended import ended
 from epsmesh.solve.estimate import AT_EDGE_LARGE, found_again_bar
@@ -262,8 +262,11 @@ class LargeContactSolution:
         of_area = nan if here.is_ended else bar + abs(finer.surface_contact.whole_area / here.whole_area - 1)
         return estimate_of(finer.body.elements, here, self.depth, (decrement, bar), of_area)
 
-    def show_rate(self, columns: Sequence[Column], movement: Movement) -> None:
-        """Copy the change per metre of the tool's advance, with the same nodes in contact, to the forms' fields."""
+    def rate(self, columns: Sequence[Column], movement: Movement) -> Rate:
+        """Return the rate with the same nodes in contact."""
+        return Rate([column.amount for column in columns], self._show_rate)
+
+    def _show_rate(self) -> None:
         body, state, active, found = self.body, self.body.state, self.touched.active, list[FloatArray]()
         for share in (1 + _NEARBY, 1 - _NEARBY):
             body.state = state

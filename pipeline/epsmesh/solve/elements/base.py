@@ -68,6 +68,18 @@ class HierarchicalEstimate:
     is_solved: bool = False
 
 
+@dataclass(frozen=True)
+class Rate:
+    """The change of a state per metre of the tool's advance along its axis; ``show`` copies it to the forms' fields.
+
+    The state is the sum of the columns times ``amounts``. ``show`` is collective, and raises a SolveError if a linear
+    solver fails.
+    """
+
+    amounts: list[float]
+    show: Callable[[], None]
+
+
 class HierarchicalEstimator(Protocol):
     """An object with a hierarchical estimate from one degree more."""
 
@@ -83,12 +95,8 @@ class HierarchicalEstimator(Protocol):
         ``keep`` requests the solutions of that degree, too.
         """
 
-    def show_rate(self, columns: Sequence[Column], movement: Movement) -> None:
-        """Copy the change of the solution per metre of the tool's advance to the forms' fields; collective.
-
-        Raises:
-            SolveError: if a linear solver fails.
-        """
+    def rate(self, columns: Sequence[Column], movement: Movement) -> "Rate":
+        """Return how the state changes with the depth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,15 +156,20 @@ class Solver(ABC):
     ) -> HierarchicalEstimate:
         """Return the hierarchical estimate: see :class:`HierarchicalEstimator`."""
 
-    def show_rate(self, columns: Sequence[Column], movement: Movement) -> None:
-        """Copy the solution per metre of the tool's advance along its axis, −z, to the forms' fields."""
-        show_unit(self.elements, columns, movement)
+    def rate(self, columns: Sequence[Column], movement: Movement) -> Rate:
+        """Return the rate of linear tissue: the solution per metre along −z."""
+        return rate_of_linear(self.elements, columns, movement)
 
 
-def show_unit(elements: ElementFields, columns: Sequence[Column], movement: Movement) -> None:
-    """Copy the solution of linear tissue per metre of the tool's advance along its axis, −z, to the forms' fields."""
+def rate_of_linear(elements: ElementFields, columns: Sequence[Column], movement: Movement) -> Rate:
+    """Return the rate of linear tissue whose footprint is known: the solution per metre along −z.
+
+    Loads, of the last column, add a force of their own.
+    """
     number = next(n for n, motion in enumerate(movement.motions) if motion.direction[2])
-    elements.show([columns[number]], [-movement.motions[number].direction[2]])
+    along = -movement.motions[number].direction[2]
+    amounts = [*movement.amounts, *(0.0 for _ in columns[len(movement.motions) :])]
+    return Rate(amounts, lambda: elements.show([columns[number]], [along]))
 
 
 class Linearised(ABC):

@@ -130,6 +130,11 @@ def is_loaded(scene: Scene) -> bool:
     return scene.load.acts or bool(scene.body.pressures)
 
 
+def _moves_surface(scene: Scene) -> bool:
+    """Return whether the depth counts from the surface as loads leave it, and not from the undeformed one."""
+    return is_loaded(scene) and (scene.probe.is_unilateral or _is_large(scene) or bool(scene.load.terms))
+
+
 def _has_term(scene: Scene, name: str) -> bool:
     return bool(getattr(scene.load, name))
 
@@ -233,6 +238,7 @@ FEATURES: dict[str, Feature] = {
     "mixed elements": Feature("mesh.element", lambda s: s.mesh.element == "mixed"),
     "accuracy": Feature("mesh.accuracy", lambda s: s.mesh.accuracy is not None),
     "loads": Feature("load", is_loaded, ("body",)),
+    "loads that move the surface": Feature("load", _moves_surface, ("body", "material", "probe")),
     "terms": Feature("load", lambda s: bool(s.load.terms)),
     **{name: Feature(f"load.{name}", partial(_has_term, name=name), write=lambda _: None) for name in TERMS},
     # Of a case: the sections of a scene have none.

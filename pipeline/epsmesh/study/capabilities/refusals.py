@@ -176,7 +176,11 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("insertion", "loads", f"cuts in tissue under loads are not computed: {_NO_LOADS}"),
     # Where F is decided: its derivatives by the modulus at a place.
     Refusal("influence", "friction", "with friction, F is no derivative of an energy: omit it, or friction"),
-    Refusal("influence", "loads", f"the loads decide a part of F, and where its depth begins: {_NO_LOADS}, or omit it"),
+    Refusal(
+        "influence",
+        "loads that move the surface",
+        f"they decide where the depth begins: {_NO_LOADS}, or omit it",
+    ),
     Refusal("influence", "half ball", 'tissue beyond the cut decides a part of F: omit it, or use outside = "coarse"'),
     Refusal("influence", "slit", "the force of a blade in a slit has a part at the slit's front: omit it"),
     Refusal("influence", "insertion", "along an insertion, F has parts of fracture and friction: omit it"),
