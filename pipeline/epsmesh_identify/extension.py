@@ -92,6 +92,25 @@ def draw(dataset: "xr.Dataset", stem: Path) -> list[Path]:
     return drawn(dataset, stem)
 
 
+def is_sensitivity(dataset: "xr.Dataset") -> bool:
+    """Tell the dataset of Sobol's indices from others."""
+    return {"first", "total", "surrogate_error"} <= {*dataset.data_vars}
+
+
+def write_sensitivity(dataset: "xr.Dataset", path: Path) -> Path:
+    """Write the report of Sobol's indices."""
+    from epsmesh_identify.report.page import write_sensitivity as write  # noqa: PLC0415
+
+    return write(dataset, path)
+
+
+def draw_sensitivity(dataset: "xr.Dataset", stem: Path) -> list[Path]:
+    """Draw the figure of Sobol's indices."""
+    from epsmesh_identify.report.figures.sensitivity import draw as drawn  # noqa: PLC0415
+
+    return drawn(dataset, stem)
+
+
 def further(study: Study, output: Path) -> Callable[[Path], Made] | None:
     """Return what makes the sensitivity of a study; None without the section."""
     from epsmesh_identify.cli.sensitivity import sensitivity_of  # noqa: PLC0415
@@ -122,3 +141,6 @@ SECTIONS = Sections(
 )
 
 IDENTIFICATION = Kind("an identification", "identification of curves", is_identification, write_page, draw)
+SENSITIVITY = Kind(
+    "a sensitivity", "sensitivity of forces to parameters", is_sensitivity, write_sensitivity, draw_sensitivity
+)

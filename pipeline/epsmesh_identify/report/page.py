@@ -1,4 +1,4 @@
-"""The report of an identification: one HTML page with the answer, its figure, all values, and the study."""
+"""The reports of an identification and of Sobol's indices: one HTML page with answer, figure, values, and study."""
 
 from pathlib import Path
 from shlex import quote
@@ -14,7 +14,9 @@ from epsmesh.report.page.facts import provenance, study_path
 from epsmesh.report.page.inline import PAGE_CSS, in_page
 from epsmesh.study.identified import FITS
 from epsmesh_identify.report.figures.identification import identification
+from epsmesh_identify.report.figures.sensitivity import sensitivity
 from epsmesh_identify.report.identified import answer, bar, if_undeclared, material, parts, title, wanted, written
+from epsmesh_identify.report.sensitivity import rows_of, sentences
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -34,6 +36,7 @@ def render(dataset: xr.Dataset, name: str) -> str:
         "",
         PAGE_CSS.parent,
         title=dataset.attrs.get("title", name),
+        heading="Values and their error bars",
         name=name,
         style=joined(PAGE_CSS),
         answer=answer(dataset),
@@ -41,12 +44,41 @@ def render(dataset: xr.Dataset, name: str) -> str:
         figure=_figure(dataset),
         columns=columns,
         rows=rows,
+        is_beside=len(columns) < 6 and len(rows) < 8,
         parts=[parts(dataset, one) for one in wanted(dataset)] if is_one and fits else [],
         material=material(dataset),
         study=str(dataset.attrs.get("study", "")),
         commands=[f"epsmesh identify {study_path(dataset, name)}", f"epsmesh report {quote(f'results/{name}.nc')}"],
         provenance=provenance(dataset),
     )
+
+
+def write_sensitivity(dataset: xr.Dataset, path: Path) -> Path:
+    """Write the report of Sobol's indices to ``path``, in place of an earlier one only once it is whole."""
+    with mpl.rc_context(STYLE):
+        figure = in_page(sensitivity(dataset.assign_attrs(title="")), "sensitivity")
+    name = path.stem.removesuffix("_sensitivity")
+    page = render_page(
+        _TEMPLATES / "identification.html.j2",
+        "",
+        PAGE_CSS.parent,
+        title=dataset.attrs.get("title", name),
+        heading="Shares of the variance and their error bars",
+        name=name,
+        style=joined(PAGE_CSS),
+        answer=sentences(dataset),
+        fits=True,
+        figure=figure,
+        columns=["of", "parameter", "range", "alone", "in all"],
+        rows=rows_of(dataset),
+        is_beside=False,
+        parts=[],
+        material="",
+        study=str(dataset.attrs.get("study", "")),
+        commands=[f"epsmesh run {study_path(dataset, name)}", f"epsmesh report {quote(f'results/{path.stem}.nc')}"],
+        provenance=provenance(dataset),
+    )
+    return write_whole(path, page)
 
 
 def _figure(dataset: xr.Dataset) -> dict[str, Any]:

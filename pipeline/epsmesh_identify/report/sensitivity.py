@@ -14,6 +14,17 @@ def answer(dataset: xr.Dataset) -> list[str]:
     return [line for output in dataset["output"].values for line in _of_output(dataset.sel(output=output))]
 
 
+def sentences(dataset: xr.Dataset) -> list[str]:
+    """Return in a sentence or two for each output which parameter matters most, and how exact that is."""
+    outputs = [ordered(dataset.sel(output=output)) for output in dataset["output"].values]
+    return [_concluded(one) for one in outputs]
+
+
+def rows_of(dataset: xr.Dataset) -> list[list[str]]:
+    """Return a row of words for each output and parameter: output, parameter, range, and both indices."""
+    return [row for output in dataset["output"].values for row in _rows(dataset.sel(output=output))]
+
+
 def share(value: float, error: float) -> str:
     """Write a share and its error bar in per cent."""
     return f"{100 * value:.1f} ± {100 * error:.1f} %"
@@ -38,12 +49,21 @@ def _of_output(one: xr.Dataset) -> Iterator[str]:
     letter, mean = symbol(name), write(name, float(one["mean"]), unit)
     yield f"{letter}: mean {mean}, standard deviation {100 * float(one['deviation']):.1f} % of it"
     yield _ROW.format("parameter", "from – to", "alone", "in all")
-    found = ordered(one)
+    yield from (_ROW.format(*row[1:]) for row in _rows(one))
+    yield f"  {_concluded(ordered(one))}"
+
+
+def _rows(one: xr.Dataset) -> Iterator[list[str]]:
+    letter, found = symbol(str(one["output"].values)), ordered(one)
     for number in range(found.sizes["parameter"]):
         row = found.isel(parameter=number)
         alone, total = (share(float(row[kind]), float(row[f"{kind}_error"])) for kind in ("first", "total"))
-        yield _ROW.format(str(row["parameter"].values), range_of(row), alone, total)
-    yield f"  {_what_matters(found, letter)} Surrogate: {int(one['cases'])} cases, error {percent(one)}."
+        yield [letter, str(row["parameter"].values), range_of(row), alone, total]
+
+
+def _concluded(found: xr.Dataset) -> str:
+    letter = symbol(str(found["output"].values))
+    return f"{_what_matters(found, letter)} Surrogate: {int(found['cases'])} cases, error {percent(found)}."
 
 
 def _what_matters(found: xr.Dataset, letter: str) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from epsmesh.netcdf import write_netcdf
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import read_mapping
 from epsmesh.study.toml import to_toml
@@ -105,6 +106,19 @@ def test_the_dataset_names_what_was_varied():
     assert list(dataset["parameter"].values) == list(VARIED)
     assert float(dataset["high"].sel(parameter="radius")) == pytest.approx(3e-3)
     assert str(dataset["output_unit"].sel(output="force").values) == "N"
+
+
+def test_the_report_of_its_dataset_has_the_answer_the_figure_and_all_indices(tmp_path, epsmesh):
+    study = read_mapping(PUNCH | {"sensitivity": VARIED}, "punch")
+    path = tmp_path / "punch_sensitivity.nc"
+    write_netcdf(dataset_of(study, explain(study, solved_by(_punch))), path)
+    result = epsmesh("report", path)
+    assert result.exit_code == 0, result.output
+    page = path.with_suffix(".html").read_text(encoding="utf-8")
+    assert "young matters most" in page
+    assert "<svg" in page
+    assert all(f"<td>{name}</td>" in page for name in VARIED)
+    assert "epsmesh run punch.toml" in page
 
 
 def test_an_output_that_varies_by_less_than_its_error_has_no_known_indices():
