@@ -179,7 +179,7 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         "influence",
         "loads that move the surface",
-        f"they decide where the depth begins: {_NO_LOADS}, or omit it",
+        f"the loads decide where the depth begins: {_NO_LOADS}, or omit it",
     ),
     Refusal("influence", "half ball", 'tissue beyond the cut decides a part of F: omit it, or use outside = "coarse"'),
     Refusal("influence", "slit", "the force of a blade in a slit has a part at the slit's front: omit it"),
