@@ -1,4 +1,4 @@
-"""Make the surfaces and the label maps in meshes/: shapes like organs', copied from nobody's.
+"""Make the surfaces, the label maps and the stiffness map in meshes/: shapes like organs', copied from nobody's.
 
 Ellipsoids that run into each other, with smooth noise, sampled as the voxels of a segmented image; the surface round
 them, as a body `image` has it, with fewer facets. The same files every time: python scripts/make_organs.py
@@ -198,11 +198,25 @@ def names() -> bytes:
     return "\n".join(["# Labels of patient.nii.gz; made by scripts/make_organs.py", *lines, ""]).encode()
 
 
+def stiffness() -> bytes:
+    """A map of the liver's stiffness (kPa), as elastography has it: voxels of 3 mm, and no value near the surface."""
+    counts, voxel, half = (67, 41, 34), 3.0, (100.0, 60.0, 50.0)
+    affine = np.vstack([np.column_stack([np.eye(3) * voxel, -np.array(half)]), [0, 0, 0, 1]])
+    places = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1) @ affine[:3, :3].T + affine[:3, 3]
+    values = 5 * np.exp(0.25 * noise(places, 40, 5))
+    values += 20 / (1 + np.exp(lump(places) / 1.5))
+    values[liver(places) > -2] = np.nan
+    found = nibabel.Nifti1Image(np.round(values, 2).astype(np.float32), affine)
+    found.header.set_xyzt_units("mm")
+    return gzip.compress(found.to_bytes(), mtime=0)
+
+
 FILES: dict[str, Callable[[], bytes]] = {
     **{name: lambda name=name: WRITERS[Path(name).suffix](*surface(ORGANS[name])) for name in ORGANS},
     "liver.nii.gz": lambda: image(tumour),
     "patient.nii.gz": lambda: image(*PATIENT.values()),
     "patient.txt": names,
+    "stiffness.nii.gz": stiffness,
 }
 
 

@@ -213,6 +213,14 @@ def test_what_has_no_field_is_refused(changes, said):
     assert said in refusal(raw(material={"young": {"formula": "8 kPa*(1 + 0.1*z/(20 mm))"}}, **changes))
 
 
+def test_cases_on_one_mesh_have_their_own_fields():
+    formulas = ["10 kPa", "10 kPa*(1 - z/(10 mm))", "10 kPa*(1 + z/(40 mm))"]
+    together = solve(material={"young": {"formula": formulas}})
+    alone = [force(material={"young": {"formula": formula}}) for formula in formulas]
+    assert [record.force for record in together.values()] == pytest.approx(alone, rel=1e-7)
+    assert len({round(number, 5) for number in alone}) == len(formulas)
+
+
 def test_one_of_several_fields_is_a_label_of_a_sweep():
     several = study(material={"young": {"formula": ["8 kPa", "9 kPa*(1 + 0.1*z/(20 mm))"]}})
     assert [axis.path for axis in several.axes] == ["material.young.formula"]

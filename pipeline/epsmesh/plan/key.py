@@ -117,10 +117,11 @@ def _rim_text(case: Case) -> tuple[str, ...]:
 def operator_key(case: Case) -> str:
     """Return the key of a case's spaces and boundary conditions on its mesh: all further inputs but the moduli.
 
-    The depth is left out, too, if contact is found or displacements are large.
+    The depth is left out, too, if contact is found or displacements are large. Fields of moduli are conditions, too.
     """
     probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.way.is_followed else _UNPHYSICAL)
-    return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.load.terms)])
+    fields = [tissue.varying.identity if tissue.varying else "" for tissue in case.tissues] if case.varies else []
+    return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.load.terms), *fields])
 
 
 def normalised(case: Case) -> Case:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 from epsmesh.extensions import Filled, Reading
@@ -9,6 +10,7 @@ from epsmesh.shapes.body import Body
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.section import Section
 from epsmesh.study.output import Output
+from epsmesh.study.problems import Problems
 from epsmesh.study.schema import Material
 from epsmesh_identify.sections.identification import Identification, check_shared, read_identify, read_measurements
 from epsmesh_identify.sections.measured import OF_ONE_FORCE, completed, with_borrowed
@@ -38,6 +40,7 @@ def _read_experiment(study: Reading) -> tuple[tuple[Measurement, ...], Identific
     measurements = read_measurements(raw["measurement"], problems) if "measurement" in raw else ()
     if problems.errors or not (measurements or "identify" in raw):
         return measurements, Identification()
+    _check_constant(study.sections, "identification", problems)
     found = read_identify(raw.get("identify", {}), measurements, _parameters(study.sections), problems)
     for number, measurement in enumerate(measurements, start=1):
         where, known = f"measurement[{number}]", _parameters(study.sections)
@@ -45,6 +48,7 @@ def _read_experiment(study: Reading) -> tuple[tuple[Measurement, ...], Identific
             scene = scene_at(raw, measurement, where, study.file, problems)
             if scene is None:
                 continue
+            _check_constant(scene.sections, "identification", problems)
             known = _parameters(scene.sections)
             check_shared(found, measurement, known, problems)
         found = own_errors(found, measurement, where, known, problems)
@@ -55,9 +59,20 @@ def _read_spread(study: Reading, outputs: Sequence[Output]) -> Spread:
     """Return the parameters that are varied, and the outputs to explain."""
     if study.problems.errors or "sensitivity" not in study.given:
         return Spread()
+    _check_constant(study.sections, "sensitivity", study.problems)
     known = {name: one for name, one in _parameters(study.sections).items() if one.place}
     asked = study.given["sensitivity"]
     return read_sensitivity(asked, known | {DEPTH.name: DEPTH}, outputs, study.problems)
+
+
+def _check_constant(sections: Mapping[str, tuple[Section, ...]], what: str, problems: Problems) -> None:
+    """Report moduli that vary from place to place: a modulus is then no number to be found or varied."""
+    for body, material in product(sections["body"], sections["material"]):
+        assert isinstance(body, Body) and isinstance(material, Material)
+        if any(tissue.varying is not None for tissue in (material, *body.regions)):
+            allowed = f"is a field, and {what} is computed for one modulus in each region: give a value"
+            problems.error("material.young", None, allowed)
+            return
 
 
 def _parameters(sections: Mapping[str, tuple[Section, ...]]) -> dict[str, Parameter]:
