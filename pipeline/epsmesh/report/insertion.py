@@ -48,7 +48,8 @@ def _lines(dataset: xr.Dataset) -> Iterator[str]:
     if back is not None and bool(np.isfinite(back["force"]).any()):
         pulled = back["force"].dropna("depth").values * 1e3
         first, end, least = (f"{force:.4g} mN" for force in (pulled[-1], pulled[0], pulled.min()))
-        yield f"withdrawal: F begins at {first} and ends at {end}; its least value is {least}"
+        further = "" if least in (first, end) else f"; its least value is {least}"
+        yield f"withdrawal: F begins at {first} and ends at {end}{further}"
     worst = float(np.nanmax(np.abs(whole["energy_balance"].values)))
     yield f"work is stored energy + fracture + friction within {100 * worst:.2g} %"
 
