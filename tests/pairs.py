@@ -338,8 +338,9 @@ def write_bodies(folder: Path) -> None:
     }
     header["space origin"] = np.array([-23.0, -23.0, -23.0])
     nrrd.write(str(folder / "box.nrrd"), label, header)
-    x, y, z = np.indices(label.shape)
-    nrrd.write(str(folder / "map.nrrd"), 10.0 + 2.0 * np.sin(x / 5) + 0.1 * y - 0.2 * z, header)
+    x, y, z = np.indices((26, 26, 24))
+    place = {"space origin": np.array([-25.0, -25.0, -23.0])}
+    nrrd.write(str(folder / "map.nrrd"), 10.0 + 2.0 * np.sin(x / 5) + 0.1 * y - 0.2 * z, header | place)
     label[:12, 12:] *= 2
     nrrd.write(str(folder / "labels.nrrd"), label, header)
     # In a process of its own: in this one the mesher may have begun.

@@ -55,8 +55,9 @@ def test_a_field_that_is_constant_in_a_layer_is_the_layer(changes, poisson):
 
 
 @pytest.mark.mpi
-def test_ranks_agree():
-    changes = {"material": {"young": {"formula": "10 kPa*(1 + 0.3*z/(20 mm))"}, "poisson": 0.49}}
+@pytest.mark.parametrize("changes", [{}, {"probe": SPHERE}], ids=str)
+def test_ranks_agree(changes):
+    changes = changes | {"material": {"young": {"formula": "10 kPa*(1 + 0.3*z/(20 mm))"}, "poisson": 0.49}}
     assert force(MPI.COMM_WORLD, **changes) == pytest.approx(force(**changes), rel=1e-6)
 
 
@@ -211,6 +212,75 @@ SLIT = {"shape": "blade", "length": "8 mm", "width": "1 mm", "incision": "8 mm",
 )
 def test_what_has_no_field_is_refused(changes, said):
     assert said in refusal(raw(material={"young": {"formula": "8 kPa*(1 + 0.1*z/(20 mm))"}}, **changes))
+
+
+def test_a_stack_of_layers_tends_to_the_field():
+    """Layers of a thickness h, with the moduli of their middles, change F as h²."""
+    mesh = {"fine": "2.5 mm", "coarse": "6 mm", "rim": "0.5 mm", "growth": 0.6, "degree": 3}
+
+    def young(depth):
+        return f"{10 * (1 + 0.15 * depth):.9g} kPa"
+
+    def stack(count):
+        thick = 20 / count
+        layers = [
+            {"name": f"l{n}", "thickness": f"{thick} mm", "young": young((n + 0.5) * thick), "poisson": 0.3}
+            for n in range(count - 1)
+        ]
+        return force(body={"layer": layers}, material={"young": young(20 - thick / 2)}, mesh=mesh)
+
+    known = force(material={"young": {"formula": "10 kPa*(1 - 0.15*z/(1 mm))"}}, mesh=mesh)
+    off = [stack(count) / known - 1 for count in (2, 4, 8)]
+    assert off[2] < 0.03
+    assert off[0] / off[1] == pytest.approx(3.1, rel=0.1)
+    assert off[1] / off[2] == pytest.approx(3.6, rel=0.2)
+
+
+def test_an_image_of_two_values_tends_to_a_layer(tmp_path):
+    (layer,) = solve(body=_layer("30 kPa", 0.3)).values()
+    off = []
+    for voxel in (2.0, 1.0):
+        counts = [int(44 / voxel), int(44 / voxel), int(24 / voxel)]
+        z = -22.0 + voxel * (np.arange(counts[2]) + 0.5)
+        values = np.broadcast_to(np.where(z > -3, 30.0, 10.0), counts)
+        origin = (-22 + voxel / 2, -22 + voxel / 2, -22 + voxel / 2)
+        _image(tmp_path, values, voxel=voxel, origin=origin)
+        found = _force(tmp_path, {"file": "map.nii.gz", "unit": "kPa"})
+        assert abs(found.force / layer.force - 1) < found.force_error + layer.force_error
+        off.append(abs(found.force / layer.force - 1))
+    assert off[1] < off[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "poisson"),
+    [({}, 0.3), ({}, 0.49), ({"probe": SPHERE}, 0.49), ({"material": LARGE}, 0.3), ({"material": LARGE}, 0.49)],
+    ids=str,
+)
+def test_bars_hold_finer_elements_with_a_field(changes, poisson):
+    material = {"young": {"formula": "10 kPa*exp(-z/(8 mm))*(1 + x^2/(20 mm)^2)"}, "poisson": poisson}
+    coarse, fine = (
+        solve(**changes | {"material": material | changes.get("material", {}), "mesh": mesh})
+        for mesh in ({}, {"rim": "0.2 mm", "growth": 0.4, "fine": "3 mm"})
+    )
+    (found,), (known,) = coarse.values(), fine.values()
+    assert found.balance < 1e-6
+    assert abs(found.force / known.force - 1) < found.force_error + known.force_error
+    assert known.force_error < found.force_error
+
+
+def test_large_displacements_begin_as_small_ones_with_a_field():
+    young = {"formula": "10 kPa*(1 - z/(10 mm))"}
+    probe = {"depth": "0.01 mm"}
+    assert force(material=LARGE | {"young": young}, probe=probe) == pytest.approx(
+        force(material={"young": young}, probe=probe), rel=1e-3
+    )
+
+
+def test_what_elements_do_not_resolve_is_in_the_bar():
+    smooth, rough = solve(
+        material={"young": {"formula": ["10 kPa*(1 + 0.5*sin(x/(9 mm)))", "10 kPa*(1 + 0.5*sin(x/(0.1 mm)))"]}}
+    ).values()
+    assert rough.force_error > smooth.force_error + 0.02
 
 
 def test_cases_on_one_mesh_have_their_own_fields():
