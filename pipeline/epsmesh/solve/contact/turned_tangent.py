@@ -23,7 +23,7 @@ from epsmesh.solve.elements.pressures import without_columns
 from epsmesh.solve.hyperelastic import HyperelasticBody
 from epsmesh.solve.kernels.pressure import matrix_of
 from epsmesh.solve.krylov import INDEFINITE, check_converged, explained, factorised, is_truncated, keep, solver_of
-from epsmesh.solve.newton import forcing
+from epsmesh.solve.newton import FINE, forcing
 from epsmesh.solve.physics import MaterialLaw
 
 _MOST_ITERATIONS = 300
@@ -209,6 +209,9 @@ class IteratedTangent(TurnedTangent):
         is_mixed, norm = isinstance(self._elements, MixedElements), load.norm()
         gained, self._before = norm / self._before if self._before else 1.0, norm
         tolerance = forcing(gained, target / norm if norm else 1.0)
+        if constraint.sliding is not None:
+            # Friction is corrected once an iteration, and then gains little: its nodes would be judged by rough solves.
+            tolerance = FINE
         for kind in ("tangent, mixed",) if is_mixed else ("tangent", "tangent, mixed"):
             how = {"ksp_rtol": tolerance, "ksp_max_it": _MOST_ITERATIONS}
             ksp = solver_of(kind, self._matrix, stack, preconditioner, **how)
