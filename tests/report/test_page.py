@@ -14,12 +14,13 @@ import pytest
 from epsmesh.pages import json_in_page, marked
 from epsmesh.report import page
 from epsmesh.report.dataset import write
-from epsmesh.report.figures import choose, draw
+from epsmesh.report.figures import choose, draw, figure
 from epsmesh.report.guide import USUAL_ACCURACY, guide, guide_if_any
 from epsmesh.report.headline import headline
 from epsmesh.report.page import render, write_page
 from epsmesh.report.page.cases import case_table
 from epsmesh.report.page.facts import reproduce
+from epsmesh.report.page.inline import in_page
 from epsmesh.report.read import read_file
 from epsmesh.report.study import case_at, study_of
 from tests.cases import BLADE, raw
@@ -198,6 +199,17 @@ def test_every_kind_of_figure_is_in_the_page_once():
     found = Reader(render(data, "places"))
     assert found.ids.count("figure-map") == 1
     assert [tag for tag, _ in found.tags].count("figure") == len(choose(data))
+
+
+def test_a_figure_is_in_the_page_once_whatever_it_is_cut_into():
+    """Columns of panels and the legend: side by side they are as wide as the figure."""
+    data = dataset(**SWEEP)
+    found = in_page(figure(data, "ratio", titled=False), "ratio")
+    widths = [float(width) for width in re.findall(r"--width: ([\d.]+)px", found["svg"])]
+    assert len(widths) == data.sizes["outside"] + 1
+    assert sum(widths) == pytest.approx(found["width"], abs=1)
+    assert found["svg"].count('id="ratio-whole"') == 1
+    assert found["svg"].count('href="#ratio-whole"') == len(widths) - 1
 
 
 def test_a_written_dataset_gives_the_same_table(tmp_path):

@@ -62,6 +62,14 @@ class Work:
     shard: "Shard | None" = None
     fresh: bool = False
 
+    def stores(self, study: "Study") -> tuple[Path, list[Path]]:
+        """Return the case store of a study, and those beside it: a shard's are apart from the others'."""
+        from epsmesh.plan.shard import stores_of
+
+        main = self.output / STORE_NAME
+        own = self.shard.store(self.output, study) if self.shard else main
+        return self.store or own, [main] if self.shard else stores_of(self.output, study)
+
 
 def plan(
     file: File,
@@ -221,14 +229,11 @@ def _show_forecasts(study: "Study", *, quiet: bool) -> dict[str, Any]:
 
 def _planned(study: "Study", of: Work) -> "tuple[Plan, dict[str, Record]]":
     """Return the plan of what is not on record, and the records that are."""
-    from epsmesh.plan.shard import stores_of
     from epsmesh.run.reading import plan_the_rest
     from epsmesh.run.store import StoreError
 
-    path = of.store or (of.shard.store(of.output, study) if of.shard else of.output / STORE_NAME)
-    path = Path(os.devnull) / STORE_NAME if of.fresh else path  # there is none
+    path, beside = (Path(os.devnull) / STORE_NAME, []) if of.fresh else of.stores(study)  # of a fresh one there is none
     check_store(path)
-    beside = [] if of.fresh else [of.output / STORE_NAME] if of.shard else stores_of(of.output, study)
     with refusing(StoreError, file=path):
         return plan_the_rest(study, path, of.without, shard=of.shard, beside=beside)
 

@@ -160,12 +160,11 @@ def _run(
     """Run one study, print its result, and add it to what was ``found``; return the exit status. Collective."""
     from epsmesh import workflow
     from epsmesh.errors import CompilerError
-    from epsmesh.plan.shard import stores_of
     from epsmesh.run.jobs import WorkerError
     from epsmesh.run.store import StoreError
 
-    start, speaks, main = time.monotonic(), comm.rank == 0, of.output / STORE_NAME
-    store = of.store or (of.shard.store(of.output, study) if of.shard else main)
+    start, speaks = time.monotonic(), comm.rank == 0
+    store, beside = of.stores(study)
     try:
         plan, opened = workflow.prepare(
             study,
@@ -175,7 +174,7 @@ def _run(
             without=of.without,
             meshes=meshes,
             shard=of.shard,
-            beside=[main] if of.shard else stores_of(of.output, study),
+            beside=beside,
         )
         if speaks:
             _announce(plan, opened, quiet=voice.quiet or voice.as_json, verbose=voice.verbose)

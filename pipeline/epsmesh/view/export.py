@@ -10,6 +10,7 @@ from epsmesh.files import atomic
 from epsmesh.scene.model import FIXED, PROBE
 from epsmesh.solve.points.derived import von_mises
 from epsmesh.view.fields import Fields
+from epsmesh.view.numbers import keys_of
 
 # Names of cells for meshio, and degrees, by the number of nodes.
 _KINDS = {4: "tetra", 10: "tetra10", 20: "VTK_LAGRANGE_TETRAHEDRON"}
@@ -58,17 +59,11 @@ def _mesh(fields: Fields, points: np.ndarray, cells: np.ndarray, displacement: n
 def _marked(fields: Fields, group: str, count: int, cells: np.ndarray) -> np.ndarray:
     """Mark the nodes of ``cells`` on a group of facets, of ``count`` nodes."""
     marks = np.zeros(count, dtype=np.int32)
-    size, nodes = len(fields.points), compat.equidistant_nodes(_DEGREES[cells.shape[1]])
+    nodes = compat.equidistant_nodes(_DEGREES[cells.shape[1]])
     weights = np.column_stack([1 - nodes.sum(axis=1), nodes])
-    known = _keys(fields.facets[group], size)
+    known = keys_of(fields.facets[group])
     for corner in range(4):
         facets = np.delete(fields.cells[:, :4], corner, axis=1)
-        chosen = np.isin(_keys(facets, size), known)
+        chosen = np.isin(keys_of(facets), known)
         marks[cells[np.ix_(chosen, np.abs(weights[:, corner]) < _ZERO)]] = 1
     return marks
-
-
-def _keys(facets: np.ndarray, size: int) -> np.ndarray:
-    """Return a number for each facet of three of ``size`` points."""
-    first, second, third = np.sort(facets, axis=1).T
-    return np.asarray((first * size + second) * size + third)

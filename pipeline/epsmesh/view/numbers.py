@@ -123,7 +123,7 @@ def _faces(corners: IntArray, facets: dict[str, IntArray]) -> dict[str, npt.NDAr
     triangles = np.vstack(list(facets.values()))
     is_on = np.isin(np.arange(corners.max() + 1), triangles)
     near = np.flatnonzero(is_on[corners[:, FACES]].all(axis=-1))  # 4 × cell + the corner opposite to the face
-    known, faces = _keys(triangles), _keys(corners[:, FACES].reshape(-1, 3)[near])
+    known, faces = keys_of(triangles), keys_of(corners[:, FACES].reshape(-1, 3)[near])
     groups = np.repeat([_GROUPS.get(name, 0) for name in facets], [len(facet) for facet in facets.values()])
     _, place, found = np.intersect1d(faces, known, return_indices=True)
     if len(found) < len(known):
@@ -136,7 +136,7 @@ def _faces(corners: IntArray, facets: dict[str, IntArray]) -> dict[str, npt.NDAr
     }
 
 
-def _keys(triples: IntArray) -> IntArray:
+def keys_of(triples: IntArray) -> IntArray:
     """Return one integer for each triple (k, 3) of numbers of points, whatever their order."""
     low, middle, high = np.sort(triples, axis=1).T.astype(np.int64)
     return np.asarray((low << 2 * _POINT_BITS) | (middle << _POINT_BITS) | high)

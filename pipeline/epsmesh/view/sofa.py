@@ -4,10 +4,10 @@ from pathlib import Path
 
 import meshio
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from epsmesh.arrays import FloatArray
 from epsmesh.files import atomic, write_whole
+from epsmesh.pages import render_text
 from epsmesh.scene.model import FIXED, PROBE
 from epsmesh.view.fields import Fields
 
@@ -34,8 +34,8 @@ def write_sofa(fields: Fields, stem: Path, title: str, version: str) -> list[Pat
     tool, support = (np.searchsorted(kept, np.unique(fields.facets[group][:, :3])) for group in (PROBE, FIXED))
     tool = np.setdiff1d(tool, support)
     young, poisson = _tissues(fields)
-    environment = Environment(loader=FileSystemLoader(_TEMPLATE.parent), undefined=StrictUndefined, autoescape=False)
-    scene = environment.get_template(_TEMPLATE.name).render(
+    scene = render_text(
+        _TEMPLATE,
         title=" ".join(title.replace("\\", "/").replace('"', "'").split()),
         version=version,
         name=stem.name,

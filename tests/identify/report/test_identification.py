@@ -110,6 +110,19 @@ def test_figure_and_page_are_written_whole(tmp_path):
     assert 'from = "results/one.nc"' in page
 
 
+def test_the_outer_bar_is_seen_or_ends_in_an_arrow():
+    dataset = identification()
+    one = dataset.sel(unknown="young")
+    estimate, low, high = (float(one[name]) for name in ("estimate", "low", "high"))
+    for times, arrows in ((2.0, 0), (50.0, 2)):
+        outer = {"low": estimate - times * (estimate - low), "high": estimate + times * (high - estimate)}
+        is_it = dataset["unknown"] == "young"
+        wide = dataset.assign({f"{end}_hidden": dataset[end].where(~is_it, at) for end, at in outer.items()})
+        (ax,) = (ax for ax in figure(wide, "").axes if ax.get_xlabel().startswith("E,"))
+        assert sum(line.get_marker() in "<>" for line in ax.lines) == arrows
+        assert np.ptp(ax.get_xlim()) > 2.5 * 1e-3 * (high - low)  # kPa
+
+
 def test_curves_of_any_length_and_number_are_shown():
     curves = estimate().curves
     short = [type(one)(f"curve {n}", *(getattr(one, name)[: 200 + n] for name in ("depth", "force", "fit", "band")),
