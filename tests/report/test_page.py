@@ -210,6 +210,8 @@ def test_a_figure_is_in_the_page_once_whatever_it_is_cut_into():
     assert sum(widths) == pytest.approx(found["width"], abs=1)
     assert found["svg"].count('id="ratio-whole"') == 1
     assert found["svg"].count('href="#ratio-whole"') == len(widths) - 1
+    letters = re.findall(r"<text [^>]*>", found["svg"])  # of dark pages, too
+    assert letters and all('fill="currentColor"' in text for text in letters)
 
 
 def test_a_written_dataset_gives_the_same_table(tmp_path):

@@ -51,7 +51,9 @@ def in_page(figure: Figure, name: str) -> dict[str, Any]:
     text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", buffer.getvalue(), flags=re.DOTALL)
     text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{name}-", text[text.index("<svg") :])
     content = text[text.index(">") + 1 : text.rindex("</svg>")].strip()
-    content = f'<g id="{name}-whole">{_COLOUR.sub(lambda found: _THEME[found[0]], content)}</g>'
+    # Styles of the page do not reach what is shown again of it.
+    content = _COLOUR.sub(lambda found: _THEME[found[0]], content).replace("<text ", '<text fill="currentColor" ')
+    content = f'<g id="{name}-whole">{content}</g>'
     width, height = figure.bbox.size
     parts = []
     for left, right in itertools.pairwise([0.0, *cuts, width]):
