@@ -29,8 +29,6 @@ _OF_FILE = ("unit", "length_unit", "reach")
 class Values(Protocol):
     """A field of values (Pa) on a body."""
 
-    detail: float
-
     def at(self, points: FloatArray) -> FloatArray:
         """Return the values (Pa) at ``points`` (n, 3), m; NaN where there is none."""
 
@@ -162,6 +160,11 @@ class Varying(Section):
     def at(self, points: FloatArray) -> FloatArray:
         """Return the moduli (Pa) at ``points`` (n, 3), m, without the factor ``scale``; NaN where there is none."""
         return np.asarray(self._values.at(points))
+
+    def coarsened(self) -> Values:
+        """Return the image with voxels twice as wide."""
+        found: Values = self._values.coarsened()
+        return found
 
     def relative(self, values: FloatArray) -> FloatArray:
         """Return moduli (Pa), without the factor ``scale``, relative to :attr:`young` without it."""

@@ -213,6 +213,11 @@ def _chunks(cells: IntArray, level: int) -> Iterator[IntArray]:
     return (cells[start : start + size] for start in range(0, len(cells), size))
 
 
+def places(nodes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return 32 places (cells, q, 3) of equal shares of cells with these ``nodes`` (cells, n, 3), and |dx/dX| there."""
+    return _places(nodes, _points(1))
+
+
 def _places(nodes: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return places (cells, q, 3) of reference points ``at`` (q, 3) of cells with these ``nodes``, and |dx/dX|."""
     degree = 1 if nodes.shape[1] == _CORNERS else 2

@@ -39,6 +39,7 @@ from epsmesh.study.insertion_stages import has_insertion
 from epsmesh.study.place import place_error
 from epsmesh.study.plausible import check_extent, check_moduli, check_tools
 from epsmesh.study.problems import Problems
+from epsmesh.study.regions import tissues_of
 from epsmesh.study.schema import Material, Mesh, Planning, Solving
 from epsmesh.study.slit import check_slit, check_slit_in
 from epsmesh.study.stages import check_history
@@ -57,6 +58,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     bodies, probes = cast(Sequence[Body], sections["body"]), cast(Sequence[Probe], sections["probe"])
     materials, meshes = cast(Sequence[Material], sections["material"]), cast(Sequence[Mesh], sections["mesh"])
     problems.each(_tell_notices, body=bodies)
+    problems.each(_tell_of_fields, body=bodies, material=materials)
     problems.each(_check_boundary, body=bodies)
     linear = [material for material in materials if not material.is_large]
     if linear:
@@ -207,6 +209,13 @@ def _tell_notices(body: Body, problems: Problems) -> None:
     """Warn of what was found in the files of a body and of its regions."""
     for notice in body.notices:
         problems.warn("body.file" if isinstance(body, FromFile) else "body.region", getattr(body, "file", None), notice)
+
+
+def _tell_of_fields(body: Body, material: Material, problems: Problems) -> None:
+    """Warn of what was found in images of the modulus."""
+    for key, tissue in tissues_of(body, material):
+        for notice in tissue.varying.notices if tissue.varying else ():
+            problems.warn(f"{key}.young.file", tissue.varying and tissue.varying.file, notice)
 
 
 def _check_boundary(body: Body, problems: Problems) -> None:

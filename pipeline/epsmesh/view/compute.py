@@ -14,8 +14,10 @@ from epsmesh.mesh.generate import MeshArrays
 from epsmesh.mesh.reflect import reflect, reflect_vectors
 from epsmesh.plan.steps import Solve
 from epsmesh.plan.symmetry import mirror_planes
+from epsmesh.run.map_resolution import change_with_wider_voxels
 from epsmesh.run.mesh_cache import MeshCache
 from epsmesh.run.solved import Solved, modelled_arrays, solve_fields
+from epsmesh.shapes.section import in_mm
 from epsmesh.solve.cell_values import CellValues
 from epsmesh.solve.compiled import vector_space
 from epsmesh.solve.points.state import State
@@ -43,7 +45,18 @@ def compute_fields(
     if mesh_only:
         arrays = modelled_arrays(solve, comm, cache, note)
         return _whole(solve, arrays) if arrays is not None else None
-    return fields_of(solve_fields(solve, comm, bar=bar, cache=cache, note=note), stress=stress)
+    solved = solve_fields(solve, comm, bar=bar, influence=_has_image(solve), cache=cache, note=note)
+    if wider := change_with_wider_voxels(solved):
+        size, change = wider
+        note(
+            f"material.young: with voxels of {in_mm(2 * size)} in place of {in_mm(size)}, F would change by about "
+            f"{100 * change:+.2g} %"
+        )
+    return fields_of(solved, stress=stress)
+
+
+def _has_image(solve: Solve) -> bool:
+    return any(tissue.varying is not None and tissue.varying.file is not None for tissue in solve.case.tissues)
 
 
 def fields_of(solved: Solved, *, stress: bool = False) -> Fields | None:
