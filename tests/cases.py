@@ -1,5 +1,6 @@
 """Small studies for the tests, solved by the program's own run."""
 
+import json
 from typing import Any
 
 import pytest
@@ -25,6 +26,7 @@ BASE: dict[str, Any] = {
 
 # In a mesh of an accuracy, no sizes are given.
 NO_SIZES = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
+_SOLVED: dict[tuple[int, str], Record] = {}
 BLADE: dict[str, Any] = {"shape": "blade", "length": "10 mm", "width": "3 mm", "depth": "0.1 mm"}
 
 
@@ -58,6 +60,16 @@ def solve(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> dict[tuple[int, ...
         case.index: records[key].scaled(plan.scale_of(case))
         for case, key in zip(plan.study.cases(), plan.keys, strict=True)
     }
+
+
+def solved(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> Record:
+    """Return the record of a study of one case, which is solved once for all tests of a process."""
+    key = comm.size, json.dumps(changes, sort_keys=True)
+    if key not in _SOLVED:
+        (record,) = solve(comm, **changes).values()
+        assert record.status == "ok", record.message
+        _SOLVED[key] = record
+    return _SOLVED[key]
 
 
 def force(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> float:

@@ -1,6 +1,5 @@
 """Unilateral contact: known forces, no tension, no penetration, independent of the solver."""
 
-import json
 from contextlib import contextmanager
 from math import radians, sqrt
 
@@ -16,7 +15,7 @@ from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.problems import StudyError
-from tests.cases import solve, study
+from tests.cases import solve, solved, study
 from tests.verification import known
 
 SMALL = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm"}
@@ -27,18 +26,8 @@ DISC = {"shape": "disc", "radius": "1 mm", "depth": "0.1 mm", "contact": "unilat
 COARSE = {"fine": "2 mm", "coarse": "2 mm", "rim": "0.3 mm", "growth": 0.5}
 
 
-KNOWN = {}
-
-
 def record(comm=MPI.COMM_SELF, mesh=None, **changes):
-    """Solve a scene, once for all tests."""
-    scene = {"body": SMALL, "probe": SPHERE, "mesh": {**COARSE, **(mesh or {})}} | changes
-    key = comm.size, json.dumps(scene, sort_keys=True)
-    if key not in KNOWN:
-        (found,) = solve(comm, **scene).values()
-        assert found.status == "ok", found.message
-        KNOWN[key] = found
-    return KNOWN[key]
+    return solved(comm, **{"body": SMALL, "probe": SPHERE, "mesh": COARSE | (mesh or {})} | changes)
 
 
 @contextmanager

@@ -1,6 +1,5 @@
 """Friction of found contact: limits in the coefficient, closed forms for tissue that sticks, Coulomb's law at nodes."""
 
-import json
 from math import inf, log
 
 import numpy as np
@@ -14,26 +13,19 @@ from epsmesh.solve.contact.surface import Candidates, facet_nodes
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.problems import StudyError
-from tests.cases import NO_SIZES, solve, study
+from tests.cases import NO_SIZES, solve, solved, study
 from tests.verification import known
 
 BODY = {"shape": "cylinder", "radius": "60 mm", "height": "60 mm"}
 SPHERE = {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"}
 DISC = {"shape": "disc", "radius": "1 mm", "depth": "0.1 mm", "contact": "unilateral"}
 MESH = {"fine": "20 mm", "coarse": "20 mm", "rim": "0.3 mm", "growth": 0.5}
-KNOWN = {}
 
 
 def record(friction=0.0, probe=SPHERE, mesh=None, poisson=0.3, comm=MPI.COMM_SELF, **changes):
-    """Solve a scene, once for all tests."""
     scene = {"body": BODY, "mesh": MESH | (mesh or {}), "probe": probe | {"friction": friction}} | changes
     scene["material"] = {"poisson": poisson}
-    key = comm.size, json.dumps(scene, sort_keys=True)
-    if key not in KNOWN:
-        (found,) = solve(comm, **scene).values()
-        assert found.status == "ok", found.message
-        KNOWN[key] = found
-    return KNOWN[key]
+    return solved(comm, **scene)
 
 
 def test_without_friction_it_is_the_frictionless_contact():
@@ -171,13 +163,9 @@ NEO_HOOKEAN = {"law": "neo-hookean", "poisson": 0.3}
 
 
 def large(friction, mesh=None):
-    """Return the record of a ball on neo-Hookean tissue, solved once for all tests."""
+    """Return the record of a ball on neo-Hookean tissue."""
     mesh = {"fine": "6 mm", "coarse": "6 mm", "rim": "0.35 mm", "growth": 0.7} | (mesh or {})
-    key = "large", friction, mesh["rim"]
-    if key not in KNOWN:
-        (KNOWN[key],) = solve(**LARGE, probe=SPHERE | {"friction": friction}, mesh=mesh, material=NEO_HOOKEAN).values()
-        assert KNOWN[key].status == "ok", KNOWN[key].message
-    return KNOWN[key]
+    return solved(**LARGE, probe=SPHERE | {"friction": friction}, mesh=mesh, material=NEO_HOOKEAN)
 
 
 def test_at_large_displacements_little_friction_is_none():
