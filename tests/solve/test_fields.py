@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from epsmesh import compat
 from epsmesh.plan.plan import declare, make_plan
+from epsmesh.run.solved import solve_alone, solve_fields
 from epsmesh.study.read import read_mapping
 from tests.cases import force, raw, refusal, solve, study
 
@@ -169,6 +171,15 @@ def test_tissue_without_a_value_is_refused_with_its_place(tmp_path, change, said
     assert "reach" in record.message
 
 
+def test_tissue_without_a_value_is_told_before_a_run(tmp_path):
+    _image(tmp_path, _linear_map()[:8])
+    _, content = _of(tmp_path, {"file": "map.nii.gz", "unit": "Pa"})
+    (warning,) = (one for one in content.warnings if "outside the image" in one)
+    assert "4 of 8 points of the surface: cases fail" in warning
+    _image(tmp_path, _linear_map())
+    assert not _of(tmp_path, {"file": "map.nii.gz", "unit": "Pa"})[1].warnings
+
+
 def test_places_without_a_value_have_that_of_the_nearest_voxel(tmp_path):
     values = np.full((22, 22, 12), 1e4)
     values[-3:] = np.nan
@@ -281,6 +292,38 @@ def test_what_elements_do_not_resolve_is_in_the_bar():
         material={"young": {"formula": ["10 kPa*(1 + 0.5*sin(x/(9 mm)))", "10 kPa*(1 + 0.5*sin(x/(0.1 mm)))"]}}
     ).values()
     assert rough.force_error > smooth.force_error + 0.02
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.49])
+@pytest.mark.parametrize("law", [{}, LARGE], ids=str)
+def test_stress_has_the_field(law, poisson):
+    points = np.array([[1e-3, 0.5e-3, -1e-3], [2e-3, 1e-3, -2.5e-3], [0.5e-3, 0, -5e-3]])
+
+    def solved(young):
+        case = study(body=_layer(young, poisson), material={"poisson": poisson} | law)
+        return solve_fields(solve_alone(case, case.case(())), MPI.COMM_SELF).state
+
+    layer, field = solved("30 kPa"), solved(TRIPLE)
+    known = layer.at(points).stress
+    assert field.at(points).stress == pytest.approx(known, rel=1e-5, abs=1e-5 * np.abs(known).max())
+    if poisson == 0.49:
+        assert field.whole_pressure().x.norm() > 0
+        of_layer = layer.whole_pressure()
+        values = np.asarray(of_layer.x.array)[compat.cell_dofs(of_layer.function_space)]
+        whole = field.whole_pressure()
+        found = np.asarray(whole.x.array)[compat.cell_dofs(whole.function_space)]
+        assert found == pytest.approx(values, rel=1e-4, abs=1e-4 * np.abs(values).max())
+
+
+def test_stress_is_that_of_the_modulus_there():
+    case = study(material={"young": {"formula": "10 kPa*(1 - z/(10 mm))"}})
+    state = solve_fields(solve_alone(case, case.case(())), MPI.COMM_SELF).state
+    points = np.array([[1e-3, 0.5e-3, -2e-3], [2e-3, 1e-3, -8e-3], [5e-3, 3e-3, -14e-3]])
+    values = state.at(points)
+    shear = 1e4 * (1 - points[:, 2] / 10e-3) / (2 * 1.3)
+    deviator = values.stress - np.trace(values.stress, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3
+    strain = values.strain - np.trace(values.strain, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3
+    assert deviator == pytest.approx(2 * shear[:, None, None] * strain, rel=1e-6, abs=1e-9)
 
 
 def test_cases_on_one_mesh_have_their_own_fields():

@@ -65,7 +65,7 @@ class CaseSolution:
 
         It is λ₁ times the change of volume, λ₁ = λ − µ: the part of the stress that is not in the displacement's.
         """
-        return self.solved.state.pressure
+        return self.solved.state.whole_pressure()
 
     @property
     def law(self) -> MaterialLaw:

@@ -31,6 +31,7 @@ _CONSTANT, _LEAST = 1e-9, 0.05
 # Points that are evaluated at once.
 _CHUNK = 1_000_000
 _CORNERS = 4
+_AT_CORNERS = np.vstack([np.zeros(3), np.eye(3)])
 # For each mesh, the factors of variations.
 _known: WeakKeyDictionary[Any, dict["Variation", "Factors"]] = WeakKeyDictionary()
 
@@ -55,13 +56,15 @@ class Factors:
 
     ``means`` (cells) are their means. They vary within cells of any rank if ``varies``. Relative to the mean,
     ``variances`` (cells) are those within cells, ``rests`` (cells) those of what elements do not resolve there: more
-    than quadratic functions, or in cells of many details, than linear ones.
+    than quadratic functions, or in cells of many details, than linear ones. ``corners`` (cells, 4) are the values of
+    the linear fit at the corners of cells.
     """
 
     means: FloatArray
     varies: bool
     variances: FloatArray
     rests: FloatArray
+    corners: FloatArray
     _at: Callable[[int], FloatArray]
     _known: dict[int, FloatArray] = field(default_factory=dict)
 
@@ -72,7 +75,7 @@ class Factors:
         def ones(degree: int) -> FloatArray:
             return np.ones((1, len(basix.make_quadrature(basix.CellType.tetrahedron, degree)[1])))
 
-        return Factors(np.ones(1), True, np.zeros(1), np.zeros(1), ones)
+        return Factors(np.ones(1), True, np.zeros(1), np.zeros(1), np.ones((1, 4)), ones)
 
     def in_cells(self, degree: int) -> FloatArray:
         """Return the factors at the quadrature points of a ``degree``; their means alone where they do not vary."""
@@ -108,14 +111,15 @@ class Variation:
 
     def _factors(self, body: BodyMesh) -> Factors:
         count, refusal = len(compat.geometry_dofs(body.mesh)), ""
-        means, variances, rests = np.ones(count), np.zeros(count), np.zeros(count)
+        means, variances, rests, corners = np.ones(count), np.zeros(count), np.zeros(count), np.ones((count, 4))
         for values_of, cells, nodes in self._parts(body):
-            means[cells], variances[cells], rests[cells], why = self._sampled(values_of, nodes)
+            *found, why = self._sampled(values_of, nodes)
+            means[cells], variances[cells], rests[cells], corners[cells] = found
             refusal = refusal or why
         if refusals := [why for why in body.comm.allgather(refusal) if why]:
             raise SolveError(refusals[0])
         varies = bool(body.comm.allreduce(float(variances.max(initial=0.0)), op=MPI.MAX) > _CONSTANT**2)
-        return Factors(means, varies, variances, rests, lambda degree: self._at_points(body, means, degree))
+        return Factors(means, varies, variances, rests, corners, lambda degree: self._at_points(body, means, degree))
 
     def _parts(self, body: BodyMesh) -> Iterator[tuple[Field, IntArray, FloatArray]]:
         """Yield each field with its local cells and their nodes (cells, n, 3)."""
@@ -126,11 +130,12 @@ class Variation:
                 cells = np.flatnonzero(regions == number)
                 yield one, cells, np.asarray(body.mesh.geometry.x)[nodes[cells]]
 
-    def _sampled(self, of: Field, nodes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, str]:
-        """Return means over cells with these ``nodes``, variances and rests (see :class:`Factors`), and a refusal."""
+    def _sampled(self, of: Field, nodes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, str]:
+        """Return means over cells with these ``nodes``, variances, rests and corners, and a refusal."""
         halvings, refusal = _halvings(nodes, of.detail), ""
         is_fitted = halvings > 0
         means, variances, rests = np.ones(len(nodes)), np.zeros(len(nodes)), np.zeros(len(nodes))
+        corners = np.ones((len(nodes), 4))
         for level in range(_HALVINGS + 1):
             for cells in _chunks(np.flatnonzero(halvings == level), level):
                 values, weights, why = self._values(of, nodes[cells], _points(level))
@@ -146,7 +151,9 @@ class Variation:
                 linear = (values - values @ _projection(finest, 1)).var(axis=1)
                 quadratic = (values - values @ _projection(finest, 2)).var(axis=1)
                 rests[cells] = np.where(is_fitted[cells], linear, quadratic) / found**2
-        return means, variances, rests, refusal
+                fit = values @ np.linalg.pinv(_functions(_points(finest), 1)).T @ _functions(_AT_CORNERS, 1).T
+                corners[cells] = np.maximum(fit, _LEAST * found[:, None])
+        return means, variances, rests, corners, refusal
 
     def _at_points(self, body: BodyMesh, means: FloatArray, degree: int) -> FloatArray:
         """Return the factors at quadrature points: of the field, or of its linear fit in cells of many details."""

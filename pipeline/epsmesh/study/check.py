@@ -10,8 +10,9 @@ from typing import cast
 
 import numpy as np
 
-from epsmesh.shapes.body import Body
+from epsmesh.shapes.body import Body, Layered
 from epsmesh.shapes.contact import first_touch
+from epsmesh.shapes.facetted import Facetted
 from epsmesh.shapes.from_file import FromFile
 from epsmesh.shapes.probe import Probe, is_direction
 from epsmesh.shapes.punch import LINEAR
@@ -50,6 +51,8 @@ _MOST_FORCES = 2_000_000
 _TILTED = 0.005
 # For the slope of a tool, in units of its half width.
 _STEP = 1e-4
+# Points of a surface that is not checked.
+_NOWHERE = np.empty((0, 3))
 _OR_NO_CONTACT = '. To go on without contact at such places, write `off = "no contact"` in [probe.path]'
 
 
@@ -216,6 +219,21 @@ def _tell_of_fields(body: Body, material: Material, problems: Problems) -> None:
     for key, tissue in tissues_of(body, material):
         for notice in tissue.varying.notices if tissue.varying else ():
             problems.warn(f"{key}.young.file", tissue.varying and tissue.varying.file, notice)
+    varying = body.main(material).varying
+    if body.pieces or varying is None or varying.kind == "function":
+        return
+    points = _NOWHERE
+    if isinstance(body, Facetted):
+        points = body.triangles.points
+    elif isinstance(body, Layered) and body.shape == "box":
+        points = body.corners
+    values = varying.at(points)
+    if (lacks := ~(values > 0)).any():
+        first = int(lacks.argmax())
+        share = f"{lacks.sum()} of {len(points)} points of the surface: cases fail whose elements come there"
+        problems.warn(
+            "", None, f"{varying.refusal('material.young', points[first], float(values[first]))}. So at {share}"
+        )
 
 
 def _check_boundary(body: Body, problems: Problems) -> None:

@@ -331,9 +331,9 @@ class Elements(ElementFields, ABC):
         """Return a copy of the forms' fields, with the ``law`` of their solution."""
         pressure = self._pressure(law)
         p = None if pressure is None else _copied(pressure[0], self.unit(law))
-        return State(
-            self.body, _copied(self.displacements.forms.displacement), p, law, factors=self.displacements.means
-        )
+        space = self.displacements
+        factors = None if space.factors is None else space.factors.corners
+        return State(self.body, _copied(space.forms.displacement), p, law, factors=factors)
 
     def _pressure(self, law: MaterialLaw) -> tuple[Any, Any] | None:
         """Return the pressure of the forms and its compliance, or None."""

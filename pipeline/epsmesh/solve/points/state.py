@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 
 from epsmesh import compat
@@ -14,6 +15,7 @@ from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from epsmesh.mesh.curve import EDGES
 from epsmesh.mesh.distribute import BodyMesh, distribute
 from epsmesh.scene.model import PROBE
+from epsmesh.solve.compiled import space as function_space
 from epsmesh.solve.forms import one_cell
 from epsmesh.solve.physics import MaterialLaw, SplitLaw, of_regions
 from epsmesh.solve.point_law import SYMMETRIC, PointLaw
@@ -63,8 +65,8 @@ class State:
     ``displacement`` (m) and ``pressure`` (Pa, positive in tension) are dolfinx functions; the pressure is that of mixed
     elements, λ₁ times the change of volume, and None in displacement elements. The body may be the half or quarter that
     planes of symmetry leave. ``influence`` is known if it was requested: see :mod:`epsmesh.solve.influence`.
-    ``factors`` are those of the energy of local cells, None where they are 1: stresses, and the pressure, are to be
-    multiplied by them.
+    ``factors`` (cells, 4) are those of the energy at the corners of local cells, None where they are 1: stresses, and
+    the pressure, are to be multiplied by them.
     """
 
     body: BodyMesh
@@ -164,7 +166,7 @@ class State:
         gradient = np.einsum("rnk,nki,nrj->nij", table[1:], values, inverse)
         stress = self._stress(cells, at, gradient)
         if self.factors is not None:
-            stress *= self.factors[cells][:, None, None]
+            stress *= self._factors_at(cells, at)[:, None, None]
         found[here, :3] = np.einsum("nk,nki->ni", table[0], values)
         found[here, 3:12], found[here, 12:21] = gradient.reshape(-1, 9), stress.reshape(-1, 9)
         facet = self._on_footprint(cells, at)
@@ -173,6 +175,23 @@ class State:
         found[here, 22] = np.where(facet >= 0, -np.einsum("ni,nij,nj->n", normal, stress, normal), 0.0)
         if self.body.regions is not None:
             found[here, 23] = self.body.regions[cells]
+        return found
+
+    def _factors_at(self, cells: IntArray, at: FloatArray) -> FloatArray:
+        assert self.factors is not None
+        return np.asarray((np.column_stack([1 - at.sum(axis=1), at]) * self.factors[cells]).sum(axis=1))
+
+    def whole_pressure(self) -> Any | None:
+        """Return the pressure (Pa) with its factors, a discontinuous function; None in displacement elements."""
+        if self.pressure is None or self.factors is None:
+            return self.pressure
+        space = self.pressure.function_space
+        mesh, degree = self.body.mesh, compat.degree(space)
+        found = fem.Function(function_space(mesh, compat.element(mesh, "DG", degree)))
+        at = np.asarray(compat.reference_element(degree).points)
+        factors = self.factors @ np.column_stack([1 - at.sum(axis=1), at]).T
+        values = np.asarray(self.pressure.x.array)[compat.cell_dofs(space)] * factors
+        found.x.array[compat.cell_dofs(found.function_space).reshape(-1)] = values.reshape(-1)
         return found
 
     # ---- stress ----------------------------------------------------------------------------------------
