@@ -16,11 +16,12 @@ unset PYTHONPATH PYTHONHOME VIRTUAL_ENV
 export PIP_USER=0 PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1 OMP_NUM_THREADS=1
 export EPSMESH_CACHE="$work/cache" XDG_STATE_HOME="$work/state"
 
-# Building leaves files beside the sources. First, because a set-up of the checkout may run beside this.
+# Building leaves files beside the sources. First, because a set-up of the checkout may run beside this: a folder that it
+# adds something to while tar reads it is tar's status 1.
 mkdir "$work/source"
-tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --exclude=./build --exclude='*.egg-info' \
-    --exclude='*.so' --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
-    tar -xf - -C "$work/source"
+tar -cf - --warning=no-file-changed --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist \
+    --exclude=./build --exclude='*.egg-info' --exclude='*.so' --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
+    tar -xf - -C "$work/source" || (($? == 1)) || fail "the sources cannot be copied"
 
 # ---- Python --------------------------------------------------------------------------------------------
 fits() { # a shim of pyenv is on PATH, and need not be a Python
