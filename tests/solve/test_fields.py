@@ -334,6 +334,15 @@ def test_cases_on_one_mesh_have_their_own_fields():
     assert len({round(number, 5) for number in alone}) == len(formulas)
 
 
+def test_numbers_and_tables_are_one_sweep(tmp_path):
+    _image(tmp_path, _linear_map())
+    (tmp_path / "field.py").write_text("def young(points):\n    return 1e4 + 0 * points[:, 2]\n")
+    several = ["10 kPa", {"file": "map.nii.gz", "unit": "Pa"}, {"function": "field.py:young"}]
+    _, content = _of(tmp_path, several)
+    assert [case.material.varying is not None for case in content.cases()] == [False, True, True]
+    assert "must be a file in the folder" in refusal(raw(material={"young": ["10 kPa", {"function": "../a.py:f"}]}))
+
+
 def test_one_of_several_fields_is_a_label_of_a_sweep():
     several = study(material={"young": {"formula": ["8 kPa", "9 kPa*(1 + 0.1*z/(20 mm))"]}})
     assert [axis.path for axis in several.axes] == ["material.young.formula"]

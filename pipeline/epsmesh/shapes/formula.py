@@ -28,6 +28,8 @@ _OF_ONE_UNIT = ("abs", "min", "max")
 _OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)
 _QUANTITY = re.compile(r"(?<![\w.])(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)[ \t]*([^\W\d_]+|%|°)")
 _LONGEST, _DEEPEST = 500, 50
+# What a word processor writes for operators.
+_SPELLINGS = str.maketrans({"^": "**", "·": "*", "×": "*", "\N{MINUS SIGN}": "-", "\N{NO-BREAK SPACE}": " "})
 _NUMBER, _LENGTH, _PRESSURE = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
 _KINDS = {_NUMBER: "a number", _LENGTH: "a length", _PRESSURE: "a pressure"}
 
@@ -64,7 +66,7 @@ class Formula:
 
         if len(self.text) > _LONGEST:
             raise FormulaError(f"has {len(self.text)} characters: at most {_LONGEST}")
-        plain = _QUANTITY.sub(replaced, self.text.strip()).replace("^", "**")
+        plain = _QUANTITY.sub(replaced, self.text.strip().translate(_SPELLINGS))
         try:
             tree = ast.parse(plain, mode="eval").body
         except (SyntaxError, ValueError, RecursionError, MemoryError):

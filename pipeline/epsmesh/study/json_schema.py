@@ -88,7 +88,9 @@ def study_schema() -> Schema:
         for key, value in properties.items():
             in_file = _in_file(value, name in swept, key)
             if key in PLAIN_TOO:
-                in_file = {"anyOf": [in_file, {"$ref": f"#/$defs/{Varying.__name__}"}]}
+                table = {"$ref": f"#/$defs/{Varying.__name__}"}
+                some = {"type": "array", "minItems": 1, "items": {"anyOf": [{"type": "string"}, table]}}
+                in_file = {"anyOf": [in_file, table, some]}
             properties[key] = _described(in_file, words.get(name), key)
     for section, schema_of_others in ((name, other) for one in added for name, other in one.others.items()):
         (model,) = sections[section]

@@ -192,9 +192,13 @@ def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
         if not isinstance(one, dict):
             return one
         pieces = {key: table(one[key]) for key in PIECES if isinstance(one.get(key), list)}
-        field = one.get("young")
-        young = {"young": field | of_files(field, "file", "function")} if isinstance(field, dict) else {}
+        young = {"young": field_of(one["young"])} if "young" in one else {}
         return one | pieces | young | of_files(one, "file", "names")
+
+    def field_of(young: Any) -> Any:
+        if isinstance(young, list):
+            return [field_of(part) for part in young]
+        return young | of_files(young, "file", "function") if isinstance(young, dict) else young
 
     def of_files(one: dict[str, Any], *keys: str) -> dict[str, Any]:
         return {key: found(one[key]) for key in keys if key in one}
@@ -214,10 +218,11 @@ def _check_functions(raw: dict[str, Any], folder: Path, problems: Problems) -> N
         for key in PIECES:
             check(one.get(key), f"{where}.{key}")
         young = one.get("young")
-        given = young.get("function") if isinstance(young, dict) else None
-        for function in given if isinstance(given, list) else [given]:
-            if isinstance(function, str) and (wrong := problem_of(function, folder)):
-                problems.error(f"{where}.young.function", function, wrong)
+        for field in young if isinstance(young, list) else [young]:
+            given = field.get("function") if isinstance(field, dict) else None
+            for function in given if isinstance(given, list) else [given]:
+                if isinstance(function, str) and (wrong := problem_of(function, folder)):
+                    problems.error(f"{where}.young.function", function, wrong)
 
     for name in ("body", "material"):
         check(raw.get(name), name)
