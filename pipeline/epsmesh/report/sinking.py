@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import hypot, nan
 from operator import mul
 
-from epsmesh.plan.symmetry import mirror_planes
+from epsmesh.plan.symmetry import mirror_planes, slides_across
 from epsmesh.shapes.frame import Vector
 from epsmesh.shapes.probe import PLANES
 from epsmesh.study.case import Case
@@ -28,7 +28,8 @@ def why_not(case: Case) -> str:
     if probe.force_exponent is None:
         return f"F of a {'rounded ' if getattr(probe, 'tip', 0) else ''}{probe.shape} is not a power of the depth"
     aside = [t - probe.depth * a for t, a in zip(case.travel, case.frame.axis, strict=True)]
-    if any(aside) and not any(_is_along(aside, PLANES[plane]) for plane in mirror_planes(case)):
+    planes = mirror_planes(case) if slides_across(case) else ()
+    if any(aside) and not any(_is_along(aside, PLANES[plane]) for plane in planes):
         return "the blade also moves sideways, which changes F where no mirror plane excludes it"
     return ""
 

@@ -32,7 +32,7 @@ _CONSTANT, _LEAST = 1e-9, 0.05
 _CHUNK = 1_000_000
 _CORNERS = 4
 _AT_CORNERS = np.vstack([np.zeros(3), np.eye(3)])
-# For each mesh, the factors of variations.
+# For each mesh, the factors of the last variation.
 _known: WeakKeyDictionary[Any, dict["Variation", "Factors"]] = WeakKeyDictionary()
 
 
@@ -104,9 +104,9 @@ class Variation:
         Raises:
             SolveError: if a field has no positive value somewhere in its region.
         """
-        known = _known.setdefault(body.mesh, {})
+        known = _known.get(body.mesh, {})
         if self not in known:
-            known[self] = self._factors(body)
+            known = _known[body.mesh] = {self: self._factors(body)}
         return known[self]
 
     def _factors(self, body: BodyMesh) -> Factors:
