@@ -1,7 +1,7 @@
 """Unilateral contact: known forces, no tension, no penetration, independent of the solver."""
 
 from contextlib import contextmanager
-from math import radians, sqrt
+from math import cos, hypot, radians, sqrt, tan
 
 import numpy as np
 import pytest
@@ -226,3 +226,48 @@ def test_the_required_accuracy_is_reached():
     assert found.force_error < 0.02
     hertz = known.half_space_ball(10e3, 0.3, 10e-3, 0.1e-3)
     assert found.force == pytest.approx(1.013 * hertz, rel=found.force_error)
+
+
+def tilted(degrees, depth=0.3, law="linear", **probe):
+    """Return the record of a ball of 5 mm, pressed into a flat face along an axis at an angle to its normal."""
+    tool = SPHERE | {"radius": "5 mm", "depth": f"{depth} mm", "axis": [-tan(radians(degrees)), 0, -1]} | probe
+    body = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"]}
+    return record(body=body, probe=tool, material={"law": law}, mesh={"fine": "6 mm", "coarse": "6 mm"})
+
+
+@pytest.mark.parametrize(("degrees", "depth", "friction"), [(8, 0.2, 0.0), (8, 0.2, 1e-6), (30, 1.5, 0.0)])
+def test_tilted_ball_presses_across_the_surface_as_deep_as_it_is_below_it(degrees, depth, friction):
+    """A ball has no axis: its force is that of the upright one at its depth below the face, and across the face."""
+    found, upright = tilted(degrees, depth, friction=friction), tilted(0, depth * cos(radians(degrees)))
+    aside, along, normal = found.force_vector
+    assert normal == pytest.approx(upright.force, rel=found.force_error + upright.force_error)
+    assert normal == pytest.approx(upright.force, rel=0.01)
+    assert hypot(aside, along) < 1e-5 * normal
+    assert found.force == pytest.approx(normal * cos(radians(degrees)), rel=1e-5)
+    assert found.contact_area / cos(radians(degrees)) == pytest.approx(upright.contact_area, rel=0.04)
+
+
+def test_tilt_within_the_threshold_is_the_same_contact():
+    below, above = tilted(0.4, 0.2), tilted(0.6, 0.2)
+    assert below.force_vector[0] != 0
+    assert below.force == pytest.approx(above.force, rel=1e-3)
+
+
+def test_tilted_ball_of_a_linear_law_is_that_of_small_strains():
+    linear, large = tilted(8, 0.1), tilted(8, 0.1, law="neo-hookean")
+    assert linear.force == pytest.approx(large.force, rel=linear.force_error + large.force_error)
+    assert linear.force_vector[0] == pytest.approx(0, abs=1e-5 * linear.force)
+
+
+def test_force_of_a_tilted_ball_is_proportional_to_the_modulus():
+    soft, stiff = (
+        solve(
+            body=SMALL,
+            probe=SPHERE | {"depth": "0.2 mm", "axis": [0.1, 0, -1]},
+            mesh=COARSE | {"fine": "4 mm"},
+            material={"young": young},
+            without=("scaling",),
+        )
+        for young in ("10 kPa", "30 kPa")
+    )
+    assert [r.force for r in stiff.values()] == pytest.approx([3 * r.force for r in soft.values()], rel=1e-6)

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from epsmesh.plan.key import case_key
@@ -455,9 +454,6 @@ def test_several_materials_beside_layers_are_told_to_be_a_sweep():
     assert "one material below the layers (a, b)" in warning
 
 
-BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"]}
-
-
 def _cut(epsilon):
     return study(mesh=NO_SIZES | {"accuracy": "1 %", "outside": "free", "epsilon": epsilon}).warnings
 
@@ -465,13 +461,3 @@ def _cut(epsilon):
 def test_an_accuracy_of_columns_alone_is_warned_of():
     assert any('"free": cuts the body at epsilon in every case' in one for one in _cut("9 mm"))
     assert not any("cuts the body" in one for one in _cut(["9 mm", "full"]))
-
-
-@pytest.mark.parametrize("degrees", [0, 2, 10, 17])
-def test_contact_beside_the_axis_of_a_linear_law_is_warned_of(degrees):
-    axis = [np.sin(np.radians(degrees)), 0.0, -np.cos(np.radians(degrees))]
-    ball = {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "contact": "unilateral", "axis": axis}
-    told = " ".join(study(probe=ball, body=BOX).warnings)
-    assert (f"inclined by {degrees}° to its axis" in told) == (degrees > 4)
-    large = {"material": {"law": "neo-hookean"}}
-    assert "inclined" not in " ".join(study(probe=ball, body=BOX, **large).warnings)

@@ -11,6 +11,7 @@ from epsmesh.plan.cost import features
 from epsmesh.plan.recipe import edge_width_of, half_width_of, has_sure_contact, has_sure_limit, is_ball, is_thin
 from epsmesh.plan.refinement import is_refined
 from epsmesh.plan.steps import Solve
+from epsmesh.run.problem import normal_of
 from epsmesh.run.record import Record
 from epsmesh.shapes.body import Layered
 from epsmesh.shapes.contact import first_touch
@@ -77,7 +78,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         force=force,
         force_error=bar / abs(force),
         force_vector=turned_back(turn, _known_of(case, solution.reaction)),
-        force_vector_error=_vector_bars(solution, turn),
+        force_vector_error=_vector_bars(case, solution),
         stiffness=_rows(solution.stiffness, turn) if case.way.motion is Motion.SIX else (),
         stiffness_error=_rows(solution.bars, turn, bars=True) if case.way.motion is Motion.SIX else (),
         energy=solution.energy,
@@ -209,12 +210,18 @@ def turned_back(turn: FloatArray | None, vector: Vector) -> Vector:
     return x, y, z
 
 
-def _vector_bars(solution: Solution, turn: FloatArray | None) -> Vector:
+def _vector_bars(case: Case, solution: Solution) -> Vector:
     """Return the error bars (N) of the force's components; 0 for components that are zero by symmetry.
 
-    In turned coordinates, the bar of a component is the sum over its contributions.
+    In turned coordinates, the bar of a component is the sum over its contributions. With a linear law, forces of
+    frictionless contact have one direction. It is the surface's normal, or the axis, which may differ a bit from that.
     """
+    turn, way = case.frame.turn, case.way
     x, y, z = (0.0 if f == 0 else bar for f, bar in zip(solution.reaction, solution.reaction_bars, strict=True))
+    if way.is_found and not way.is_large:
+        (a, b, c), size = normal_of(case), z if way.is_inclined else abs(solution.reaction[2])
+        x, y = (0.0, 0.0) if way.is_inclined and not way.rubs else (x, y)
+        x, y = x + size * abs(a / c), y + size * abs(b / c)
     return turned_back(None if turn is None else np.abs(turn), (x, y, z))
 
 

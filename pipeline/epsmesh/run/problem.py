@@ -15,9 +15,9 @@ from epsmesh.run.far_field import far_field_of, far_field_seconds
 from epsmesh.run.fields import variation_of
 from epsmesh.run.loads import loads_of, terms_of
 from epsmesh.run.room import MEMORY_SHARE
-from epsmesh.shapes.contact import first_touch
+from epsmesh.shapes.contact import first_touch, normal_at_touch
 from epsmesh.shapes.distance import Distance
-from epsmesh.shapes.frame import Frame
+from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.indenter import Indenter
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.tissue import FIBRE, Tissue
@@ -111,7 +111,17 @@ def conditions_of(case: Case) -> Conditions:
 def tool_of(case: Case) -> Tool:
     """Return the surface of the probe of ``case``, for the mesh turned so that the probe presses along -z."""
     *_, first = first_touch(case.body, case.probe, case.frame)
-    return tool_at(case.probe, case.frame.upright, first)
+    tool = tool_at(case.probe, case.frame.upright, first)
+    return replace(tool, normal=normal_of(case)) if case.way.is_inclined else tool
+
+
+def normal_of(case: Case) -> Vector:
+    """Return the outward unit normal of the surface that the tool of ``case`` first touches, for the same mesh."""
+    normal, turn = normal_at_touch(case.body, case.probe, case.frame), case.frame.turn
+    if turn is None:
+        return normal
+    x, y, z = map(float, turn @ np.array(normal))
+    return x, y, z
 
 
 def tool_at(probe: Probe, frame: Frame, first: float) -> Tool:

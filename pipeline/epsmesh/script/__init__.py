@@ -11,16 +11,16 @@ from typing import Any
 
 from dolfinx import fem
 
-from epsmesh.run.problem import tool_at
 from epsmesh.script.given import (
     body_of,
     check_apart,
     check_place,
     element_of,
     parameters,
+    placed_tool,
     probe_of,
 )
-from epsmesh.shapes.frame import Frame, Vector
+from epsmesh.shapes.frame import Vector
 from epsmesh.solve.conditions import Conditions
 from epsmesh.solve.elements import elements_of
 from epsmesh.solve.elements.base import Elements
@@ -140,7 +140,7 @@ class Problem:
         """
         if not depth > 0:
             raise ValueError(f"depth = {depth}: must be a positive number of metres")
-        tool = None if self._tool is None else tool_at(probe_of(self._tool, depth), Frame(self._at), 0.0)
+        tool = None if self._tool is None else placed_tool(self.body, probe_of(self._tool, depth), self._at)
         with (
             Spaces(self.body) as spaces,
             QuasiStaticProblem(spaces, self.degree, self.conditions, self.element, tool=tool) as problem,

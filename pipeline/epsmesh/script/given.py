@@ -1,6 +1,7 @@
 """What a problem is given, and whether it can work: mesh, groups, laws, tool and supports, told before a solve."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import inf
 from typing import Any
 
@@ -13,9 +14,11 @@ from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.mesh.distribute import BodyMesh, exterior_facets
 from epsmesh.run.problem import tool_at
 from epsmesh.scene.model import FIXED, FREE, MIRROR, PROBE
-from epsmesh.shapes.frame import Frame, Vector
+from epsmesh.shapes.contact import UPRIGHT
+from epsmesh.shapes.frame import Frame, Vector, angle_between
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.registry import PROBES, specialised
+from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.laws import LAWS
 from epsmesh.solve.loads import boundary_of
 from epsmesh.solve.physics import MaterialLaw, Parameters
@@ -75,6 +78,28 @@ def probe_of(tool: Mapping[str, Any], depth: float) -> Probe:
     return probe
 
 
+def placed_tool(body: BodyMesh, probe: Probe, at: Vector) -> Tool:
+    """Return the tool ``at`` its place; a linear law has the normal of the facets that it touches first; collective."""
+    tool = tool_at(probe, Frame(at), 0.0)
+    if probe.is_flat:
+        return tool
+    facets = boundary_of(body, (PROBE,))
+    points = _points_of(facets.corners)
+    gaps = tool.height(points.reshape(-1, 3)).reshape(points.shape[:2]).min(axis=1)
+    least = body.comm.allreduce(float(gaps.min(initial=np.inf)), op=MPI.MIN)
+    touched = facets.normals[gaps <= least + _OFF * _extent(body.mesh)].sum(axis=0)
+    normal = np.asarray(body.comm.allreduce(touched))
+    normal[[*body.mirrored]] = 0.0
+    x, y, z = map(float, normal / np.linalg.norm(normal))
+    return tool if angle_between((x, y, z), (0.0, 0.0, 1.0)) <= UPRIGHT else replace(tool, normal=(x, y, z))
+
+
+def _points_of(corners: FloatArray) -> FloatArray:
+    """Return points (n, k, 3) on facets, whose ``corners`` (n, 3, 3) they include."""
+    shares = np.array([(i, j, _ALONG - i - j) for i in range(_ALONG + 1) for j in range(_ALONG + 1 - i)]) / _ALONG
+    return np.einsum("kc,ncd->nkd", shares, corners)
+
+
 def check_place(body: BodyMesh, tool: Mapping[str, Any], at: Vector) -> None:
     """Check that a ``tool`` touches the body ``at`` a point at depth 0, and that the face of a flat one is its facets.
 
@@ -84,9 +109,7 @@ def check_place(body: BodyMesh, tool: Mapping[str, Any], at: Vector) -> None:
     extent = _extent(body.mesh)
     probe = probe_of(tool, 1e-3 * extent)
     corners = boundary_of(body, (PROBE,)).corners
-    shares = np.array([(i, j, _ALONG - i - j) for i in range(_ALONG + 1) for j in range(_ALONG + 1 - i)]) / _ALONG
-    points = np.einsum("kc,ncd->nkd", shares, corners).reshape(-1, 3)
-    gaps = tool_at(probe, Frame(at), 0.0).height(points)
+    gaps = tool_at(probe, Frame(at), 0.0).height(_points_of(corners).reshape(-1, 3))
     least = body.comm.allreduce(float(gaps.min(initial=np.inf)), op=MPI.MIN)
     edges = np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2)
     edge = body.comm.allreduce(float(edges.max(initial=0.0)), op=MPI.MAX)

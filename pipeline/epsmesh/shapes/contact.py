@@ -11,7 +11,7 @@ import numpy as np
 
 from epsmesh.arrays import FloatArray
 from epsmesh.shapes.body import Body
-from epsmesh.shapes.frame import MOST_INCLINED, Frame, PlaceError
+from epsmesh.shapes.frame import MOST_INCLINED, Frame, PlaceError, Vector, angle_between
 from epsmesh.shapes.indenter import Indenter
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.section import in_mm
@@ -36,6 +36,9 @@ _CLOSER = 0.6
 _MANY = 256
 # A surface counts as plane within this distance, in units of the footprint.
 _FLAT = 1e-9
+# Angle (degrees) between a tool's axis and the surface's normal below which a normal force is one along the axis: the
+# axial force differs by 1/cos - 1 < 4e-5, and the lateral one is less than 1 % of it. Facets of an organ turn as much.
+UPRIGHT = 2.0
 # Curvature times the footprint's radius below which it is rounding.
 _LEAST_BENT = 1e-6
 
@@ -207,6 +210,29 @@ def first_touch(body: Body, probe: Probe, frame: Frame) -> tuple[float, float, f
         step *= _CLOSER
     # A touch off the axis by rounding alone counts as on the axis.
     return (float(best[0]), float(best[1]), gap) if gap < -_FLAT * probe.half_width else (0.0, 0.0, 0.0)
+
+
+def is_inclined(body: Body, probe: Probe, frame: Frame) -> bool:
+    """Return whether the surface is inclined to a tool's axis where the tool first touches it."""
+    if probe.is_flat or is_level(body, frame):
+        return False
+    return angle_between(normal_at_touch(body, probe, frame), frame.outward) > UPRIGHT
+
+
+@lru_cache(_MANY)
+def normal_at_touch(body: Body, probe: Probe, frame: Frame) -> Vector:
+    """Return the outward unit normal of the surface where a tool first touches it.
+
+    Of a surface of triangles it is the mean below a footprint there, as for the tool's place: that of one facet is
+    noise.
+    """
+    x, y, _ = first_touch(body, probe, frame)
+    inward = frame.normal
+    if (x, y) != (0.0, 0.0):
+        points, _ = body.lift(frame, np.vstack([[[x, y]], outline_points(probe)]))
+        inward = body.frame_below(tuple(map(float, points[0])), None, probe.circumradius).normal
+    a, b, c = inward
+    return -a, -b, -c
 
 
 def _least_gap(body: Body, probe: Probe, frame: Frame, points: FloatArray) -> tuple[FloatArray, float]:

@@ -5,6 +5,7 @@ A tool is all that is above its profile: above the largest radius of its profile
 distance is the largest of the distances to all planes that touch it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,9 @@ from epsmesh.shapes.contour import Contour
 
 # Points are on the axis, or in the plane of an edge, within this share of their height.
 _ON_AXIS = 1e-9
+# Newton's method for the height of a tool: most steps, the slope of a line that passes it, and the last step, in units
+# of the extent of the points.
+_MOST, _AWAY, _ROUNDING = 100, 1e-6, 1e-14
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
@@ -36,11 +40,20 @@ class Distance:
     curvature: FloatArray
 
     @staticmethod
-    def along_axis(heights: FloatArray, moved: FloatArray) -> "Distance":
-        """Return the distance of linear elasticity: that along the last axis, above the places of points at rest.
+    def along(direction: FloatArray, heights: FloatArray, moved: FloatArray) -> "Distance":
+        """Return the distance of linear elasticity: that along a unit ``direction``, above places at rest.
 
         ``heights`` (n) are those of the tool there, ``moved`` (n, d) the displacements.
         """
+        normal, curvature = (
+            np.broadcast_to(-direction, moved.shape),
+            np.broadcast_to(0.0, (*moved.shape, moved.shape[1])),
+        )
+        return Distance(heights - moved @ direction, normal, curvature)
+
+    @staticmethod
+    def along_axis(heights: FloatArray, moved: FloatArray) -> "Distance":
+        """Return that along the last axis, the tool's."""
         dim = moved.shape[1]
         normal, curvature = np.broadcast_to(-np.eye(dim)[-1], moved.shape), np.broadcast_to(0.0, (*moved.shape, dim))
         return Distance(heights - moved[:, -1], normal, curvature)
@@ -48,6 +61,25 @@ class Distance:
     def turned(self, axes: FloatArray) -> "Distance":
         """Return it from coordinates with the unit vectors ``axes``, in rows (3, 3), in those of these vectors."""
         return Distance(self.gap, self.normal @ axes, axes.T @ self.curvature @ axes)
+
+
+def heights_along(direction: FloatArray, distance: Callable[[FloatArray], Distance], points: FloatArray) -> FloatArray:
+    """Return how far (n, m) a tool is from ``points`` (n, 3) along a unit ``direction``, less than 0 within it.
+
+    Past the tool it is as far as it is from the outermost point. From before the tool on, its distance is a convex
+    function, so that Newton's method does not pass its zero.
+    """
+    extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+    heights, nearer = np.full(len(points), -extent), np.ones(len(points), dtype=bool)
+    for _ in range(_MOST):
+        found = distance(points + heights[:, None] * direction)
+        slope = -found.normal @ direction
+        nearer &= slope > _AWAY
+        step = np.where(nearer, found.gap / np.maximum(slope, _AWAY), 0.0)
+        heights = heights + step
+        if np.abs(step).max() <= _ROUNDING * extent:
+            break
+    return np.where(nearer, heights, extent)
 
 
 def revolved(contour: Contour, points: FloatArray) -> Distance:

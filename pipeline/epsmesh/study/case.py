@@ -12,7 +12,7 @@ from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.axis import Axis
-from epsmesh.study.capabilities.features import features_of, is_loaded, needs_time_steps
+from epsmesh.study.capabilities.features import features_of, is_loaded, needs_time_steps, touches_inclined
 from epsmesh.study.capabilities.obstacles import obstacle
 from epsmesh.study.closure import FarRegion
 from epsmesh.study.loads import Load
@@ -295,6 +295,7 @@ class Case:
             Dimension.SECTION if probe.crack else Dimension.BODY,
             is_loaded=is_loaded(self),
             has_terms=bool(self.load.terms),
+            is_inclined=touches_inclined(self),
             motion=self._motion,
         )
 

@@ -5,13 +5,12 @@ Each shape checks its own keys. This module checks combinations of sections.
 
 import itertools
 from collections.abc import Sequence
-from math import atan, degrees, hypot, prod
+from math import prod
 from typing import cast
 
 import numpy as np
 
 from epsmesh.shapes.body import Body, Layered
-from epsmesh.shapes.contact import first_touch
 from epsmesh.shapes.facetted import Facetted
 from epsmesh.shapes.from_file import FromFile
 from epsmesh.shapes.probe import Probe, is_direction
@@ -47,10 +46,6 @@ from epsmesh.study.stages import check_history
 
 # Forces of all cases and times: a dataset then has a few hundred megabytes.
 _MOST_FORCES = 2_000_000
-# The square of a slope from which it is told: of 30° it is 0.33, and F of a ball 22 % too large; of 17°, 0.09 and 6 %.
-_TILTED = 0.005
-# For the slope of a tool, in units of its half width.
-_STEP = 1e-4
 # Points of a surface that is not checked.
 _NOWHERE = np.empty((0, 3))
 _OR_NO_CONTACT = '. To go on without contact at such places, write `off = "no contact"` in [probe.path]'
@@ -74,7 +69,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     problems.each(check_linear, body=bodies, material=materials, mesh=meshes)
     problems.each(check_support, body=bodies, mesh=meshes)
     way = next((axis for axis in axes if axis.off), None)
-    placed = _placed(bodies, probes, way, problems, is_linear=bool(linear))
+    placed = _placed(bodies, probes, way, problems)
     for body, probe in placed:
         for check in (check_column, check_ball, check_gap, check_slit_in):
             problems.each(check, body=(body,), probe=(probe,), mesh=meshes)
@@ -144,7 +139,7 @@ def _check_times(probes: Sequence[Probe], axes: tuple[Axis, ...], problems: Prob
 
 
 def _placed(
-    bodies: Sequence[Body], probes: Sequence[Probe], way: Axis | None, problems: Problems, *, is_linear: bool
+    bodies: Sequence[Body], probes: Sequence[Probe], way: Axis | None, problems: Problems
 ) -> list[tuple[Body, Probe]]:
     """Return the bodies with the probes that have a place on them, and report those that have none."""
     sane = [probe for probe in probes if _has_place(probe, problems)]
@@ -154,8 +149,6 @@ def _placed(
         with problems.about(body=body, probe=probe):
             if _check_place(body, probe, way, problems, refused):
                 placed.append((body, probe))
-                if is_linear:  # here, where the first touch was found just now
-                    _warn_of_tilt(body, probe, problems)
     for (body_name, probe_name, why), lost in refused.items():
         places = [[in_mm(x) for x in probe.at] for probe in lost]
         more = f"; the same for {len(places) - 1} more places, up to {', '.join(places[-1])}" if len(places) > 1 else ""
@@ -188,24 +181,6 @@ def warn_of_depth(probe: Probe, problems: Problems) -> None:
             problems.warn(one.key, one.found, one.allowed)
         else:
             problems.warn("probe.force", f"{probe.force:.6g} N", f"expected depth {one.found}: {one.allowed}")
-
-
-def _warn_of_tilt(body: Body, probe: Probe, problems: Problems) -> None:
-    """Warn of a tool that touches where the surface is inclined to its axis: linear contact has the axis as normal."""
-    if not probe.is_unilateral or probe.is_flat:
-        return
-    x, y, _ = first_touch(body, probe, probe.frame_on(body))
-    step = _STEP * probe.half_width
-    right, left, above, below = probe.profile(np.array([[x + step, y], [x - step, y], [x, y + step], [x, y - step]]))
-    slope = hypot(right - left, above - below) / (2 * step) if (x, y) != (0.0, 0.0) else 0.0
-    if slope**2 > _TILTED:
-        problems.warn(
-            "probe.axis",
-            list(probe.axis) if probe.axis else None,
-            f"the {probe.shape} touches where the surface is inclined by {degrees(atan(slope)):.2g}° to its axis; "
-            f"a linear law has the forces of contact along the axis: F may be too large by {100 * slope**2:.2g} %, and "
-            "lateral forces mean nothing. Turn the axis to the surface's normal, or use a law of large displacements",
-        )
 
 
 def _tell_notices(body: Body, problems: Problems) -> None:

@@ -50,7 +50,8 @@ class Way:
     """How a case is solved.
 
     ``laws`` are the sorted names of its regions' laws, :data:`LINEAR` at small displacements. ``is_loaded`` says that
-    dead loads act, ``has_terms`` that the energy has other terms than theirs and those of laws.
+    dead loads act, ``has_terms`` that the energy has other terms than theirs and those of laws,
+    ``is_inclined`` that a linear law has found contact whose normal is not the tool's axis.
     """
 
     element: str = "displacement"
@@ -60,6 +61,7 @@ class Way:
     dimension: Dimension = Dimension.BODY
     is_loaded: bool = False
     has_terms: bool = False
+    is_inclined: bool = False
     motion: Motion = Motion.PRESS
 
     @property
@@ -69,8 +71,11 @@ class Way:
 
     @property
     def is_nonlinear(self) -> bool:
-        """Whether it is solved by Newton's method, whatever the time: so is friction on a surface that loads bend."""
-        return self.is_large or self.has_terms or (self.rubs and self.is_loaded)
+        """Whether it is solved by Newton's method, whatever the time.
+
+        So is friction on a surface that loads bend, and contact whose normal is not the tool's axis.
+        """
+        return self.is_large or self.has_terms or self.is_inclined or (self.rubs and self.is_loaded)
 
     @property
     def is_mixed(self) -> bool:

@@ -49,17 +49,17 @@ class Touch:
 
         The gaps are those of linear laws, above undeformed places: a move across the axis changes none.
         """
-        risen = moved[candidates.facets]
-        return self._first(candidates, risen) - self._first(candidates, np.zeros_like(risen))
+        return self.least(candidates, moved) - self.least(candidates, np.zeros_like(moved))
 
     def sag_at(self, candidates: Candidates, points: FloatArray) -> float:
         """Return how much farther (m) the probe moves to touch the surface with its nodes at deformed ``points``."""
-        still = np.zeros(candidates.facets.shape)
-        return self._first(replace(candidates, points=points), still) - self._first(candidates, still)
+        still = np.zeros(len(candidates))
+        return self.least(replace(candidates, points=points), still) - self.least(candidates, still)
 
-    def _first(self, candidates: Candidates, moved: FloatArray) -> float:
-        """Return the smallest gap (m) to a surface displaced by ``moved`` (m, k) at the nodes of its facets."""
-        x, facets, step = candidates.points[candidates.facets], np.arange(len(moved)), 1.0
+    def least(self, candidates: Candidates, moved: FloatArray) -> float:
+        """Return the smallest gap (m) to a surface whose nodes are ``moved`` (n), m, towards the probe."""
+        x, moved, step = candidates.points[candidates.facets], moved[candidates.facets], 1.0
+        facets = np.arange(len(moved))
         middle = np.full((len(facets), FACET_CORNERS), 1 / FACET_CORNERS)
         for _ in range(_ROUNDS):
             places = middle[:, None] + step * (_grid()[None] - 1 / FACET_CORNERS)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from epsmesh.arrays import FloatArray
+from epsmesh.solve import SolveError
 from epsmesh.solve.contact.geometry import Touch
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
@@ -15,6 +16,9 @@ from epsmesh.solve.dead_loads import sag
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Loads
 from epsmesh.solve.relaxing import crept
+
+# Search for the first touch beside the axis: most steps, and the last one, in units of the surface's displacement.
+_MOST, _CLOSE = 30, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +38,10 @@ class Sagged:
     def placed(self, tool: Tool, body: DeformedBody) -> Tool:
         """Return a tool whose depths count from the first touch of the sagged surface of a ``body``.
 
-        With a linear law its gaps are those along the axis.
+        With a linear law its gaps are those above the body at rest.
         """
         if body.law.is_linear:
-            tool = tool.along_axis(body.candidates.points)
+            tool = tool.at_rest(body.candidates.points)
         if np.isnan(self.sag):
             return tool
         return replace(tool, distance=lambda points, depth: tool.distance(points, depth + self.sag))
@@ -71,6 +75,28 @@ def sagged_body(
 def _sag_of(tool: Tool, body: DeformedBody) -> float:
     """Return how much farther (m) a tool moves to touch a ``body`` in its state, with the gaps of the law."""
     touch, positions = Touch(tool.height, tool.first), body.positions()
-    if body.law.is_linear:
-        return touch.sag(body.candidates, (positions - body.places)[:, 2])
-    return touch.sag_at(body.candidates, positions)
+    if not body.law.is_linear:
+        return touch.sag_at(body.candidates, positions)
+    if tool.normal is not None:
+        return _sag_along(tool, np.array(tool.normal), body)
+    return touch.sag(body.candidates, (positions - body.places)[:, 2])
+
+
+def _sag_along(tool: Tool, normal: FloatArray, body: DeformedBody) -> float:
+    """Return the same where gaps are along a ``normal`` that is not the axis: their least one is that at rest.
+
+    Raises:
+        SolveError: if no depth is found.
+    """
+    candidates, moved = body.candidates, (body.positions() - body.places) @ normal
+
+    def gap(depth: float, risen: FloatArray) -> float:
+        return Touch(lambda points: tool.heights_along(normal, points, depth)).least(candidates, risen)
+
+    sag, at_rest, size = 0.0, gap(0.0, np.zeros_like(moved)), float(np.abs(moved).max(initial=0.0))
+    for _ in range(_MOST):  # the tool comes nearer by about the cosine of its way
+        change = (gap(sag, moved) - at_rest) / normal[2]
+        sag += change
+        if abs(change) <= _CLOSE * size:
+            return sag
+    raise SolveError("no depth is found at which the tool first touches the surface that loads move")

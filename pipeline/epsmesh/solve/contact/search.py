@@ -78,7 +78,7 @@ class ContactSearch:
                 the probe does not end.
         """
         is_bent = asked.movement.loads is not None and self._tool.friction > 0
-        if not asked.law.is_linear or self._elements.displacements.terms or is_bent:
+        if not asked.law.is_linear or self._elements.displacements.terms or is_bent or self._tool.normal is not None:
             return self._solve_large(asked, stack)
         law, movement, strict = asked.law, asked.movement, _STRICTER * asked.tolerance
         columns = self._elements.columns(movement, stack)

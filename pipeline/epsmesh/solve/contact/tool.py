@@ -2,11 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
-from epsmesh.shapes.distance import Distance
+from epsmesh.shapes.distance import Distance, heights_along
+from epsmesh.shapes.frame import Vector
+
+# Depths of which gaps are kept: friction goes from one to the next, and asks for both.
+_DEPTHS = 4
 
 
 def _no_distance(points: FloatArray, depth: float) -> Distance:
@@ -24,6 +29,7 @@ class Tool:
     axis. ``friction`` is Coulomb's coefficient, infinite for tissue that sticks. ``distance`` is that of
     points (n, 3) to the probe pressed in by a depth (m) from the first touch, for contact at large displacements.
     ``foot`` (m) are x and y of its axis. ``is_sharp`` says that it ends at a sharp edge, off which tissue slides.
+    ``normal`` is the surface's outward unit normal at the first touch, if that is inclined to the axis.
     """
 
     height: Callable[[FloatArray], FloatArray]
@@ -33,15 +39,35 @@ class Tool:
     distance: Callable[[FloatArray, float], Distance] = _no_distance
     foot: tuple[float, float] = (0.0, 0.0)
     is_sharp: bool = False
+    normal: Vector | None = None
 
-    def along_axis(self, places: FloatArray) -> "Tool":
-        """Return the tool of linear elasticity: gaps of nodes are those along −z, above their undeformed ``places``."""
+    def at_rest(self, places: FloatArray) -> "Tool":
+        """Return the tool of linear elasticity: gaps of nodes are those above their undeformed ``places``.
+
+        They are along the surface's normal at the first touch: −z, but for a tool that is inclined to the surface.
+        """
+        if self.normal is not None:
+            return self._along(np.array(self.normal), places)
         heights = self.height(places) - self.first
 
         def distance(points: FloatArray, depth: float) -> Distance:
             return Distance.along_axis(heights - depth, points - places)
 
         return replace(self, distance=distance)
+
+    def _along(self, normal: FloatArray, places: FloatArray) -> "Tool":
+        @lru_cache(_DEPTHS)
+        def heights(depth: float) -> FloatArray:
+            return self.heights_along(normal, places, depth)
+
+        def distance(points: FloatArray, depth: float) -> Distance:
+            return Distance.along(normal, heights(depth), points - places)
+
+        return replace(self, distance=distance)
+
+    def heights_along(self, normal: FloatArray, places: FloatArray, depth: float) -> FloatArray:
+        """Return how far (n, m) the tool, at a ``depth`` (m), is from ``places`` (n, 3) along a unit ``normal``."""
+        return heights_along(normal, lambda points: self.distance(points, depth), places)
 
     def torque(self, points: FloatArray, forces: FloatArray) -> float:
         """Return the torque (N m) of the tissue on the tool about its advance, −z.

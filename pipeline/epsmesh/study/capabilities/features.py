@@ -10,7 +10,7 @@ from math import inf, isfinite
 from typing import Any, Protocol
 
 from epsmesh.shapes.body import Body, Layered
-from epsmesh.shapes.contact import first_touch, is_flat, is_level
+from epsmesh.shapes.contact import is_flat, is_inclined, is_level
 from epsmesh.shapes.from_file import FromFile
 from epsmesh.shapes.insertion import Inserted
 from epsmesh.shapes.probe import STICK, Probe
@@ -76,9 +76,11 @@ def _is_column(scene: Scene) -> bool:
     return not scene.mesh.is_closed and isfinite(scene.mesh.column(scene.body.reach(scene.probe.frame_on(scene.body))))
 
 
-def _touches_beside(scene: Scene) -> bool:
-    x, y, _ = first_touch(scene.body, scene.probe, scene.probe.frame_on(scene.body))
-    return not scene.probe.is_flat and (x, y) != (0.0, 0.0)
+def touches_inclined(scene: Scene) -> bool:
+    """Return whether a linear law has contact whose normal is not the tool's axis: large laws have their own."""
+    if not scene.probe.is_unilateral or _is_large(scene):
+        return False
+    return is_inclined(scene.body, scene.probe, scene.probe.frame_on(scene.body))
 
 
 def _is_level(scene: Scene) -> bool:
@@ -198,9 +200,7 @@ FEATURES: dict[str, Feature] = {
         "probe.contact", lambda s: _has_edge(s) and not s.probe.is_unilateral
     ),
     "friction": Feature("probe.friction", lambda s: s.probe.friction > 0, write=_coefficient),
-    "inclined touch of a linear law": Feature(
-        "probe.axis", lambda s: _touches_beside(s) and not _is_large(s), ("body", "material"), list
-    ),
+    "inclined touch of a linear law": Feature("probe.axis", touches_inclined, ("body", "material"), list),
     "given force": Feature("probe.force", lambda s: s.probe.force is not None, write=lambda force: f"{force:.6g} N"),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),

@@ -16,6 +16,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "varying stiffness": "a field of the modulus is computed in three dimensions",
         "loads": "loads are computed in three dimensions",
         "terms": "terms are computed in three dimensions",
+        "inclined touch of a linear law": "contact off the tool's axis is computed in three dimensions",
         "outputs": "outputs are numbers of a solution in three dimensions",
         "influence": "the influence is that of a solution in three dimensions",
     },
@@ -68,6 +69,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "loads": "their force is not proportional to the depth",
         "terms": "F is not proportional to the depth",
         "large displacements": "F is not proportional to the depth",
+        "inclined touch of a linear law": "F is not proportional to the depth",
         "outputs": "outputs of a function need the solution of each depth",
     },
     "path": {
@@ -88,6 +90,8 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "friction": "with friction, F_exact would not be more accurate than F on a fine mesh",
         "terms": "F_exact is of the body and the tool alone",
         "large displacements": "at large displacements, F_exact would not be more accurate than F on a fine mesh",
+        "inclined touch of a linear law": "beside the tool's axis, F_exact would not be more accurate than F on a fine "
+        "mesh",
     },
     "SOFA scene": {
         "large displacements": "material.law: a scene of SOFA is for linear tissue",

@@ -115,12 +115,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "frictionless contact",
         'a frictionless blade slides without force: use contact = "bonded"',
     ),
-    Refusal(
-        "friction",
-        "inclined touch of a linear law",
-        "the tool touches beside its axis, where its surface is inclined, and with a linear law friction is across the "
-        "axis: turn the axis to the surface's normal, use a law of large displacements, or omit friction",
-    ),
     Refusal("slit", "region", "slits in a body with regions of triangles are not computed: use an inclusion"),
     Refusal("slit", "no flat top", "a slit needs the flat top of a box or a cylinder, and goes straight down"),
     Refusal(
