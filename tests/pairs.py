@@ -257,6 +257,7 @@ FEATURES = (
     Feature("sphere", "probe", _indenter(shape="sphere", radius="5 mm")),
     Feature("sticking sphere", "probe", _indenter(shape="sphere", radius="5 mm", friction="stick")),
     Feature("rubbing sphere", "probe", _indenter(shape="sphere", radius="5 mm", friction=0.1)),
+    Feature("tilted sphere", "probe", _indenter(shape="sphere", radius="5 mm", axis=[0.1045, 0.0, -0.9945])),
     Feature("cone", "probe", _indenter(shape="cone", angle="70 deg", radius="8 mm", tip="1 mm")),
     Feature("paraboloid", "probe", _indenter(shape="paraboloid", radius="5 mm", shaft="5 mm")),
     Feature("pyramid", "probe", _indenter("0.1 mm", shape="pyramid", angle="50 deg", sides=3, tip="0.5 mm")),
