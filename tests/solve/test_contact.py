@@ -237,8 +237,8 @@ def tilted(degrees, depth=0.3, law="linear", rim=0.3, comm=MPI.COMM_SELF, materi
     return record(comm, mesh, body=body, probe=tool, material={"law": law} | (material or {}))
 
 
-# A tool must touch well within the region that is searched: the more it is tilted, the deeper.
-DEPTHS = {5: (0.2, 0.3), 17: (0.6, 0.6), 30: (1.5, 1.0), 45: (2.5, 1.2)}
+# The touch must be well within the region that is searched: the more a tool is tilted, the deeper, and 45° are refused.
+DEPTHS = {5: (0.2, 0.3), 17: (0.6, 0.6), 30: (1.5, 1.0), 44: (2.5, 1.2)}
 
 
 @pytest.mark.parametrize("degrees", DEPTHS)
@@ -254,7 +254,7 @@ def test_tilted_ball_presses_across_the_surface_as_deep_as_it_is_below_it(degree
     assert found.contact_area / cosine == pytest.approx(upright.contact_area, rel=0.06)
     assert found.balance < 1e-6
     assert abs(aside) <= found.force_vector_error[0] < 0.1 * normal
-    assert found.force_vector_error[2] >= found.force_error * normal
+    assert found.force_vector_error[2] == pytest.approx(found.force_error * normal, rel=1e-6)
 
 
 @pytest.mark.parametrize("degrees", [5, 17])
@@ -285,7 +285,7 @@ def test_tilted_ball_on_a_surface_that_loads_move():
     tool = SPHERE | {"radius": "5 mm", "depth": "0.1 mm", "axis": [-0.14, 0, -1]}
     scene = {"body": {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"]}, "probe": tool, "load": load}
     linear, large = (
-        record(mesh={"fine": "6 mm"}, material={"law": law, "density": "1060 kg/m^3"}, **scene)
+        record(mesh={"fine": "6 mm", "coarse": "6 mm"}, material={"law": law, "density": "1060 kg/m^3"}, **scene)
         for law in ("linear", "neo-hookean")
     )
     assert linear.sag == pytest.approx(large.sag, rel=0.02)
@@ -296,7 +296,9 @@ def test_fixed_axis_on_a_curved_body():
     """A ball that comes down beside the top of an ellipsoid presses along the surface's normal there."""
     body = {"shape": "ellipsoid", "axes": ["24 mm", "24 mm", "20 mm"], "fixed": {"below": "-8 mm"}}
     tool = SPHERE | {"radius": "5 mm", "depth": "0.3 mm", "at": ["4 mm", "2 mm"], "axis": [0, 0, -1]}
-    linear, large = (record(mesh={"fine": "6 mm"}, body=body, probe=tool, material={"law": w}) for w in LAWS)
+    linear, large = (
+        record(mesh={"fine": "6 mm", "coarse": "6 mm"}, body=body, probe=tool, material={"law": w}) for w in LAWS
+    )
     x, y, z = linear.force_vector
     assert y / x == pytest.approx(0.5, rel=0.01)
     assert 0.1 < x / z < 0.2
