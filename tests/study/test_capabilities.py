@@ -22,7 +22,7 @@ HAVING = {
     "unilateral contact": {"probe": SPHERE},
     "tool that is not flat": {"probe": SPHERE},
     "friction": {"probe": SPHERE | {"friction": 0.3}},
-    "inclined touch of a linear law": {"probe": SPHERE | {"axis": [0.1, 0, -1]}},
+    "inclined touch of a linear law": {"probe": SPHERE | {"axis": [0.1, 0, -1]}, "material": {"law": "linear"}},
     "rounded edge": {"probe": {"edge": "0.2 mm", "contact": "unilateral"}},
     "six motions": {"probe": {"motion": "all"}},
     "slice": {"probe": BLADE | {"slice": "0.1 mm"}},
