@@ -34,6 +34,8 @@ _RINGS = tuple(i / 12 for i in range(13))
 _AROUND = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)], dtype=float)
 _CLOSER = 0.6
 _MANY = 256
+# Cases of a map, each of which is asked often how its tool touches.
+_OF_A_MAP = 1 << 14
 # A surface counts as plane within this distance, in units of the footprint.
 _FLAT = 1e-9
 # Angle (degrees) between a tool's axis and the surface's normal below which a normal force is one along the axis: the
@@ -193,7 +195,7 @@ def _check_rim(body: Body, probe: Indenter, frame: Frame, first: float) -> None:
         )
 
 
-@lru_cache(_MANY)
+@lru_cache(_OF_A_MAP)
 def first_touch(body: Body, probe: Probe, frame: Frame) -> tuple[float, float, float]:
     """Return where a tool first touches a body, relative to its axis (m, along and across), and its gap (m) there.
 
@@ -219,7 +221,7 @@ def is_inclined(body: Body, probe: Probe, frame: Frame) -> bool:
     return angle_between(normal_at_touch(body, probe, frame), frame.outward) > UPRIGHT
 
 
-@lru_cache(_MANY)
+@lru_cache(_OF_A_MAP)
 def normal_at_touch(body: Body, probe: Probe, frame: Frame) -> Vector:
     """Return the outward unit normal of the surface where a tool first touches it.
 
