@@ -27,6 +27,7 @@ COARSE = {"fine": "2 mm", "coarse": "2 mm", "rim": "0.3 mm", "growth": 0.5}
 
 LAWS = ("linear", "neo-hookean")
 
+
 def record(comm=MPI.COMM_SELF, mesh=None, **changes):
     return solved(comm, **{"body": SMALL, "probe": SPHERE, "mesh": COARSE | (mesh or {})} | changes)
 
