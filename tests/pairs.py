@@ -298,6 +298,7 @@ FEATURES = (
     Feature("swept E", "young", _update("material", young=["10 kPa", "20 kPa"])),
     Feature("output", "output", _output),
     Feature("influence", "influence", _update("solve", influence=True)),
+    Feature("spread", "spread", _update("material", spread={"young": "30 %", "correlation_length": "5 mm"})),
 )  # fmt: skip
 
 

@@ -46,6 +46,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
         text_of(case.solve, ("timing", "repeats", "exact", "influence")),
         *tail,
         *(["influence"] if case.solve.influence else []),
+        *_spread_text(case),
         *map(_output_text, case.outputs),
         *_rim_text(case),
     ]
@@ -83,6 +84,13 @@ def _output_text(output: Output) -> str:
         first, *others = (digest(file.read_text(encoding="utf-8")) for file in output.sources)
         content["function"] = [first, name, *others]
     return _text(content)
+
+
+@of_scene
+def _spread_text(case: Case) -> tuple[str, ...]:
+    """Return the random fields of the moduli by region, in canonical form; none of a case without."""
+    spreads = [tissue.spread for tissue in case.tissues]
+    return (str([spread and text_of(spread) for spread in spreads]),) if any(spreads) else ()
 
 
 def reference_key(case: Case, accuracy: float) -> str:

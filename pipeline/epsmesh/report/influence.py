@@ -12,6 +12,9 @@ from epsmesh.study.case import Case
 from epsmesh.study.influence import DECIDED
 from epsmesh.study.sweep import Study
 
+SPREAD = "force_uncertainty_tissue"
+# A normal distribution has 95 % within so many standard deviations.
+OF_NORMAL = 1.959964
 # What is given, each with its dimension.
 _GIVEN = {"force_share": "region", "poisson_effect": "region", "influence_radius": "decided"}
 
@@ -33,7 +36,30 @@ def add_influence(
             values = [_of(case, record, name, dim, labels[dim]) for case, record in zip(cases, records, strict=True)]
             dims = (*(axis.name for axis in study.axes), dim)
             found[name] = dims, np.array(values).reshape(*study.shape, -1), attributes(name)
+    if any(tissue.spread for case in cases for tissue in case.tissues):
+        found[SPREAD] = _spread(dataset, study, cases, records)
     return dataset.assign(found).assign_coords({dim: (dim, labels[dim], attributes(dim)) for dim in labels})
+
+
+def _spread(
+    dataset: xr.Dataset, study: Study, cases: Sequence[Case], records: Sequence[Record | None]
+) -> tuple[Any, ...]:
+    """Return half of the range that holds 95 % of the forces (N), whose logarithm is normally distributed."""
+    deviations = [_known(record, "tissue_spread") or (np.nan,) for record in records]
+    shares = np.sinh(OF_NORMAL * np.array(deviations).reshape(study.shape))
+    named = [
+        f"{name} {tissue.spread}"
+        for case in cases
+        for name, tissue in zip(case.body.region_names, case.tissues, strict=True)
+        if tissue.spread
+    ]
+    dims = [axis.name for axis in study.axes]
+    values = abs(dataset["force"].transpose(*dims).values) * shares
+    return dims, values, attributes(SPREAD) | {"comment": "; ".join(dict.fromkeys(named))}
+
+
+def _known(record: Record | None, name: str) -> tuple[float, ...] | None:
+    return record.influence.get(name) if record and record.is_ok else None
 
 
 def _regions(case: Case) -> dict[str, int]:
@@ -43,7 +69,7 @@ def _regions(case: Case) -> dict[str, int]:
 
 
 def _of(case: Case, record: Record | None, name: str, dim: str, labels: Sequence[Any]) -> np.ndarray[Any, Any]:
-    known = record.influence.get(name) if record and record.is_ok else None
+    known = _known(record, name)
     if known is None:
         return np.full(len(labels), np.nan)
     if dim == "decided":

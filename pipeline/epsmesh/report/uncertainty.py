@@ -8,11 +8,19 @@ import xarray as xr
 from epsmesh.plan.plan import Plan
 from epsmesh.plan.work import EndPlans
 from epsmesh.quantities import attributes
+from epsmesh.report.influence import SPREAD
 from epsmesh.report.words import percent
 from epsmesh.shapes.segmented import Segmented, is_uncertain
 
 NAME = "force_uncertainty"
 IMAGE = "force_image_uncertainty"
+# Bars of F, and what to do about each.
+_NEXT = {
+    "force_error": "the mesh: refine it before measuring more",
+    NAME: "the tissue's parameters: measure its mean stiffness next",
+    SPREAD: "the tissue's spread: measure next how stiff it is within `influence_radius`, such as by elastography",
+    IMAGE: "the image: find the boundary better next",
+}
 ForceOf = Callable[[Plan], xr.DataArray]
 
 
@@ -76,13 +84,28 @@ def _like(force: xr.DataArray, other: xr.DataArray) -> xr.DataArray:
 
 
 def unknowns(dataset: xr.Dataset) -> str:
-    """Say how the mesh's error compares with what is not known of the tissue and of the image, if that is given."""
-    return " ".join(filter(None, (tissue(dataset), image(dataset))))
+    """Compare the mesh's error with what is not known of the tissue and of the image, if that is given."""
+    return " ".join(filter(None, (tissue(dataset), spread(dataset), image(dataset), next_measurement(dataset))))
 
 
 def tissue(dataset: xr.Dataset) -> str:
     """Say how the mesh's error compares with what is not known of the tissue; "" if its material was not identified."""
     return _compared(dataset, NAME, "tissue", "The bars of the tissue's parameters are not computed: run the study.")
+
+
+def spread(dataset: xr.Dataset) -> str:
+    """Say how the mesh's error compares with the tissue's spread from place to place; "" if it has none."""
+    return _compared(dataset, SPREAD, "spread of the tissue", "The bars of the tissue's spread are not computed.")
+
+
+def next_measurement(dataset: xr.Dataset) -> str:
+    """Say which bar is the largest, of several with a spread among them, and what makes it smaller."""
+    if SPREAD not in dataset or not np.isfinite(dataset[SPREAD]).any():
+        return ""
+    force = abs(dataset["force"])
+    bars = {name: float((abs(dataset[name]) / force).max()) for name in _NEXT if name in dataset}
+    largest = max(bars, key=lambda name: np.nan_to_num(bars[name]))
+    return f"The largest bar is that of {_NEXT[largest]}."
 
 
 def image(dataset: xr.Dataset) -> str:

@@ -13,6 +13,7 @@ from epsmesh import compat
 from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.plan.steps import Solve
+from epsmesh.run.spread import deviation_of
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.points.locate import table_of
 from epsmesh.solve.points.reduce import CHANGES
@@ -33,6 +34,8 @@ def influence_of(
     solve: Solve, state: State, finer: State | None, contact_error: float = 0.0
 ) -> Mapping[str, tuple[float, ...]]:
     """Return share of F by region, and distance (m) by share of F, with error bars, by their names; collective.
+
+    If moduli are random fields, ``tissue_spread`` is the standard deviation of ln F.
 
     The mesh is that of the solver, turned so that the probe presses along −z. ``contact_error`` is the relative error
     bar of the contact radius: two degrees may have the same nodes in contact, and F another share where it is wider.
@@ -75,6 +78,8 @@ def influence_of(
     is_known = above is not state.influence
     values = {name: value for name, (value, _) in found.items()}
     values |= {f"{name}_error": bar if is_known else np.full_like(bar, np.nan) for name, (_, bar) in found.items()}
+    spreads = [tissue.spread for tissue in case.tissues]
+    values |= {"tissue_spread": (deviation_of(state, numbers, spreads),)} if any(spreads) else {}
     return {name: tuple(map(float, numbers)) for name, numbers in values.items()}
 
 

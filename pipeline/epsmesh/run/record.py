@@ -60,7 +60,8 @@ class Record:
       the force if the probe is held. ``load_energy`` (J): their strain energy. ``sag`` (m): their displacement of a
       probe that is free along its axis.
     - ``influence``: shares of the force by region, and distances (m) within which shares are decided, with error bars,
-      by their names in the dataset; empty unless the study asks for them.
+      by their names in the dataset; empty unless the study asks for them. ``tissue_spread`` in it is the standard
+      deviation of ln F by random fields of the moduli.
     - ``course``: what a case in time steps does over time: see ``COURSE``; empty for any other case.
     - ``surface_deviation`` (m): distance of the mesh from the surface in the body's file.
     - ``kind``, ``planned_cells``, ``poisson``: inputs of the cost model (:mod:`epsmesh.plan.cost`).

@@ -1,6 +1,6 @@
 """Material of a region of tissue."""
 
-from math import hypot, inf
+from math import hypot, inf, log1p
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -8,9 +8,9 @@ from pydantic import AfterValidator, BaseModel, Field, ModelWrapValidatorHandler
 from pydantic_core import PydanticCustomError
 
 from epsmesh.shapes.frame import Vector
-from epsmesh.shapes.section import OptionalName, Section, Words
+from epsmesh.shapes.section import OptionalName, Section, Words, in_mm
 from epsmesh.shapes.varying import Varying
-from epsmesh.units import Density, Pressure, Time
+from epsmesh.units import Density, Length, Pressure, Share, Time
 from epsmesh.viscoelastic import Terms
 
 
@@ -135,6 +135,39 @@ class Fibres(Section):
         return self.k1 == 0 or self.dispersion > 1 / 3 - _ALIGNED
 
 
+class Spread(Section):
+    """What is not known of Young's modulus within a tissue: a random field about it.
+
+    ln E is normally distributed, and Matérn's covariance of smoothness 3/2 is that of ln E at two places. The mean of E
+    is ``young`` of the tissue, or its field.
+    """
+
+    young: Annotated[
+        Share,
+        Field(gt=0, le=1),
+        Words(
+            "Standard deviation of Young's modulus at a place, relative to its mean, which is the tissue's `young`.",
+            '"30 %"',
+        ),
+    ]
+    correlation_length: Annotated[
+        Length,
+        Words(
+            "Distance l over which the modulus stays alike: the correlation at a distance r is "
+            "(1 + sqrt(3) r/l) exp(-sqrt(3) r/l), 0.48 at l.",
+            '"5 mm"',
+        ),
+    ]
+
+    @property
+    def deviation(self) -> float:
+        """The standard deviation of ln E."""
+        return log1p(self.young**2) ** 0.5
+
+    def __str__(self) -> str:
+        return f"\N{PLUS-MINUS SIGN} {100 * self.young:.3g} % over {in_mm(self.correlation_length)}"
+
+
 def name_in_term(own: str, number: int, key: str) -> str:
     """Return the name of a key of a table of a list, the ``number``-th from 0, which may have its ``own`` name."""
     return f"{own}_{key}" if own else f"{key}_{number + 1}"
@@ -226,6 +259,15 @@ class Tissue(Section):
             default="none: elastic; of regions, the material's, none where layers fill the body",
         ),
     ] = ()
+
+    spread: Annotated[
+        Spread | None,
+        Words(
+            "Random deviation of Young's modulus from place to place: `force_uncertainty_tissue` is what it does to F.",
+            '{young = "30 %", correlation_length = "5 mm"}',
+            default="none: the modulus is known; of regions, too",
+        ),
+    ] = None
 
     _varying: Varying | None = PrivateAttr(None)
 

@@ -11,7 +11,7 @@ KEYS = ("from", "to", "steps")
 MOST_STEPS = 10_000
 EXAMPLE = '{from = "0.1 mm", to = "1 mm", steps = 10}'
 # Tables whose values can be swept.
-_TABLES = ("history", "sine", "young")
+_TABLES = ("history", "sine", "spread", "young")
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
 

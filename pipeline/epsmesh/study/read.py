@@ -1,16 +1,16 @@
 """Read a study file: TOML to checked sections and axes, or all problems at once."""
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from epsmesh.class_maps import CLASS_MAPS
 from epsmesh.extensions import Filled, Reading
-from epsmesh.shapes.body import PIECES
+from epsmesh.shapes.body import PIECES, Body
 from epsmesh.shapes.section import Section
 from epsmesh.sources import problem_of
 from epsmesh.study.axis import Axis
@@ -24,7 +24,7 @@ from epsmesh.study.meant import OTHER_SECTIONS
 from epsmesh.study.output import Output, check_outputs, read_outputs
 from epsmesh.study.problems import Problem, Problems, StudyError, nearest
 from epsmesh.study.regions import check_regions, material_without_section
-from epsmesh.study.schema import FURTHER, NESTED, SECTIONS, Mesh, added_to, further, is_added
+from epsmesh.study.schema import FURTHER, NESTED, SECTIONS, Material, Mesh, added_to, further, is_added
 from epsmesh.study.stages import with_stages
 from epsmesh.study.sweep import Study
 from epsmesh.study.tables import MOST_CASES, read_section
@@ -111,11 +111,21 @@ def parse(raw: Mapping[str, Any], *, file: str = "study", text: str = "", filled
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))
     warnings = tuple(f"{file}: {warning}" for warning in problems.warnings_once())
+    sections["solve"] = tuple(_with_influence(sections))
     title = str(whole.get("title", Path(file).stem))
     return Study(
         file, Path(file).stem, title, text, every_axis, sections, warnings, given, extra, identified, outputs(),
         filled.lacking, filled.does,
     )  # fmt: skip
+
+
+def _with_influence(sections: Mapping[str, tuple[Section, ...]]) -> Iterator[Section]:
+    """Yield the solver section, which asks for the influence if the modulus of a tissue is a random field."""
+    bodies, materials = cast("Sequence[Body]", sections["body"]), cast("Sequence[Material]", sections["material"])
+    tissues = (*materials, *(region for body in bodies for region in body.regions))
+    needed = {"influence": True} if any(tissue.spread for tissue in tissues) else {}
+    for solve in sections["solve"]:
+        yield solve.model_copy(update=needed) if needed else solve
 
 
 def _check_one_force(

@@ -18,7 +18,7 @@ from epsmesh.shapes.regions import Inclusion, Layer
 from epsmesh.shapes.registry import BODIES, PROBES, TERMS
 from epsmesh.shapes.section import Section, Words
 from epsmesh.shapes.segment import Segment
-from epsmesh.shapes.tissue import LAWS, Fibres, Relaxation, Term, Tissue
+from epsmesh.shapes.tissue import LAWS, Fibres, Relaxation, Spread, Term, Tissue
 from epsmesh.shapes.varying import Varying
 from epsmesh.study.loads import Load, Traction
 from epsmesh.study.output import Output
@@ -341,7 +341,7 @@ SINGLE = ("solve", "plan", "figure")
 # Tables within a section.
 TABLES: dict[str, dict[str, type[BaseModel]]] = {
     "probe": {"path": Path, "history": History, "insertion": Insertion},
-    "material": {"fibres": Fibres, "young": Varying},
+    "material": {"fibres": Fibres, "spread": Spread, "young": Varying},
 }
 # Keys that may be a table or a plain value.
 PLAIN_TOO = ("young",)

@@ -114,6 +114,11 @@ def _varies(scene: Scene) -> bool:
     return any(tissue.varying is not None for tissue in (scene.body.main(scene.material), *scene.body.regions))
 
 
+def has_spread(scene: Scene) -> bool:
+    """Return whether the modulus of a tissue is a random field."""
+    return any(tissue.spread is not None for tissue in (scene.body.main(scene.material), *scene.body.regions))
+
+
 def _coefficient(friction: float) -> float | str:
     return STICK if friction == inf else friction
 
@@ -184,6 +189,7 @@ FEATURES: dict[str, Feature] = {
     ),
     "fibres": Feature("material.law", lambda s: any(t.has_fibres for t in (s.material, *s.body.regions)), ("body",)),
     "varying stiffness": Feature("material.young", _varies, ("body",), lambda _: None),
+    "spread": Feature("material.spread", has_spread, ("body",), lambda _: None),
     # Of regions, those of layers that fill the body included, the study's check of laws reports it.
     "ν < 0.2": Feature(
         "material.poisson",

@@ -39,6 +39,16 @@ _NO_LOADS = "omit [load], and pressure in hollow regions"
 _WITH_TERMS, _NO_TERMS = "with springs or other terms in [load]", "omit them"
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
 _OF_LAW = "with a law of large displacements"
+# Where derivatives of F by the modulus at a place are not those of an energy, or not computed.
+_NO_DERIVATIVES = {
+    "friction": "with friction, F is no derivative of an energy: omit it, or friction",
+    "loads that move the surface": f"the loads decide where the depth begins: {_NO_LOADS}, or omit it",
+    "half ball": 'tissue beyond the cut decides a part of F: omit it, or use outside = "coarse"',
+    "slit": "the force of a blade in a slit has a part at the slit's front: omit it",
+    "insertion": "along an insertion, F has parts of fracture and friction: omit it",
+    "history": "is not computed over time: omit [probe.history], or it",
+    "given force": "is computed at given depths: give a depth, or omit it",
+}
 
 REFUSALS: tuple[Refusal, ...] = (
     # What the shapes have no keys for: the schema refuses it.
@@ -168,18 +178,8 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("insertion", "region", "needs a body of layers: cuts through regions are not computed"),
     Refusal("insertion", "varying stiffness", "cuts are computed in tissue of a constant modulus: give layers"),
     Refusal("insertion", "loads", f"cuts in tissue under loads are not computed: {_NO_LOADS}"),
-    # Where F is decided: its derivatives by the modulus at a place.
-    Refusal("influence", "friction", "with friction, F is no derivative of an energy: omit it, or friction"),
-    Refusal(
-        "influence",
-        "loads that move the surface",
-        f"the loads decide where the depth begins: {_NO_LOADS}, or omit it",
-    ),
-    Refusal("influence", "half ball", 'tissue beyond the cut decides a part of F: omit it, or use outside = "coarse"'),
-    Refusal("influence", "slit", "the force of a blade in a slit has a part at the slit's front: omit it"),
-    Refusal("influence", "insertion", "along an insertion, F has parts of fracture and friction: omit it"),
-    Refusal("influence", "history", "is not computed over time: omit [probe.history], or influence"),
-    Refusal("influence", "given force", "is computed at given depths: give a depth, or omit it"),
+    # Where F is decided, and what a random field of the modulus does to it: its derivatives by the modulus at a place.
+    *(Refusal(name, other, reason) for name in ("influence", "spread") for other, reason in _NO_DERIVATIVES.items()),
     # Loads.
     Refusal(
         "truncated body",
