@@ -61,7 +61,7 @@ def deviation_of(state: State, regions: IntArray, spreads: Sequence[Spread | Non
     variance = 0.0
     for number, spread in enumerate(spreads):
         if spread is not None:
-            sources = _of_all(comm, cells.of(np.flatnonzero(regions == number)))
+            sources = _of_all(comm, cells.of(np.flatnonzero(regions == number).astype(int)))
             clusters = sources.gathered(_clusters(sources, spread.correlation_length))
             variance += spread.deviation**2 * _integral(comm, clusters, spread.correlation_length, mirrored)
     return sqrt(max(variance, 0.0))

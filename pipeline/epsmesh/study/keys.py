@@ -49,8 +49,9 @@ _TEXTS = {
     "the values of a named term can be swept.",
     "material.fibres": "Fibres of Holzapfel's law; those of a layer are [body.layer.fibres]. Optional; every value can "
     "be swept.",
-    "material.spread": "Random deviation of Young's modulus from place to place; that of a layer is [body.layer.spread], "
-    "and those of different tissues are independent. F does not depend on it. Optional; every value can be swept.",
+    "material.spread": "Random deviation of Young's modulus from place to place; that of a layer is "
+    "[body.layer.spread]. Those of different tissues are independent. F does not depend on it. Optional; every value "
+    "can be swept.",
     "material.young": "A modulus that varies from place to place; those of a layer are [body.layer.young]. It takes "
     "the place of the value of `young`. Optional; every value can be swept.",
     "probe": "The tool, called probe in study files and datasets, and its motion.",

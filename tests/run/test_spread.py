@@ -1,0 +1,137 @@
+"""What random fields of the modulus do to F: sums over places, samples, symmetric parts, ranks, and refusals."""
+
+from math import log1p, sinh
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from epsmesh.arrays import FloatArray
+from epsmesh.plan.plan import make_plan
+from epsmesh.report.dataset import build
+from epsmesh.report.influence import OF_NORMAL
+from epsmesh.report.uncertainty import unknowns
+from epsmesh.run.execute import compute
+from epsmesh.run.spread import Sources, _clusters, _integral
+from epsmesh.study.read import parse
+from tests.cases import raw, refusal
+
+WORLD = MPI.COMM_WORLD
+SPREAD = {"young": "30 %", "correlation_length": "4 mm"}
+SKIN = {"name": "skin", "thickness": "3 mm", "young": "30 kPa", "poisson": 0.3}
+BALL = {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "contact": "unilateral"}
+
+
+def dataset(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> Any:
+    """Return the dataset of the base study with changes, whose tissue has a spread."""
+    plan = make_plan(parse(raw(**changes)))
+    return build(plan, compute(plan, comm))
+
+
+def deviation(spread: Any = SPREAD, comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> FloatArray:
+    """Return the standard deviation of ln F."""
+    material = changes.pop("material", {}) | ({"spread": spread} if spread else {})
+    found = dataset(comm, material=material, **changes)
+    return np.asarray(np.arcsinh(found["force_uncertainty_tissue"] / abs(found["force"])).values / OF_NORMAL)
+
+
+@pytest.mark.parametrize("length", [0.5, 2.0, 10.0])
+def test_the_sum_over_clusters_is_that_over_all_pairs(length):
+    rng = np.random.default_rng(5)
+    centres = np.abs(rng.normal(size=(3000, 3)) * rng.exponential(3, size=(3000, 1)))
+    shares = rng.random(3000) / (1 + np.linalg.norm(centres, axis=1) ** 3)
+    shares /= 4 * shares.sum()
+    whole = np.concatenate([centres * [x, y, 1] for x in (1, -1) for y in (1, -1)])
+    total = 0.0
+    for rows in np.array_split(np.arange(3000), 10):
+        away = np.sqrt(3) / length * np.linalg.norm(centres[rows, None] - whole[None], axis=2)
+        total += 4 * float(shares[rows] @ ((1 + away) * np.exp(-away)) @ np.tile(shares, 4))
+    sources = Sources(shares, centres, np.zeros(3000))
+    clusters = sources.gathered(_clusters(sources, length))
+    assert len(clusters.shares) < 1000
+    assert _integral(MPI.COMM_SELF, clusters, length, (0, 1)) == pytest.approx(total, rel=1e-3)
+
+
+def test_a_field_without_change_is_one_unknown_modulus():
+    found = deviation({"young": "30 %", "correlation_length": "10 m"})
+    assert found == pytest.approx(log1p(0.3**2) ** 0.5, rel=1e-3)
+    lengths = deviation({"young": "30 %", "correlation_length": ["1 mm", "4 mm", "16 mm"]})
+    assert (np.diff(lengths) > 0).all()
+    one, other = deviation({"young": ["10 %", "20 %"], "correlation_length": "4 mm"})
+    assert other / one == pytest.approx((log1p(0.2**2) / log1p(0.1**2)) ** 0.5, rel=1e-6)
+
+
+def test_coarse_and_fine_cells_have_the_same_deviation():
+    for length in ("1 mm", "4 mm"):
+        fine = {"fine": "2.5 mm", "coarse": "4 mm", "rim": "0.5 mm"}
+        coarse, finer = (deviation(SPREAD | {"correlation_length": length}, mesh=mesh) for mesh in ({}, fine))
+        assert coarse == pytest.approx(finer, rel=0.05)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("contact", [{}, {"probe": BALL, "mesh": {"rim": "0.5 mm"}}], ids=["bonded", "found"])
+def test_a_quarter_has_the_deviation_of_the_whole_on_any_ranks(contact):
+    quarter = deviation(**contact)
+    assert deviation(comm=WORLD, **contact) == pytest.approx(quarter, rel=1e-4)
+    whole = contact | {"mesh": contact.get("mesh", {}) | {"model": "3d"}}
+    assert deviation(**whole) == pytest.approx(quarter, rel=0.03)
+
+
+def test_tissues_vary_independently_and_only_where_that_is_said():
+    def of(skin: Any, tissue: Any) -> float:
+        return float(deviation(tissue, body={"layer": [SKIN | ({"spread": skin} if skin else {})]}))
+
+    skin, tissue, both = of(SPREAD, None), of(None, SPREAD), of(SPREAD, SPREAD)
+    assert min(skin, tissue) > 0.01
+    assert skin**2 + tissue**2 == pytest.approx(both**2, rel=1e-6)
+
+
+def test_the_bar_is_half_of_what_holds_95_per_cent_and_the_report_says_what_to_measure():
+    found = dataset(material={"spread": {"young": "100 %", "correlation_length": "10 m"}})
+    bar = found["force_uncertainty_tissue"]
+    assert float(bar / found["force"]) == pytest.approx(sinh(1.959964 * np.log(2) ** 0.5), rel=1e-3)
+    assert bar.attrs["units"] == "N"
+    assert bar.attrs["comment"] == "tissue ± 100 % over 1e+04 mm"
+    said = unknowns(found)
+    assert "by the spread of the tissue" in said
+    assert "The largest bar is that of the tissue's spread: measure next" in said
+    assert "spread" not in unknowns(dataset())
+
+
+def test_the_force_does_not_depend_on_the_spread():
+    found, plain = dataset(material={"spread": SPREAD}, solve={"influence": True}), dataset(solve={"influence": True})
+    for name in ("force", "force_error"):
+        assert float(found[name]) == float(plain[name])
+    for name in ("force_share", "influence_radius"):
+        assert found[name].values.tolist() == plain[name].values.tolist()
+
+
+@pytest.mark.parametrize(
+    ("spread", "said"),
+    [
+        ({"young": "0 %", "correlation_length": "4 mm"}, "material.spread.young"),
+        ({"young": "120 %", "correlation_length": "4 mm"}, "material.spread.young"),
+        ({"young": "30 %", "correlation_length": 4}, "material.spread.correlation_length"),
+        ({"young": "30 %", "correlation_length": "0 mm"}, "material.spread.correlation_length"),
+        ({"young": "30 %"}, "material.spread.correlation_length"),
+        ({"young": "30 %", "correlation_length": "4 mm", "poisson": 0.1}, "material.spread.poisson"),
+    ],
+)
+def test_what_is_wrong_with_a_spread_is_named(spread, said):
+    assert said in refusal(raw(material={"spread": spread}))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"probe": BALL | {"friction": 0.3}}, "no derivative of an energy"),
+        ({"mesh": {"epsilon": "8 mm", "outside": "halfspace"}}, "beyond the cut"),
+        ({"probe": {"force": "5 mN", "depth": None}}, "give a depth"),
+    ],
+)
+def test_what_has_no_influence_has_no_spread(changes, said):
+    message = refusal(raw(**changes, material={"spread": SPREAD}))
+    assert "material.spread" in message
+    assert said in message
+    assert "solve.influence" not in message
