@@ -52,7 +52,7 @@ class Sources:
         centres = np.column_stack([np.bincount(numbers, sizes * x) for x in self.centres.T]) / whole[:, None]
         apart = ((self.centres - centres[numbers]) ** 2).sum(axis=1) / 3
         variances = np.bincount(numbers, sizes * (self.variances + apart)) / whole
-        return Sources(np.bincount(numbers, self.shares), centres, variances)
+        return Sources(np.asarray(np.bincount(numbers, self.shares), dtype=float), centres, variances)
 
 
 def deviation_of(state: State, regions: IntArray, spreads: Sequence[Spread | None]) -> float:
